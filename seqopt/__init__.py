@@ -46,7 +46,7 @@ _HOMES = {
     "graph.formulation": ("Formulation", "formulations"),
     "sequence.rules": ("FreeRules",),
     "plan.solving": ("pose", "solve"),
-    "workflow": ("optimize",),
+    "workflow": ("Search", "optimize"),
     "scene.scenarios": ("scenarios",),
     "plan.plan": ("Plan",),
     "instances._files": ("read_instance", "save_instance"),
@@ -57,7 +57,7 @@ _HOMES = {
     "contact.mortar": ("DRY", "EPOXY"),
     "stability.assessment": ("Stability",),
     "stability.steps": ("assess_steps",),
-    "_cli.python": ("assess", "compare", "pareto", "replan"),
+    "doors": ("assess", "compare", "pareto", "replan"),
     "errors": ("SeqoptError",),
 }  # in the order in which they are met; type checkers read them in __init__.pyi
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -1,9 +1,9 @@
-from seqopt._cli.python import assess as assess
-from seqopt._cli.python import compare as compare
-from seqopt._cli.python import pareto as pareto
-from seqopt._cli.python import replan as replan
 from seqopt.contact.mortar import DRY as DRY
 from seqopt.contact.mortar import EPOXY as EPOXY
+from seqopt.doors import assess as assess
+from seqopt.doors import compare as compare
+from seqopt.doors import pareto as pareto
+from seqopt.doors import replan as replan
 from seqopt.engines.interface import Engine as Engine
 from seqopt.engines.registry import make_engine as make_engine
 from seqopt.errors import SeqoptError as SeqoptError
@@ -46,6 +46,7 @@ from seqopt.sequence.two_robots import sequential as sequential
 from seqopt.stability.assessment import Stability as Stability
 from seqopt.stability.steps import assess_steps as assess_steps
 from seqopt.study.published import CRITERIA as CRITERIA
+from seqopt.workflow import Search as Search
 from seqopt.workflow import optimize as optimize
 
 __version__: str

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from seqopt.engines.interface import Engine
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import On, find_formulation
@@ -17,28 +19,22 @@ from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import in_layers, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS
-from seqopt.problem.problem import WORST_PEAK, Orders, Problem
+from seqopt.problem.problem import WORST_PEAK, Orders, RobustAim
 from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
 from seqopt.scene._armed import find_postures
 from seqopt.scene._checks import short
+from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.rules import FREE, FreeRules, with_robots
+from seqopt.sequence.rules import FREE, FreeRules, parse_rules, with_robots
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.study.published import EQUATIONS, find_criterion
+from seqopt.work.progress import Tell
 
 SEARCH = "search"  # the order that is sought
-RULES = tuple(field.name for field in fields(FreeRules) if field.name != "robots")
-FREE_WORDS = ("rules", *(name for name in RULES if name != "candidates"))
-"""Options that the free schedule alone has."""
-STATE_WORDS = ("aim", "stands")
-"""Options with which states of a build are chosen, of whatever schedule, and no candidates."""
-ASKED = ("stands", "budgets", "scenarios", "over", "also")
-"""Options of `seqopt.pose`, as words or values."""
-SHARING = ("workers", "executor", "cache")
-"""Options of `seqopt.responses.Resources` that no formulation of states has."""
 
 
 @dataclass(frozen=True)
@@ -54,15 +50,58 @@ DEFAULTS = {FREE: Defaults(WORST_OVER_METHODS, "minmax"), "any other": Defaults(
 """By schedule; of those with open grips the loop of three robots, or of two without a third."""
 
 
-def optimize(
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """How a plan is searched for, and what that may use.
+
+    Parameters
+    ----------
+    proof, lazy : bool, optional
+        As of `seqopt.solve`.
+    time_limit : float, optional
+        Seconds of choosing; the best choice by then has a lower bound.
+    workers, executor, cache, max_memory : optional
+        As of `seqopt.responses.Resources`.
+    options : mapping of str to object, optional
+        What the formulation has options for, as ``{"width": 10}``.
+
+    Examples
+    --------
+    >>> Search(time_limit=60, workers=2).workers
+    2
+    """
+
+    proof: bool = True
+    lazy: bool = False
+    time_limit: float = math.inf
+    workers: int = 1
+    executor: Executor | None = None
+    cache: Path | str | None = None
+    max_memory: float | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+def optimize(  # noqa: PLR0913  # every question is a word of its own
     scene: Scene | str | Path,
     schedule: Schedule | Path | str | None = None,
     criterion: Criterion | str | None = None,
     formulation: str | None = None,
     engine: str = DEFAULT,
     *,
+    aim: str | None = None,
     limits: Sequence[Limit | str] | str = (),
-    **options: Any,
+    budgets: Sequence[str] | str = (),
+    stands: Standing | Mortar | str | None = None,
+    scenarios: Scenarios | Sequence[Scene] = (),
+    over: RobustAim | str = WORST_PEAK,
+    also: Sequence[str] = (),
+    order: str | Sequence[int] | None = None,
+    mortar: Mortar | str | None = None,
+    robots: int | Sequence[str] | None = None,
+    candidates: str | None = None,
+    rules: FreeRules | Sequence[str] | str | None = None,
+    search: Search = Search(),  # it is frozen
+    progress: Tell | None = None,
 ) -> Plan:
     """Choose where robots hold over a whole build, or every step of a free schedule.
 
@@ -78,12 +117,26 @@ def optimize(
         A name in `seqopt.formulations`; here and above, `DEFAULTS` say what is taken otherwise.
     engine : str
         A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest level (`pose`).
+    aim : str, optional
+        What is to be small, the most important first: ``"minmax,steps"``.
     limits : sequence of Limit or str
         Bounds that no step may exceed: ``"payload"``, ``"F_largest=300"``, ``"linear_range=any"``.
-    **options
-        ``aim``, ``stands``, ``budgets``, ``scenarios`` and ``over`` of `seqopt.pose`, in words;
-        ``order``, which may be ``"search"``; ``mortar``, ``robots``, ``candidates``; of
-        `seqopt.solve`, the formulation, `seqopt.responses.Resources`, if free of `FreeRules`.
+    budgets, stands, scenarios, over, also : optional
+        As of `seqopt.pose`: ``"travel=3.5m"``, ``"dry"``, `seqopt.scenarios`, ``"cvar=0.9"``.
+    order : str or sequence of int, optional
+        In which order bricks are placed: ``"ends"``, all names, or ``"search"``.
+    mortar : Mortar or str, optional
+        What holds the joints, for engines that ask.
+    robots : int or sequence of str, optional
+        Who takes part; of a free schedule also how many.
+    candidates : str, optional
+        Nodes to look at: ``"near:12"``.
+    rules : FreeRules, str or sequence of str, optional
+        Of a free schedule: ``"least_grips=1"``.
+    search : Search, optional
+        How it is searched, and what that may use.
+    progress : callable, optional
+        Told how far it is.
 
     Returns
     -------
@@ -100,90 +153,86 @@ def optimize(
     Plan('arch25', 'free', by schedule_search: 50 steps, minmax 0.840088, steps 50, optimal)
     """
     start = time.perf_counter()
-    problem = _asked(scene, schedule, (criterion, engine, formulation), limits, options)
+    found = load_scene(scene) if isinstance(scene, str | Path) else scene
+    sought = isinstance(order, str) and order == SEARCH
+    found = in_order(found, None if sought else order)
+    free = isinstance(schedule, str) and schedule == FREE
+    if free and isinstance(robots, int):
+        found, robots = with_robots(found, robots), None
+    find_postures(found, search.cache, progress)
+    own = make_engine(engine, build_network(found), mortar)
+    moves = _find_moves(own.network, schedule, robots, candidates, rules)
+    shared = Resources(search.workers, search.executor, search.cache)
+    options, tell = dict(search.options), progress
+    states = _chooses_states(moves, formulation, others=(aim, stands, sought))
+    if not states:
+        shared, tell = replace(shared, max_memory=search.max_memory, progress=progress), None
+    elif search.max_memory is not None:
+        options["max_memory"] = search.max_memory
+    problem = pose(
+        own,
+        moves,
+        *_with_defaults(criterion, aim, over, states=states),
+        limits,
+        budgets=budgets,
+        stands=stands,
+        scenarios=scenarios,
+        over=over,
+        orders=Orders.TIED if sought else None,
+        also=also,
+        resources=shared,
+    )
     assemble = time.perf_counter() - start
-    plan = solve(problem, formulation, **options)
+    plan = solve(
+        problem,
+        formulation,
+        proof=search.proof,
+        lazy=search.lazy,
+        time_limit=search.time_limit,
+        progress=tell,
+        **options,
+    )
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
 
 
-def _asked(
-    scene: Scene | str | Path,
-    schedule: Schedule | Path | str | None,
-    given: tuple[Criterion | str | None, str, str | None],
-    limits: Sequence[Limit | str] | str,
-    options: dict[str, Any],
-) -> Problem:
-    """Return the problem; what options say of it is taken out of them."""
-    found = load_scene(scene) if isinstance(scene, str | Path) else scene
-    order = options.pop("order", None)
-    sought = isinstance(order, str) and order == SEARCH
-    made = in_order(found, None if sought else order)
-    free = isinstance(schedule, str) and schedule == FREE
-    if free and isinstance(options.get("robots"), int):
-        made = with_robots(made, options.pop("robots"))
-    if not free:
-        _refuse(options, FREE_WORDS, f"only the free schedule has it; give schedule={FREE!r}")
-    find_postures(made, options.get("cache"), options.get("progress"))
-    criterion, name, formulation = given
-    engine = make_engine(name, build_network(made), options.pop("mortar", None))
-    moves = _free_rules(options) if free else _open(engine.network, schedule, options)
-    asked = {name: options.pop(name) for name in ASKED if name in options}
-    asked |= {"orders": Orders.TIED} if sought else {}
-    states = _of_states(moves, {**options, **asked}, formulation)
-    names = SHARING if states else [field.name for field in fields(Resources)]
-    resources = Resources(**{name: options.pop(name) for name in names if name in options})
-    aim = options.pop("aim", None)
-    how = {"limits": limits, "formulation": formulation, "resources": resources, **asked}
-    return posed(engine, moves, criterion, aim, **how)
-
-
-def posed(
-    engine: Engine,
-    moves: Schedule | FreeRules,
-    criterion: Criterion | str | None = None,
-    aim: str | None = None,
-    *,
-    formulation: str | None = None,
-    **asked: Any,
-) -> Problem:
-    """Return the problem of a build, by what people say of it: as of `optimize`, `seqopt.pose`."""
-    states = _of_states(moves, {**asked, "aim": aim}, formulation)
+def _with_defaults(
+    criterion: Criterion | str | None, aim: str | None, over: RobustAim | str, *, states: bool
+) -> tuple[Criterion, str | tuple[()]]:
+    """Return criterion and aims of a problem, those by default where nothing is said."""
     usual = DEFAULTS[FREE if states else "any other"]
-    chosen = find_criterion(criterion or usual.criterion)
-    of_totals = str(asked.get("over", WORST_PEAK)) != str(WORST_PEAK)  # they are of sums
-    return pose(engine, moves, chosen, aim or (not of_totals and usual.aim) or (), **asked)
+    of_totals = str(over) != str(WORST_PEAK)  # they are of sums
+    return find_criterion(criterion or usual.criterion), aim or (not of_totals and usual.aim) or ()
 
 
-def _of_states(moves: Schedule | FreeRules, asked: dict[str, Any], formulation: str | None) -> bool:
-    """Return whether states are chosen, and not candidates of moves."""
-    said = any(asked.get(name) for name in (*STATE_WORDS, "orders"))
-    if said or not in_layers(moves) or formulation is None:
-        return said or not in_layers(moves)
-    return find_formulation(formulation).on in (On.STATES, On.TIMES)
+def _chooses_states(
+    moves: Schedule | FreeRules, formulation: str | None, others: Sequence[object] = ()
+) -> bool:
+    """Return whether states are chosen, and not candidates; ``others``: what also asks for it."""
+    if any(others) or not in_layers(moves):
+        return True
+    named = None if formulation is None else find_formulation(formulation)
+    return named is not None and named.on in (On.STATES, On.TIMES)
 
 
-def _open(
-    network: Network, schedule: Schedule | Path | str | None, options: dict[str, Any]
-) -> Schedule:
-    """Return the schedule with open grips; take out of options what they say of it."""
-    robots, rule = options.pop("robots", None) or (), options.pop("candidates", None)
-    if isinstance(robots, str) or not isinstance(robots, Sequence):
+def _find_moves(
+    network: Network,
+    schedule: Schedule | Path | str | None,
+    robots: int | Sequence[str] | None,
+    candidates: str | None,
+    rules: FreeRules | Sequence[str] | str | None,
+    where: str = "rules",
+) -> Schedule | FreeRules:
+    """Return the open grips of a schedule, or the rules of the free one, in words or as values.
+
+    ``where``: rules, for messages.
+    """
+    if isinstance(schedule, str) and schedule == FREE:
+        found = parse_rules(() if rules is None else rules, where=where)
+        given: dict[str, Any] = {"robots": robots, "candidates": candidates}
+        return replace(found, **{name: each for name, each in given.items() if each is not None})
+    if rules is not None:
+        raise ProblemError(f"{where}: only the free schedule has them; give schedule={FREE!r}")
+    if isinstance(robots, str) or not isinstance(robots, Sequence | None):
         raise ProblemError(f"robots {short(robots)}: give names, as ['rob1', 'rob2']")
-    found = find_schedule(network, schedule, robots)
-    return found if rule is None else thin(found, rule)
-
-
-def _free_rules(options: dict[str, Any]) -> FreeRules:
-    """Take out of options what they say of the rules of a free schedule."""
-    rules = options.pop("rules", FreeRules())
-    if not isinstance(rules, FreeRules):
-        raise ProblemError(f"rules {short(rules)}: give a seqopt.FreeRules")
-    given = {name: options.pop(name) for name in ("robots", *RULES) if name in options}
-    return replace(rules, **given)
-
-
-def _refuse(options: dict[str, Any], names: Sequence[str], why: str) -> None:
-    """Raise an error if an option is given that does not go with the schedule."""
-    for name in names:
-        if name in options:
-            raise ProblemError(f"option {name}: {why}")
+    opened = find_schedule(network, schedule, robots or ())
+    return opened if candidates is None else thin(opened, candidates)

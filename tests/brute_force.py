@@ -13,9 +13,9 @@ from seqopt.errors import MechanismError
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.quantities import CHOSEN_BY, lengths
-from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Payload
 from seqopt.sequence.steps import StepKind
+from tests.plain_rules import PlainBook
 
 FOUR = ("F_largest", "M_sup", "T_max", "D_max")
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
@@ -99,7 +99,7 @@ def whole_graph(engine, rules, *, last=False, allow=None):
     states are allowed may be said by a function of brick count and grips, as of `allowed`.
     """
     allow = partial(allowed, engine, rules) if allow is None else allow
-    book, scene = RuleBook(engine.network, rules), engine.network.scene
+    book, scene = PlainBook(engine.network, rules), engine.network.scene
     none = (None,) * len(scene.robots)
     bricks, held, regrips = book.start
     stays = rules.begin.stays if rules.begin and rules.begin.stays else none

@@ -2,35 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy import linalg
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines._hands import Hands
+from seqopt.engines._grip_compliance import GripCompliance
 from seqopt.engines.interface import Fields, join_sets, no_sets
-from seqopt.engines.rigid._mechanism import (
-    RigidStructure,
-    lost_to_rounding,
-    require_resistance,
-    resisting_modes,
-    rigid_structure,
-)
+from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond
 from seqopt.errors import SolverError
+from seqopt.network._mechanics import Statics, build_statics, node_motion, spring_maps
 from seqopt.network.network import Network
 
+_ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
 _BACKWARD = 1e-10  # largest backward error of an accepted solution
 
 
-def solve_dense(network: Network, bricks: int, columns: Ints, hands: Hands | None = None) -> Fields:
+def solve_dense(
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
+) -> Fields:
     """Return the fields of grip sets from the stiffness matrix of each.
 
     Raises `MechanismError` if nothing resists a motion; `SolverError` if a motion is resisted too
     little for the assembled stiffness to tell, or the backward error is larger than `_BACKWARD`.
     """
     parts = rigid_structure(network, bricks)
-    if hands is not None and hands.give is not None:
+    if compliance is not None and compliance.matrix is not None:
         raise SolverError("direct solve: it holds rigidly; take another engine for soft grips")
-    far = (hands or Hands()).far(*columns.shape)
+    far = (compliance or GripCompliance()).offsets(*columns.shape)
     each = zip(columns, far, strict=True)
     answers = [_solve_one_dense(network, parts, *one) for one in each]
     return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
@@ -64,3 +65,48 @@ def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints, far: 
     force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
     solution = Solution(twist[None], wrench[None], force[None])
     return respond(network, parts.statics, parts.motion, grips[None], solution)
+
+
+@dataclass(frozen=True)
+class RigidStructure:
+    """The parts of the stiffness of one partial structure."""
+
+    acting: Ints  # (s,); the springs that act
+    gap: Floats  # (s, 6, 6b); their deformations for unit twists of the bricks
+    stiffness: Floats  # (s, 6, 6); theirs, N/m and N m/rad
+    matrix: Floats  # (6b, 6b); stiffness of the structure without grips
+    motion: Floats  # (3n, 6b); displacements of the nodes for unit twists
+    inner_motion: Floats  # (6b, 6b); of these, the inner nodes in the order of ``network.inner``
+    statics: Statics  # of the network
+
+    def forbidden(self, grips: Ints) -> Floats:
+        """Return the motions (3r, 6b) that grips forbid."""
+        return np.asarray(self.inner_motion[(3 * grips[:, None] + np.arange(3)).ravel()])
+
+
+def rigid_structure(network: Network, bricks: int) -> RigidStructure:
+    """Return the parts of the stiffness of a partial structure."""
+    acting, gap, stiffness = spring_maps(network, bricks)
+    matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
+    motion = node_motion(network, bricks).toarray()
+    inner = motion[(3 * network.inner[:bricks].reshape(-1, 1) + np.arange(3)).ravel()]
+    return RigidStructure(acting, gap, stiffness, matrix, motion, inner, build_statics(network))
+
+
+def lost_to_rounding(values: Floats) -> bool:
+    """Return whether the least of ascending eigenvalues may be rounding alone."""
+    return len(values) > 0 and not values[0] > _ROUNDING * values[-1]  # all may be zero
+
+
+def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return how a structure of some stiffness resists the motions that its grips do not forbid.
+
+    Results: ``values`` (m,): eigenvalues of the scaled stiffness, ascending; ``vectors`` (m, m):
+    its modes; ``motions`` (6b, m): the motions that the modes combine.
+    """
+    free = linalg.null_space(forbidden) if len(forbidden) else np.eye(len(matrix))
+    diagonal = np.diag(free.T @ matrix @ free)
+    most = max(diagonal.max(initial=0.0), np.finfo(float).tiny / _ROUNDING)
+    motions = free / np.sqrt(np.maximum(diagonal, _ROUNDING * most))
+    values, vectors = np.linalg.eigh(motions.T @ matrix @ motions)
+    return values, vectors, motions

@@ -38,10 +38,11 @@ ROOMS = (
     {"exchange", "times", "instances"},
     {"report"},
     {"_cli"},
+    {"doors"},
     {"__init__", "__main__"},
 )  # a room imports from rooms above it in this list only
 OUTER = {"arms", "exchange", "times", "instances", "report", "_cli"}  # the inner ones do without
-TOP = {"workflow", "__init__", "__main__"}  # open inner and outer rooms
+TOP = {"workflow", "doors", "__init__", "__main__"}  # open inner and outer rooms
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import
@@ -60,14 +61,14 @@ SHARED = {  # what formulations may import
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame
 LINES = 450  # of code: no thought is split for a limit; imports, docstrings and comments aside
-LINES_OF_A_FUNCTION = 50
+LINES_OF_A_FUNCTION = 48  # of code: what it takes and its docstring aside
 IMPORT = r"(?m)^ *((?:from .*)?\bimport (?:\([^)]*\)|.*))$"  # on one line, or in brackets
 NO_CODE = {COMMENT, NL, NEWLINE, INDENT, DEDENT, ENDMARKER}
 SAID = (ast.Module, ast.ClassDef, ast.FunctionDef)  # what may have a docstring
 PARAMETERS = 8  # of an experiment's function
 DRAWS_ON_ALL = "study"  # the topic that sets every other one beside the paper
 MOST_ROOMS = 20  # thirteen inner and six outer ones, and data
-MOST_NAMES = 450  # functions and classes without an underscore
+MOST_NAMES = 470  # functions and classes without an underscore
 
 
 def sources(folder: str) -> list[Path]:
@@ -179,7 +180,7 @@ def test_rooms_are_looked_up_in_four_places_only():
     """
     known = ["_cli.arguments", "_cli.main", "_later", "_registry"]
     assert hidden_arrows(sources("seqopt")) == ["seqopt", *(f"seqopt.{each}" for each in known)]
-    commands = {f"seqopt._cli.{command.module}" for command in COMMANDS.values()}
+    commands = {f"seqopt._cli.{c.where.partition(':')[0]}" for c in COMMANDS.values()}
     assert commands <= set(graph("seqopt"))
     assert {room(module) for module in OFFERS.values()} <= OUTER
 
@@ -314,7 +315,8 @@ def test_modules_and_functions_stay_small(folder):
         assert text.count("\n") <= LINES or len(code_lines(text)) <= LINES, path
         for node in ast.walk(parsed(path)):
             if isinstance(node, ast.FunctionDef):
-                length = (node.end_lineno or 0) - node.lineno
+                body = node.body[1:] if ast.get_docstring(node) else node.body
+                length = (node.end_lineno or 0) - body[0].lineno if body else 0
                 assert length < LINES_OF_A_FUNCTION, f"{path}: {node.name}"
 
 

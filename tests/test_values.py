@@ -14,7 +14,7 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
-from seqopt.engines._hands import read_hands
+from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines._planar import _Plane
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete._equilibrium_path import settle
@@ -22,7 +22,7 @@ from seqopt.engines.discrete._system import build_system
 from seqopt.engines.discrete.engine import _held_nodes
 from seqopt.engines.interface import SPACE, Fields, Want
 from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._mechanism import rigid_structure, share, ungripped_system
+from seqopt.engines.rigid._mechanism import share, ungripped_system
 from seqopt.engines.rigid._mixed import Solution, mixed_system
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
@@ -36,7 +36,7 @@ from seqopt.scene.boxes import boxes
 from seqopt.scene.library.common import _overlaps
 from seqopt.scene.shape import Surface
 from seqopt.sequence.two_robots import sequential
-from seqopt.stability._held_states import _HoldingForces, _Known, first_directions
+from seqopt.stability._held_states import _HoldingForces, _Known
 from seqopt.stability._load_factor import load_factor
 from seqopt.stability._prover import Prover
 from seqopt.stability._step_verdicts import each_verdict
@@ -71,15 +71,15 @@ def values(arch25):
         *(network, network.springs, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
         *(SPACE, plane, tree, operator, operator.doubts, parts, share(network)),
-        *(mixed_system(parts, grips), rigid_structure(network, 2)),
+        mixed_system(parts, grips),
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
         *(load_factor(assembly, EPOXY), arch25.grip_kinds),
         HeldPostures(np.array([0]), np.array([1]), np.array([[0]]), (np.ones((1, 6, 2)),)),
-        read_hands(network, grips[None], [[2]], np.ones((1, 1, 3))),
+        read_compliance(network, grips[None], [[2]], np.ones((1, 1, 3))),
         *_Known(assembly, bonded(assembly, DRY)).motions_of(-np.ones((2, 6))),
-        *(_HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),
+        _HoldingForces(0.0, np.zeros(1)),
         *each_verdict(network, sequential(network)[:1], EPOXY),
     )
     return {type(value).__name__: value for value in every}

@@ -80,8 +80,10 @@ WRONG = {
     "limits 5: give": lambda: seqopt.optimize(SCENE, "free", limits=5),
     "limits [5]: give values": lambda: seqopt.pose(ENGINE, LOOP, EQUATIONS, limits=[5]),
     "schedule 5: give a Schedule": lambda: seqopt.optimize(SCENE, 5),
-    "cache is 5; give the path of a folder": lambda: seqopt.optimize(SCENE, cache=5),
-    "cache is ''; give the path": lambda: seqopt.optimize(SCENE, cache=""),
+    "cache is 5; give the path of a folder": lambda: seqopt.optimize(
+        SCENE, search=seqopt.Search(cache=5)
+    ),
+    "cache is ''; give the path": lambda: seqopt.optimize(SCENE, search=seqopt.Search(cache="")),
     "robots 5: give names": lambda: seqopt.optimize(SCENE, robots=5),
     "robots 'rob1': give names": lambda: seqopt.optimize(SCENE, robots="rob1"),
     "aims 5: give goals": lambda: seqopt.optimize(SCENE, "free", aim=5),

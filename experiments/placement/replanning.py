@@ -24,9 +24,9 @@ import pandas as pd
 import seqopt
 from experiments.harness.claim import Claim, Finding, Options, Times, told
 from seqopt.errors import InfeasibleError, StepError
+from seqopt.judge._rule_moves import check_free
 from seqopt.plan._studies.replan import goes_on, without
 from seqopt.plan.solving import states_of
-from seqopt.sequence._rule_check import check_free
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, idle_robots
@@ -101,11 +101,12 @@ def losses(engine: seqopt.Engine, every: int) -> Iterator[dict[str, object]]:
     steps = seqopt.optimize(scene, "free", aim=AIM, engine="compliance").steps
     for done, robot in product(range(1, len(steps), every), scene.robots):
         _, begin = without(scene, Site.after(steps, done), [robot.name])
+        rules = FreeRules(begin=begin)
         left = tuple(each.name for each in scene.robots if each is not robot)
         start, plan, said = time.process_time(), None, ""
         try:
             plan = seqopt.optimize(
-                scene, "free", aim=AIM, engine="compliance", begin=begin, robots=left
+                scene, "free", aim=AIM, engine="compliance", rules=rules, robots=left
             )
         except InfeasibleError as error:
             said = str(error)

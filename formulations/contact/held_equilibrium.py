@@ -21,23 +21,22 @@ method goes on from the basis of the set before.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import highspy
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
-from seqopt.stability._held_states import (
-    Directions,
-    Enough,
-    HeldProgram,
-    better_directions,
-    first_directions,
-)
+from seqopt.stability._held_states import Enough, HeldProgram
 from seqopt.stability.limit_analysis import CAP, Answer, Case, Claim, limits
 
+_SIDES = 8  # of a cone to start with, the axes of its contact among them
+_SPREAD = np.array([p for p in product((-1.0, 0.0, 1.0), repeat=3) if any(p)])
+_GAIN = 1e-7  # least gain for which a direction joins, over the largest entry of the motion
 ROUNDS = 12  # of refinement
 GROWN = 4  # times as many directions as at the start are too many: it starts again
 FREE = highspy.kHighsInf
@@ -51,6 +50,46 @@ OPTIONS: dict[str, Any] = {
     "simplex_scale_strategy": 0,  # programs come scaled; without, none went in circles
     "simplex_iteration_limit": 5000,  # of one answer; what takes longer has stalled
 }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Directions(FrozenValue):
+    """_Directions in which corners and grips act.
+
+    ``owner`` (n,): corner, or grip counted on after the corners. ``unit`` (n, 3): unit vectors;
+    those of a corner have no normal part.
+    """
+
+    owner: Ints
+    unit: Floats
+
+    def joined(self, other: _Directions) -> _Directions:
+        """Return these directions and others after them."""
+        owner = np.concatenate([self.owner, other.owner])
+        return _Directions(owner, np.concatenate([self.unit, other.unit]))
+
+
+def _first_directions(corners: int, grips: int) -> _Directions:
+    """Return directions to start with, the same ones for every corner and for every grip."""
+    angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    flat = np.stack([np.zeros(_SIDES), np.cos(angle), np.sin(angle)], axis=1)
+    space = _SPREAD / np.linalg.norm(_SPREAD, axis=1, keepdims=True)
+    of_corners = _Directions(np.repeat(np.arange(corners), _SIDES), np.tile(flat, (corners, 1)))
+    of_grips = corners + np.repeat(np.arange(grips), len(space))
+    return of_corners.joined(_Directions(of_grips, np.tile(space, (grips, 1))))
+
+
+def _better_directions(known: _Directions, along: Floats, wanted: Bools) -> _Directions:
+    """Return the best directions of corners and grips where those known are not as good.
+
+    ``along`` (m, 3): what a force of every corner or grip is worth, per component; the normal parts
+    of corners are zero. ``wanted`` (m,): whose directions are asked for.
+    """
+    best = np.zeros(len(along))
+    np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))
+    size = np.linalg.norm(along, axis=1)
+    which = np.flatnonzero(wanted & (size - best > _GAIN))
+    return _Directions(which, along[which] / size[which, None])
 
 
 class _HeldEquilibrium:
@@ -72,7 +111,7 @@ class _HeldEquilibrium:
 
     def _start(self) -> None:
         """Write the program down with the directions to start with."""
-        self._directions = Directions(np.zeros(0, np.int64), np.zeros((0, 3)))
+        self._directions = _Directions(np.zeros(0, np.int64), np.zeros((0, 3)))
         self._owner = np.zeros(0, np.int64)  # of every column but the first, and its force
         self._force = np.zeros((0, 3))
         self._held = np.zeros(self._grips)  # payloads in the program
@@ -86,8 +125,10 @@ class _HeldEquilibrium:
         grown = (case.tension, case.cohesion, case.payload, case.applied)
         grows = any((*(growth for _, growth in grown), *case.pull))
         cost, most = (case.sense.value, CAP) if grows else (0.0, 0.0)
-        self._add(np.array([cost]), np.array([most]), sparse.csc_array(self._growth()[:, None]))
-        self._join(first_directions(self._corners, self._grips))
+        pulls, held = self._case.loads(self._assembly)[1], np.full(self._grips, case.payload[1])
+        z = np.concatenate([pulls - self._pressed(self._cut[1]), -self._disc[1], -held])
+        self._add(np.array([cost]), np.array([most]), sparse.csc_array(z[:, None]))
+        self._join(_first_directions(self._corners, self._grips))
         self._first = len(self._owner)
 
     def _add(self, cost: Floats, most: Floats, matrix: sparse.csc_array) -> None:
@@ -107,13 +148,7 @@ class _HeldEquilibrium:
         balance = self._pressed(self._cut[0]) - self._case.loads(self._assembly)[0]
         return np.concatenate([balance, self._disc[0], payload])
 
-    def _growth(self) -> Floats:
-        """Return the column of z."""
-        balance = self._case.loads(self._assembly)[1] - self._pressed(self._cut[1])
-        payload = np.full(self._grips, self._case.payload[1])
-        return np.concatenate([balance, -self._disc[1], -payload])
-
-    def _join(self, new: Directions) -> None:
+    def _join(self, new: _Directions) -> None:
         """Add the columns of directions: rays of cones, points of discs, and grips."""
         corner = new.owner < self._corners
         at, unit, by = new.owner[corner], new.unit[corner], new.owner[~corner]
@@ -187,8 +222,9 @@ class _HeldEquilibrium:
                 return self._forces()
             if status == highspy.HighsModelStatus.kInfeasible:
                 _, known, ray = self._solver.getDualRay()
-                if known:
-                    return self._reason(np.array(ray))
+                if known:  # a motion that says why there are no forces
+                    motion = -np.array(ray) * (np.sign(self._right() @ ray) or 1.0)
+                    return self._nothing(Claim.INFEASIBLE, motion[: self._lines])
             self._solver.clearSolver()
         return self._nothing(Claim.STALLED, np.zeros(self._lines))
 
@@ -203,23 +239,18 @@ class _HeldEquilibrium:
         value = float(x[0])
         return Answer(Claim.SOLVED, value, force[: self._corners], force[self._corners :], motion)
 
-    def _reason(self, ray: Floats) -> Answer:
-        """Return the answer that there are no forces, with the motion that a ray is."""
-        ray = ray * (np.sign(self._right() @ ray) or 1.0)
-        return self._nothing(Claim.INFEASIBLE, -ray[: self._lines])
-
     def _nothing(self, claim: Claim, motion: Floats) -> Answer:
         forces = np.zeros((self._corners, 3)), np.zeros((self._grips, 3))
         return Answer(claim, np.nan, *forces, motion.reshape(-1, 6))
 
-    def _better(self, motion: Floats) -> Directions:
+    def _better(self, motion: Floats) -> _Directions:
         size = np.abs(motion).max(initial=0.0) or 1.0
         along = -(self._map.T @ (motion.ravel() / size)).reshape(-1, 3)
         corner = along[: self._corners]
         closing = corner[:, 0] + self._case.friction * np.linalg.norm(corner[:, 1:], axis=1)
         corner[:, 0] = 0.0
         cones = (closing > 0) | bool(self._disc.size)
-        return better_directions(self._directions, along, np.concatenate([cones, self._held > 0]))
+        return _better_directions(self._directions, along, np.concatenate([cones, self._held > 0]))
 
 
 def compile_held(assembly: Assembly, case: Case) -> HeldProgram:

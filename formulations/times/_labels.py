@@ -1,13 +1,13 @@
-"""Labels over a build in time, many at once, and prices of the time of robots, which bound them.
+"""Labels over a build in time, in batches, and multipliers of the robots' time, which bound them.
 
 A label of a state is when the last step ended, since when the robots of its columns are free, and
-what sums took by then. One that another of the same state is nowhere above is dropped, and so is
-one of which prices or potentials say that it ends beyond what is allowed.
+what sums took by then. One that another of the same state dominates is dropped, and so is one of
+which multipliers or potentials say that it ends beyond the caps.
 
 Whatever a build does, it takes no less than the time of all that its steps take one after the
 other, and no less than the time of any robot: preparing, acting, and holding while others act. With
-prices from 0 that add up to one over these, the priced time of moves is a sum along a path, and the
-shortest path bounds every build. The best prices are found by cutting planes.
+multipliers from 0 that add up to one over these, the weighted time of moves is a sum along a path,
+and the shortest path bounds every build. The best multipliers are found by cutting planes.
 """
 
 from __future__ import annotations
@@ -90,11 +90,12 @@ def _cheapest(graph: Graph, work: Floats, prices: Floats) -> tuple[Floats, tuple
         tight = costs + left[graph.target] <= left[graph.source] + slack
     tight &= np.isfinite(left[graph.target])
     path = fewest_moves(graph.only(tight))
-    moves = _moves_of(graph, path)
+    moves = moves_of(graph, path)
     return left, path, work[moves].sum(axis=0)
 
 
-def _moves_of(graph: Graph, path: tuple[int, ...]) -> Ints:
+def moves_of(graph: Graph, path: Sequence[int]) -> Ints:
+    """Return the moves (k,) of a path, its start left out: the first of those side by side."""
     codes = graph.source.astype(np.int64) * graph.states + graph.target
     wanted = np.array((0, *path[:-1])) * graph.states + np.array(path)
     return np.asarray(np.searchsorted(codes, wanted))
@@ -158,7 +159,7 @@ class Labels(NamedTuple):
     placed: Floats
 
     def only(self, rows: Ints | Bools) -> Labels:
-        """Return some of them."""
+        """Select rows."""
         every = (self.state[rows], self.end[rows], self.since[rows])
         return Labels(*every, self.sums[rows], self.before[rows], self.placed[rows])
 
@@ -296,7 +297,7 @@ class Sweep:
         return np.column_stack([ends, labels.sums + self._left[labels.state]])
 
     def _within(self, labels: Labels, caps: Floats, aim: int) -> tuple[Labels, float]:
-        """Return labels within caps, and the least that others take of what is minimized."""
+        """Return labels within the caps, and the least bound of those that are pruned."""
         bounds = self._bounds(labels)
         most = caps + MARGIN * np.abs(caps)
         ok = np.asarray((np.isfinite(bounds) & (bounds <= most)).all(axis=1))
@@ -374,7 +375,7 @@ class Sweep:
                 ]
 
     def _undominated(self, fresh: Labels, known: Sequence[Labels]) -> Labels:
-        """Return the labels that no known one, and no other, is nowhere above."""
+        """Return the labels that no known one, and no other, dominates."""
         states = np.zeros(self._timed.graph.states, dtype=bool)
         states[fresh.state] = True
         old = [labels.only(states[labels.state]) for labels in known]

@@ -22,7 +22,7 @@ from formulations.states._search import (
     watched,
 )
 from formulations.states._totals import StopError
-from formulations.times._stages import ALMOST, Choose, StageFound, Stages
+from formulations.times._stages import ALMOST, Choose, Goals, StageFound, Stages
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
@@ -112,12 +112,6 @@ def require_cured(problem: States, name: str, *, cures: bool) -> None:
         raise ProblemError(f"{name}: it does not know mortar that cures; take makespan_labels")
 
 
-class _Asking(NamedTuple):
-    goals: tuple[Goal, ...]
-    aims: tuple[Goal, ...]
-    budgets: tuple[float, ...]
-
-
 def of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
     """Return the best path through an instance, its states the numbers of nodes."""
     timed = instance.timed
@@ -126,7 +120,7 @@ def of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
     own = {PEAK: Measure.PEAK, TIME: Measure.MAKESPAN}
     aims = tuple(Goal(own.get(goal.kind, Measure.SUM)) for goal in instance.goals)
     caps = [Measure.MAKESPAN if c.column is None else Measure.SUM for c in instance.caps]
-    asked = _Asking((*aims, *map(Goal, caps)), aims, tuple(cap.most for cap in instance.caps))
+    asked = Goals((*aims, *map(Goal, caps)), aims, tuple(cap.most for cap in instance.caps))
     stages = Stages(
         asked,
         Visited(timed.graph, ((0, 0, np.arange(instance.nodes)[:, None]),)),
@@ -178,7 +172,7 @@ class _InTime(Terse):
 def _searched(
     problem: States, choose: Choose, watch: Watch, tell: Watching, progress: Tell
 ) -> StatePath:
-    """Return the best plan of states that stand as is demanded."""
+    """Return the best plan of states that are proven to stand, where that is demanded."""
     first, waits, best = None, Waits(problem), list[StatePath]()
     try:
         first = narrow(problem, WIDTH, tell)
@@ -230,7 +224,8 @@ def _staged(
 ) -> tuple[Visited, Stages, StageFound]:
     """Return the visited states in time, and the best path through them, goal after goal."""
     visited = wide.graph()
-    stages = Stages(problem, visited, choose, watch, timed_graph(problem, visited, waits.cuts))
+    asked = Goals(problem.goals, problem.aims, problem.budgets)
+    stages = Stages(asked, visited, choose, watch, timed_graph(problem, visited, waits.cuts))
     try:
         return visited, stages, stages.run()
     except InfeasibleError as error:
@@ -238,7 +233,7 @@ def _staged(
 
 
 def _fell(problem: States, wide: Explorer, visited: Visited, path: Sequence[int]) -> bool:
-    """Leave out states of a path that do not stand as is demanded; return whether some do not."""
+    """Leave out states of a path that are not proven to stand; return whether there are any."""
     fell = False
     for level, part, state in visited.of(path) if problem.demands else ():
         if not problem.stand(level, state[None])[0]:

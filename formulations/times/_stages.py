@@ -1,7 +1,7 @@
 """What formulations of time share: states, goals one after the other, and plans from paths.
 
 A formulation of time is a function from a build in time to a `Chosen`: a path, its makespan and
-what no path stays below. Goals before the makespan leave moves out, as without time; where there
+a lower bound. Goals before the makespan leave moves out, as without time; where there
 are budgets, and after the makespan, they are sought by labels that keep all caps at once.
 """
 
@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from formulations.times._labels import (
     Sweep,
     Swept,
     best_prices,
+    moves_of,
 )
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError, NothingFoundError
@@ -122,24 +122,19 @@ def beams(
     return best
 
 
-class _Goals(Protocol):
-    """What is asked: by goals, of which the last ones are capped."""
+class Goals(NamedTuple):
+    """What is asked: goals, of which the last ones are capped by ``budgets`` and no ``aims``."""
 
-    @property
-    def goals(self) -> tuple[Goal, ...]: ...
-
-    @property
-    def aims(self) -> tuple[Goal, ...]: ...
-
-    @property
-    def budgets(self) -> tuple[float, ...]: ...
+    goals: tuple[Goal, ...]
+    aims: tuple[Goal, ...]
+    budgets: tuple[float, ...]
 
 
 class Stages:
     """Goals of a problem one after the other, on a graph in time."""
 
     def __init__(
-        self, problem: _Goals, visited: Visited, choose: Choose, watch: Watch, timed: TimedGraph
+        self, problem: Goals, visited: Visited, choose: Choose, watch: Watch, timed: TimedGraph
     ) -> None:
         self._problem, self._choose, self._watch = problem, choose, watch
         self._visited = visited
@@ -294,17 +289,14 @@ class Stages:
     def _taken(self, path: Sequence[int], k: int) -> float:
         """Return what a goal that is no makespan takes of a path."""
         graph = self._timed.graph
-        codes = graph.source.astype(np.int64) * graph.states + graph.target
-        wanted = [a * graph.states + b for a, b in pairwise((0, *path))]
-        amounts = graph.amounts[np.searchsorted(codes, wanted), k]
+        amounts = graph.amounts[moves_of(graph, path), k]
         return float(amounts.max(initial=0.0) if graph.peaks[k] else amounts.sum())
 
     def least(self, path: Sequence[int]) -> float:
         """Return how long a path takes by all that is known of its waits, s."""
         graph = self._timed.graph
         codes = graph.source.astype(np.int64) * graph.states + graph.target
-        wanted = [a * graph.states + b for a, b in pairwise((0, *path))]
-        kept = np.isin(codes, wanted)
+        kept = np.isin(codes, codes[moves_of(graph, path)])
         prices = best_prices(self._timed, kept, Watch(0.0))
         return Sweep(self._timed, prices, kept, Caps()).run(Watch()).best
 

@@ -12,8 +12,8 @@ can be step :math:`i`, which takes :math:`p_a` to be prepared and :math:`d_a` to
    & r \text{ stays free} \Rightarrow \rho_{i r} \ge \rho_{i-1, r}, \qquad
    r \text{ lets go} \Rightarrow \rho_{i r} \ge T_i .
 
-That no robot does two things at once follows, and is said as well, since it bounds what is left to
-decide: over the robots of a kind,
+That no robot does two things at once follows, and is a constraint as well, since it bounds what is
+left to decide: over the robots of a kind,
 
 .. math::
 
@@ -253,7 +253,7 @@ class _Program:
             model.add(sum(w * t for w, t in zip(whole, taken, strict=True)) <= int(cap))
 
     def solve(self) -> tuple[Ints, float, bool]:
-        """Return which moves are taken, what no build stays below, s, and whether that is proven.
+        """Return the chosen moves, the lower bound, s, and whether it is proven.
 
         None are where no build is better.
         """

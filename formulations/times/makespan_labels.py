@@ -9,10 +9,10 @@ been so, :math:`(t, \rho)`. An act of robot :math:`r` that takes :math:`p` to be
 
    t' = \max \{ t, \, \rho_r + p \} + a, \qquad \rho'_r = t' \; \text{ where it lets go } (p = 0).
 
-Of two labels of a state one is dropped if the other is nowhere above it, where of :math:`\rho_r`
-only what is later than :math:`t` less the longest preparation counts, and robots that are alike are
-sorted. With prices :math:`\lambda_r \ge 0` of the time of robots and :math:`\lambda_0` of the time
-of all, :math:`\sum \lambda = 1`, every build from a label ends no sooner than
+Of two labels of a state one is dropped if the other dominates it, where of :math:`\rho_r` only what
+is later than :math:`t` less the longest preparation counts, and robots that are alike are sorted.
+With multipliers :math:`\lambda_r \ge 0` of the time of robots and :math:`\lambda_0` of the time of
+all, :math:`\sum \lambda = 1`, every build from a label ends no sooner than
 
 .. math::
 

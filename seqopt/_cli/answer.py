@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Mapping, Sequence
@@ -89,14 +88,14 @@ class Answer:
         return plain(said)
 
 
-def print_answer(answer: Answer, options: argparse.Namespace) -> Status:
+def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) -> Status:
     """Print an answer in the form that is asked for; return its status.
 
     Where its files are written, nothing is lost if nobody hears.
     """
-    if options.json:
-        show(json.dumps(answer.document(options.command), indent=2, allow_nan=False) + "\n")
-    elif options.quiet:
+    if as_json:
+        show(json.dumps(answer.document(command), indent=2, allow_nan=False) + "\n")
+    elif quiet:
         paths = "".join(f"{path}\n" for path in answer.written)
         show(answer.data or paths or f"{answer.text}\n")
     else:
@@ -104,7 +103,7 @@ def print_answer(answer: Answer, options: argparse.Namespace) -> Status:
             show(answer.data)
         if answer.text and not (answer.written and sys.stdout is None):
             show_text(answer.text, answer.headings)
-    for text in () if options.quiet else answer.notes:
+    for text in () if quiet else answer.notes:
         note(text)
     for text in answer.failures:
         complain(text)

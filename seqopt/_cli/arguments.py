@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import re
+from argparse import SUPPRESS
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import version
@@ -12,8 +14,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from seqopt._cli.answer import Status
-from seqopt._cli.screens import ALL, HelpAll, first_screen
-from seqopt._cli.terminal import columns, complain, show, wrapped
+from seqopt._cli.terminal import columns, complain, show
 from seqopt.errors import did_you_mean
 
 EXAMPLES = """Three examples:
@@ -28,6 +29,8 @@ EXAMPLES = """Three examples:
 seqopt --help names all commands, seqopt COMMAND --help what each is for, and
 seqopt COMMAND --help-all what it can do.
 """
+LINES = 40  # of a screen
+ALL = "--help-all"
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
 MISSING = "the following arguments are required"
@@ -74,39 +77,51 @@ def _layout(prog: str) -> argparse.HelpFormatter:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Command:
-    """A command in a few words, and its module of `seqopt._cli`, loaded when it is asked for.
+    """A command in a few words, and where in `seqopt._cli` the class is of what it is asked.
 
-    That has ``add_arguments``, ``run``, ``DESCRIPTION``, ``EXAMPLES``, and ``USAGE`` where it has
-    more options than a reader takes in at once.
+    Its module has ``run`` as well, and is loaded when it is asked for.
     """
 
     about: str
-    module: str
+    where: str
 
     def load(self) -> ModuleType:
         """Return the module."""
-        return import_module(f"seqopt._cli.{self.module}")
+        return import_module(f"seqopt._cli.{self.where.partition(':')[0]}")
+
+    @property
+    def asked(self) -> Any:
+        """The class of what it is asked."""
+        return getattr(self.load(), self.where.partition(":")[2])
 
 
 COMMANDS = {
-    "compare": _Command("show all ways to build a scene side by side", "commands.compare"),
-    "optimize": _Command("choose where robots hold, and write the plan", "commands.optimize"),
-    "replan": _Command("plan the rest of a build after a change", "commands.replan"),
-    "next": _Command("look up the best next move of a build", "commands.next"),
-    "pareto": _Command("find all plans that no other one beats in every aim", "commands.pareto"),
-    "analyze": _Command("compute forces and displacements in every step", "commands.analyze"),
-    "times": _Command("say how long a build takes, and who does what when", "commands.times"),
-    "assess": _Command("prove which steps stand, and with what margins", "commands.assess"),
-    "report": _Command("make a page that shows plans step by step", "commands.report"),
-    "reach": _Command("say which arms reach which nodes, and how", "commands.reach"),
-    "scene": _Command("check, describe, export or list scenes", "commands.scene"),
-    "import": _Command(
-        "make a scene of an assembly of COMPAS, a mesh or a table", "commands.importing"
+    "compare": _Command("show all ways to build a scene side by side", "commands.compare:Compare"),
+    "optimize": _Command(
+        "choose where robots hold, and write the plan", "commands.optimize:Optimize"
     ),
-    "export": _Command("write a plan in a format of others", "commands.exporting"),
-    "instance": _Command("write the graph of a problem, for any solver", "bare.instance"),
-    "judge": _Command("check a bare solution of an instance, and a bound", "bare.judge"),
-    "completion": _Command("let the shell complete words of seqopt", "commands.completion"),
+    "replan": _Command("plan the rest of a build after a change", "commands.replan:Replan"),
+    "next": _Command("look up the best next move of a build", "commands.next:Next"),
+    "pareto": _Command(
+        "find all plans that no other one beats in every aim", "commands.pareto:Pareto"
+    ),
+    "analyze": _Command(
+        "compute forces and displacements in every step", "commands.analyze:Analyze"
+    ),
+    "times": _Command("say how long a build takes, and who does what when", "commands.times:Times"),
+    "assess": _Command("prove which steps stand, and with what margins", "commands.assess:Assess"),
+    "report": _Command("make a page that shows plans step by step", "commands.report:Report"),
+    "reach": _Command("say which arms reach which nodes, and how", "commands.reach:Reach"),
+    "scene": _Command("check, describe, export or list scenes", "commands.scene:SceneAsked"),
+    "import": _Command(
+        "make a scene of an assembly of COMPAS, a mesh or a table", "commands.importing:Import"
+    ),
+    "export": _Command("write a plan in a format of others", "commands.exporting:Export"),
+    "instance": _Command("write the graph of a problem, for any solver", "bare.instance:Instance"),
+    "judge": _Command("check a bare solution of an instance, and a bound", "bare.judge:Judge"),
+    "completion": _Command(
+        "let the shell complete words of seqopt", "commands.completion:Completion"
+    ),
 }
 
 
@@ -137,6 +152,14 @@ class _Parser(argparse.ArgumentParser):
         self.exit(Status.BAD_INPUT)
 
 
+class _HelpAll(argparse.Action):
+    """The option that prints the help of a command with all its options."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        show(parser.format_help())
+        parser.exit()
+
+
 class _Version(argparse.Action):
     """The option that prints the version, which is looked up then alone."""
 
@@ -158,9 +181,8 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
         "seqopt COMMAND --help-all has all of its options.",
     )
     about = "show program's version number and exit"
-    whole.add_argument("--version", action=_Version, nargs=0, default=argparse.SUPPRESS, help=about)
+    whole.add_argument("--version", action=_Version, nargs=0, default=SUPPRESS, help=about)
     whole.color = False  # signs of color would be printed as codes
-    whole.set_defaults(quiet=False, json=False)
     commands = whole.add_subparsers(
         required=True, title="commands", metavar="COMMAND", dest="command"
     )
@@ -168,22 +190,57 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
         added = commands.add_parser(name, help=command.about, formatter_class=_layout)
         added.color = False
         if asked in (None, name):
-            _fill(added, command.load())
+            from seqopt._cli.signatures import fill  # noqa: PLC0415  # of which help needs nothing
+
+            all_help = "show every option of the command, and exit"
+            added.add_argument(ALL, action=_HelpAll, nargs=0, default=SUPPRESS, help=all_help)
+            fill(added, command.asked)
         if asked == name:
             whole.asked, whole.spoken = name, tuple(added._option_string_actions)
     return whole
 
 
-def _fill(command: argparse.ArgumentParser, module: ModuleType) -> None:
-    """Give a command what its module says."""
-    if usages := getattr(module, "USAGE", ()):
-        command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
-    lines = "\n".join(f"  {example}" for example in module.EXAMPLES)
-    command.description = wrapped(module.DESCRIPTION)
-    about = "show every option of the command, and exit"
-    command.add_argument(ALL, action=HelpAll, nargs=0, default=argparse.SUPPRESS, help=about)
-    command.epilog = f"example{'s' * (len(module.EXAMPLES) > 1)}:\n{lines}"
-    module.add_arguments(command)
+def request(words: Sequence[str], tell: Any = None) -> tuple[str, Any]:
+    """Return the command that words ask for, and what it is asked; a wrong word ends the program.
+
+    ``tell``: told how far it is.
+    """
+    options = vars(parser(asked_command(words)).parse_args(words))
+    from seqopt._cli.signatures import parsed  # noqa: PLC0415  # of which help needs nothing
+
+    name = options.pop("command")
+    more = {"words": (*words,)} | ({} if tell is None else {"tell": tell})
+    return name, parsed(COMMANDS[name].asked, options, **more)
+
+
+def first_screen(command: argparse.ArgumentParser) -> str:
+    """Return the help of a command on one screen: the whole of it where that fits.
+
+    Else what must be given, what an example gives, and what has no dashes; of its help as much as
+    stands before the first semicolon.
+    """
+    whole = command.format_help()
+    if whole.count("\n") <= LINES or command._subparsers is not None:
+        return whole
+    given = {word.partition("=")[0] for word in (command.epilog or "").split()}
+    first = [
+        action
+        for action in command._actions
+        if action.required or not action.option_strings or given & {*action.option_strings}
+    ]
+    more = len(command._actions) - len(first) - 2  # both forms of help are no answer to more
+    lines = command._get_formatter()
+    lines.add_usage(command.usage, first, ())
+    lines.add_text(command.description)
+    lines.start_section("what a first use needs")
+    brief = [*map(copy, first)]
+    for action in brief:
+        action.help = (action.help or "").partition("; ")[0]
+    lines.add_arguments(brief)
+    lines.end_section()
+    lines.add_text(command.epilog)
+    lines.add_text(f"{command.prog} {ALL} has {more} more options, by question.")
+    return lines.format_help()
 
 
 def asked_command(words: Sequence[str]) -> str:

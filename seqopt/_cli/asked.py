@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from seqopt._cli.answer import Answer, Status
+from seqopt._cli.options import Asked, Built, Computed, Fixed, Judged, Posed, Stands, Strict, Timed
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_robots
-from seqopt._cli.words.given import given_scene, given_steps
+from seqopt._cli.words.given import NamedSteps, given_plan, given_scene, given_steps
 from seqopt._cli.words.props import parse_props
 from seqopt.arms._plan_postures import arm_faults
 from seqopt.arms.reach import find_postures
-from seqopt.contact.mortar import Mortar
+from seqopt.contact.mortar import Mortar, _mortar_name
 from seqopt.engines._kinds import ChoosingEngine, Level
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, LIMITED, _chooser_of, make_engine, simplest
 from seqopt.errors import ExtraError, ProblemError, SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.requirements import _carrying_excesses, _prop_faults, overloads
+from seqopt.problem.requirements import (
+    LIFTED,
+    LINEAR_RANGE,
+    _carrying_excesses,
+    _prop_faults,
+    overloads,
+)
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.rules import MOST_ROBOTS, FreeRules, _usual_grips, with_robots
@@ -51,79 +57,80 @@ def size_line(scene: Scene) -> str:
     return f"{scene.name}: {size}, {len(scene.grounds)} ground ends"
 
 
-def asked_scene(options: argparse.Namespace, *, ranged: bool = False) -> Scene:
+def asked_scene(asked: Built, *, ranged: bool = False) -> Scene:
     """Return the scene that a command is asked for, in the order that it is asked for.
 
     ``ranged``: whether a range of stiffnesses leaves the scene's own.
     """
-    if options.order == "search":
+    if asked.order == "search":
         raise ProblemError(
             "--order search: only the free schedule has it; give optimize --schedule free"
         )
-    scene = in_order(given_scene(options), options.order)
-    for text in options.payload:
+    scene = in_order(given_scene(asked), asked.order)
+    for text in asked.payload:
         scene = parse_payload(text, scene)
-    if getattr(options, "robots", "").isdecimal():
-        scene = with_robots(scene, int(options.robots))
-    if options.props is not None:
-        scene = scene.with_props(*parse_props(options.props, scene))
-    own = options.grips is None or (ranged and ".." in options.grips)
-    return scene if own else parse_grips(options.grips, scene)
+    if asked.robots.isdecimal():
+        scene = with_robots(scene, int(asked.robots))
+    if asked.props is not None:
+        scene = scene.with_props(*parse_props(asked.props, scene))
+    if asked.grips is None or (ranged and ".." in asked.grips):
+        return scene
+    return parse_grips(asked.grips, scene)
 
 
-def in_seconds(options: argparse.Namespace, scene: Scene) -> Scene:
+def in_seconds(asked: Timed | Posed, scene: Scene) -> Scene:
     """Return a scene whose robots take as long as a command is told."""
     try:
-        return scene.with_durations(*options.durations)
+        return scene.with_durations(*asked.durations)
     except SceneError as error:
         raise SceneError(f"--{error}") from None
 
 
-def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
+def asked_engine(asked: Computed, network: Network) -> Engine:
     """Return the engine that a command is asked for; where none is named, that of the scene."""
-    mortar = None if options.mortar is None else mortar_word(options.mortar, "--mortar")
-    of_verdicts = options.engine not in LIMITED and not getattr(options, "no_stability", True)
-    if options.engine is None:
+    mortar = None if asked.mortar is None else mortar_word(asked.mortar, "--mortar")
+    of_verdicts = asked.engine not in LIMITED and not asked.no_stability
+    if asked.engine is None:
         engine = make_engine(DEFAULT, network, None if of_verdicts else mortar)
         # with a mortar of its own an engine is asked where joints open: set by set
         return simplest(engine) if of_verdicts or mortar is None else engine
     try:
-        return make_engine(options.engine, network, None if of_verdicts else mortar)
+        return make_engine(asked.engine, network, None if of_verdicts else mortar)
     except SceneError as error:
-        why = str(error).removeprefix(f"engine {options.engine}: ")
-        raise SceneError(f"--engine {options.engine}: {why}") from error
+        why = str(error).removeprefix(f"engine {asked.engine}: ")
+        raise SceneError(f"--engine {asked.engine}: {why}") from error
 
 
-def asked_steps(options: argparse.Namespace, network: Network) -> tuple[Step, ...]:
-    """Return the closed sequence that a command is asked for.
+def asked_steps(asked: Fixed, network: Network) -> NamedSteps:
+    """Return the closed sequence that a command is asked for, and what it is called.
 
     Raises `SceneError`, `StepError` if the method is not for the scene, or robots are named beside
     a plan.
     """
-    robots = parse_robots(options.robots)
-    if options.robots and (options.plan is not None or options.method == PUBLISHED):
+    robots = parse_robots(asked.robots)
+    if asked.robots and (given_plan(asked) is not None or asked.method == PUBLISHED):
         raise StepError(
-            f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
+            f"--robots {asked.robots}: a plan says itself who holds; leave it out, or give "
             f"--method {' or '.join(METHODS)}"
         )
-    return given_steps(options, network, robots)
+    return given_steps(asked, network, robots)
 
 
-def posture_trouble(options: argparse.Namespace, scene: Scene) -> str:
+def posture_trouble(asked: Asked, scene: Scene) -> str:
     """Compute postures of arms, or take those that are kept; return why there are none, if so."""
     try:
-        find_postures(scene, options.cache, options.tell)
+        find_postures(scene, asked.cache, asked.tell)
     except (ExtraError, SceneError) as error:
         return str(error)
     return ""
 
 
-def level_notes(options: argparse.Namespace, engine: Engine) -> tuple[str, ...]:
+def level_notes(asked: Computed, engine: Engine) -> tuple[str, ...]:
     """Return which levels an engine that picks them took, and why.
 
     Where none is named, only that of joints that open: which other one was enough is said of steps.
     """
-    named = options.engine is not None
+    named = asked.engine is not None
     if (chooser := _chooser_of(engine)) is not None:
         choice = chooser.choice
         return (f"engine: {choice.level.value}: {choice.reason}",) if named else ()
@@ -193,13 +200,14 @@ def waits_said(build: ShownBuild) -> Iterator[str]:
     yield "every state is proven to stand with the bond that its joints have when it begins"
 
 
-def asked_prover(options: argparse.Namespace, network: Network) -> BuildProver:
+def asked_prover(asked: Judged, network: Network) -> BuildProver:
     """Return what says which steps of builds stand, with the mortars that a command shows."""
-    own = getattr(options, "stands", None) or getattr(options, "mortar", None) or "epoxy"
-    demanded = asked_standing(options) if getattr(options, "stands", None) else None
+    demanded = asked_standing(asked) if isinstance(asked, Stands) else None
+    own = getattr(asked, "stands", None) or asked.mortar or "epoxy"
     mortar = mortar_word(own, "--mortar") if demanded is None else demanded.mortar
-    shown = {"dry": Mortar(friction=mortar.friction), own: mortar}
-    return BuildProver(network, {} if options.no_stability else shown, options.tell)
+    name = own if isinstance(own, str) else _mortar_name(mortar)
+    shown = {"dry": Mortar(friction=mortar.friction), name: mortar}
+    return BuildProver(network, {} if asked.no_stability else shown, asked.tell)
 
 
 def refused(prover: BuildProver) -> tuple[str, ...]:
@@ -236,9 +244,17 @@ def marked(answer: Answer, outside: Sequence[object]) -> Answer:
     return replace(answer, text="\n".join([*map(wrapped, lines), answer.text]))
 
 
+def kept_range(answer: Answer, beyond: str | None) -> Answer:
+    """Return an answer whose status says it if a plan leaves the limit of the linear range."""
+    if beyond is None or answer.status is not Status.DONE:
+        return answer
+    said = f"seqopt: {OUTSIDE}: {beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
+    return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
+
+
 def strictly(
     answer: Answer,
-    options: argparse.Namespace,
+    asked: Strict,
     over: Sequence[str],
     outside: Sequence[object] = (),
     verdicts: Mapping[str, Sequence[BuildVerdicts]] | None = None,
@@ -267,6 +283,6 @@ def strictly(
         "does not stand": falls,
     }
     said = [f"seqopt: {name}: {'; '.join(each)}" for name, each in wrong.items() if each]
-    if not options.strict or not said or answer.status is not Status.DONE:
+    if not asked.strict or not said or answer.status is not Status.DONE:
         return answer
     return replace(answer, failures=(*answer.failures, *said), status=Status.DOES_NOT_HOLD)

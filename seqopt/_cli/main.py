@@ -12,7 +12,7 @@ from importlib import import_module
 from types import ModuleType
 
 from seqopt._cli.answer import Answer, Status, print_answer, status_of
-from seqopt._cli.arguments import COMMANDS, EXAMPLES, asked_command, parser
+from seqopt._cli.arguments import COMMANDS, EXAMPLES, asked_command, request
 from seqopt._cli.terminal import flush, quiet_numbers, show, silence
 from seqopt.errors import SeqoptError
 
@@ -67,7 +67,8 @@ def load(words: Sequence[str]) -> None:
         if any(map(os.path.exists, words)):
             import jsonschema  # noqa: F401, PLC0415  # scene files need it
 
-        import seqopt._cli.watcher  # noqa: F401, PLC0415  # of which help needs nothing
+        import seqopt._cli.signatures  # noqa: PLC0415  # of which help needs nothing
+        import seqopt._cli.watcher  # noqa: F401, PLC0415
 
         COMMANDS[asked].load()
     gc.freeze()
@@ -79,13 +80,12 @@ def _run(words: Sequence[str]) -> int:
         show(EXAMPLES)
         return Status.DONE
     try:
-        options = parser(asked_command(words)).parse_args(words)
+        name, asked = request(words)
     except SystemExit as stop:  # the parser has said why, or printed its help
         return int(stop.code or 0)
     from seqopt._cli.watcher import Watcher  # noqa: PLC0415  # of which help needs nothing
 
-    options.words = (*words,)  # an instance says which ones made it
-    with quiet_numbers(quiet=options.quiet), Watcher(shows=not options.quiet) as options.tell:
-        answer: Answer = COMMANDS[options.command].load().run(options)
-    answer = replace(answer, notes=(*getattr(options, "taken", ()), *answer.notes))
-    return print_answer(answer, options)
+    with quiet_numbers(quiet=asked.quiet), Watcher(shows=not asked.quiet) as tell:
+        answer: Answer = COMMANDS[name].load().run(replace(asked, tell=tell))
+    answer = replace(answer, notes=(*asked.taken, *answer.notes))
+    return print_answer(answer, name, quiet=asked.quiet, as_json=asked.json)

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
-from seqopt._cli.outputs import figure_notes, require_out, write_outputs
+from seqopt._cli.options import Fixed
+from seqopt._cli.outputs import figure_notes, require_out, write_outputs, written_to
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import count_word, mortar_word
-from seqopt._cli.words.given import plan_name
+from seqopt._cli.words.given import given_plan
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import ProblemError, SceneError, SeqoptError
 from seqopt.network.build import build_network
 from seqopt.problem._limit_words import number_word
-from seqopt.report._failures import AXIS_WORDS, Builds, cure_words, failure_page, usual_builds
+from seqopt.report._failures import Builds, failure_blocks, failure_page, usual_builds
 from seqopt.scene._checks import MOST_BRICKS
 from seqopt.scene._counts import scene_of_bricks
 from seqopt.scene.scene import Scene, in_order
@@ -28,27 +27,25 @@ BRICKS = "bricks"
 WAYS = ("friction", "tilt")
 SHARES = (0.5, 0.75, 1.0, 1.25, 1.5)  # of the bricks of a scene, by default
 STEEPEST = 45.0  # degrees
-NAME = 26  # columns of a build with what holds it
 
 
-def answer_map(options: argparse.Namespace) -> Answer:
-    """Answer where builds of a scene fail."""
-    scene = asked_scene(options)
-    axis, values = _asked_axis(options.map)
-    holds = (options.holds or "dry,epoxy").split(",")
+def answer_map(asked: Fixed, over: str, holds: Sequence[str]) -> Answer:
+    """Answer where builds of a scene fail, over an axis and what holds their joints."""
+    scene = asked_scene(asked)
+    axis, values = _asked_axis(over)
     for name in holds:
         mortar_word(name, "--holds")
-    require_out(options)
-    builds, notes = _asked_builds(options, scene)
+    require_out(asked)
+    builds, notes = _asked_builds(asked, scene)
     if axis == BRICKS:
-        scene, builds, found, more = _over_bricks(options, (scene, builds), holds, values)
+        scene, builds, found, more = _over_bricks(asked, scene, builds, (over, holds, values))
         notes += more
     else:
-        found = failure_map(scene, builds, holds, axis, values, options.tell)
-    written = write_outputs(options, lambda: _files(scene, builds, found))
-    blocks = ["\n".join(block) for block in (_table(scene, found), _cures(found)) if block]
+        found = failure_map(scene, builds, holds, axis, values, asked.tell)
+    written = write_outputs(asked, lambda: _files(scene, builds, found))
+    blocks = failure_blocks(scene, found, wrapped)
     if written:
-        where = f"written to {options.out}; {options.out / PAGE} shows how steps fall"
+        where = written_to(asked.out, what="how steps fall")
         notes += [*figure_notes()]
     else:
         where = "--out DIR writes tables, a picture and a page that shows how steps fall"
@@ -88,48 +85,45 @@ def _asked_axis(text: str) -> tuple[str, tuple[float, ...]]:
 
 
 def _over_bricks(
-    options: argparse.Namespace,
-    asked: tuple[Scene, Builds],
-    holds: Sequence[str],
-    counts: Sequence[float],
+    asked: Fixed, scene: Scene, builds: Builds, over: tuple[str, Sequence[str], Sequence[float]]
 ) -> tuple[Scene, Builds, FailureMap, list[str]]:
     """Return the map over the number of bricks, and why it is not possible, or not for all.
 
     With it the scene and the builds of which it is shown how steps fall. A scene whose bricks
     cannot be counted otherwise, or a plan, is mapped along its build.
     """
-    scene, now = asked[0], len(asked[0].bricks)
+    (text, holds, counts), now = over, len(scene.bricks)
     try:
-        if options.plan is not None:
-            raise SceneError(f"plan {options.plan}: it is for {now} bricks alone")
-        scene_of_bricks(options.scene, now)
+        if (plan := given_plan(asked)) is not None:
+            raise SceneError(f"plan {plan}: it is for {now} bricks alone")
+        scene_of_bricks(str(asked.scene), now)
     except SceneError as error:
         note = f"{error}; this maps steps by how many bricks are placed"
         placed = [count for count in counts if count <= now]
-        found = failure_map(scene, asked[1], holds, "bricks placed", placed, options.tell)
-        return *asked, found, [note]
-    scenes, notes = {now: asked}, list[str]()
+        found = failure_map(scene, builds, holds, "bricks placed", placed, asked.tell)
+        return scene, builds, found, [note]
+    scenes, notes = {now: (scene, builds)}, list[str]()
     for count in counts or [round(share * now) for share in SHARES]:
         try:
-            other = in_order(scene_of_bricks(options.scene, int(count)), options.order)
+            other = in_order(scene_of_bricks(str(asked.scene), int(count)), asked.order)
             if len(other.bricks) not in scenes:
-                builds, _ = _asked_builds(options, other)
-                scenes[len(other.bricks)] = other, builds
+                scenes[len(other.bricks)] = other, _asked_builds(asked, other)[0]
         except SeqoptError as error:
             notes.append(f"{count:g} bricks: {error}")
     if counts and now not in counts:
         del scenes[now]
     if not scenes:
-        raise ProblemError(f"--map {options.map}: {'; '.join(notes)}")
+        raise ProblemError(f"--map {text}: {'; '.join(notes)}")
     ordered, usual = dict(sorted(scenes.items())), min(scenes, key=lambda n: abs(n - now))
-    return *scenes[usual], _brick_map(ordered, usual, holds, options.tell), notes
+    return *scenes[usual], _brick_map(ordered, usual, holds, asked.tell), notes
 
 
-def _asked_builds(options: argparse.Namespace, scene: Scene) -> tuple[Builds, list[str]]:
+def _asked_builds(asked: Fixed, scene: Scene) -> tuple[Builds, list[str]]:
     """Return the builds that are asked for, by name, and why others are not possible."""
-    if options.method is None and options.plan is None:
-        return usual_builds(scene, options.tell)
-    return {plan_name(options): asked_steps(options, build_network(scene))}, []
+    if asked.method is None and given_plan(asked) is None:
+        return usual_builds(scene, asked.tell)
+    name, steps = asked_steps(asked, build_network(scene))
+    return {name: steps}, []
 
 
 def _files(scene: Scene, builds: Builds, found: FailureMap) -> dict[str, bytes | str]:
@@ -146,43 +140,3 @@ def _files(scene: Scene, builds: Builds, found: FailureMap) -> dict[str, bytes |
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
 
     return files | picture_files("map", failure_figure(found))
-
-
-def _table(scene: Scene, found: FailureMap) -> Iterator[str]:
-    """Yield how many steps fall, a line for every build and what holds it."""
-    cases = found.cases
-    axis = AXIS_WORDS[str(cases["axis"].iloc[0])]
-    yield f"{scene.name}: steps that fall, by {axis}"
-    values = sorted(cases["value"].unique())
-    yield f"{'':{NAME}}{'steps':>5}" + "".join(f"{value:8.3g}" for value in values)
-    for (build, holds), rows in cases.groupby(["build", "holds"], sort=False):
-        steps = rows["steps"].unique()
-        counts = {
-            case["value"]: _count(case, differ=len(steps) > 1) for case in rows.to_dict("records")
-        }
-        cells = "".join(f"{counts.get(value, ''):>8}" for value in values)
-        yield f"{f'{build}, {holds}':{NAME}}{steps[0] if len(steps) == 1 else '':5}{cells}"
-
-
-def _count(case: Mapping[Any, Any], *, differ: bool) -> str:
-    """Return how many steps of a case fall, and of how many where numbers of steps differ."""
-    of = f"/{case['steps']}" if differ else ""
-    open_ = f" ({case['undecided']}?)" if case["undecided"] else ""
-    return f"{case['fall']}{of}{open_}"
-
-
-def _cures(found: FailureMap) -> Sequence[str]:
-    """Return what fails first in every build, and what would cure it."""
-    value = found.usual
-    axis = AXIS_WORDS[str(found.cases["axis"].iloc[0])]
-    here = found.cases[(found.cases["value"] == value) & (found.cases["fall"] > 0)]
-    lines = [wrapped(_first_words(case)) for case in here.to_dict(orient="records")]
-    title = f"What falls first, {axis} {value:.3g}, and what would cure it"
-    return [title, *lines] if lines else []
-
-
-def _first_words(case: Mapping[Any, Any]) -> str:
-    """Return what falls first in a case, and what would cure it."""
-    joint = f", joint {case['joint']} {case['motion']}" if case["joint"] else ""
-    where = f"step {case['first_step']}, brick {case['brick']}{joint}"
-    return f"{case['build']}, {case['holds']}: {where}; {cure_words(case)}"

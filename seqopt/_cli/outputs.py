@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from seqopt._cli.options import Asked
 from seqopt._cli.words.given import is_folder
 from seqopt._files import (
     csv_text,
@@ -29,7 +29,6 @@ from seqopt.scene.scene_file import builtin_scenes, dump_scene
 from seqopt.stability._builds import BuildProver
 
 if TYPE_CHECKING:
-    from seqopt.report._speed._table import SpeedTable
     from seqopt.report.comparison import Comparison
 
 ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
@@ -42,53 +41,31 @@ def figure_notes() -> tuple[str, ...]:
     return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
 
 
-def comparison_files(result: Comparison) -> dict[str, bytes | str]:
-    """Return the tables of a comparison by file name, and its figures if they can be drawn."""
+def comparison_files(result: Comparison, softly: pd.DataFrame) -> dict[str, bytes | str]:
+    """Return the tables of a comparison by file name, and its figures if they can be drawn.
+
+    ``softly``: what builds come to for grips of several stiffnesses, if that is asked.
+    """
+    loop, speed = result.loop, result.speed
     files: dict[str, bytes | str] = {
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
         **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
     }
-    if result.loop is not None and result.loop.ranks is not None:
-        files["published_ranks.csv"] = result.loop.ranks.to_csv(index=False)
-    if figure_notes() or result.loop is None:
-        return files
-    from seqopt.report._style import picture_files  # noqa: PLC0415
-    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
-
-    for name, figure in comparison_figures(result).items():
-        files |= picture_files(name, figure)
-    return files
-
-
-def softness_files(table: pd.DataFrame) -> dict[str, bytes | str]:
-    """Return what builds come to for grips of several stiffnesses, as table and picture."""
-    if table.empty:
-        return {}
-    files: dict[str, bytes | str] = {"grips.csv": csv_text(table)}
-    if figure_notes():
-        return files
-    from seqopt.report._style import picture_files  # noqa: PLC0415
-    from seqopt.report.charts import _softness_chart  # noqa: PLC0415  # matplotlib is an extra
-
-    return files | picture_files("grips", _softness_chart(table, [*dict.fromkeys(table["build"])]))
-
-
-def speed_files(table: SpeedTable | None) -> dict[str, bytes | str]:
-    """Return speed against accuracy by file name: as table, and as picture where one is drawn."""
-    if table is None:
-        return {}
-    files: dict[str, bytes | str] = {"speed.csv": csv_text(table.table)}
+    files |= {} if softly.empty else {"grips.csv": csv_text(softly)}
+    files |= {} if speed is None else {"speed.csv": csv_text(speed.table)}
+    if loop is not None and loop.ranks is not None:
+        files["published_ranks.csv"] = loop.ranks.to_csv(index=False)
     if figure_notes():
         return files
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.charts import _softness_chart, comparison_figures  # noqa: PLC0415
 
-    return files | picture_files("speed", table.plot())
-
-
-TABLES = {
-    "--tables plan|all": "which tables are written: those of the plan, or all, with every choice of"
-    " every open step beside: megabytes (default: plan)"
-}
+    drawn = {} if loop is None else comparison_figures(result)
+    drawn |= {} if softly.empty else {"grips": _softness_chart(softly, [*softly["build"].unique()])}
+    drawn |= {} if speed is None else {"speed": speed.plot()}
+    for name, figure in drawn.items():
+        files |= picture_files(name, figure)
+    return files
 
 
 def _steps_table(plan: ShownBuild) -> pd.DataFrame:
@@ -191,47 +168,46 @@ def put_table(
     return {"text": f"{said} written to {path}", "written": (path,)}
 
 
-def written_to(folder: Path | None, *, page: bool = True) -> str:
-    """Return where a folder with a page was written, and what shows it, or how to have one."""
+def written_to(folder: Path | None, *, page: bool = True, what: str = "it step by step") -> str:
+    """Return where a folder with a page was written, and what that shows, or how to have one."""
     if folder is None:
         return "--out DIR writes the plan, its tables and a page that shows it step by step"
-    return f"written to {folder}" + f"; {folder / PAGE} shows it step by step" * page
+    return f"written to {folder}" + f"; {folder / PAGE} shows {what}" * page
 
 
-def write_outputs(
-    options: argparse.Namespace, files: Callable[[], Mapping[str, bytes | str]]
-) -> tuple[Path, ...]:
+def write_outputs(asked: Asked, files: Callable[[], Mapping[str, bytes | str]]) -> tuple[Path, ...]:
     """Write the folder that a command was asked for, whole, if it was asked for one; return it.
 
     Raises `FileError` if a file would overwrite what the command reads, or cannot be written.
     """
-    if options.out is None:
+    if asked.out is None:
         return ()
-    options.tell("writing the plan")
+    asked.tell("writing the plan")
     made = files()
-    require_apart([options.out / name for name in made], _inputs(options))
-    write_folder(options.out, made)
-    return (options.out,)
+    require_apart([asked.out / name for name in made], _inputs(asked))
+    write_folder(asked.out, made)
+    return (asked.out,)
 
 
-def require_out(options: argparse.Namespace, *names: str) -> None:
+def require_out(asked: Asked, *names: str) -> None:
     """Raise `FileError`, before anything is computed, if the folder asked for cannot be made.
 
     Nor may what will have one of some names in it be what the command reads.
     """
-    if options.out is not None:
-        require_folder(options.out)
-        keep_apart(options, *(options.out / name for name in names))
+    if asked.out is not None:
+        require_folder(asked.out)
+        keep_apart(asked, *(asked.out / name for name in names))
 
 
-def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
+def keep_apart(asked: Asked, *outputs: Path | None) -> None:
     """Raise `FileError` if outputs are one file, or one that the command reads."""
-    require_apart([path for path in outputs if path is not None], _inputs(options))
+    require_apart([path for path in outputs if path is not None], _inputs(asked))
 
 
-def _inputs(options: argparse.Namespace) -> list[Path]:
-    asked = (options.scene, getattr(options, "plan", None), getattr(options, "schedule", None))
-    named = [Path(name) for name in asked if isinstance(name, str | Path)]
+def _inputs(asked: Asked) -> list[Path]:
+    """Return the files that a command reads, those in the folder of a plan among them."""
+    given = (getattr(asked, name, None) for name in ("scene", "plan", "schedule"))
+    named = [Path(name) for name in given if isinstance(name, str | Path)]
     folders = [path for path in named if is_folder(path)]
     inside = [path / name for path in folders for name in ("scene.json", "plan.csv")]
     return [path for path in (*named, *inside) if str(path) not in builtin_scenes()]

@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-import argparse
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 from seqopt._cli.asked import asked_engine, asked_scene, in_seconds
+from seqopt._cli.options import Posed
 from seqopt._cli.outputs import require_out
 from seqopt._cli.values import (
     asked_criterion,
     asked_resources,
     asked_standing,
     count_word,
-    parse_criterion,
     parse_numbers,
     parse_robots,
-    parse_rules,
 )
 from seqopt._cli.words.props import parse_props
-from seqopt._cli.words.where import Place, _kept_place, asked_place, between
+from seqopt._cli.words.where import Place, asked_place, between, kept_place
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.graph.formulation import On, find_formulation
 from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt.plan.solving import pose
 from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.problem import (
+    WORST_PEAK,
     Orders,
     Problem,
     RobustAim,
@@ -34,17 +34,14 @@ from seqopt.problem.problem import (
     parse_caps,
     parse_robust,
 )
-from seqopt.problem.requirements import Criterion
 from seqopt.scene._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, Direction, FreeRules
-from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._steps import step_times
-from seqopt.workflow import SEARCH, posed
+from seqopt.workflow import DEFAULTS, SEARCH, _chooses_states, _find_moves, _with_defaults
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
 COUNT = 30
@@ -63,11 +60,13 @@ _WRONG = {
 }
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Asked:
-    """What a command is asked for: the problem, the scenarios, and those that judge the plan."""
+Change: TypeAlias = Callable[[Scene, Place], tuple[Scene, Place, str]]  # and who takes part
 
-    scene: Scene
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PosedProblem:
+    """The problem that a command is asked, the scenarios, and those that judge the plan."""
+
     problem: Problem
     whole: Problem | None = None  # the same from an empty site, if it begins elsewhere
     aim: RobustAim | None = None
@@ -76,80 +75,78 @@ class Asked:
     fewest: tuple[Prop, ...] | None = None  # candidates, where as few props as can be are asked
 
 
-def fewest_asked(options: argparse.Namespace, scene: Scene) -> tuple[Prop, ...] | None:
-    """Return the candidates where as few props as can be are asked; that aim is then taken out."""
-    aims = [word.strip() for word in (options.aim or "").split(",")]
-    among = getattr(options, "props_among", None)
-    if "props" not in aims:
-        if among is not None:
-            raise ProblemError("--props-among: it goes with --aim props,minmax")
-        return None
-    wrong = aims[0] != "props" or options.command != "optimize"
-    if wrong or scene.props or getattr(options, "bases", None) is not None:
-        raise ProblemError(
-            "aim props: it comes first, and goes with optimize, without --bases or props that are "
-            "given (--props none leaves out those of a scene)"
-        )
-    options.aim = ",".join(aims[1:]) or "minmax"
-    return parse_props(among or "all", scene, "--props-among")
-
-
-def asked_problem(options: argparse.Namespace) -> Asked:
+def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
     """Return the problem that the command ``optimize`` or ``pareto`` is asked for.
 
-    Raises `ProblemError` or `StepError` if words do not go together, naming one.
+    ``change``: what has changed where the build begins. Raises `ProblemError` or `StepError` if
+    words do not go together, naming one.
     """
-    of_states = _wants_states(options)
-    _require_known(options, of_states=of_states)
-    sought = options.order == SEARCH
-    options.order = None if sought else options.order
-    criterion = _criterion(options, of_states=of_states)
-    scene = asked_scene(options)
-    if getattr(options, "bases", None) is not None:
-        if options.schedule != FREE or options.order is not None or sought:
+    of_states = _wants_states(asked)
+    _require_known(asked, of_states=of_states)
+    sought = asked.order == SEARCH
+    asked = replace(asked, order=None) if sought else asked
+    criterion = asked_criterion(asked, DEFAULTS[FREE if of_states else "any other"].criterion)
+    scene = asked_scene(asked)
+    if asked.bases is not None:
+        if asked.schedule != FREE or asked.order is not None or sought:
             raise ProblemError(f"--bases: it goes with --schedule {FREE} in the scene's own order")
         from seqopt.arms._bases import without_arms  # noqa: PLC0415  # few ask for bases
 
         scene = without_arms(scene)  # bases are chosen afterwards
-    scene, begin, end = _asked_ends(options, scene)
-    fewest = fewest_asked(options, scene)
+    scene, begin, end, robots = _asked_ends(asked, scene, change)
+    fewest, goals = _fewest_asked(asked, scene)
     scene = scene if fewest is None else scene.with_props(*fewest)
-    if getattr(options, "durations", ()):
-        scene = in_seconds(options, scene)
-    find_postures(scene, getattr(options, "cache", None), options.tell)
-    words: dict[str, Any] = {"limits": parse_limits(options.limit, scene, "--limit")}
-    budgets = getattr(options, "budget", [])
-    (parse_caps if of_states else parse_budgets)(budgets)  # said before anything is built
-    aim = known = unseen = None
-    if options.command == "optimize":
-        words["resources"] = asked_resources(options, None if of_states else options.tell)
-        words["formulation"] = options.formulation
-        if options.robust is not None:
-            aim = _asked_aim(options)
-            known, unseen = _asked_scenarios(options, scene)
-            words |= {"scenarios": known, "over": aim}
-    require_out(options)
-    engine = asked_engine(options, build_network(scene))
-    every = _asked_moves(options, engine.network)
-    moves = between(every, begin, end)
-    words |= {"stands": asked_standing(options), "budgets": budgets}
+    scene = in_seconds(asked, scene) if asked.durations else scene
+    find_postures(scene, asked.cache, asked.tell)
+    words: dict[str, Any] = {"limits": parse_limits(asked.limit, scene, "--limit")}
+    (parse_caps if of_states else parse_budgets)(asked.budget)  # said before anything is built
+    words["resources"] = asked_resources(asked, None if of_states else asked.tell)
+    aim = None if asked.robust is None else _asked_aim(asked.robust)
+    known, unseen = (None, None) if aim is None else _asked_scenarios(asked, scene)
+    words |= {} if aim is None else {"scenarios": known, "over": aim}
+    require_out(asked)
+    engine = asked_engine(asked, build_network(scene))
+    rules = asked.rule if asked.schedule == FREE else None
+    names = parse_robots(robots) or None
+    every = _find_moves(engine.network, asked.schedule, names, asked.candidates, rules, "--rule")
+    if isinstance(every, FreeRules) and asked.direction is not None:
+        every = replace(every, direction=asked.direction)
+    words |= {"stands": asked_standing(asked), "budgets": asked.budget}
     words |= {"orders": Orders.TIED} if sought else {}
-    problem = posed(engine, moves, criterion, options.aim, **words)
-    whole = None
-    if begin.site is not None and not hasattr(options, "change"):
-        start = between(every, Place(), end)
-        whole = posed(engine, start, criterion, options.aim, **words)
-    return Asked(scene, problem, whole, aim, known, unseen, fewest)
+    others = (goals, words["stands"], sought)
+
+    def posed(begin: Place) -> Problem:
+        moves = between(every, begin, end)
+        states = _chooses_states(moves, asked.formulation, others)
+        what = _with_defaults(criterion, goals, aim or WORST_PEAK, states=states)
+        return pose(engine, moves, *what, **words)
+
+    whole = posed(Place()) if begin.site is not None and change is None else None
+    return PosedProblem(posed(begin), whole, aim, known, unseen, fewest)
 
 
-def _aged(options: argparse.Namespace, scene: Scene, begin: Place) -> Place:
+def _fewest_asked(asked: Posed, scene: Scene) -> tuple[tuple[Prop, ...] | None, str | None]:
+    """Return the candidates where as few props as can be are asked, and the aims after that."""
+    aims = [word.strip() for word in (asked.aim or "").split(",")]
+    if "props" not in aims:
+        if asked.props_among is not None:
+            raise ProblemError("--props-among: it goes with --aim props,minmax")
+        return None, asked.aim
+    if aims[0] != "props" or not asked.counts_props or scene.props or asked.bases is not None:
+        raise ProblemError(
+            "aim props: it comes first, and goes with optimize, without --bases or props that are "
+            "given (--props none leaves out those of a scene)"
+        )
+    found = parse_props(asked.props_among or "all", scene, "--props-among")
+    return found, ",".join(aims[1:]) or "minmax"
+
+
+def _aged(asked: Posed, scene: Scene, begin: Place) -> Place:
     """Return where a build begins with the ages of bricks, where mortar cures: as the plan was."""
-    if not getattr(options, "curing", None) or not begin.done or begin.site is None:
+    standing = asked_standing(asked) if asked.curing and begin.done else None
+    if begin.site is None or not begin.done or standing is None or standing.curing is None:
         return begin
-    standing = asked_standing(options)
-    if standing is None or standing.curing is None:
-        return begin
-    scene = in_seconds(options, scene) if getattr(options, "durations", ()) else scene
+    scene = in_seconds(asked, scene) if asked.durations else scene
     waits = CuringBuilds(build_network(scene), standing.mortar, standing.curing).waits
     try:
         times = step_times(scene, begin.done, waits)
@@ -160,101 +157,73 @@ def _aged(options: argparse.Namespace, scene: Scene, begin: Place) -> Place:
     return replace(begin, site=replace(begin.site, ages=ages))
 
 
-def _asked_ends(options: argparse.Namespace, scene: Scene) -> tuple[Scene, Place, Place]:
-    """Return where a build begins and ends, and the scene after what has changed."""
-    scene, begin = asked_place(options, "from", scene)
-    begin = _aged(options, scene, begin)
-    if hasattr(options, "change"):
-        scene, begin, options.robots = options.change(scene, begin)
-    if getattr(options, "keep", None) is not None:
-        return _kept_place(options, scene, begin)
-    later, end = asked_place(options, "to", scene)
-    if later != scene:
-        raise StepError(f"--to {options.to}: its bricks are not those that follow in this order")
-    return scene, begin, end
+def _asked_ends(
+    asked: Posed, scene: Scene, change: Change | None
+) -> tuple[Scene, Place, Place, str]:
+    """Return where a build begins and ends, the scene after what has changed, who takes part."""
+    scene, begin = asked_place(asked.begin, "from", scene)
+    begin, robots = _aged(asked, scene, begin), asked.robots
+    if change is not None:
+        scene, begin, robots = change(scene, begin)
+    if asked.keep is not None:
+        scene, end = kept_place(asked, asked.keep, scene, begin)
+        return scene, begin, end, robots
+    found, end = asked_place(asked.to, "to", scene)
+    if found != scene:
+        raise StepError(f"--to {asked.to}: its bricks are not those that follow in this order")
+    return scene, begin, end, robots
 
 
-def _wants_states(options: argparse.Namespace) -> bool:
+def _wants_states(asked: Posed) -> bool:
     """Return whether states of the build are to be chosen, and not candidates of moves."""
-    if options.schedule == FREE or options.aim or options.stands or options.order == SEARCH:
+    if asked.schedule == FREE or asked.aim or asked.stands or asked.order == SEARCH:
         return True
-    named = getattr(options, "formulation", None)
+    named = asked.formulation
     return named is not None and find_formulation(named).on in (On.STATES, On.ORDERS, On.TIMES)
 
 
-def _criterion(options: argparse.Namespace, *, of_states: bool) -> Criterion | None:
-    """Return the criterion that is asked for; None leaves it to what is posed."""
-    if of_states:
-        asked = options.criteria is not None
-        return parse_criterion(options.criteria, options.crown) if asked else None
-    said = (options.criteria, options.crown, options.ranked, options.among)
-    return None if said == (None,) * 4 else asked_criterion(options)
-
-
-def _asked_moves(options: argparse.Namespace, network: Network) -> Schedule | FreeRules:
-    """Return the open grips or the rules that a command is asked for."""
-    rule = getattr(options, "candidates", None)
-    if options.schedule != FREE:
-        schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
-        return schedule if rule is None else thin(schedule, rule)
-    rules = parse_rules(options.rule, parse_robots(options.robots))
-    rules = replace(rules, direction=getattr(options, "direction", None) or Direction.BUILD)
-    return replace(rules, candidates=rule) if rule else rules
-
-
-def _require_known(options: argparse.Namespace, *, of_states: bool) -> None:
+def _require_known(asked: Posed, *, of_states: bool) -> None:
     """Raise an error if options are given that states, or candidates, do not have."""
-    if options.command == "optimize" and options.robust is None:
-        for name in ALONE:
-            if getattr(options, name):
-                raise ProblemError(
-                    f"--{name}: plans over scenarios alone have it; give --robust worst-peak, "
-                    "worst-total or as cvar=0.9"
-                )
-    free = options.schedule == FREE
-    _require_direction(options, free=free)
+    down, free = Direction.TAKE_DOWN.value, asked.schedule == FREE
+    for name in ALONE:
+        if asked.robust is None and getattr(asked, name):
+            raise ProblemError(
+                f"--{name}: plans over scenarios alone have it; give --robust worst-peak, "
+                "worst-total or as cvar=0.9"
+            )
+    if asked.direction == down and not free:
+        raise ProblemError(f"--direction {down}: it goes with --schedule {FREE}")
+    if asked.keep is not None and asked.direction != down:
+        raise ProblemError(f"--keep {asked.keep}: it goes with --direction {down}")
     for name, why in _WRONG["free" if free else "states" if of_states else "candidates"].items():
-        if getattr(options, name, None):
+        if getattr(asked, name):
             raise ProblemError(f"--{name}: {why}")
 
 
-def _require_direction(options: argparse.Namespace, *, free: bool) -> None:
-    """Raise an error if a take-down is asked for that does not go with the rest."""
-    down, keep = Direction.TAKE_DOWN.value, getattr(options, "keep", None)
-    asked = getattr(options, "direction", None)
-    if asked == down and not free:
-        raise ProblemError(f"--direction {down}: it goes with --schedule {FREE}")
-    if keep is not None and asked != down:
-        raise ProblemError(f"--keep {keep}: it goes with --direction {down}")
-
-
-def _asked_aim(options: argparse.Namespace) -> RobustAim:
+def _asked_aim(text: str) -> RobustAim:
     try:
-        return parse_robust(options.robust)
+        return parse_robust(text)
     except ProblemError as error:
         raise ProblemError(f"--robust: {error}") from error
 
 
-def _asked_scenarios(
-    options: argparse.Namespace, scene: Scene
-) -> tuple[Scenarios, Scenarios | None]:
+def _asked_scenarios(asked: Posed, scene: Scene) -> tuple[Scenarios, Scenarios | None]:
     """Return the scenarios to choose by, and those of the next seed that judge if any are to."""
-    count = count_word(options.scenarios, "--scenarios", MOST, usual=COUNT)
-    seed, other = count_word(options.seed, "--seed", MOST, least=0), None
-    if options.unseen is not None:
-        other = count_word(options.unseen, "--unseen", MOST)
-    known = _drawn(scene, options, count, seed)
-    return known, None if other is None else _drawn(scene, options, other, seed + 1)
+    count = count_word(asked.scenarios, "--scenarios", MOST, usual=COUNT)
+    seed, known = count_word(asked.seed, "--seed", MOST, least=0), asked.unseen
+    other = None if known is None else count_word(known, "--unseen", MOST)
+    drawn = _drawn(scene, asked.vary, count, seed)
+    return drawn, None if other is None else _drawn(scene, asked.vary, other, seed + 1)
 
 
-def _drawn(scene: Scene, options: argparse.Namespace, count: int, seed: int) -> Scenarios:
-    asked = parse_numbers("--vary", options.vary, SPREADS, zero=True, advice=", as stiffness=3")
-    factor = asked.pop("stiffness", 3.0)
-    grips = asked.pop("grips", 1.0)
+def _drawn(scene: Scene, vary: Sequence[str], count: int, seed: int) -> Scenarios:
+    """Return samples of a scene."""
+    spread = parse_numbers("--vary", vary, SPREADS, zero=True, advice=", as stiffness=3")
+    factor, grips = spread.pop("stiffness", 3.0), spread.pop("grips", 1.0)
     for name, each in (("stiffness", factor), ("grips", grips)):
         if each < 1:
             raise ProblemError(f"--vary {name}={each:g}: give a factor from 1")
     if grips > 1 and scene.grip_kinds.rigid:
         raise ProblemError(f"--vary grips={grips:g}: they are rigid; say how stiff with --grips")
-    drawn = scenarios(scene, stiffness=(1 / factor, factor), count=count, seed=seed, **asked)
+    drawn = scenarios(scene, stiffness=(1 / factor, factor), count=count, seed=seed, **spread)
     return drawn if grips == 1 else drawn.with_grips((1 / grips, grips))

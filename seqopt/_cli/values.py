@@ -2,37 +2,31 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from math import radians
 from typing import Any
 
-from seqopt.contact.curing import Curing, _find_curing
-from seqopt.contact.mortar import MORTARS, Mortar, _mortar_name, find_mortar
-from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError, did_you_mean
+from seqopt._cli.options import Cost, Posed, Stands
+from seqopt.contact.curing import _find_curing
+from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
+from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
 from seqopt.graph.formulation import Formulation, as_formulation
-from seqopt.problem._limit_words import LARGEST, NAMES, number_word, split_word
+from seqopt.problem._limit_words import LARGEST, number_word, split_word
 from seqopt.problem.criteria import Among, Ranked, RankSum
 from seqopt.problem.requirements import NEVER, Criterion
 from seqopt.problem.standing import Standing
-from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.resources import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FreeRules
-from seqopt.study.published import CRITERIA
+from seqopt.study.published import CRITERIA, find_criterion
 from seqopt.work.progress import Tell
-from seqopt.workflow import DEFAULTS
 
-BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 MOST_WORKERS = 1024
-COUNTS = ("least_grips", "regrips")
-UNBOUND = {("regrips", "any"): None, ("placers", "any"): (), ("candidates", "all"): ""}
-RULES = ("newest", "payload", "ending", "placers", "candidates", *COUNTS)
+NAMED = (None, *CRITERIA)
 
 
 def speed_seconds(text: str | None) -> float:
@@ -55,30 +49,6 @@ def count_word(text: str | None, where: str, most: int, least: int = 1, usual: i
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
         raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
     return int(text)
-
-
-def _known_word(
-    name: str,
-    known: Iterable[str],
-    where: str,
-    error: type[SeqoptError] = ProblemError,
-    advice: str = "",
-) -> str:
-    """Return a name if it is known; else raise an error that says which are."""
-    if name not in known:
-        names = ", ".join(known)
-        hint = did_you_mean(name, known)
-        raise error(f"{where} does not exist{hint}; give one of {names}{advice}")
-    return name
-
-
-def _response_word(name: str) -> str:
-    if name not in (*NAMES, "F_each") and not name.startswith("F_"):
-        names = (*CRITERIA, *CHOICE_RESPONSES, "F_each")
-        hint = did_you_mean(name, names)
-        known = ", ".join(names)
-        raise ProblemError(f"--criteria {name} does not exist{hint}; give {known}, F_ROBOT")
-    return name
 
 
 def parse_robots(text: str) -> tuple[str, ...]:
@@ -145,7 +115,7 @@ def parse_grips(text: str, scene: Scene) -> Scene:
 def parse_numbers(
     where: str,
     texts: Sequence[str],
-    known: Iterable[str] | None = None,
+    known: Collection[str] | None = None,
     *,
     zero: bool = False,
     advice: str = "",
@@ -154,8 +124,9 @@ def parse_numbers(
     out: dict[str, float] = {}
     for text in texts:
         name, value = split_word(text)
-        if known is not None:
-            _known_word(name, known, f"{where} {text}", advice=advice)
+        if known is not None and name not in known:
+            hint, names = did_you_mean(name, known), ", ".join(known)
+            raise ProblemError(f"{where} {text} does not exist{hint}; give one of {names}{advice}")
         out[name] = number_word(value, f"{where} {text}", zero=zero)
     return out
 
@@ -187,22 +158,6 @@ def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[
     return out
 
 
-def asked_mortars(options: argparse.Namespace) -> dict[str, Mortar]:
-    """Return the mortar that is named, or dry joints and the epoxy, by what they are called.
-
-    The last is what the build counts on. Numbers that are given take the place of its own, and
-    friction in dry joints as well.
-    """
-    given = {
-        name: number_word(text, f"--{name.replace('_', '-')}", zero=True)
-        for name in ("friction", "tensile_strength", "cohesion")
-        if (text := getattr(options, name)) is not None
-    }
-    own = replace(mortar_word(options.mortar or "epoxy", "--mortar"), **given)
-    dry = () if options.mortar else (Mortar(friction=own.friction),)
-    return {_mortar_name(mortar): mortar for mortar in (*dry, own)}
-
-
 def mortar_word(text: str | Mortar, where: str) -> Mortar:
     """Return a mortar by its words; ``where`` is the argument, for messages."""
     if isinstance(text, Mortar):  # of Python
@@ -215,85 +170,57 @@ def mortar_word(text: str | Mortar, where: str) -> Mortar:
         raise ProblemError(f"{where} {text}{hint}: {known}") from error
 
 
-def asked_standing(options: argparse.Namespace) -> Standing | None:
+def asked_standing(asked: Stands) -> Standing | None:
     """Return what is demanded of the stability of states, if anything is."""
-    curing = getattr(options, "curing", [])
-    names = [name for name in ("tilt", "friction") if getattr(options, name, None) is not None]
-    names += ["curing"] * bool(curing)
-    if options.stands is None:
+    if isinstance(asked.stands, Standing):  # of Python
+        return asked.stands
+    said = {"tilt": asked.tilt, "friction": asked.friction}
+    given = {
+        name: number_word(text, f"--{name}", zero=True)
+        for name, text in said.items()
+        if text is not None and asked.stands is not None
+    }
+    if asked.stands is None:
+        names = [name for name in (*said, "curing") if getattr(asked, name)]
         if names:
             raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands dry, say")
         return None
-    mortar = mortar_word(options.stands, "--stands")
-    numbers = [name for name in names if name != "curing"]
-    given = {name: number_word(getattr(options, name), f"--{name}", zero=True) for name in numbers}
+    mortar = mortar_word(asked.stands, "--stands")
+    try:
+        cures = _find_curing(" ".join(asked.curing)) if asked.curing else None
+    except SceneError as error:
+        raise ProblemError(f"--{error}") from error
     tilt = radians(given.pop("tilt", 0.0))
-    cures = _curing_words(curing) if curing else None
     return Standing(replace(mortar, **given), tilt, cures)
 
 
-def _curing_words(words: Sequence[str]) -> Curing:
-    try:
-        return _find_curing(" ".join(words))
-    except SceneError as error:
-        raise ProblemError(f"--{error}") from error
+def asked_criterion(asked: Cost | Posed, usual: Criterion) -> Criterion | None:
+    """Return the criterion that a command is asked for, with what it ranks among; None of nothing.
 
-
-def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
-    """Return the rules of a free schedule, each from ``NAME=VALUE``, for these robots or all."""
-    given: dict[str, object] = {"robots": robots}
-    for text in texts:
-        name, _, value = text.partition("=")
-        _known_word(name, RULES, f"--rule {text}", StepError)
-        if (name, value) in UNBOUND:
-            given[name] = UNBOUND[name, value]
-        elif name == "placers":
-            given[name] = parse_robots(value)
-        else:
-            given[name] = int(value) if name in COUNTS and value.isdecimal() else value
-    return FreeRules(**given)  # type: ignore[arg-type]
-
-
-def asked_criterion(options: argparse.Namespace) -> Criterion:
-    """Return the criterion that a command is asked for, with what it ranks among."""
-    usual = DEFAULTS["any other"].criterion.name
-    criterion = parse_criterion(options.criteria or usual, options.crown)
-    kinds: dict[str, Any] = {"ranked": Ranked, "among": Among}
-    for name, kind in kinds.items():
-        if (text := getattr(options, name)) is not None:
-            if not isinstance(criterion, RankSum):
-                raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
-            criterion = replace(criterion, **{name: kind(text)})
+    ``usual``: of what ranks are said if no criterion is named.
+    """
+    said = {"crown": asked.crown, "ranked": asked.ranked, "among": asked.among}
+    given = {name: text for name, text in said.items() if text is not None}
+    if asked.criteria is None and not given:
+        return None
+    criterion = usual if asked.criteria is None else find_criterion(asked.criteria, "--criteria")
+    for name, text in given.items():
+        if not isinstance(criterion, RankSum) or (name == "crown" and asked.criteria not in NAMED):
+            raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
+        kinds: dict[str, Any] = {"crown": _crown, "ranked": Ranked, "among": Among}
+        criterion = replace(criterion, **{name: kinds[name](text)})
     return criterion
 
 
-def parse_criterion(text: str | Criterion, crown: str | None = None) -> Criterion:
-    """Return a criterion by name, or a rank sum of responses, as ``T_max,M_sup=2``.
-
-    A weight is 1 by default; ``crown`` has the bricks placed at the crown, or ``none``.
-    """
-    if not isinstance(text, str):  # of Python
-        return text
-    if crown is not None:
-        named = CRITERIA.get(text)
-        if not isinstance(named, RankSum):
-            raise ProblemError(f"--crown {crown}: {text} has none; leave it out")
-        return replace(named, crown=NEVER if crown == "none" else number_word(crown, "--crown"))
-    if text in CRITERIA:
-        return CRITERIA[text]
-    terms = []
-    for part in BETWEEN.split(text):
-        name, weight = split_word(part)
-        response = _response_word(name)
-        terms.append((response, number_word(weight or "1", f"--criteria {part}")))
-    return RankSum(text, tuple(terms), tuple(terms))
+def _crown(text: str) -> float:
+    return NEVER if text == "none" else number_word(text, "--crown")
 
 
-def asked_resources(options: argparse.Namespace, progress: Tell | None = None) -> Resources:
+def asked_resources(asked: Posed, progress: Tell | None = None) -> Resources:
     """Return what a computation may use."""
-    workers = count_word(options.workers, "--workers", MOST_WORKERS)
-    most = None if options.max_memory is None else parse_size(options.max_memory)
-    return Resources(workers, None, options.cache, most, progress)
+    workers = count_word(asked.workers, "--workers", MOST_WORKERS)
+    most = None if asked.max_memory is None else parse_size(asked.max_memory)
+    return Resources(workers, None, asked.cache, most, progress)
 
 
 def parse_size(text: str) -> float:

@@ -266,7 +266,7 @@ class _Search(Tried):
         return float(np.minimum(found.until[:, 1:], len(scene.bricks) + 1).mean())
 
     def _outcome(self, scene: Scene) -> tuple[str, tuple[float, ...]]:
-        """Return what is known of a set, in words, and what its plans do not stay below."""
+        """Return the outcome of a set of bases in words, and lower bounds of its plans."""
         apart = _with_arms(scene, lambda arm: replace(arm, keeps_apart=False, joint_stiffness=()))
         soft = scene.grip_kinds.arms.any()
         try:

@@ -36,7 +36,10 @@ class PostureRules:
         self._options: dict[tuple[int, int, int], int] = {}
         column = {name: i for i, name in enumerate(self._table.bricks)}
         self._placed = [column[name] for name in scene.build_order]
-        self._apart = [_bits(~np.array(row)) for row in self._table.collide]
+        self._apart = [
+            int.from_bytes(np.packbits(~np.array(row), bitorder="little").tobytes(), "little")
+            for row in self._table.collide
+        ]
 
     def allow(self, bricks: int, states: Ints) -> Bools:
         """Return which states have postures that go together while so many bricks stand, (n,).
@@ -76,11 +79,6 @@ class PostureRules:
                 return True
             first &= first - 1
         return False
-
-
-def _bits(row: Bools) -> int:
-    """Return a row of flags as a number, the first one its lowest bit."""
-    return int.from_bytes(np.packbits(row, bitorder="little").tobytes(), "little")
 
 
 def check_postures(scene: Scene, steps: Sequence[Step]) -> None:

@@ -84,12 +84,15 @@ class ArmModel:
         self.model, geometry = _read(pin, path, arm)
         self.data = self.model.createData()
         self.flange = self.model.getFrameId(flange_of(self.model, arm))
-        self.base = pin.SE3(_axes(arm), np.array(arm.position))
+        x, y = np.array(arm.x_axis), np.array(arm.y_axis)
+        self.base = pin.SE3(np.column_stack([x, y, np.cross(x, y)]), np.array(arm.position))
         bodies = [*_bodies(self.model, geometry)]
         self.fixed = [body for body in bodies if body.joint == 0]
         self.moving = [body for body in bodies if body.joint > 0]
         lower, upper = self.model.lowerPositionLimit, self.model.upperPositionLimit
-        turns = np.array([joint.shortname().startswith("JointModelR") for joint in _joints(self)])
+        turns = np.array(
+            [joint.shortname().startswith("JointModelR") for joint in [*self.model.joints][1:]]
+        )
         self.turns: Bools = turns
         self.above = sum(body.joint == 1 for body in self.moving)  # what turns about the base
         self.low: Floats = np.where(turns, np.maximum(lower, -np.pi), lower)
@@ -249,16 +252,6 @@ def flange_of(model: Any, arm: Arm) -> str:
     return name
 
 
-def _axes(arm: Arm) -> Floats:
-    """Return the directions of the base as columns."""
-    x, y = np.array(arm.x_axis), np.array(arm.y_axis)
-    return np.column_stack([x, y, np.cross(x, y)])
-
-
-def _joints(model: ArmModel) -> list[Any]:
-    return [*model.model.joints][1:]
-
-
 def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
     """Return the model of a URDF, joints locked that do not move the flange, and its bodies."""
     folders = [str(folder) for folder in [*path.resolve().parents][:UP]]
@@ -352,7 +345,9 @@ class PosedArm:
         pin.forwardKinematics(model.model, data, self._own)
         joints = [model.base.act(data.oMi[j].translation) for j in range(1, model.model.njoints)]
         points = [root, *joints, flange, flange + self.arm.tool_length * axes[:, 2]]
-        apart = (p for i, p in enumerate(points) if not i or not _close(p, points[i - 1]))
+        apart = (
+            p for i, p in enumerate(points) if not i or np.linalg.norm(p - points[i - 1]) > _SAME
+        )
         found = np.array([*apart])
         return found if self.holds else found[[0, 1, 1]]
 
@@ -371,25 +366,16 @@ class PosedArm:
         if not self.holds:
             return tuple(out)
         placed = model.placed(self._own[None], np.array([self.arm.tool_length]))
-        local = [*(body.points for body in model.moving), _tool(self.arm)]
+        angles = np.linspace(0.0, 2 * np.pi, _AROUND, endpoint=False)
+        ring = self.arm.tool_radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+        end = np.array([0.0, 0.0, 0.5 * self.arm.tool_length])
+        local = [*(body.points for body in model.moving), np.concatenate([ring - end, ring + end])]
         moved = zip(local, placed.rotation[0], placed.shift[0], strict=True)
         return (*out, *(points @ turn.T + shift for points, turn, shift in moved))
 
     @property
     def _own(self) -> Floats:
         return np.asarray(self.joints)[: _model(self.arm).joints]
-
-
-def _close(one: Floats, two: Floats) -> bool:
-    return bool(np.linalg.norm(one - two) <= _SAME)
-
-
-def _tool(arm: Arm) -> Floats:
-    """Return points of a tool around its middle, (m, 3), m."""
-    angles = np.linspace(0.0, 2 * np.pi, _AROUND, endpoint=False)
-    ring = arm.tool_radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
-    end = np.array([0.0, 0.0, 0.5 * arm.tool_length])
-    return np.concatenate([ring - end, ring + end])
 
 
 def idle_arm(arm: Arm) -> PosedArm:

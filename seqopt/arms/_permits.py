@@ -7,6 +7,7 @@ one, whose stiffness is that of its grip.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
@@ -172,3 +173,50 @@ def find_table(scene: Scene) -> PostureTable:
     if found is None:
         raise SceneError(f"scene {scene.name}: no robot has an arm; give one in its scene file")
     return found
+
+
+def reach_without_arms(scene: Scene) -> pd.DataFrame:
+    """Return which nodes lie within the reach of each robot, a row for each."""
+    rows = (
+        {"robot": robot.name, "brick": brick.name, "node": node, "reached": node in reached}
+        for robot in scene.robots
+        for brick, reached in zip(scene.placed, scene.within_reach(robot), strict=True)
+        for node in brick.nodes
+        if node not in scene.blocked_nodes
+    )
+    return pd.DataFrame(rows)
+
+
+def reach_covered(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
+    """Yield how much lies within the reach of each robot, none of which has an arm."""
+    yield f"no robot of {scene.name} has an arm: this is the reach that the scene gives them"
+    for robot, (_, rows) in zip(scene.robots, table.groupby("robot", sort=False), strict=True):
+        yield f"{robot.name}: reach {robot.reach}, {rows['reached'].sum()} of {len(rows)} nodes"
+        lacking = [str(node) for node in rows["node"][~rows["reached"]]]
+        if lacking:
+            yield f"  never: {_listed(lacking)}"
+
+
+def reach_described(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
+    """Yield what each robot reaches, in words."""
+    free = [node for node in table["node"].unique() if node not in scene.blocked_nodes]
+    last = len(scene.bricks)
+    for name, rows in table[table["node"].isin(free)].groupby("robot", sort=False):
+        able = rows[rows["to_bricks"] > 0]
+        to_end = able[able["to_bricks"] == last]
+        yield (
+            f"{name}: reaches {len(able)} of {len(free)} nodes when their bricks are placed, "
+            f"{len(to_end)} of them up to the last brick; "
+            f"{able['postures'].median() if len(able) else 0:g} postures at a node, by the median"
+        )
+        for why, lacking in rows[rows["to_bricks"] == 0].groupby("why", sort=False):
+            yield f"  never: {_listed([*map(str, lacking['node'])])} ({why})"
+        early = able[able["to_bricks"] < last]
+        if len(early):
+            pairs = zip(early["node"], early["to_bricks"], strict=True)
+            yield f"  up to fewer bricks: {_listed([f'{n} ({to})' for n, to in pairs])}"
+
+
+def _listed(names: list[str], most: int = 30) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

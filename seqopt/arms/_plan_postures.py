@@ -1,4 +1,4 @@
-"""Which postures the arms of robots take in the steps of a plan, whoever made it.
+"""Which postures the arms of robots take in the steps of any plan.
 
 A robot keeps its posture from the step in which it takes a node to the last in which it holds it.
 In every step no arm may hit a brick that stands, and no two arms each other. All postures of the

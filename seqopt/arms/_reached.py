@@ -82,7 +82,8 @@ def targets(model: ArmModel, brick: Brick, node: int) -> Iterator[Target]:
     """
     at, frame = np.array(brick.node_position(node)), brick.frame
     away = at - np.array(brick.position)
-    for face in _signed(model.arm.faces):
+    both = (f"{sign}{face}" if face in _AXES else face for face in model.arm.faces for sign in "+-")
+    for face in dict.fromkeys(both):
         axis, sign = _AXES[face[1:]], 1.0 if face[0] == "+" else -1.0
         outward = sign * frame[axis]
         depth = 0.5 * brick.dimensions[axis] - float(away @ outward)
@@ -93,11 +94,6 @@ def targets(model: ArmModel, brick: Brick, node: int) -> Iterator[Target]:
             x = turn * frame[0 if axis else 1]
             axes = np.column_stack([x, np.cross(-outward, x), -outward])
             yield Target(face, axes, at + model.arm.tool_length * outward, tool)
-
-
-def _signed(faces: tuple[str, ...]) -> tuple[str, ...]:
-    both = (f"{sign}{face}" if face in _AXES else face for face in faces for sign in "+-")
-    return tuple(dict.fromkeys(both))
 
 
 def solve(model: ArmModel, target: Target, draws: np.random.Generator) -> list[Floats]:
@@ -199,7 +195,7 @@ class Site:
         return cls(bricks, robots, tuple(sorted(scene.blocked_nodes)), scene.up)
 
     def alone(self, robot: int) -> Site:
-        """Return the same with one of the robots, whatever its name and the others."""
+        """Return the site of one of the robots alone, equal for robots that differ in name only."""
         own = self.robots[robot]
         arm = own.arm and replace(own.arm, keeps_apart=True)
         return replace(self, robots=(replace(own, name="alone", arm=arm),))
@@ -325,14 +321,20 @@ def _blame_itself(
     model: ArmModel, faults: list[_Fault | None], placed: Placed, ground: tuple[Floats, float]
 ) -> None:
     """Find postures in which an arm touches itself or the ground, by what is up and how high."""
-    pairs, names = apart_pairs(model), model.names
+    pairs, names, (up, height) = apart_pairs(model), model.names, ground
     both = [names[j].replace(SAYS, f"touches {names[i].split(f' {SAYS}')[0]}") for i, j in pairs]
     above = names[len(model.fixed) + model.above :]
     low = [name.replace(SAYS, "touches the ground") for name in above]
     for each in (placed, *placed.ways):
         _blame(faults, touching(model, each, pairs), both, 1)
-        under = _lowest(model, each, ground[0])[:, model.above :] <= ground[1]
-        _blame(faults, under, low, 2)
+        lowest = each.shift @ up  # point of each moving body, (P, L)
+        for k, body in enumerate(model.moving):
+            turned = each.rotation[:, k].transpose(0, 2, 1) @ up
+            lowest[:, k] += (turned @ body.points.T).min(axis=1)
+        lean = each.rotation[:, -1, :, 2] @ up
+        lowest[:, -1] -= 0.5 * each.tools * np.abs(lean)
+        lowest[:, -1] -= model.arm.tool_radius * np.sqrt(np.clip(1.0 - lean**2, 0.0, None))
+        _blame(faults, lowest[:, model.above :] <= height, low, 2)
 
 
 def _with_ways(
@@ -409,17 +411,6 @@ def _unsolved(model: ArmModel, aims: Sequence[Target]) -> str:
     if min(_distance(model, aim) for aim in aims) > model.reach:
         return f"too far: its flange gets about {model.reach:.2g} m from its base"
     return "no posture was found within joint limits with the tool square to a face of the brick"
-
-
-def _lowest(model: ArmModel, placed: Placed, up: Floats) -> Floats:
-    """Return how high the lowest point of each moving body is, (P, L), m."""
-    out = placed.shift @ up
-    for k, body in enumerate(model.moving):
-        out[:, k] += (placed.rotation[:, k].transpose(0, 2, 1) @ up @ body.points.T).min(axis=1)
-    lean = placed.rotation[:, -1, :, 2] @ up
-    out[:, -1] -= 0.5 * placed.tools * np.abs(lean)
-    out[:, -1] -= model.arm.tool_radius * np.sqrt(np.clip(1.0 - lean**2, 0.0, None))
-    return np.asarray(out)
 
 
 def _corners(brick: Brick) -> Floats:

@@ -130,7 +130,10 @@ def _stored_table(folder: Path, site: Site, compute: Callable[[], PostureTable])
     if path.exists() and (found := _read(path, site)) is not None:
         return found
     table = compute()
-    write_bytes(path, _content(table))
+    out = io.BytesIO()
+    arrays = {each.name: np.asarray(getattr(table, each.name)) for each in fields(table)}
+    np.savez_compressed(out, **arrays)  # type: ignore[arg-type]
+    write_bytes(path, out.getvalue())
     return table
 
 
@@ -162,14 +165,6 @@ def _model(path: Path) -> Iterator[bytes]:
             if mesh.is_file():
                 yield read_bytes(mesh)
                 break
-
-
-def _content(table: PostureTable) -> bytes:
-    """Return a table as the bytes of a NumPy archive."""
-    out = io.BytesIO()
-    arrays = {each.name: np.asarray(getattr(table, each.name)) for each in fields(table)}
-    np.savez_compressed(out, **arrays)  # type: ignore[arg-type]
-    return out.getvalue()
 
 
 def _read(path: Path, site: Site) -> PostureTable | None:

@@ -78,9 +78,14 @@ def read_urdf(path: Path) -> Urdf:
         name = str(link.get("name"))
         if link.find("collision/geometry") is not None:
             continue
-        if _take_visual(link):
+        mass = link.find("inertial/mass")
+        shown = [each for each in link.findall("visual") if each.find("geometry") is not None]
+        for each in shown:
+            shape = ElementTree.SubElement(link, "collision")
+            shape.extend(deepcopy(part) for part in each if part.tag in ("origin", "geometry"))
+        if shown:
             visual.append(name)
-        elif name in bodies or _has_mass(link):
+        elif name in bodies or (mass is not None and _number(str(mass.get("value"))) > 0):
             bare.append(name)
     return Urdf(ElementTree.tostring(robot, encoding="unicode"), tuple(visual), tuple(bare))
 
@@ -88,7 +93,7 @@ def read_urdf(path: Path) -> Urdf:
 def shape_notes(scene: Scene) -> tuple[str, ...]:
     """Return which links of arms have no shapes for collisions, a line for each arm with some.
 
-    Nothing is said of a model that cannot be read: who needs it does.
+    A model that cannot be read has no note: reading it for postures raises the error.
     """
     found = []
     for robot in scene.robots:
@@ -96,15 +101,6 @@ def shape_notes(scene: Scene) -> tuple[str, ...]:
             with suppress(SceneError, FileError):
                 found.append((robot.name, str(read_urdf(model_path(robot.arm)))))
     return tuple(f"robot {name}: its arm has {said}" for name, said in found if said)
-
-
-def _take_visual(link: _Link) -> bool:
-    """Give a link its visual shapes for collisions, in place; return whether there are any."""
-    shown = [each for each in link.findall("visual") if each.find("geometry") is not None]
-    for each in shown:
-        shape = ElementTree.SubElement(link, "collision")
-        shape.extend(deepcopy(part) for part in each if part.tag in ("origin", "geometry"))
-    return bool(shown)
 
 
 def _followed(robot: _Link) -> list[str]:
@@ -119,11 +115,6 @@ def _followed(robot: _Link) -> list[str]:
         if name in moved and any(_number(part) for part in shift.split()):
             out.append(name)
     return out
-
-
-def _has_mass(link: _Link) -> bool:
-    mass = link.find("inertial/mass")
-    return mass is not None and _number(str(mass.get("value"))) > 0
 
 
 def _number(text: str) -> float:

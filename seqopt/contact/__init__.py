@@ -10,7 +10,7 @@ A partial structure and its grips become rigid blocks with faces between them:
 >>> assembly.contact_name, assembly.area.round(4).tolist()
 (('ground-1', '1-2'), [0.0061, 0.0061])
 
-Joints stay elastic as long as the stress on their faces stays below the strength of the mortar:
+Joints stay elastic as long as the stress on their faces is less than the strength of the mortar:
 
 >>> import numpy as np
 >>> wrench = np.zeros((1, 26, 6))

@@ -1,4 +1,4 @@
-"""Elastic limits: whether the stress in joints stays below the strength of their mortar.
+"""Elastic limits: whether the stress in joints is less than the strength of their mortar.
 
 The wrench of a joint is distributed linearly over its face, force over area and moment over second
 moment, and checked at the corners, where the stress is largest.

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from seqopt.arrays import Floats, frozen
-from seqopt.contact._prop_grips import PropGrips, added, prop_grips
+from seqopt.contact._prop_grips import added, prop_grips
 from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
@@ -69,24 +69,11 @@ _KEY = "_contacts"
 _SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
 
-class Contacts(dict[int, tuple[str, Floats, Floats]]):
-    """Names, normals (3,) and corners (m, 3) of contacts by springs, found when first asked for.
-
-    They stay with the network: all that are made for it share them.
-    """
-
-    def __init__(self, network: Network) -> None:
-        self._network = network
-        self._kept: dict[int, tuple[str, Floats, Floats]] = vars(network).setdefault(_KEY, {})
-
-    def __missing__(self, spring: int) -> tuple[str, Floats, Floats]:
-        if spring not in self._kept:
-            self._kept[spring] = self._found(spring)
-        self[spring] = self._kept[spring]
-        return self[spring]
-
-    def _found(self, spring: int) -> tuple[str, Floats, Floats]:
-        springs, placed = self._network.springs, self._network.scene.placed
+def contact_at(network: Network, spring: int) -> tuple[str, Floats, Floats]:
+    """Return name, normal (3,) and corners (m, 3) of a spring's contact; the network keeps it."""
+    kept: dict[int, tuple[str, Floats, Floats]] = vars(network).setdefault(_KEY, {})
+    if spring not in kept:
+        springs, placed = network.springs, network.scene.placed
         first, second = springs.bodies[spring]
         name = f"{'ground' if first == GROUND else placed[first].name}-{placed[second].name}"
         axes, corners = springs.axes[spring], springs.face[spring]
@@ -94,12 +81,11 @@ class Contacts(dict[int, tuple[str, Floats, Floats]]):
             between = [placed[b] for b in (first, second) if b != GROUND]
             where, thickness = springs.position[spring], float(springs.thickness[spring])
             axes, corners = _contact(name, between, axes, where, thickness)
-        return frozen((name, axes[0], corners))
+        kept[spring] = frozen((name, axes[0], corners))
+    return kept[spring]
 
 
-def step_assembly(
-    network: Network, bricks: int, grips: Sequence[int | None], known: Contacts | None = None
-) -> Assembly:
+def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) -> Assembly:
     """Return a partial structure with the grips that hold it: blocks and their contacts.
 
     A joint is a contact over the face that it says. If it says none, its bricks are boxes, and the
@@ -112,8 +98,6 @@ def step_assembly(
     bricks : int
     grips : sequence of (int or None)
         Node that each of the scene's robots holds.
-    known : Contacts, optional
-        Those found for other steps; what is missing joins them.
 
     Returns
     -------
@@ -126,17 +110,9 @@ def step_assembly(
     """
     pairs = zip(grips, network.scene.robots, strict=True)
     held = [(node, robot.payload) for node, robot in pairs if node is not None]
-    bare = bare_assembly(network, bricks, known)
+    bare = bare_assembly(network, bricks)
     props = prop_grips(network, bricks, held=bool(held))
-    return _with_grips(bare, network, held, props)
-
-
-def _with_grips(
-    bare: Assembly, network: Network, held: Sequence[tuple[int, float]], props: PropGrips
-) -> Assembly:
-    """Return an assembly with grips of robots, nodes and payloads, N, and of props."""
-    placed = network.scene.placed
-    block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}
+    block = {node: i for i, brick in enumerate(network.scene.placed) for node in brick.nodes}
     nodes = [*(node for node, _ in held), *props.nodes]
     return replace(
         bare,
@@ -154,15 +130,13 @@ def _applied_rows(network: Network, bricks: int) -> Floats:
     return applied if applied.any() else np.zeros((0, 6))
 
 
-def bare_assembly(network: Network, bricks: int, known: Contacts | None = None) -> Assembly:
+def bare_assembly(network: Network, bricks: int) -> Assembly:
     """Return a partial structure that nobody holds.
 
     Parameters
     ----------
     network : Network
     bricks : int
-    known : Contacts, optional
-        As of `step_assembly`.
 
     Returns
     -------
@@ -174,7 +148,7 @@ def bare_assembly(network: Network, bricks: int, known: Contacts | None = None) 
         If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
     """
     placed, acting = network.scene.placed, network.springs.acting(bricks)
-    contacts = [*map((Contacts(network) if known is None else known).__getitem__, acting.tolist())]
+    contacts = [contact_at(network, spring) for spring in acting.tolist()]
     return Assembly(
         block_name=tuple(brick.name for brick in placed[:bricks]),
         # of the boxes, as their faces: means of inner nodes differ from them by rounding
@@ -204,7 +178,9 @@ def _contact(
     sign = np.sign(axes[0] @ (np.array(between[-1].position) - below)) or 1.0
     axes = axes * np.array([[sign], [1.0], [sign]])
     common = _overlap(axes, point, between, name)
-    middle = point + _centroid(common) @ axes[1:]
+    (x, y), (u, v) = common.T, np.roll(common, -1, axis=0).T
+    turn = x * v - u * y  # a corner that occurs twice does not count twice
+    middle = point + np.array([(x + u) @ turn, (y + v) @ turn]) / (3.0 * turn.sum()) @ axes[1:]
     before = -_face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
     ends = (before, _face_distance(between[-1], axes[0], middle))
     _require_touching(name, between, ends, _distance_beside(common), thickness)
@@ -251,13 +227,6 @@ def _clip(polygon: Floats, other: Floats) -> Floats:
                 kept.append(polygon[i])
         polygon = np.array(kept).reshape(-1, 2)
     return polygon
-
-
-def _centroid(polygon: Floats) -> Floats:
-    """Return the centroid (2,) of a polygon; a corner that occurs twice does not count twice."""
-    (x, y), (u, v) = polygon.T, np.roll(polygon, -1, axis=0).T
-    turn = x * v - u * y
-    return np.asarray([(x + u) @ turn, (y + v) @ turn] / (3.0 * turn.sum()))
 
 
 def _polygon_area(polygon: Floats) -> float:

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from seqopt.arrays import Bools, Floats
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._hands import read_hands
+from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines._kinds import ChoosingEngine, Level, LevelChoice, OpeningEngine
 from seqopt.engines._planar import _leaves_plane, find_plane, off_plane
 from seqopt.engines.interface import (
@@ -57,8 +57,8 @@ def find_level(network: Network) -> LevelChoice:
     nodes = np.array([network.node_name[i] for i in network.inner.ravel()], dtype=np.int64)
     for holder in [*{kind: i for i, kind in enumerate(kinds.of_robot)}.values()]:
         grips = kinds.numbers(nodes, [holder] * len(nodes))[:, None]
-        hands = None if kinds.arms.any() else read_hands(network, columns, grips, None)
-        if hands is None or _leaves_plane(plane, hands, columns).any():
+        compliance = None if kinds.arms.any() else read_compliance(network, columns, grips, None)
+        if compliance is None or _leaves_plane(plane, compliance, columns).any():
             return _GIVING
     return _IN_PLANE
 
@@ -110,8 +110,10 @@ class _RigidBricks(NamedEngine):
             return np.full(len(np.asarray(grips)), self._flat[0])
         columns = grip_columns(self.network, bricks, grips)
         flat = np.asarray(self._flat[columns].all(axis=1))
-        hands = read_hands(self.network, columns, grips, moved)
-        return flat if hands is None else flat & ~_leaves_plane(self._mirror, hands, columns)
+        compliance = read_compliance(self.network, columns, grips, moved)
+        return (
+            flat if compliance is None else flat & ~_leaves_plane(self._mirror, compliance, columns)
+        )
 
 
 def _of(moved: ArrayLike | None, which: Bools) -> Floats | None:

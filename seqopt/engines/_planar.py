@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.engines._hands import Hands
+from seqopt.engines._grip_compliance import GripCompliance
 from seqopt.engines._kinds import FlatEngine
 from seqopt.engines.interface import Basis
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -76,20 +76,20 @@ def off_plane(network: Network, plane: _Plane) -> Floats:
     return away
 
 
-def _leaves_plane(plane: _Plane, hands: Hands, columns: Ints) -> Bools:
-    """Return the hands of which grip sets (S,) are moved, or give way, out of a plane."""
+def _leaves_plane(plane: _Plane, compliance: GripCompliance, columns: Ints) -> Bools:
+    """Return the grips of which sets (S,) are moved, or compliant, out of a plane."""
     out = np.zeros(len(columns), dtype=bool)
-    if hands.moved is not None:
-        away = np.abs(hands.moved @ plane.normal).max(axis=1, initial=0.0)
-        size = np.linalg.norm(hands.moved, axis=2).max(axis=1, initial=0.0)
+    if compliance.moved is not None:
+        away = np.abs(compliance.moved @ plane.normal).max(axis=1, initial=0.0)
+        size = np.linalg.norm(compliance.moved, axis=2).max(axis=1, initial=0.0)
         out |= away > _FLAT * size
-    if hands.give is not None:
-        give = hands.each_give(*columns.shape)
+    if compliance.matrix is not None:
+        flexibility = compliance.matrices(*columns.shape)
         across = Basis(plane.normal[None], plane.axes)
-        turned = hands.turns is not None
+        turned = compliance.transmits_moment is not None
         ways = [b.wrench if turned else b.force for b in (plane.basis, across)]
-        mixed = np.abs(ways[0] @ give @ ways[1].T).max(axis=(1, 2, 3), initial=0.0)
-        out |= mixed > _FLAT * np.abs(give).max(axis=(1, 2, 3), initial=0.0)
+        mixed = np.abs(ways[0] @ flexibility @ ways[1].T).max(axis=(1, 2, 3), initial=0.0)
+        out |= mixed > _FLAT * np.abs(flexibility).max(axis=(1, 2, 3), initial=0.0)
     return out
 
 
@@ -176,9 +176,9 @@ class PlanarEngine(FlatEngine, ComplianceEngine):
         """The same bricks and joints, free to leave the plane."""
         return ComplianceEngine(self.network)
 
-    def _require_known(self, columns: Ints, hands: Hands | None) -> None:
-        """Raise `GripError` if a grip lies outside the plane, or moves or gives way out of it."""
-        if hands is not None and _leaves_plane(self._plane, hands, columns).any():
+    def _require_known(self, columns: Ints, compliance: GripCompliance | None) -> None:
+        """Raise `GripError` if a grip lies, is moved or is compliant out of the plane."""
+        if compliance is not None and _leaves_plane(self._plane, compliance, columns).any():
             raise GripError(f"a grip is moved, or gives way, out of the scene's plane; {_ELSE}")
         if self._away is None:
             return

@@ -21,7 +21,7 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.engines._hands import Hands, read_hands
+from seqopt.engines._grip_compliance import GripCompliance, read_compliance
 from seqopt.engines.interface import Engine, Fields, Want, grip_columns
 from seqopt.engines.rigid._mechanism import free_motion, ungripped_system
 from seqopt.engines.rigid._mixed import MixedSystem, mixed_system, solve_mixed
@@ -35,7 +35,7 @@ _EIGENVALUE_TOLERANCE = 1e-6  # relative
 
 
 def _spectrum(
-    network: Network, bricks: int, columns: Ints, hands: Hands | None = None
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
 ) -> tuple[float, float, Floats]:
     """Return how the constrained stiffness, scaled by its diagonal, resists motions.
 
@@ -49,11 +49,13 @@ def _spectrum(
     most = max(diagonal.max(), 1.0 if not diagonal.any() else 0.0)
     scale = np.sqrt(np.maximum(diagonal, _LEAST_DIAGONAL * most))
     try:
-        lowest, motion = _lowest(mixed_system(parts, columns, hands=hands), scale, len(root))
+        lowest, motion = _lowest(
+            mixed_system(parts, columns, compliance=compliance), scale, len(root)
+        )
     except RuntimeError:  # exactly singular, or the iteration broke down
         lowest = 0.0
     if not lowest > UNRESISTED:
-        shifted = mixed_system(parts, columns, _SHIFT * scale**2, hands)
+        shifted = mixed_system(parts, columns, _SHIFT * scale**2, compliance)
         lowest, motion = _lowest(shifted, scale, len(root))
         lowest = max(lowest - _SHIFT, 0.0)
     scaled = sparse.diags_array(root.ravel()) @ parts.deformation @ sparse.diags_array(1 / scale)
@@ -92,7 +94,7 @@ class _Residuals:
     ``equilibrium``: force or moment left on a brick over the largest sum of magnitudes on one;
     ``joints``: wrench of a joint less stiffness times deformation, over the sum of the magnitudes
     in it, or over the weight of a brick where they are smaller; ``grips``: what is between a held
-    node and its hand over the largest motion of any brick, or over what the weight of a brick does
+    node and its grip over the largest motion of any brick, or over what the weight of a brick does
     to the stiffest joint where all are smaller; ``plain``: stiffness times motions less load, over
     the load: no measure of quality, shown to compare.
     """
@@ -109,7 +111,11 @@ class _Residuals:
 
 
 def residual(
-    network: Network, bricks: int, columns: Ints, fields: Fields, hands: Hands | None = None
+    network: Network,
+    bricks: int,
+    columns: Ints,
+    fields: Fields,
+    compliance: GripCompliance | None = None,
 ) -> _Residuals:
     """Return the residuals of the first grip set's fields, from the network alone."""
     springs, center = network.springs, network.centroid[:bricks]
@@ -138,7 +144,7 @@ def residual(
     owner = columns // 2
     grip = np.hstack([fields.grip_force[0], fields.grip_moment[0]])
     still = _moved(twist[owner], node[columns] - center[owner]).sum(axis=0)
-    still = _apart_from_hands(still, grip, hands)
+    still = _off_grips(still, grip, compliance)
     every = np.repeat(np.arange(bricks), 2)
     motion = np.abs(_moved(twist[every], node - center[every])[:, :, :3]).sum(axis=0).max()
     dead = np.hstack([network.weight[:bricks], np.zeros((bricks, 3))])
@@ -157,22 +163,22 @@ def residual(
     )
 
 
-def _apart_from_hands(moved: Floats, borne: Floats, hands: Hands | None) -> Floats:
-    """Return how far nodes are from where their hands let them be (r, n), m, turns over a lever.
+def _off_grips(moved: Floats, borne: Floats, compliance: GripCompliance | None) -> Floats:
+    """Return how far nodes are from where their grips let them be (r, n), m, turns over a lever.
 
-    ``moved``, ``borne`` (r, 6): how nodes shift and turn, what hands exert on them.
+    ``moved``, ``borne`` (r, 6): how nodes shift and turn, what grips exert on them.
     """
-    if hands is None:
+    if compliance is None:
         return moved[:, :3]
-    out = moved * np.repeat([1.0, hands.lever], 3)
-    bears = borne / np.repeat([1.0, hands.lever], 3)
-    if hands.moved is not None:
-        out[:, :3] -= hands.moved[0]
-    if hands.give is not None:
-        give = hands.each_give(1, len(moved))[0]
-        ways = give.shape[2]
-        out[:, :ways] += np.einsum("rij,rj->ri", give, bears[:, :ways])
-    out[~hands.each_turns(1, len(moved))[0], 3:] = 0.0
+    out = moved * np.repeat([1.0, compliance.lever], 3)
+    bears = borne / np.repeat([1.0, compliance.lever], 3)
+    if compliance.moved is not None:
+        out[:, :3] -= compliance.moved[0]
+    if compliance.matrix is not None:
+        flexibility = compliance.matrices(1, len(moved))[0]
+        ways = flexibility.shape[2]
+        out[:, :ways] += np.einsum("rij,rj->ri", flexibility, bears[:, :ways])
+    out[~compliance.transmit_moments(1, len(moved))[0], 3:] = 0.0
     return np.asarray(out)
 
 
@@ -309,20 +315,20 @@ def diagnose(
     numbers = np.array(grips, dtype=np.int64).reshape(1, -1)
     columns = grip_columns(network, bricks, numbers)
     far = None if moved is None else np.array(moved, dtype=float)[None]
-    hands = read_hands(network, columns, numbers, far)
-    lowest, condition, mode = _spectrum(network, bricks, columns[0], hands)
-    free = free_motion(network, bricks, columns[0], hands) if lowest < _LOOKED_INTO else None
+    compliance = read_compliance(network, columns, numbers, far)
+    lowest, condition, mode = _spectrum(network, bricks, columns[0], compliance)
+    free = free_motion(network, bricks, columns[0], compliance) if lowest < _LOOKED_INTO else None
     if free is not None:
         lowest, condition, mode = 0.0, np.inf, free
     residuals, refusal = None, None
     try:
         if isinstance(source, Network):
-            fields = solve_mixed(network, bricks, columns, hands)
+            fields = solve_mixed(network, bricks, columns, compliance)
         elif far is None:
             fields = source.solve(bricks, numbers, Want.JOINTS | Want.BRICKS)
         else:
             fields = source.solve(bricks, numbers, Want.JOINTS | Want.BRICKS, far)
-        residuals = residual(network, bricks, columns[0], fields, hands)
+        residuals = residual(network, bricks, columns[0], fields, compliance)
     except (MechanismError, SolverError) as error:
         refusal = error
     finding, reason = _judge(lowest, condition, residuals, refusal)

@@ -9,7 +9,7 @@ to check it and to show what that generality costs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._hands import Hands, invertible
+from seqopt.engines._grip_compliance import GripCompliance, invertible
 from seqopt.engines.interface import Fields, SerialEngine
 from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.errors import SolverError
@@ -47,18 +47,16 @@ class FrameEngine(SerialEngine):
         super().__init__(network)
         self._contrast = contrast
 
-    def _answers(self, bricks: int, columns: Ints, hands: Hands | None) -> Iterable[Fields]:
-        every = [None if hands is None else hands.of(slice(i, i + 1)) for i in range(len(columns))]
-        pairs = zip(columns, every, strict=True)
-        return [_solve_one(self.network, bricks, *each, self._contrast) for each in pairs]
+    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance | None) -> Fields:
+        return _solve_one(self.network, bricks, columns, compliance, self._contrast)
 
 
 def _solve_one(
-    network: Network, bricks: int, columns: Ints, hands: Hands | None, contrast: float
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None, contrast: float
 ) -> Fields:
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     split, deformation, stiffness = _frame(network, bricks, contrast)
-    grips = _hold(network, columns, hands, deformation.shape[1])
+    grips = _hold(network, columns, compliance, deformation.shape[1])
     load = np.zeros((deformation.shape[1] // 6, 6))
     load[network.inner[:bricks].ravel(), :3] = network.inner_weight[: 2 * bricks]
     both, applied = network.inner[:bricks], network.applied(bricks)
@@ -80,7 +78,7 @@ def _solve_one(
     every = np.concatenate([stiffness, grips.stiffness])
     reduced, strain = whole[:, unknown], whole @ motion
     strain[len(stiffness) :] -= grips.stretched
-    examine = partial(require_resistance, network, bricks, columns, hands)
+    examine = partial(require_resistance, network, bricks, columns, compliance)
     pull = load.ravel()[unknown]
     motion[unknown] = _solve(reduced, every, pull, strain, contrast, examine)
     stress = stiffness * (deformation @ motion)
@@ -107,19 +105,22 @@ def _solve_one(
 class _Holds(NamedTuple):
     """How grips hold a frame."""
 
-    fixed: Ints  # (f,); motions (6n,) that hands prescribe
+    fixed: Ints  # (f,); motions (6n,) that rigid grips prescribe
     moved: Floats  # (f,); by how much, m
-    spring: sparse.csr_array  # (p, 6n); deformations of hands that give way
+    spring: sparse.csr_array  # (p, 6n); deformations of soft grips
     stiffness: Floats  # (p,)
     stretched: Floats  # (p,); of these, where the nodes are in place
     turns: Bools  # (r,); which bear moments
 
 
-def _hold(network: Network, columns: Ints, hands: Hands | None, size: int) -> _Holds:
+def _hold(network: Network, columns: Ints, compliance: GripCompliance | None, size: int) -> _Holds:
     """Return how the grips of one set hold a frame with as many motions."""
-    hands, grips = hands or Hands(), len(columns)
-    soft, turns = hands.soft(1, grips)[0], hands.each_turns(1, grips)[0]
-    far, at = hands.far(1, grips)[0], 6 * network.inner.ravel()[columns][:, None] + np.arange(6)
+    compliance, grips = compliance or GripCompliance(), len(columns)
+    soft, turns = compliance.soft(1, grips)[0], compliance.transmit_moments(1, grips)[0]
+    far, at = (
+        compliance.offsets(1, grips)[0],
+        6 * network.inner.ravel()[columns][:, None] + np.arange(6),
+    )
     fixed: list[Ints] = [np.zeros(0, dtype=np.int64)]
     spring: list[Floats] = [np.zeros((0, size))]
     stiffness: list[float] = []
@@ -129,9 +130,11 @@ def _hold(network: Network, columns: Ints, hands: Hands | None, size: int) -> _H
         if not soft[g]:
             fixed.append(at[g, :3])
         if ways:
-            scale = np.where(np.array(ways) < 3, 1.0, hands.lever)
-            give = hands.each_give(1, grips)[0, g][np.ix_(ways, ways)] / np.outer(scale, scale)
-            values, axes = np.linalg.eigh(invertible(give))
+            scale = np.where(np.array(ways) < 3, 1.0, compliance.lever)
+            flexibility = compliance.matrices(1, grips)[0, g][np.ix_(ways, ways)] / np.outer(
+                scale, scale
+            )
+            values, axes = np.linalg.eigh(invertible(flexibility))
             own = np.zeros((len(ways), size))
             own[:, at[g, ways]] = axes.T
             spring.append(own)

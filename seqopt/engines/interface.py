@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
 from functools import cache, cached_property, wraps
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy import linalg
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
-from seqopt.engines._hands import Hands, read_hands
+from seqopt.engines._grip_compliance import GripCompliance, read_compliance
 from seqopt.errors import GripError, SolverError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
@@ -248,7 +248,7 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
 
 
 def _searched(network: Network, bricks: int, numbers: Ints) -> Ints:
-    """Return the same of numbers of nodes, some of which are wrong or far from all others."""
+    """Return columns by a search: some numbers are wrong or far from all others."""
     known, index = network.index_of_grip
     at = np.searchsorted(known, numbers)
     columns = index.take(at, mode="clip")
@@ -267,7 +267,7 @@ def _couples(grips: int) -> Ints:
     return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
-def failing_in_a_line(function: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
+def _failing_in_a_line(function: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
     """Let numerical failures of a function be a `SolverError`."""
 
     @wraps(function)
@@ -288,7 +288,7 @@ def failing_in_a_line(function: Callable[_Asked, _Answer]) -> Callable[_Asked, _
 
 def no_sets(network: Network, bricks: int, held: int) -> Fields:
     """Return the fields of no grip set at all that would hold some nodes: their shapes."""
-    counts = counts_of_fields(network, bricks)
+    counts = _counts_of_fields(network, bricks)
     empty = {name: np.empty((0, count, *SHAPES[name])) for name, count in counts.items()}
     return Fields(grip_force=np.empty((0, held, 3)), **empty)
 
@@ -299,7 +299,7 @@ def _empty_site(network: Network) -> Fields:
     return Fields(**{n: np.zeros((1, *getattr(empty, n).shape[1:])) for n in _NAMES})
 
 
-def counts_of_fields(network: Network, bricks: int) -> dict[str, int]:
+def _counts_of_fields(network: Network, bricks: int) -> dict[str, int]:
     """Return of how many edges, nodes, ends, springs or bricks each field tells."""
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     ends, springs = len(network.springs.support), len(network.springs.since)
@@ -344,7 +344,7 @@ class SerialEngine(NamedEngine, ABC):
     All fields are evaluated whatever is asked: the solution dominates the cost.
     """
 
-    @failing_in_a_line
+    @_failing_in_a_line
     def solve(
         self,
         bricks: int,
@@ -354,11 +354,13 @@ class SerialEngine(NamedEngine, ABC):
     ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self.network, bricks, grips)
-        hands = read_hands(self.network, columns, grips, moved)
-        none = no_sets(self.network, bricks, columns.shape[1])
-        answer = join_sets([none, *self._answers(bricks, columns, hands)])
-        return require_finite(answer, bricks, grips)
+        compliance = read_compliance(self.network, columns, grips, moved)
+        answers = [no_sets(self.network, bricks, columns.shape[1])]
+        for i, held in enumerate(columns):
+            own = None if compliance is None else compliance.select(slice(i, i + 1))
+            answers.append(self._answer(bricks, held, own))
+        return require_finite(join_sets(answers), bricks, grips)
 
     @abstractmethod
-    def _answers(self, bricks: int, columns: Ints, hands: Hands | None) -> Iterable[Fields]:
-        """Return the fields of every grip set by itself."""
+    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance | None) -> Fields:
+        """Return the fields of one grip set, whose columns are (r,)."""

@@ -73,17 +73,17 @@ class Recipe:
     def key(self) -> str:
         """What answers depend on, condensed: equal for equal scenes, options and arithmetic.
 
-        Names and provenance of a scene change no answer and are left out; of robots only how their
-        grips give way counts, and where these are of several kinds what each carries; of arms whose
-        joints give way, how they do at every node.
+        Names and provenance of a scene change no answer and are left out; of robots only the
+        compliance of their grips counts, and where these are of several kinds what each carries; of
+        arms with compliant joints, their compliance at every node.
         """
         scene = {k: v for k, v in scene_to_dict(self.scene).items() if k not in _WITHOUT_EFFECT}
         ways = [(r.stiffness, r.rotational_stiffness, r.payload) for r in self.scene.robots]
         kinds = [*dict.fromkeys(ways)]
         scene["grips"] = kinds if len(kinds) > 1 else [way[:2] for way in kinds]
         if (held := held_postures(self.scene)) is not None:
-            give = (self.scene.grip_kinds.of_robot, held.robots, held.compliance(self.scene))
-            scene["arms"] = [np.asarray(each).tobytes().hex() for each in give]
+            flexibility = (self.scene.grip_kinds.of_robot, held.robots, held.compliance(self.scene))
+            scene["arms"] = [np.asarray(each).tobytes().hex() for each in flexibility]
         built = json.dumps(scene, sort_keys=True)
         options = {} if self.simplest else self.options  # joints that never fail need none
         parts = (self.name, repr(sorted(options.items())), built, _arithmetic())

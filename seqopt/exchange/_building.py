@@ -122,7 +122,7 @@ def own_scene(
 ) -> Scene | None:
     """Return the scene that a file carries, if its blocks are still those of its bricks.
 
-    ``content``: in m, with z up; ``said``: gets why it is not used.
+    ``content``: in m, with z up; ``said``: a list that gets the reason where it is not used.
     """
     own = content.own
     asked = (given.supports, given.law, given.gap)

@@ -188,7 +188,11 @@ def read_model(document: Any, source: str) -> Content:
             )
         held = held_by(f"{source}: model", held["model"])
     elements = _elements(source, held)
-    densities = _densities(source, held)
+    items = by_guid(f"{source}: materials", held.get("materials") or [])
+    found = {guid: held_by(source, item).get("density") for guid, item in items}
+    densities = {
+        g: number(f"{source}: density", value) for g, value in found.items() if value is not None
+    }
     kept = {i: e for i, e in enumerate(elements) if e.kind != "group"}
     blocks = [_block(str(i), element, densities) for i, element in kept.items()]
     if len(kept) < len(elements):
@@ -201,15 +205,6 @@ def read_model(document: Any, source: str) -> Content:
         for a, b, corners in _contacts(source, held)
     )
     return Content(tuple(blocks), faces, law=law, said=tuple(said))
-
-
-def _densities(source: str, held: Entry) -> dict[str, float]:
-    """Return the densities of materials by their identifier."""
-    items = by_guid(f"{source}: materials", held.get("materials") or [])
-    found = {guid: held_by(source, item).get("density") for guid, item in items}
-    return {
-        g: number(f"{source}: density", value) for g, value in found.items() if value is not None
-    }
 
 
 def _block(key: str, element: _Element, densities: dict[str, float]) -> FileBlock:
@@ -341,7 +336,7 @@ _DEEPEST = 50  # lists and groups within each other
 def is_meshes(document: Any) -> bool:
     """Return whether a document is a mesh of COMPAS, or a list or dictionary of such.
 
-    Lines and what else has no volume count, to be told so.
+    Lines and what else has no volume count, so that the error names them.
     """
     if isinstance(document, list):
         return True

@@ -41,7 +41,9 @@ def solid_of(where: str, value: Any) -> _Solid:
     """Return the vertices (V, 3) and faces of a mesh, a polyhedron or a box."""
     held = payload(value)
     if isinstance(held, dict) and {"xsize", "ysize", "zsize"} <= set(held):
-        return _box(where, held)
+        size = [number(f"{where}: {key}", held[key]) for key in ("xsize", "ysize", "zsize")]
+        origin, axes = frame_of(where, held.get("frame"))
+        return origin + 0.5 * (BOX_CORNERS * size) @ axes, [list(face) for face in BOX_FACES]
     if isinstance(held, dict) and "vertices" in held:
         rows = [point(f"{where}: a vertex", row) for row in listing(where, held["vertices"])]
         sides = listing(where, entry(where, held, "faces"))
@@ -73,13 +75,6 @@ def _corners(where: str, side: Any, place: dict[str, int] | None) -> list[int]:
             raise SceneError(f"{where}: there is no vertex {short(key)}")
         out.append(named)
     return out[:-1] if len(out) > 1 and out[0] == out[-1] else out
-
-
-def _box(where: str, held: dict[str, Any]) -> _Solid:
-    """Return a box, whose frame is in its middle."""
-    size = [number(f"{where}: {key}", held[key]) for key in ("xsize", "ysize", "zsize")]
-    origin, axes = frame_of(where, held.get("frame"))
-    return origin + 0.5 * (BOX_CORNERS * size) @ axes, [list(face) for face in BOX_FACES]
 
 
 def frame_of(where: str, value: Any) -> tuple[Floats, Floats]:

@@ -73,11 +73,21 @@ def hold(scene: Scene, robot: Robot, node: int) -> Held:
     at = np.array(brick.node_position(node))
     normals, depths = _faces_seen(brick, at)
     now, later = _covers(scene, brick)
-    score = normals @ (_wanted(scene, robot, at) + _UP * np.array(scene.up))
+    reach, toward = robot.reach, np.array(scene.up)  # up where the robot may be anywhere
+    if isinstance(reach, Side):
+        toward = np.array(reach.toward)
+    if isinstance(reach, Sphere) and reach.center != tuple(at):
+        toward = np.array(reach.center) - at
+    score = normals @ (toward / np.linalg.norm(toward) + _UP * np.array(scene.up))
     score -= _NEVER * _covered(normals, now) + _LATER * _covered(normals, later)
     best = int(score.argmax())
     grip = _tool(brick, as_vector(at), normals[best])
-    away = _way_out(now, np.vstack([normals[best], scene.up, normals]))
+    tried = np.vstack([normals[best], scene.up, normals])
+    mean = -now.sum(axis=0)  # away from all that the brick touches
+    if np.linalg.norm(mean) > 1e-9:
+        tried = np.vstack([mean / np.linalg.norm(mean), tried])
+    worst = (-tried @ now.T).min(axis=1, initial=1.0)
+    away = tried[int((worst >= worst.max() - 1e-9).argmax())]
     return Held(brick_frame(brick), grip, float(depths[best]), as_vector(away))
 
 
@@ -94,22 +104,14 @@ def _faces_seen(brick: Brick, at: Floats) -> tuple[Floats, Floats]:
     normals = total / np.linalg.norm(total, axis=1, keepdims=True)
     depths = np.einsum("fi,fi->f", points[[face[0] for face in faces]] - at, normals)
     slack = _EDGE * float(np.ptp(points, axis=0).max())
-    within = _within(corners, signed, normals[owner], at, slack)
+    sign = np.sign(np.einsum("ti,ti->t", signed, normals[owner]))
+    edges = np.roll(corners, -1, axis=1) - corners
+    lengths = np.maximum(np.linalg.norm(edges, axis=2), slack)
+    inward = np.einsum("tki,ti->tk", np.cross(edges, at - corners), normals[owner]) / lengths
+    within = np.asarray(sign * (sign[:, None] * inward >= -slack).all(axis=1))
     seen = (depths > 0) & (np.bincount(owner, within) > 0.5)
     kept = seen if seen.any() else depths > 0
     return (normals[kept], depths[kept]) if kept.any() else (normals, depths)
-
-
-def _within(corners: Floats, signed: Floats, normals: Floats, at: Floats, slack: float) -> Floats:
-    """Return for triangles (T, 3, 3) of fans whether a point lies before them, with their signs.
-
-    ``signed`` (T, 3) is against the normal of its face where the fan folds back.
-    """
-    sign = np.sign(np.einsum("ti,ti->t", signed, normals))
-    edges = np.roll(corners, -1, axis=1) - corners
-    lengths = np.maximum(np.linalg.norm(edges, axis=2), slack)
-    inward = np.einsum("tki,ti->tk", np.cross(edges, at - corners), normals) / lengths
-    return np.asarray(sign * (sign[:, None] * inward >= -slack).all(axis=1))
 
 
 def _covers(scene: Scene, brick: Brick) -> tuple[Floats, Floats]:
@@ -129,17 +131,6 @@ def _covers(scene: Scene, brick: Brick) -> tuple[Floats, Floats]:
     return now, later
 
 
-def _wanted(scene: Scene, robot: Robot, at: Floats) -> Floats:
-    """Return the unit vector from a point to a robot; up where it may be anywhere."""
-    reach = robot.reach
-    toward = np.array(scene.up)
-    if isinstance(reach, Side):
-        toward = np.array(reach.toward)
-    if isinstance(reach, Sphere) and reach.center != tuple(at):
-        toward = np.array(reach.center) - at
-    return np.asarray(toward / np.linalg.norm(toward))
-
-
 def _covered(normals: Floats, joints: Floats) -> Floats:
     """Return 1 for faces with normals (n, 3) that a joint lies on, else 0, (n,)."""
     return np.asarray((normals @ joints.T > _SQUARE).any(axis=1).astype(float))
@@ -151,18 +142,6 @@ def _tool(brick: Brick, at: Vector, normal: Floats) -> Frame:
     first = along - (along @ normal) * normal
     first /= np.linalg.norm(first)
     return Frame(at, as_vector(first), as_vector(np.cross(-normal, first)))
-
-
-def _way_out(joints: Floats, others: Floats) -> Floats:
-    """Return the unit vector that leads away most from joints whose outward normals are given.
-
-    ``others``: directions to try beside the mean of all, (k, 3), the first of equals.
-    """
-    total = -joints.sum(axis=0)
-    size = float(np.linalg.norm(total))
-    tried = np.vstack([total / size, others]) if size > 1e-9 else others
-    worst = (-tried @ joints.T).min(axis=1, initial=1.0)
-    return np.asarray(tried[int((worst >= worst.max() - 1e-9).argmax())])
 
 
 Document = dict[str, Any]

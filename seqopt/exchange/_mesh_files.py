@@ -292,17 +292,12 @@ def _solids(
         raise SceneError(f"{where}: blocks stand in blocks {_DEEPEST} deep; explode some")
     else:
         matrix = np.reshape(shape.Xform.ToFloatArray(True), (4, 4))  # noqa: FBT003  # by row
-        for inner in _inside(file, shape):
+        definition = file.InstanceDefinitions.FindId(shape.ParentIdefId)
+        keys = () if definition is None else definition.GetObjectIds()
+        found = (file.Objects.FindId(str(key)) for key in keys)
+        for inner in [item.Geometry for item in found if item is not None]:
             for vertices, faces in _solids(file, inner, where, left, depth + 1):
                 yield moved(vertices, matrix), faces
-
-
-def _inside(file: Any, block: Any) -> list[Any]:
-    """Return the objects of which a block of Rhino is made."""
-    definition = file.InstanceDefinitions.FindId(block.ParentIdefId)
-    keys = () if definition is None else definition.GetObjectIds()
-    found = (file.Objects.FindId(str(key)) for key in keys)
-    return [item.Geometry for item in found if item is not None]
 
 
 def _extrusion(where: str, shape: Any) -> _Solid:
@@ -369,12 +364,8 @@ def _points(where: str, rows: Sequence[Any]) -> Floats:
     return found
 
 
-def _mesh(where: str, shape: Any) -> _Solid:
-    return _joined(where, [shape])
-
-
 _READERS: dict[str, Callable[[str, Any], _Solid]] = {
-    "Mesh": _mesh,
+    "Mesh": lambda where, shape: _joined(where, [shape]),
     "Extrusion": _extrusion,
     "Brep": _polysurface,
 }

@@ -290,7 +290,8 @@ def repair_shape(block: FileBlock, *, may_be_open: bool = False) -> Repaired:
     mended: Counter[str] = Counter()
     points, faces = block.vertices, [_plain(face) for face in block.faces]
     size = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
-    if _open_edges(faces):
+    times = Counter(frozenset(edge) for face in faces for edge in edges(face))
+    if any(count != 2 for count in times.values()):
         faces = _welded(points, faces, mended)
     faces = [face for face in _unrepeated(faces, mended) if len(face) > 2]
     faces = _agreeing(points, faces, mended)
@@ -330,12 +331,6 @@ def _unrepeated(faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
     if len(found) < len(faces):
         mended[_TWICE] += len(faces) - len(found)
     return [face for face in faces if found.get(frozenset(face)) is face]
-
-
-def _open_edges(faces: Sequence[_Loop]) -> bool:
-    """Return whether an edge has fewer or more than two faces."""
-    times = Counter(frozenset(edge) for face in faces for edge in edges(face))
-    return any(count != 2 for count in times.values())
 
 
 def _welded(points: Floats, faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
@@ -385,14 +380,9 @@ def _agreeing(points: Floats, faces: list[_Loop], mended: Counter[str]) -> list[
             for i, j in nx.bfs_edges(beside, start):
                 turned[j] = turned[i] ^ beside[i][j]["turns"]
     out = [face[::-1] if turned[i] else face for i, face in enumerate(faces)]
-    if _volume(points, out) < 0:
+    spokes = points - points.mean(axis=0)
+    if np.linalg.det(spokes[fans(out)]).sum() < 0:  # six times the volume within
         out = [face[::-1] for face in out]
     if changed := sum(face != before for face, before in zip(out, faces, strict=True)):
         mended[_TURNED] += changed
     return out
-
-
-def _volume(points: Floats, faces: list[_Loop]) -> float:
-    """Return six times the signed volume within faces."""
-    spokes = points - points.mean(axis=0)
-    return float(np.linalg.det(spokes[fans(faces)]).sum())

@@ -217,7 +217,8 @@ def tasks_json(scene: Scene, tasks: Iterable[Task]) -> str:
     """Return tasks as JSON that `compas.json_load` opens: frames and shapes are those of COMPAS.
 
     ``blocks`` has the shape and the frame of every block in build order, ``robots`` what is known
-    of each, ``tasks`` a row for each `Task`.
+    of each, with the base of one that stands in the middle of its reach, ``tasks`` a row for each
+    `Task`.
     """
     whole = {
         "format": "seqopt-tasks",
@@ -225,7 +226,14 @@ def tasks_json(scene: Scene, tasks: Iterable[Task]) -> str:
         "scene": scene.name,
         "unit": "m",
         "blocks": [_block(brick) for brick in scene.placed],
-        "robots": [_robot(robot) for robot in scene.robots],
+        "robots": [
+            {
+                "robot": robot.name,
+                "payload": robot.payload,
+                "base": robot.reach.center if isinstance(robot.reach, Sphere) else None,
+            }
+            for robot in scene.robots
+        ],
         "tasks": [_row(task) for task in tasks],
     }
     return json.dumps(whole, ensure_ascii=False) + "\n"
@@ -235,12 +243,6 @@ def _block(brick: Brick) -> Document:
     shape = typed("compas.datastructures/Mesh", mesh_data(*vertices_of(brick)))
     frame = compas_frame(brick_frame(brick))
     return {"block": brick.name, "mass": brick.mass, "frame": frame, "shape": shape}
-
-
-def _robot(robot: Robot) -> Document:
-    """Return a robot, and the base of one that stands in the middle of its reach."""
-    base = robot.reach.center if isinstance(robot.reach, Sphere) else None
-    return {"robot": robot.name, "payload": robot.payload, "base": base}
 
 
 def _row(task: Task) -> Document:

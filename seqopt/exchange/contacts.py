@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import GROUND, Content, FileJoint, Given
 from seqopt.exchange._meshes import Repaired
@@ -130,8 +130,8 @@ def touching_faces(
     united and cut into convex pieces, each a face of its own, halfway between the two.
 
     ``shapes``: where they are in the scene; ``gap``: most that may lie between two faces, or by
-    which they may interpenetrate, m; ``progress``: told how far it is, once it takes longer than a
-    second. Raises `FileError` if shapely is not installed.
+    which they may interpenetrate, m; ``progress``: called with how far it is, once it takes longer
+    than a second. Raises `FileError` if shapely is not installed.
 
     Examples
     --------
@@ -177,7 +177,11 @@ def _facets(shape: _Shape) -> _Facets:
 def _overlaps(first: _Facets, second: _Facets, gap: float) -> Iterator[tuple[list[Any], Any]]:
     """Yield overlaps of the faces of two blocks, plane by plane, with the origins and axes."""
     planes: list[_Plane] = []
-    for k, m in _opposed(first, second, gap):
+    against = first.normal @ second.normal.T < -_OPPOSED
+    step = second.middle[None] - first.middle[:, None]
+    apart = np.abs(np.einsum("kmi,ki->km", step, first.normal))
+    wide = np.linalg.norm(step, axis=2)
+    for k, m in np.argwhere(against & (apart <= gap + (1 - _OPPOSED**2) ** 0.5 * wide)):
         normal = first.normal[k] - second.normal[m]
         normal /= np.linalg.norm(normal)
         middle = 0.5 * (first.middle[k] + second.middle[m])
@@ -194,15 +198,6 @@ def _in_plane(plane: _Plane, normal: Floats, middle: Floats, gap: float) -> bool
     """Return whether a face lies in a plane, no farther off than half a gap."""
     origin, axes, _ = plane
     return bool(normal @ axes[0] > _LEVEL and abs((middle - origin) @ axes[0]) <= 0.5 * gap)
-
-
-def _opposed(first: _Facets, second: _Facets, gap: float) -> Ints:
-    """Return pairs (P, 2) of faces that look at each other from near planes."""
-    against = first.normal @ second.normal.T < -_OPPOSED
-    step = second.middle[None] - first.middle[:, None]
-    apart = np.abs(np.einsum("kmi,ki->km", step, first.normal))
-    wide = np.linalg.norm(step, axis=2)
-    return np.argwhere(against & (apart <= gap + (1 - _OPPOSED**2) ** 0.5 * wide)).astype(np.int64)
 
 
 def _overlap(first: Floats, second: Floats, plane: tuple[Floats, Floats], gap: float) -> list[Any]:
@@ -380,13 +375,16 @@ def _on_ground(pair: tuple[int, int], face: _FlatFace, bricks: Mapping[int, Bric
 def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list[str]:
     """Say how far faces of a file lie off the blocks that they join; too far is an error."""
     shapely, farthest = import_module("shapely"), 0.0
-    sides = {i: [*_sides(facets[i])] for i in {i for face in content.faces for i in face.blocks}}
+    sides = {
+        i: [flat_face(facets[i].points[list(face)]) for face in facets[i].faces]
+        for i in {i for face in content.faces for i in face.blocks}
+    }
     for held in content.faces:
         for i in held.blocks:
             away = np.full(len(held.corners), np.inf)
-            for side, polygon in sides[i]:
+            for side in sides[i]:
                 seen = (held.corners - side.center) @ side.axes.T
-                beside = shapely.distance(polygon, shapely.points(seen[:, 1:]))
+                beside = shapely.distance(_valid(side.corners), shapely.points(seen[:, 1:]))
                 away = np.minimum(away, np.hypot(seen[:, 0], beside))
             off = float(away.max(initial=0.0))
             if off > max(gap, _OFF * float(np.ptp(facets[i].points, axis=0).max())):
@@ -399,13 +397,6 @@ def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list
     if farthest <= gap:
         return []
     return [f"faces of the file lie up to {1e3 * farthest:.3g} mm off their blocks"]
-
-
-def _sides(solid: Surface) -> Iterator[tuple[_FlatFace, Any]]:
-    """Yield the sides of a block in their mean planes, and as polygons there."""
-    for face in solid.faces:
-        flat = flat_face(solid.points[list(face)])
-        yield flat, _valid(flat.corners)
 
 
 def _file_faces(content: Content, solids: Sequence[_Shape]) -> Iterator[_Held]:

@@ -209,16 +209,6 @@ def _read_boxes(text: str, source: str) -> Content:
     """
     names, found = read_table(text, source, SceneError)
     rows = [row for _, row in found]
-    _check_columns(source, names)
-    if not rows or len(rows) > MOST_BLOCKS:
-        raise SceneError(f"{source}: {len(rows)} rows; give 1 to {MOST_BLOCKS} boxes")
-    return Content(
-        tuple(_box(f"{source}, row {i}", str(i), row) for i, row in enumerate(rows, start=1)),
-        said=("a table of boxes: no faces",),
-    )
-
-
-def _check_columns(source: str, names: list[str]) -> None:
     missing = [name for name in _NEEDED if name not in names]
     if missing:
         raise SceneError(f"{source}: column {missing[0]} is missing; give {', '.join(_NEEDED)}")
@@ -226,6 +216,12 @@ def _check_columns(source: str, names: list[str]) -> None:
         if name not in _COLUMNS or names.count(name) > 1:
             why = "occurs twice" if name in _COLUMNS else "is not known"
             raise SceneError(f"{source}: column {short(name)} {why}; give {', '.join(_COLUMNS)}")
+    if not rows or len(rows) > MOST_BLOCKS:
+        raise SceneError(f"{source}: {len(rows)} rows; give 1 to {MOST_BLOCKS} boxes")
+    return Content(
+        tuple(_box(f"{source}, row {i}", str(i), row) for i, row in enumerate(rows, start=1)),
+        said=("a table of boxes: no faces",),
+    )
 
 
 def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
@@ -241,11 +237,14 @@ def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
     density, mass, course = (None if math.isnan(value) else value for value in optional)
     if mass is not None and not mass > 0:
         raise SceneError(f"{where}: mass is {mass:g}; give a positive number of kg")
+    text = (row.get("support") or "").strip().lower()
+    if text not in (*_YES, *_NO):
+        raise SceneError(f"{where}: support is {short(text)}; give 1 or 0")
     return FileBlock(
         row.get("name", "").strip() or key,
         center + 0.5 * (BOX_CORNERS * size) @ frame.T,
         BOX_FACES,
-        support=_flag(where, row),
+        support=text in _YES,
         density=density,
         mass=mass,
         course=course,
@@ -261,13 +260,6 @@ def _number(where: str, row: dict[str, str], name: str, otherwise: str = "") -> 
     if abs(value) > LARGEST or (text and math.isnan(value)):
         raise SceneError(f"{where}: {name} is {short(text)}; give a number")
     return value
-
-
-def _flag(where: str, row: dict[str, str]) -> bool:
-    text = (row.get("support") or "").strip().lower()
-    if text not in (*_YES, *_NO):
-        raise SceneError(f"{where}: support is {short(text)}; give 1 or 0")
-    return text in _YES
 
 
 _MESHES = ("obj", "off", "stl", "ply", "glb", "3mf", "3dm")
@@ -318,7 +310,7 @@ def _form_of(path: Path, forms: set[str | None]) -> str:
 
 
 def _one_block(file: Path, content: Content, said: list[str]) -> FileBlock:
-    """Return the one block of a file. ``said``: gets how it was made of several pieces."""
+    """Return the one block of a file. ``said``: a list that gets how several pieces were joined."""
     if len(content.blocks) == 1:
         return replace(content.blocks[0], key=file.stem)
     try:

@@ -171,7 +171,7 @@ MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 
 
 def whole_bound(problem: AllOrders) -> float:
-    """Return the least value with which all bricks stand, whoever holds them.
+    """Return the lower bound from the finished structure: the least value over all grips.
 
     Every plan of every order passes such a state, and the one in which nobody holds if it ends so.
 
@@ -368,7 +368,7 @@ NARROW = 50  # states of a brick count with which an order is tried first
 class Trial:
     """An order to be tried.
 
-    ``order``: names of all bricks; ``ceiling``: what it must stay below.
+    ``order``: names of all bricks; ``ceiling``: a value of the first goal that it must beat.
     """
 
     order: Order

@@ -1,9 +1,7 @@
-"""The proof that no build order is better: a cut, or potentials, of the states of all orders.
+"""The proof that no build order is better: the states of all orders, rebuilt as those of one.
 
-Sets of bricks that stand, the newest known, are met one after the other; with each the states that
-are reached, by a second version of the rules and with responses computed again. Of a worst step
-these are states below a value: where none of them ends the build no order stays below it. Of what
-adds up every state has what a way to it takes at least.
+A part is a set of bricks that stand and the newest of them. Its rows are those of an order that
+begins with this set; between parts states have places in the scene's own order.
 """
 
 from __future__ import annotations
@@ -12,21 +10,20 @@ import time
 from collections.abc import Iterator
 from itertools import combinations
 from math import comb
-from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
-from seqopt.graph.graph import Graph
+from seqopt.arrays import Ints
 from seqopt.graph.orders import AllOrders
-from seqopt.graph.paths import distances
+from seqopt.graph.paths import distances, reached
 from seqopt.graph.states.states import States
-from seqopt.judge._answers import ask
-from seqopt.judge._proof import BELOW, Asked, Passable, Tables
-from seqopt.judge._rule_moves import Follows, RuleTables
+from seqopt.judge._proof import BELOW, Rebuilt, Space
+from seqopt.judge._rule_moves import RuleTables, Transitions
+from seqopt.judge._states import Filter, Reachable, StateEvaluator, ask
 from seqopt.network.build import build_network
 from seqopt.problem.problem import Measure
 from seqopt.problem.standing import slack
+from seqopt.scene._armed import can_hold
 from seqopt.scene.scene import Order, in_order
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_check import RuleBook
@@ -46,192 +43,125 @@ def finds_better_order(
     looked at; ``end``: until when, as of `time.perf_counter`. Result: None where it is not known,
     because there are more sets or time is over.
     """
-    goal = problem.states.goals[0]
+    goal, demands = problem.states.goals[0], problem.states.demands
     peak = goal.measure is Measure.PEAK
     if goal.of_margins:
         value = max(0.0, value - slack(goal.response, value)) if np.isfinite(value) else value
         if value == 0:
             return False
-    elif peak and _of_the_whole(problem) >= value:
-        return False
-    elif np.isfinite(value):
-        value -= 4 * BELOW * abs(value)  # further below than what is tied with it
-    least = _least_of_all(problem, value if peak else np.inf, most, end)
-    return None if least is None else least < value
+        asked = Filter((), (value,) if np.isfinite(value) else ())
+    else:
+        if peak and _bound_of_the_whole(problem) >= value:
+            return False
+        value -= 4 * BELOW * abs(value) if np.isfinite(value) else 0.0  # than what is tied with it
+        asked = Filter((value if peak else np.inf,), () if demands else None)
+    try:
+        graph = Rebuilt(_Orders(problem, most, end), asked).graph()
+    except _NotAllError:
+        return None
+    if peak:
+        return bool(graph.ends[reached(graph)].any())
+    return bool(distances(graph, graph.amounts[:, 0])[graph.ends].min(initial=np.inf) < value)
 
 
-def _least_of_all(problem: AllOrders, below: float, most: int, end: float) -> float | None:
-    """Return what the first goal takes at least in any order; None where not all are looked at.
-
-    Of a worst step it is said whether some order stays below a value: zero, or infinity.
-    """
-    first: Key = (frozenset(problem.stands), problem.stands[-1] if problem.stands else 0)
-    entries, later = _begin(problem, first)
-    looked, least = 0, np.inf
-    for bricks in range(len(first[0]), len(problem.scene.bricks) + 1):
-        following, later = later, {}
-        for key, parts in entries.items():
-            looked += 1
-            if looked > most or time.perf_counter() > end:
-                return None
-            found = _closed(problem, key, parts, below)
-            ends = found.tables.ends(bricks, found.states)
-            least = min(least, float(found.least[ends].min(initial=np.inf)))
-            if ends.any() and np.isfinite(below):
-                return 0.0
-            for after, placed in _placed(problem, key, found):
-                following.setdefault(after, []).append(placed)
-        entries = following
-    return least
+class _NotAllError(Exception):
+    """There are more sets of bricks than may be looked at, or time is over."""
 
 
-def _begin(problem: AllOrders, key: Key) -> tuple[_ByKey, _ByKey]:
-    """Return what follows where builds begin: with the bricks there, and with one more."""
-    tables = Passable(problem.judging(_order(problem, key))).tables
-    start, later = tables.start(), _ByKey()
-    found = _Reached(start, np.zeros(1), tables)
-    for after, placed in _placed(problem, key, found):
-        later.setdefault(after, []).append(placed)
-    counted = problem.states.goals[0].measure is Measure.REGRIPS
+class _Orders(Space):
+    """The states of all orders, those of up to so many sets until some time."""
 
-    def before(move: Follows) -> Floats:
-        return np.full(len(move.states), float(counted and move.regrip))
+    def __init__(self, problem: AllOrders, most: int, end: float) -> None:
+        self._problem, self._left, self._end = problem, most + 1, end  # the start is looked at too
+        self.levels = range(len(problem.stands), len(problem.scene.bricks) + 1)
+        self._nodes = {brick.name: brick.nodes for brick in problem.scene.bricks}
+        own = (node for name in problem.scene.build_order for node in self._nodes[name])
+        self._place = {node: place for place, node in enumerate(own, start=1)}
 
-    parts = [
-        _Entries(_renumbered(problem, key, move.states), before(move), move.way)
-        for move in tables.follow(len(key[0]), start)
-        if move.level == len(key[0])
-    ]
-    return ({key: parts} if parts else {}), later
+    @property
+    def first(self) -> Key:
+        """The bricks with which builds begin."""
+        stands = self._problem.stands
+        return frozenset(stands), stands[-1] if stands else 0
+
+    def at(self, part: Key) -> tuple[int, StateEvaluator]:
+        """Return how many bricks stand, and what evaluates the states of an order."""
+        self._left -= 1
+        if self._left < 0 or time.perf_counter() > self._end:
+            raise _NotAllError
+        return len(part[0]), StateEvaluator(self._problem.judging(self._order(part)))
+
+    def to_part(self, part: Key, evaluator: StateEvaluator, states: Ints) -> Ints:
+        """Return states with places in the scene's own order as rows of a part."""
+        rows = self._renumbered(self._order(part), states, back=True)
+        return evaluator.tables.in_order(rows)
+
+    def from_part(self, part: Key, states: Ints) -> Ints:
+        """Return rows of a part with places in the scene's own order."""
+        return self._renumbered(self._order(part), states)
+
+    def onward(self, part: Key, found: Reachable) -> Iterator[tuple[Key, Transitions]]:
+        """Yield what follows by placing each of the bricks that may come next."""
+        problem, (stand, _) = self._problem, part
+        parks = problem.states.goals[0].measure is Measure.TRAVEL
+        own = self.from_part(part, found.states)
+        for brick in problem.next_bricks(stand) if len(own) else ():
+            order = self._order(part, brick)
+            worlds = tuple(in_order(scene, order) for scene in problem.states.worlds)
+            book = RuleBook(build_network(problem.scene, order), problem.states.free_rules, worlds)
+            tables = RuleTables(book, [], parks=parks)
+            rows = self._renumbered(order, own, back=True)
+            for move in tables.successors(len(stand), rows):
+                if move.level > len(stand) and len(move.states):
+                    states = self._renumbered(order, move.states)
+                    yield (stand | {brick}, brick), move._replace(states=states)
+
+    def _renumbered(self, order: Order, states: Ints, *, back: bool = False) -> Ints:
+        """Return states with places in the scene's own order for those in another, or back."""
+        place = np.array([0, *(self._place[n] for name in order for n in self._nodes[name])])
+        place = np.argsort(place) if back else place
+        robots = len(self._problem.states.free_rules.team(self._problem.scene))
+        out = states.copy()
+        held = states[:, :robots]  # negative where a free robot was last
+        out[:, :robots] = np.sign(held) * place[np.abs(held)]
+        return out
+
+    def _order(self, key: Key, following: int | None = None) -> Order:
+        """Return an order that begins with a set, its newest brick last, and maybe another one."""
+        own, (stand, newest) = self._problem.scene.build_order, key
+        first = [name for name in own if name in stand and name != newest]
+        last = [newest] if stand else []
+        last += [] if following is None else [following]
+        return (*first, *last, *(n for n in own if n not in stand and n != following))
 
 
-class _Entries(NamedTuple):
-    """States to which a brick is placed: places in the scene's own order, as rows of tables.
-
-    ``before`` (n,): what the first goal takes of a way to the state before; ``way`` (n,): how far
-    the robot goes, m.
-    """
-
-    states: Ints
-    before: Floats
-    way: Floats
-
-
-_ByKey = dict[Key, list[_Entries]]
-
-
-class _Reached(NamedTuple):
-    """The states with a set of bricks that are reached, and what the first goal takes at least."""
-
-    states: Ints
-    least: Floats
-    tables: Tables
-
-
-def _of_the_whole(problem: AllOrders) -> float:
-    """Return the least value with which all bricks stand, whoever holds them: every order ends so.
+def _bound_of_the_whole(problem: AllOrders) -> float:
+    """Return the lower bound from the finished structure, in which every order ends.
 
     Minus infinity where there are too many grip sets to look at.
     """
-    free = problem.judging(problem.scene.build_order)
-    taken = {*problem.scene.blocked_nodes, *(prop.node for prop in problem.scene.props)}
-    nodes = [n for n in node_numbers(free.network) if n not in taken]
-    rules, scene = free.free_rules, problem.scene
+    free, scene = problem.judging(problem.scene.build_order), problem.scene
+    rules, kinds = free.free_rules, scene.grip_kinds
+    taken = {*scene.blocked_nodes, *(prop.node for prop in scene.props)}
+    nodes = [node for node in node_numbers(free.network) if node not in taken]
+    grips = [  # numbers, of robots of every kind
+        node + kind * kinds.span
+        for kind in np.unique(kinds.of_robot[: len(scene.robots)]).tolist()
+        for node in nodes
+        if can_hold(scene, kind, node)
+    ]
     fewest = max(1, rules.fewest_grips(scene) - len(scene.props))
-    held = range(fewest, free.space.robots + 1)
-    least = -np.inf
-    if sum(comb(len(nodes), count) for count in held) <= MOST_SETS:
-        least = min((_least(free, nodes, count) for count in held), default=np.inf)
-    return (
-        least if free.free_rules.how_it_ends is Ending.HELD else max(least, _least(free, nodes, 0))
-    )
+    held, least = range(fewest, free.space.robots + 1), -np.inf
+    if sum(comb(len(grips), count) for count in held) <= MOST_SETS:
+        least = min((_least(free, grips, count) for count in held), default=np.inf)
+    return least if rules.how_it_ends is Ending.HELD else max(least, _least(free, grips, 0))
 
 
-def _least(free: States, nodes: list[int], count: int) -> float:
-    """Return the least that the goal takes of the whole with so many grips; infinite of none."""
-    grips = np.array([*combinations(nodes, count)], dtype=np.int64)
-    found = ask(free, len(free.network.inner), grips.reshape(comb(len(nodes), count), count))
+def _least(free: States, grips: list[int], count: int) -> float:
+    """Return the least value of the whole structure with so many grips; infinite if none fits."""
+    sets = np.array([*combinations(grips, count)], dtype=np.int64)
+    sets = sets.reshape(comb(len(grips), count), count)
+    nodes = np.sort(free.network.scene.grip_kinds.split(sets)[0], axis=1)
+    sets = sets[(np.diff(nodes, axis=1) > 0).all(axis=1)]  # nobody holds what another one holds
+    found = ask(free, len(free.network.inner), sets)
     return float(found.values[found.fit, 0].min(initial=np.inf))
-
-
-def _closed(problem: AllOrders, key: Key, parts: list[_Entries], below: float) -> _Reached:
-    """Return the states with a set of bricks that are reached, below a value of a worst step."""
-    passable = Passable(problem.judging(_order(problem, key)))
-    tables, asked = passable.tables, Asked((below,), () if problem.states.demands else None)
-    if passable.margins:
-        asked = Asked((), (below,) if np.isfinite(below) else ())
-    start = tables.start()
-    states, before, way = map(np.concatenate, zip(*parts, strict=True))
-    rows = tables.in_order(_renumbered(problem, key, states, back=True).astype(start.dtype))
-    part = passable.closed(len(key[0]), rows, asked)
-    peak = problem.states.goals[0].measure is Measure.PEAK
-    if peak or not len(part.states):
-        return _Reached(part.states, np.zeros(len(part.states)), tables)
-    order = np.argsort(part.codes, kind="stable")
-
-    def moves(source: Ints, found: Follows, cost: Floats) -> tuple[Ints, Ints, Floats]:
-        wanted = tables.codes(found.states)
-        at = np.searchsorted(part.codes, wanted, sorter=order).clip(max=len(order) - 1)
-        target = order[at]
-        ok = part.codes[target] == wanted
-        taken = found._replace(way=found.way[ok])
-        amounts = passable.moved(part.values[target[ok]], taken)[:, 0]
-        return source[ok], target[ok] + 1, amounts + cost[ok]
-
-    none = np.zeros(len(rows), dtype=np.int64)
-    entered = Follows(len(key[0]), none, rows, regrip=False, way=way)
-    some = [moves(none, entered, before)]
-    for move in part.follows:
-        if move.level == len(key[0]):
-            some.append(moves(move.source + 1, move, np.zeros(len(move.source))))
-    source, target, amounts = map(np.concatenate, zip(*some, strict=True))
-    graph = Graph(
-        source.astype(np.int32),
-        target.astype(np.int32),
-        amounts[:, None],
-        (False,),
-        np.zeros(len(part.states) + 1, dtype=bool),
-    )
-    return _Reached(part.states, distances(graph, graph.amounts[:, 0])[1:], tables)
-
-
-def _placed(problem: AllOrders, key: Key, found: _Reached) -> Iterator[tuple[Key, _Entries]]:
-    """Yield what follows by placing a brick: some states more than once."""
-    parks = problem.states.goals[0].measure is Measure.TRAVEL
-    own = _renumbered(problem, key, found.states)
-    for brick in problem.next_bricks(key[0]) if len(found.states) else ():
-        order = _order(problem, key, brick)
-        network = build_network(problem.scene, order)
-        worlds = tuple(in_order(scene, order) for scene in problem.states.worlds)
-        tables = RuleTables(RuleBook(network, problem.states.free_rules, worlds), [], parks=parks)
-        rows = _places(problem, order, own, back=True).astype(tables.start().dtype)
-        for move in tables.follow(len(key[0]), rows):
-            if move.level > len(key[0]) and len(move.states):
-                states = _places(problem, order, move.states)
-                after = (key[0] | {brick}, brick)
-                yield after, _Entries(states, found.least[move.source], move.way)
-
-
-def _renumbered(problem: AllOrders, key: Key, states: Ints, *, back: bool = False) -> Ints:
-    return _places(problem, _order(problem, key), states, back=back)
-
-
-def _places(problem: AllOrders, order: Order, states: Ints, *, back: bool = False) -> Ints:
-    """Return states with places in the scene's own order for those in another one, or back."""
-    nodes = {brick.name: brick.nodes for brick in problem.scene.bricks}
-    own = {n: i for i, n in enumerate((n for b in problem.scene.build_order for n in nodes[b]), 1)}
-    place = np.array([0, *(own[n] for b in order for n in nodes[b])])
-    place = np.argsort(place) if back else place
-    out, robots = states.astype(np.int64), len(problem.states.free_rules.team(problem.scene))
-    held = states[:, :robots].astype(np.int64)  # negative where a free robot was last
-    out[:, :robots] = np.sign(held) * place[np.abs(held)]
-    return out
-
-
-def _order(problem: AllOrders, key: Key, following: int | None = None) -> Order:
-    """Return an order that begins with a set, its newest brick last, and maybe another one."""
-    own, (stand, newest) = problem.scene.build_order, key
-    first = [name for name in own if name in stand and name != newest]
-    last = [newest] if stand else []
-    last += [] if following is None else [following]
-    return (*first, *last, *(name for name in own if name not in stand and name != following))

@@ -12,9 +12,9 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError
-from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
-from seqopt.judge._proof import Asked, Levels, Passable, _rows
+from seqopt.judge._proof import Proof, Rebuilt, as_rows
+from seqopt.judge._states import Filter
 from seqopt.judge.certificate import TOLERANCE
 
 WRONG = "the policy is not what it says: {}"
@@ -29,17 +29,15 @@ def check_policy(
 
     ``levels`` (n,): of states (n, c), as of the search; ``values`` (n,): of the first goal;
     ``following`` (n,): rows of states, or -1. Raises `SolverError` where a move leads to less, or
-    the best one does not lead to what is said.
+    the best one does not lead to the value in the table.
     """
     if problem.demands:  # which states stand is known of those that were asked alone
         return 0
-    twin = replace(problem)
-    passable = Passable(twin)
-    found = Levels(passable, {}, Asked(exact=True))
-    graph = found.graph()
-    row = _row_of(twin, passable, found, (levels, states))
-    amounts, left = graph.amounts[:, 0], np.where(graph.ends, _nothing(graph), values[row])
-    source, target = graph.source, graph.target
+    proof = Proof(replace(problem))
+    rebuilt = proof.rebuilt(Filter(exact=True))
+    graph, row = rebuilt.graph(), _table_rows(proof, rebuilt, levels, states)
+    amounts, ended = graph.amounts[:, 0], -np.inf if graph.peaks[0] else 0.0
+    left, source, target = np.where(graph.ends, ended, values[row]), graph.source, graph.target
     there = np.maximum(amounts, left[target]) if graph.peaks[0] else amounts + left[target]
     slack = TOLERANCE * np.abs(np.where(np.isfinite(there), there, 0.0))
     if not (left[source] <= there + slack).all():
@@ -54,22 +52,16 @@ def check_policy(
     return len(source)
 
 
-def _nothing(graph: Graph) -> float:
-    """Return what is left where a build has ended."""
-    return -np.inf if graph.peaks[0] else 0.0
-
-
-def _row_of(problem: States, passable: Passable, found: Levels, table: tuple[Ints, Ints]) -> Ints:
-    """Return the rows of a table that the states of the proof have; all must have one."""
-    levels, states = table
-    parts = []
-    for level, own in zip(found.levels, found.states, strict=True):
+def _table_rows(proof: Proof, rebuilt: Rebuilt, levels: Ints, states: Ints) -> Ints:
+    """Return the rows of a table that rebuilt states have; all must have one."""
+    evaluator, out = proof.evaluator, []
+    for level, own in zip(rebuilt.parts, rebuilt.states, strict=True):
         rows = np.flatnonzero(levels == level)
-        told = _rows(problem, passable, {level: states[rows]})[level]
-        codes, wanted = passable.tables.codes(told), passable.tables.codes(own)
+        given = as_rows(evaluator.problem, evaluator, {level: states[rows]})[level]
+        codes, wanted = evaluator.tables.codes(given), evaluator.tables.codes(own)
         order = np.argsort(codes, kind="stable")
         at = np.searchsorted(codes, wanted, sorter=order).clip(max=max(0, len(order) - 1))
         if not (len(order) and (codes[order[at]] == wanted).all()):
             raise SolverError(WRONG.format(f"states of level {level} are left out"))
-        parts.append(rows[order[at]])
-    return np.concatenate(parts)
+        out.append(rows[order[at]])
+    return np.concatenate(out)

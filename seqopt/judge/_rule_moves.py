@@ -1,9 +1,9 @@
-"""What may follow from many states of a free schedule at once, looked up in a book of rules.
+"""Successors of many states at once, by the second book of rules as tables.
 
-The book says in plain words which nodes a robot may hold and what a state must keep to; here its
-words are tables. A state is a row: the place in build order of the node that each robot of the team
-holds, from 1, zero for a robot that is free, or where travel counts the place that it held last
-with a minus; then how many grips were taken since the last brick where that counts.
+The book says in plain words which nodes a robot may hold and what a state must keep to. A state is
+a row: the place in build order of the node that each robot of the team holds, from 1; zero for a
+robot that is free, or minus the place that it held last, where travel counts; then how many grips
+were taken since the last brick, where that counts.
 """
 
 from __future__ import annotations
@@ -14,93 +14,133 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.scene._armed import posture_rules
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_check import RuleBook, unbearable
-from seqopt.sequence.rules import Ending, Newest
+from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
 from seqopt.sequence.schedule import Hold, Schedule, holds, islands
-from seqopt.sequence.steps import StepKind
+from seqopt.sequence.steps import Grips, Step, StepKind
 
-PAIRS = 1_000_000  # of states and places that are looked at together
+PAIRS = 1_000_000  # pairs of a state and a place in one chunk
 
 
-class Follows(NamedTuple):
-    """What follows from states by steps of one kind.
+class Transitions(NamedTuple):
+    """Successors of states by steps of one kind.
 
-    ``level``: how many bricks stand then, or steps of a schedule were taken; ``source`` (m,): the
-    row of the state before; ``states`` (m, c): some of them more than once; ``regrip``: whether a
-    grip is taken on a brick that stands; ``way`` (m,): how far the robot goes that takes a grip, m.
+    ``level``: how many bricks stand then, or steps of a schedule were taken; ``source`` (m,): row
+    of the state before; ``states`` (m, c): not all different; ``regrip``: whether a grip is taken
+    on a brick that stands; ``distance`` (m,): how far the robot goes that takes a grip, m.
     """
 
     level: int
     source: Ints
     states: Ints
     regrip: bool
-    way: Floats
+    distance: Floats
 
 
-class _Places(NamedTuple):
-    """Places that count with so many bricks: lists by robot, and rows over places."""
+class _Tables:
+    """Places of nodes, and what rows of them have in common for rules and schedules.
 
-    reach: list[list[int]]  # that robots may take hold of
-    newest: list[list[int]]  # at which they hold the newest brick
-    holds: Bools  # the same as rows
-    parts: list[Bools]  # of bricks that nothing ties to the ground
+    ``nodes`` (p,): by place; -1 of none; ``team``: robots of the columns, by index; ``robots``: how
+    many; ``parks``: whether it counts where a free robot was last.
+    """
+
+    def __init__(self, scene: Scene, team: tuple[int, ...], *, parks: bool) -> None:
+        self.team, self.robots, self._parks = team, len(team), parks
+        nodes = [node for brick in scene.placed for node in brick.nodes]
+        self.nodes = np.array([-1, *nodes])
+        self._at = np.array([[np.nan] * 3, *(scene.node_position(node) for node in nodes)])
+        self._place = {node: place for place, node in enumerate(self.nodes.tolist())}
+        self._postures = posture_rules(scene, team)
+
+    def _row(self, held: Grips, stays: Grips) -> Ints:
+        """Return the row (1, robots) of nodes held, or held last where that counts."""
+        out: Ints = np.zeros((1, self.robots), dtype=np.int32)
+        for column, robot in enumerate(self.team):
+            if (node := held[robot]) is not None:
+                out[0, column] = self._place[node]
+            elif self._parks and stays and (node := stays[robot]) is not None:
+                out[0, column] = -self._place[node]
+        return out
+
+    def _take(
+        self, states: Ints, rows: Ints, robot: int, wanted: Sequence[int], held: Ints
+    ) -> tuple[Ints, Ints, Floats]:
+        """Return source, state and distance where a robot takes one of the wanted places.
+
+        ``rows`` (n,): of the states before; ``held`` (n, k): places that others hold by then.
+        """
+        places, step = np.array(wanted, dtype=np.int64), max(1, PAIRS // max(1, len(wanted)))
+        parts = [(rows[:0], states[:0], np.zeros(0))]
+        for start in range(0, len(rows), step):
+            chunk = slice(start, start + step)
+            row, at = np.nonzero(~(held[chunk, :, None] == places).any(axis=1))
+            source = rows[chunk][row]
+            after, distance = states[source], np.zeros(len(row))
+            if self._parks:  # who held nothing yet comes from nowhere: that is no distance
+                between = self._at[np.abs(after[:, robot])] - self._at[places[at]]
+                distance = np.nan_to_num(np.linalg.norm(between, axis=1))
+            after[:, robot] = places[at]
+            parts.append((source, after, distance))
+        source, after, distance = map(np.concatenate, zip(*parts, strict=True))
+        return source, after, distance
+
+    def _let_go(self, states: Ints, column: int) -> Ints:
+        """Return states in which a robot has let go."""
+        after = states.copy()
+        after[:, column] = -np.abs(states[:, column]) if self._parks else 0
+        return after
 
 
-class RuleTables:
-    """A book of rules for many states at once.
+class RuleTables(_Tables):
+    """A book of rules for many states at once; a level is a brick count.
 
-    ``groups``: robots that could change places, by their indices: of these the entries are sorted;
-    ``parks``: whether it counts where a free robot was last.
+    ``groups``: robots that could change places, by index: the entries of these are sorted.
     """
 
     def __init__(
         self, book: RuleBook, groups: Sequence[tuple[int, ...]], *, parks: bool = False
     ) -> None:
         scene = book.network.scene
-        self._rules, placed = book.rules.begun(scene), scene.placed
-        (self.first, self.last), self._parks = book.span, parks
+        super().__init__(scene, book.team, parks=parks)
+        self._book, self._rules = book, book.rules.begun(scene)
+        self.first, self.last = book.span
         self._top = 0  # of a take-down: one more than the bricks at its begin, which is level 1
         if self._rules.takes_down:
             self._top = self.first + 1
             self.first, self.last = 1, self._top - self.last
-        at = [brick.node_position(node) for brick in placed for node in brick.nodes]
-        self._at = np.array([[np.nan] * 3, *at])
-        self.nodes = np.array([-1, *(node for brick in placed for node in brick.nodes)])
-        place = {node: i for i, node in enumerate(self.nodes.tolist())}
         self._groups = [[book.team.index(r) for r in group] for group in groups]
-        self._book, self._place = book, place
         self._least = self._rules.fewest_grips(scene)
-        holders = [prop.node for prop in book.network.scene.props]
-        self._propped = np.isin(self.nodes, holders)  # of places; none of a node that is none
-        self._postures = posture_rules(book.network.scene, book.team)
-        self._known: dict[int, _Places] = {}
+        self._propped = np.isin(self.nodes, [prop.node for prop in scene.props])  # by place
+        self._limited = self._rules.regrips is not None
+        self._known: dict[int, tuple[list[list[int]], Bools, list[Bools]]] = {}
 
-    def _of(self, bricks: int) -> _Places:
-        """Return the places that count with so many bricks, looked up once."""
+    def _newest(self, bricks: int) -> list[list[int]]:
+        """Return by robot the places at which it holds the newest brick."""
+        book = self._book
+        return [[self._place[n] for n in book.newest_nodes[r, bricks]] for r in self.team]
+
+    def _places(self, bricks: int) -> tuple[list[list[int]], Bools, list[Bools]]:
+        """Return what counts with so many bricks, looked up once.
+
+        The places that robots may take; by robot and place whether it holds the newest brick;
+        places of bricks that nothing ties to the ground.
+        """
         if bricks not in self._known:
-            book, robots = self._book, range(self.robots)
-            reach = [[self._place[n] for n in book.takes[r, bricks]] for r in book.team]
-            newest = [
-                [self._place[n] for n in (book.newest_nodes[r, bricks] if bricks else ())]
-                for r in book.team
-            ]
-            holds = np.zeros((self.robots, len(self.nodes)), dtype=bool)
-            for robot in robots:
-                holds[robot, newest[robot]] = True
-            owner, parts = book.network.scene.brick_of_node, []
-            for part in islands(book.network, bricks) if bricks else ():
-                own = [n >= 0 and owner[n].name in part for n in self.nodes.tolist()]
-                parts.append(np.array(own))
-            self._known[bricks] = _Places(reach, newest, holds, parts)
+            book, scene = self._book, self._book.network.scene
+            reach = [[self._place[n] for n in book.takes[r, bricks]] for r in self.team]
+            newest = np.zeros((self.robots, len(self.nodes)), dtype=bool)
+            for robot, own in enumerate(self._newest(bricks)):
+                newest[robot, own] = True
+            owners = [0, *(scene.brick_of_node[n].name for n in self.nodes[1:].tolist())]
+            loose = [np.isin(owners, [*part]) for part in islands(book.network, bricks)]
+            for part in loose:
+                part[0] = False
+            self._known[bricks] = reach, newest, loose
         return self._known[bricks]
-
-    @property
-    def team(self) -> tuple[int, ...]:
-        """Indices of the robots of the columns."""
-        return self._book.team
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -108,124 +148,102 @@ class RuleTables:
         alone = {*range(self.robots)} - {column for group in self._groups for column in group}
         return (*(tuple(group) for group in self._groups), *((column,) for column in sorted(alone)))
 
-    @property
-    def robots(self) -> int:
-        """How many robots take part."""
-        return len(self.team)
-
     def start(self) -> Ints:
         """Return the state (1, c) in which the build begins."""
-        limited = self._rules.regrips is not None
-        out: Ints = np.zeros((1, self.robots + limited), dtype=np.int32)
         _, held, regrips = self._book.start
-        out[0, : self.robots] = [0 if held[r] is None else self._place[held[r]] for r in self.team]
-        out[0, self.robots :] = min(regrips, self._rules.regrips or 0)
-        stays = self._rules.begin.stays if self._rules.begin and self._parks else ()
-        for column, robot in enumerate(self.team if stays else ()):
-            node = stays[robot]
-            if held[robot] is None and node is not None:
-                out[0, column] = -self._place[node]
-        return self.in_order(out)
+        row = self._row(held, self._rules.begin.stays if self._rules.begin else ())
+        if self._limited:
+            row = np.pad(row, ((0, 0), (0, 1)))
+            row[0, -1] = min(regrips, self._rules.regrips or 0)
+        return self.in_order(row)
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand on a level."""
         return self._top - level if self._top else level
 
-    def follow(self, level: int, states: Ints) -> Iterator[Follows]:
-        """Yield what follows from states (n, c) by one step each, of those that the rules allow."""
+    def successors(self, level: int, states: Ints) -> Iterator[Transitions]:
+        """Yield the successors of states (n, c) that the rules allow, by kind of step."""
         rows, bricks = np.arange(len(states)), self.bricks_at(level)
         keeps = rows[self.keep(bricks, states)] if bricks else rows
-        begins = (
-            self._rules.begin is not None and level == self.first and not self._is_let_go(level)
-        )
-        able = rows if begins else keeps
-        if bricks and self._rules.regrips is not None:
+        if bricks:
+            yield from self._regripped(level, states, keeps)
+            yield from self._released(level, states)
+        if level < self.last:
+            yield from (self._removed if self._top else self._placed)(level, states, keeps)
+
+    def _regripped(self, level: int, states: Ints, keeps: Ints) -> Iterator[Transitions]:
+        """Yield what follows where a free robot takes hold of a brick that stands."""
+        bricks, begin = self.bricks_at(level), self._rules.begin
+        begins = begin is not None and level == self.first and not self._is_let_go(level)
+        able = np.arange(len(states)) if begins else keeps
+        if self._limited:
             able = able[states[able, -1] < self._rules.regrips]
-        for robot in self._takers() if bricks else ():
-            source, after, way = self._taken(states, able, robot, self._of(bricks).reach[robot])
+        for robot in self._takers():
+            wanted = self._places(bricks)[0][robot]
+            source, after, distance = self._taken(states, able, robot, wanted)
             after[:, self.robots :] += 1
             ok = self._postures.allow(bricks, after)
             held = self.in_order(after[ok])
-            yield Follows(level, source[ok], held, regrip=True, way=way[ok])
-        for source, after in self._released(level, states):
-            none = np.zeros(len(source))
-            yield Follows(level, source, self.in_order(after), regrip=False, way=none)
-        if level == self.last:
-            return
-        if self._top:
-            yield from self._removed(level, states, keeps)
-            return
-        for robot in self._takers():
-            if self._book.places(self.team[robot], bricks + 1):
-                newest = self._of(bricks + 1).newest[robot]
-                source, after, way = self._taken(states, keeps, robot, newest)
-                after[:, self.robots :] = 0
-                ok = self.keep(bricks + 1, after) & self._postures.allow(bricks + 1, after)
-                placed = self.in_order(after[ok])
-                yield Follows(bricks + 1, source[ok], placed, regrip=False, way=way[ok])
+            yield Transitions(level, source[ok], held, regrip=True, distance=distance[ok])
 
-    def _removed(self, level: int, states: Ints, rows: Ints) -> Iterator[Follows]:
+    def _released(self, level: int, states: Ints) -> Iterator[Transitions]:
+        """Yield what follows where one robot lets go, or at the end all."""
+        for robot in range(self.robots):
+            source = np.flatnonzero(states[:, robot] > 0)
+            after = self._let_go(states[source], robot)
+            if not self._is_let_go(level):
+                ok = self.keep(self.bricks_at(level), after)
+                source, after = source[ok], after[ok]
+            yield self._without_way(level, source, after)
+        if level == self.last and self._rules.how_it_ends is Ending.RELEASED:
+            source = np.flatnonzero((states[:, : self.robots] > 0).any(axis=1))
+            after = states[source]
+            after[:, : self.robots] = 0
+            yield self._without_way(level, source, after)
+
+    def _placed(self, level: int, states: Ints, keeps: Ints) -> Iterator[Transitions]:
+        """Yield what follows where a free robot places the next brick."""
+        bricks = self.bricks_at(level) + 1
+        for robot in self._takers():
+            if self._book.places(self.team[robot], bricks):
+                wanted = self._newest(bricks)[robot]
+                source, after, distance = self._taken(states, keeps, robot, wanted)
+                after[:, self.robots :] = 0
+                ok = self.keep(bricks, after) & self._postures.allow(bricks, after)
+                held = self.in_order(after[ok])
+                yield Transitions(level + 1, source[ok], held, regrip=False, distance=distance[ok])
+
+    def _removed(self, level: int, states: Ints, keeps: Ints) -> Iterator[Transitions]:
         """Yield what follows where a robot takes the newest brick away that it alone holds."""
         bricks = self.bricks_at(level)
         brick = (2 * bricks - 1, 2 * bricks)  # places of its nodes
-        holders = np.isin(states[rows, : self.robots], brick).sum(axis=1)
-        rows = rows[holders == 1]
-        for robot in range(self.robots):
+        rows = keeps[np.isin(states[keeps, : self.robots], brick).sum(axis=1) == 1]
+        for robot, newest in enumerate(self._newest(bricks)):
             if not self._book.places(self.team[robot], bricks):
                 continue
-            source = rows[np.isin(states[rows, robot], self._of(bricks).newest[robot])]
-            after = states[source]
-            after[:, robot] = -after[:, robot] if self._parks else 0
+            source = rows[np.isin(states[rows, robot], newest)]
+            after = self._let_go(states[source], robot)
             after[:, self.robots :] = 0
             if bricks > 1:
                 ok = self.keep(bricks - 1, after) & self._postures.allow(bricks - 1, after)
                 source, after = source[ok], after[ok]
-            none = np.zeros(len(source))
-            yield Follows(level + 1, source, self.in_order(after), regrip=False, way=none)
+            yield self._without_way(level + 1, source, after)
+
+    def _without_way(self, level: int, source: Ints, after: Ints) -> Transitions:
+        none = np.zeros(len(source))
+        return Transitions(level, source, self.in_order(after), regrip=False, distance=none)
 
     def _taken(
-        self, states: Ints, rows: Ints, robot: int, places: Sequence[int]
+        self, states: Ints, rows: Ints, robot: int, wanted: Sequence[int]
     ) -> tuple[Ints, Ints, Floats]:
-        """Return what follows where a free robot took one of the places that nobody holds."""
+        """Return what follows where a robot that is free takes a place that nobody holds."""
         free = rows[states[rows, robot] <= 0]
-        wanted, step = np.array(places, dtype=np.int64), max(1, PAIRS // max(1, len(places)))
-        parts = [(free[:0], states[:0], np.zeros(0))]
-        for start in range(0, len(free) if len(wanted) else 0, step):
-            block = free[start : start + step]
-            held = states[block, : self.robots, None] == wanted
-            row, at = np.nonzero(~held.any(axis=1))
-            source, after = block[row], states[block[row]]
-            way = np.zeros(len(row))
-            if self._parks:  # who held nothing yet comes from nowhere: that is no way
-                between = self._at[-after[:, robot]] - self._at[wanted[at]]
-                way = np.nan_to_num(np.linalg.norm(between, axis=1))
-            after[:, robot] = wanted[at]
-            parts.append((source, after, way))
-        source, after, way = map(np.concatenate, zip(*parts, strict=True))
-        return source, after, way
+        return self._take(states, free, robot, wanted, states[free, : self.robots])
 
     def _takers(self) -> Iterator[int]:
         """Yield the robots of which one could take a grip: of a group the last, if it is free."""
         first = {robot for group in self._groups for robot in group[:-1] if not self._parks}
         yield from (robot for robot in range(self.robots) if robot not in first)
-
-    def _released(self, level: int, states: Ints) -> Iterator[tuple[Ints, Ints]]:
-        """Yield the states after one robot let go, or at the end all, and those before."""
-        bricks = self.bricks_at(level)
-        ending = self._rules.how_it_ends
-        for robot in range(self.robots):
-            source = np.flatnonzero(states[:, robot] > 0)
-            after = states[source]
-            after[:, robot] = -after[:, robot] if self._parks else 0
-            if not self._is_let_go(level):
-                ok = self.keep(bricks, after)
-                source, after = source[ok], after[ok]
-            yield source, after
-        if level == self.last and ending is Ending.RELEASED:
-            source = np.flatnonzero((states[:, : self.robots] > 0).any(axis=1))
-            after = states[source]
-            after[:, : self.robots] = 0
-            yield source, after
 
     def _is_let_go(self, level: int) -> bool:
         """Return whether robots let go one by one there, whatever else the rules say, and only so.
@@ -255,25 +273,37 @@ class RuleTables:
 
     def keep(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, from 1 brick."""
-        ok = self._keep(bricks, states, self._propped)
-        if bricks == self.last and self._propped.any():  # where nobody holds, props are struck
-            bare = (states[:, : self.robots] <= 0).all(axis=1)
-            ok[bare] = self._keep(bricks, states[bare], np.zeros_like(self._propped))
-        return ok
+        return np.asarray(~np.any([each for each, _ in self._broken(bricks, states)], axis=0))
 
-    def _keep(self, bricks: int, states: Ints, props: Bools) -> Bools:
-        """Return the same with props at places."""
+    def _broken(self, bricks: int, states: Ints) -> list[tuple[Bools, str]]:
+        """Return which states (n, c) break which rules, the ending aside, and that in words."""
         grips = states[:, : self.robots].clip(min=0)
-        ok = np.ones(len(states), dtype=bool)
-        propped = props[: 2 * bricks + 1]
-        if bricks > 1:
-            ok &= np.count_nonzero(grips, axis=1) + propped.sum() >= self._least
-        if self._rules.newest is not Newest.FREE and not propped[-2:].any():
-            ok &= self._of(bricks).holds[np.arange(self.robots), grips].any(axis=1)
-        for part in self._of(bricks).parts:
-            if not (part & props).any():
-                ok &= part[grips].any(axis=1)
-        return ok
+        count = np.count_nonzero(grips, axis=1)
+        struck = (bricks == self._book.span[1]) & (count == 0)  # where nobody holds, props are
+        props = self._propped[: 2 * bricks + 1]
+        held = np.where(struck, 0, count + props.sum())
+        _, newest, loose = self._places(bricks)
+        words = f"{held.min(initial=self.robots)} grips, fewer than least_grips={self._least}"
+        out = [(held < self._least * (bricks > 1), words)]
+        if self._rules.newest is not Newest.FREE:
+            on = newest[np.arange(self.robots), grips].any(axis=1) | (props[-2:].any() & ~struck)
+            out.append((~on, f"nobody holds the newest brick (newest={self._rules.newest.value})"))
+        for part in loose:
+            on = part[grips].any(axis=1) | ((part & self._propped).any() & ~struck)
+            out.append((~on, "a part that no joint ties to the ground is held by nobody"))
+        return out
+
+    def fault(self, bricks: int, state: Ints) -> str:
+        """Return which rule a state (1, c) breaks, in a few words; empty if none."""
+        every = self._broken(bricks, state) if bricks else []
+        if not self._postures.allow(bricks, state)[0]:
+            held = [self.nodes[place].item() for place in state[0, : self.robots] if place > 0]
+            every = [*every, (np.ones(1, dtype=bool), f"arms cannot hold {held} together")]
+        return next((words for broken, words in every if broken[0]), "")
+
+    def row(self, grips: Grips) -> Ints:
+        """Return the row (1, robots) of nodes that the robots of a scene hold."""
+        return self._row(grips, ())
 
     def ends(self, level: int, states: Ints) -> Bools:
         """Return which states (n, c) end the build."""
@@ -285,8 +315,7 @@ class RuleTables:
         site = self._rules.finish
         if site is None or site.grips is None:
             return self.keep(self.bricks_at(level), states)
-        wanted = [0 if site.grips[r] is None else self._place[site.grips[r]] for r in self.team]
-        both = self.in_order(np.concatenate([grips, [wanted]]))
+        both = self.in_order(np.concatenate([grips, self.row(site.grips)]))
         return np.asarray((both[:-1] == both[-1]).all(axis=1))
 
     def codes(self, states: Ints) -> Ints:
@@ -303,10 +332,10 @@ class RuleTables:
         return states
 
 
-class ScheduleTables:
-    """The holds of a schedule for many states at once.
+class ScheduleTables(_Tables):
+    """The holds of a schedule for many states at once; a level is a number of steps.
 
-    ``parks``: whether it counts where a free robot was last; ``worlds``: scenes of scenarios.
+    ``worlds``: scenes of scenarios.
     """
 
     def __init__(
@@ -317,18 +346,12 @@ class ScheduleTables:
         parks: bool = False,
         worlds: tuple[Scene, ...] = (),
     ) -> None:
-        scene, self.first = network.scene, 0
+        scene = network.scene
+        super().__init__(scene, tuple(range(len(scene.robots))), parks=parks)
+        self._schedule, self.first, self.last = schedule, 0, len(schedule.steps)
         self._heavy = unbearable((scene, *worlds), schedule.steps, schedule.begin)
-        self._schedule, self._parks = schedule, parks
-        self.last, self.robots = len(schedule.steps), len(scene.robots)
         self._before = schedule.steps[0].number - 1
-        self.team = tuple(range(self.robots))
         self.groups = tuple((column,) for column in self.team)
-        self.nodes = np.array([-1, *(node for brick in scene.placed for node in brick.nodes)])
-        at = [scene.node_position(node) for node in self.nodes[1:].tolist()]
-        self._at = np.array([[np.nan] * 3, *at])
-        self._place = {node: i for i, node in enumerate(self.nodes.tolist())}
-        self._postures = posture_rules(scene, self.team)
         self._holds = {
             (hold.robot, number): hold
             for hold in holds(scene, schedule.steps)
@@ -337,52 +360,32 @@ class ScheduleTables:
 
     def start(self) -> Ints:
         """Return the state before the first step, (1, robots) int."""
-        site, out = self._schedule.begin, np.zeros((1, self.robots), dtype=np.int64)
-        for robot, node in enumerate(() if site is None else site.grips or ()):
-            stay = site.stays[robot] if site and site.stays and self._parks else None
-            if node is not None or stay is not None:
-                out[0, robot] = self._place[node] if node is not None else -self._place[stay]
-        return out
+        site, none = self._schedule.begin, (None,) * self.robots
+        return self._row(none, none) if site is None else self._row(site.grips or none, site.stays)
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand after so many steps."""
         begin = self._schedule.begin.bricks if self._schedule.begin else 0
         return max((step.bricks for step in self._schedule.steps[:level]), default=begin)
 
-    def follow(self, level: int, states: Ints) -> Iterator[Follows]:
+    def successors(self, level: int, states: Ints) -> Iterator[Transitions]:
         """Yield what follows from states (n, robots) by the next step, if there is one."""
         number = self._before + level + 1
         if level == self.last or number in self._heavy:
             return
-        source, after, way = np.arange(len(states)), states, np.zeros(len(states))
+        source, after, distance = np.arange(len(states)), states, np.zeros(len(states))
         for robot in range(self.robots):
-            source, after, way = self._moved(robot, number, (source, after, way))
+            hold = self._holds.get((robot, number))
+            if hold is None:
+                after = self._let_go(after, robot)
+            elif hold.first == number:
+                rows, others = np.arange(len(after)), self._held_by_others(after, robot, number)
+                wanted = self._wanted(hold)
+                row, after, more = self._take(after, rows, robot, wanted, others)
+                source, distance = source[row], distance[row] + more
         ok = self._postures.allow(self.bricks_at(level + 1), after)
-        source, after, way = source[ok], after[ok], way[ok]
         regrip = self._schedule.steps[level].kind is StepKind.REPOSITION
-        yield Follows(level + 1, source, after, regrip=regrip, way=way)
-
-    def _moved(
-        self, robot: int, number: int, rows: tuple[Ints, Ints, Floats]
-    ) -> tuple[Ints, Ints, Floats]:
-        """Return rows in which a robot does what it does in a step, after those before it."""
-        source, states, way = rows
-        hold = self._holds.get((robot, number))
-        if hold is not None and hold.first < number:
-            return rows
-        out = states.copy()
-        if hold is None:
-            out[:, robot] = -np.abs(states[:, robot]) if self._parks else 0
-            return source, out, way
-        wanted = self._wanted(hold)
-        others = self._held_by_others(states, robot, number)
-        row, at = np.nonzero(~(others[:, :, None] == wanted).any(axis=1))
-        source, out, way = source[row], states[row], way[row]
-        if self._parks:
-            between = self._at[np.abs(out[:, robot])] - self._at[wanted[at]]
-            way = way + np.nan_to_num(np.linalg.norm(between, axis=1))
-        out[:, robot] = wanted[at]
-        return source, out, way
+        yield Transitions(level + 1, source[ok], after[ok], regrip, distance[ok])
 
     def _held_by_others(self, states: Ints, robot: int, number: int) -> Ints:
         """Return what others hold in a step already: those before it, and who goes on holding."""
@@ -393,10 +396,10 @@ class ScheduleTables:
                 out[:, column] = 0
         return out
 
-    def _wanted(self, hold: Hold) -> Ints:
+    def _wanted(self, hold: Hold) -> list[int]:
         """Return the places that a hold may take."""
         nodes = (hold.node,) if hold.move is None else self._schedule.moves[hold.move].candidates
-        return np.array([self._place[node] for node in nodes if node is not None], dtype=np.int64)
+        return [self._place[node] for node in nodes if node is not None]
 
     def certain(self) -> Iterator[tuple[int, Ints]]:
         """Yield the level and the places held (1, robots) of steps in which no hold is chosen."""
@@ -421,3 +424,33 @@ class ScheduleTables:
     def in_order(self, states: Ints) -> Ints:
         """Return states as they are: no two robots could change places."""
         return states
+
+
+def check_free(
+    network: Network, rules: FreeRules, steps: Sequence[Step], worlds: tuple[Scene, ...] = ()
+) -> None:
+    """Require that a checked sequence keeps the rules of a free schedule, forces of grips aside."""
+    tables, heavy = RuleTables(RuleBook(network, rules, worlds), []), dict[int, str]()
+    if rules.payload is Payload.KEPT:
+        heavy = unbearable((network.scene, *worlds), steps, rules.begun(network.scene).begin)
+    level, state = tables.first, tables.start()
+    for step in steps:
+        if step.number in heavy:
+            raise StepError(f"step {step.number} ({step.kind.value}): {heavy[step.number]}")
+        to = level + (step.kind in (StepKind.PLACE, StepKind.REMOVE))
+        wanted, regrip = tables.row(step.grips), step.kind is StepKind.REPOSITION
+        found = [
+            move.states[(move.states[:, : tables.robots] == wanted).all(axis=1)]
+            for move in tables.successors(level, state)
+            if (move.level, move.regrip) == (to, regrip) and tables.bricks_at(to) == step.bricks
+        ]
+        after = np.concatenate([state[:0], *found])[:1]
+        others = (n for r, n in enumerate(step.grips) if r not in tables.team)
+        if not len(after) or any(node is not None for node in others):
+            why = tables.fault(step.bricks, wanted) or "no rule allows it after the one before"
+            raise StepError(f"step {step.number} ({step.kind.value}) of a free schedule: {why}")
+        level, state = to, after
+    if not tables.ends(level, state)[0]:
+        raise StepError(
+            f"step {len(steps)}: the build does not end there (ending={rules.ending.value})"
+        )

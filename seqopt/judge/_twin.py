@@ -18,8 +18,8 @@ class Twin(NamedTuple):
     """How a measure is computed and bounded once more, apart from the search.
 
     ``value``: of the steps of a problem, with the starts that are claimed; ``least``: combinatorial
-    lower bound of all builds by some rules; ``bounds``: makes of the states that a better build
-    could pass, the values and what is claimed a function from subgraphs to lower bounds of the
+    lower bound of all builds by some rules; ``bounds``: makes of an evaluator, rebuilt states, the
+    values and what is claimed a function from subgraphs to lower bounds of the
     goals after those about margins; ``path_value``: of arcs and acts of an instance; ``claimed``:
     what a claim about an instance proves, as of `seqopt.judge._claims.proven`.
     """

@@ -1,10 +1,8 @@
 """Certificates of free schedules: a plan recomputed, and a proof that none is better.
 
-The plan's own values come from the responses of its steps, one after the other. What no plan stays
-below is then proven goal by goal: the states that a better plan could pass and the moves between
-them are found by a second version of the rules, with responses computed again, and weak duality
-bounds every path through them (`seqopt.graph.duality`). This shares nothing with the search that is
-judged but the states that it visited, on which only the time depends.
+The values of the plan come from the responses of its steps. Lower bounds of all plans are proven
+goal by goal (`seqopt.judge._proof`): this shares nothing with the search but the states that it
+visited, on which only the time depends.
 """
 
 from __future__ import annotations
@@ -19,9 +17,9 @@ from seqopt.errors import SolverError, StepError
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.judge._proof import BELOW, Hint, Proof
-from seqopt.judge._prop_rules import check_props
-from seqopt.judge._shape_rules import check_shape
-from seqopt.judge._standing_proof import proven_margins, require_margin
+from seqopt.judge._rule_moves import check_free
+from seqopt.judge._states import goal_values
+from seqopt.judge._step_checks import check_props, check_shape, proven_margins, require_margin
 from seqopt.judge._twin import Twin, twin_of
 from seqopt.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
@@ -31,11 +29,12 @@ from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along, tol
 from seqopt.responses.quantities import CHOSEN_BY, PROP_EXCESS
 from seqopt.responses.table import _analyzed, _Columns, force_column
 from seqopt.scene._armed import check_postures
-from seqopt.sequence._rule_check import check_carried, check_free
+from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
 
 TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what the engine says
+Bounds = tuple[float, ...]
 
 
 def judge_schedule(
@@ -52,60 +51,42 @@ def judge_schedule(
     ``hint`` (mapping of int to (n, c) int): states that a search visited, by brick count; only the
     time that the proof takes depends on them; ``exact``: whether values are promised as the least;
     else only bounds that were claimed are. Raises `SolverError` if a value is not what was claimed,
-    a limit is exceeded, or a plan is better than promised; `StepError` if a step breaks a rule.
+    a limit or a budget is exceeded, or a plan is better than promised; `StepError` if a step breaks
+    a rule.
     """
-    values = _as_claimed(problem, selection, steps)
-    twin = twin_of(Measure.MAKESPAN) if problem.is_timed else None
-    if twin is not None and np.isfinite(selection.bound).any():
-        return _by_twin(problem, twin, selection, values, hint)
-    if selection.stopped or (problem.is_timed and twin is None):
-        bounds = _counted(problem, twin, values, (-np.inf,) * len(values))
-        gap = _gap(problem.aims, values, bounds)
-        return Certificate(values, bounds, gap, gap)  # its bounds are claimed, not proven
-    if problem.totals:
-        return _over_totals(problem, selection, values[0], hint)
-    proof = Proof(problem, hint)
-    if problem.budgets:
-        return _within_budgets(problem, selection, values, proof)
-    bounds = _bounds(problem, proof, values)
-    promised = values if exact else selection.bound
-    for goal, value, bound in zip(problem.goals, promised, bounds, strict=True):
-        if not goal.of_margins and not bound >= value - BELOW * abs(value):
-            raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
-    gap = _gap(problem.goals, values, bounds)
-    return Certificate(values, bounds, gap, gap, {}, proof.states)
-
-
-def _by_twin(
-    problem: States, twin: Twin, selection: StatePath, values: tuple[float, ...], hint: Hint | None
-) -> Certificate:
-    """Return the certificate of a build of which a measure of the whole path counts."""
-    aims, proof = len(problem.aims), Proof(problem, hint)
+    values, aims = _as_claimed(problem, selection, steps), len(problem.aims)
     for goal, spent, cap in zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True):
         if not spent <= cap + TOLERANCE * cap:
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
+    twin = twin_of(Measure.MAKESPAN) if problem.is_timed else None
+    proves_time = twin is not None and bool(np.isfinite(selection.bound).any())
+    if not proves_time and (selection.stopped or problem.is_timed):  # bounds are claimed alone
+        bounds = _with_counts(problem, twin, values, (-np.inf,) * len(values))
+        gap = _gap(problem.aims, values, bounds)
+        return Certificate(values, bounds, gap, gap)
+    proof, claimed = Proof(_weighed(problem, selection), hint), selection.bound
     margins = _margin_bounds(problem, proof, values)
-    bounds = (*margins, *proof.timed_bounds(twin, values, selection)[len(margins) :])
-    pairs = list(zip(bounds, values, strict=False))
-    bounds = tuple(v if b >= v - BELOW * abs(v) else b for b, v in pairs)
-    bounds = _counted(problem, twin, values, bounds)
-    said = zip(bounds, selection.bound, values, strict=False)
-    claimed = [min(v, max(b, other)) for b, other, v in said]
+    if twin is not None:
+        found = proof.timed_bounds(twin, values, selection)
+    elif problem.budgets:
+        found = proof.budget_bounds(values, claimed, _multipliers(problem, selection))
+    else:
+        found = proof.bounds(values) if len(margins) < len(values) else margins
+    bounds = _closed(values, (*margins, *found[len(margins) :]))
+    if twin is not None:
+        bounds = _with_counts(problem, twin, values, bounds)
+    elif not problem.totals:
+        _require_promised(problem, bounds, values if exact and not problem.budgets else claimed)
+        claimed = bounds
+    claimed = _closed(values, tuple(map(max, bounds, claimed)))
     gap, left = (_gap(problem.goals, values, each) for each in (bounds, claimed))
     return Certificate(values, (*bounds, *values[aims:]), gap, left, {}, proof.states)
 
 
-def _counted(
-    problem: States, twin: Twin | None, values: Sequence[float], bounds: Sequence[float]
-) -> tuple[float, ...]:
-    """Return bounds of first goals, those on makespans no less than what all builds take."""
-    if twin is None:
-        return tuple(bounds)
-    least = twin.least(problem.network, problem.rules)
-    return tuple(
-        max(bound, min(least, value)) if goal.measure is Measure.MAKESPAN else bound
-        for goal, value, bound in zip(problem.goals, values, bounds, strict=False)
-    )
+def _closed(values: Sequence[float], bounds: Sequence[float]) -> Bounds:
+    """Return bounds that are no higher than values; those that leave no room are the values."""
+    pairs = zip(values, bounds, strict=False)
+    return tuple(v if b >= v - BELOW * abs(v) else b for v, b in pairs)
 
 
 def _gap(goals: Sequence[Goal], values: Sequence[float], bounds: Sequence[float]) -> float:
@@ -116,7 +97,58 @@ def _gap(goals: Sequence[Goal], values: Sequence[float], bounds: Sequence[float]
     )
 
 
-def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) -> tuple[float, ...]:
+def _weighed(problem: States, selection: StatePath) -> States:
+    """Return a problem over totals of scenarios with the weights that are claimed, made valid."""
+    if not problem.totals:
+        return problem
+    if [*map(len, selection.prices)] != [len(problem.each)]:
+        raise SolverError("there is no weight for every scenario")
+    weights = problem.over.allowed(np.array(selection.prices[0]))
+    return replace(problem, weights=tuple(weights.tolist()))
+
+
+def _margin_bounds(problem: States, proof: Proof, values: Bounds) -> Bounds:
+    """Return lower bounds of margins, up to their proven width."""
+    out: list[float] = []
+    for goal, value in zip(problem.goals, values, strict=True):
+        if goal.of_margins:
+            bound = max(0.0, value - slack(goal.response, value))
+            if value > 0 and not proof.is_impossible((*values[: len(out)], bound)):
+                raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
+            out.append(bound)
+    return tuple(out)
+
+
+def _multipliers(problem: States, selection: StatePath) -> Sequence[Sequence[float]]:
+    """Return the multipliers that are claimed of budgets, goal by goal."""
+    found, budgets = selection.prices, len(problem.budgets)
+    if len(found) < len(problem.aims) or any(len(each) < budgets for each in found):
+        raise SolverError("there is no price for every budget and goal")
+    return found
+
+
+def _require_promised(problem: States, bounds: Bounds, promised: Sequence[float]) -> None:
+    """Raise a `SolverError` if a bound, not of a margin, is below what is promised."""
+    for goal, bound, least in zip(problem.aims, bounds, promised, strict=False):
+        if not goal.of_margins and not bound >= least - BELOW * abs(least):
+            if not problem.budgets:
+                raise SolverError(f"{goal}: {least:.9g} is promised as the least; a plan has less")
+            if not bound >= least - TOLERANCE * abs(least):
+                raise SolverError(f"{goal}: no plan within budgets is promised below {least:.9g}")
+
+
+def _with_counts(problem: States, twin: Twin | None, values: Bounds, bounds: Bounds) -> Bounds:
+    """Return bounds of first goals, those of makespans no lower than the combinatorial one."""
+    if twin is None:
+        return bounds
+    least = twin.least(problem.network, problem.rules)
+    return tuple(
+        max(bound, min(least, value)) if goal.measure is Measure.MAKESPAN else bound
+        for goal, value, bound in zip(problem.goals, values, bounds, strict=False)
+    )
+
+
+def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) -> Bounds:
     """Return the values of steps that keep the rules, if they are those that are claimed."""
     if isinstance(problem.rules, Schedule):
         _check_scheduled(problem.rules, steps)
@@ -137,11 +169,8 @@ def _check_scheduled(schedule: Schedule, steps: Sequence[Step]) -> None:
         raise StepError(f"{len(steps)} steps; schedule {schedule.method} has {len(schedule.steps)}")
     chosen: dict[int, object] = {}
     for step, planned in zip(steps, schedule.steps, strict=True):
-        same = (step.number, step.kind, step.bricks) == (
-            planned.number,
-            planned.kind,
-            planned.bricks,
-        )
+        own = planned.number, planned.kind, planned.bricks
+        same = (step.number, step.kind, step.bricks) == own
         for node, grip in zip(step.grips, planned.grips, strict=True):
             if isinstance(grip, OpenGrip):
                 found = chosen.setdefault(grip.move, node)
@@ -150,66 +179,6 @@ def _check_scheduled(schedule: Schedule, steps: Sequence[Step]) -> None:
                 same &= node == grip
         if not same:
             raise StepError(f"step {step.number} is none of schedule {schedule.method}")
-
-
-def _bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> tuple[float, ...]:
-    """Return what no plan stays below, goal by goal; margins come first and have their width."""
-    out = _margin_bounds(problem, proof, values)
-    if len(out) == len(values):
-        return tuple(out)
-    pairs = zip(proof.bounds(values), values, strict=True)
-    found = [v if b >= v - BELOW * abs(v) else b for b, v in pairs]
-    return (*out, *found[len(out) :])
-
-
-def _margin_bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> list[float]:
-    """Return what no plan stays below of margins, within what they are proven to."""
-    out: list[float] = []
-    for goal, value in zip(problem.goals, values, strict=True):
-        if goal.of_margins:
-            bound = max(0.0, value - slack(goal.response, value))
-            if value > 0 and not proof.is_impossible((*values[: len(out)], bound)):
-                raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
-            out.append(bound)
-    return out
-
-
-def _within_budgets(
-    problem: States, selection: StatePath, values: tuple[float, ...], proof: Proof
-) -> Certificate:
-    """Return the certificate of a plan within budgets: what prices leave open is its gap."""
-    aims = len(problem.aims)
-    pairs = zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True)
-    for goal, spent, cap in pairs:
-        if not spent <= cap + TOLERANCE * cap:
-            raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
-    claimed, prices = selection.bound, selection.prices
-    if len(prices) < aims or any(len(each) < len(problem.budgets) for each in prices):
-        raise SolverError("there is no price for every budget and goal")
-    margins = _margin_bounds(problem, proof, values)
-    bounds = (*margins, *proof.budget_bounds(values, claimed, prices)[len(margins) :])
-    for goal, bound, said in zip(problem.aims, bounds, claimed, strict=False):
-        if not goal.of_margins and not bound >= said - TOLERANCE * abs(said):
-            raise SolverError(f"{goal}: no plan within budgets is promised below {said:.9g}")
-    bounds = tuple(map(min, bounds, values))
-    left = _gap(problem.goals, values, bounds)
-    return Certificate(values, (*bounds, *values[aims:]), left, left, {}, proof.states)
-
-
-def _over_totals(
-    problem: States, selection: StatePath, value: float, hint: Hint | None
-) -> Certificate:
-    """Return the certificate of a total over scenarios: weights bound it by one weighted sum."""
-    if [*map(len, selection.prices)] != [len(problem.each)]:
-        raise SolverError("there is no weight for every scenario")
-    weights = problem.over.allowed(np.array(selection.prices[0]))
-    proof = Proof(replace(problem, weights=tuple(weights.tolist())), hint)
-    bound = min(value, proof.bounds((value,))[0])
-    claimed = min(value, max(bound, selection.bound[0]))
-    if claimed > value - BELOW * abs(value):
-        claimed = value
-    gap, left = (_gap(problem.goals, (value,), (each,)) for each in (bound, claimed))
-    return Certificate((value,), (bound,), gap, left, {}, proof.states)
 
 
 def plan_values(
@@ -223,59 +192,34 @@ def plan_values(
     ``claimed``: the value of every goal; margins of stability are compared with these, and taken
     from them; ``starts``: where mortar cures, when steps start, s. Result: SI units. Over scenarios
     the largest, but ways, which are those of the scene itself. Raises `SolverError` if a step
-    exceeds a limit, does not stand as is demanded, or has less of a margin.
+    exceeds a limit, is not proven to stand, or has less of a margin.
     """
     if problem.each:
-        return _in_all(problem, steps, [plan_values(each, steps, claimed) for each in problem.each])
+        found = [plan_values(each, steps, claimed) for each in problem.each]
+        if problem.totals:
+            return (problem.over.value(np.array(found)[:, 0]),)
+        pairs = zip(problem.goals, zip(*found, strict=True), strict=True)
+        of_ways = Measure.TRAVEL  # these are as they are planned
+        return tuple(_travel(problem, steps) if g.measure is of_ways else max(v) for g, v in pairs)
     check_props(problem.engine, steps)
     check_shape(problem.engine, steps, problem.limits)
     columns = _state_columns(problem, steps, _analyzed(problem.engine, steps))
-    _require_limits(problem, columns)
-    margins = _margins(problem, steps)
-    regrips = sum(step.kind is StepKind.REPOSITION for step in steps)
-    moves: dict[Measure, float] = {Measure.STEPS: len(steps), Measure.REGRIPS: regrips}
-    moves[Measure.TRAVEL] = _travel_of(problem, steps)
-    out = []
-    for k, goal in enumerate(problem.goals):
-        if goal.of_margins:
-            require_margin(goal.response, claimed[k], margins[goal.response])
-            out.append(claimed[k])
-        elif goal.measure in moves:
-            out.append(float(moves[goal.measure]))
-        elif not goal.of_states:
-            twin = twin_of(goal.measure)
-            out.append(claimed[k] if twin is None else twin.value(problem, steps, starts))
-        else:
-            costs = _costs(problem, goal, columns, [step.bricks for step in steps])
-            out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
-    return tuple(out)
-
-
-def _in_all(
-    problem: States, steps: Sequence[Step], found: Sequence[tuple[float, ...]]
-) -> tuple[float, ...]:
-    """Return the largest of what goals take in scenarios, or what is made of their totals."""
-    if problem.totals:
-        return (problem.over.value(np.array(found)[:, 0]),)
-    return tuple(
-        _travel_of(problem, steps) if goal.measure is Measure.TRAVEL else max(values)
-        for goal, values in zip(problem.goals, zip(*found, strict=True), strict=True)
-    )  # ways are as they are planned
-
-
-def _require_limits(problem: States, columns: Mapping[str, np.ndarray]) -> None:
-    """Raise a `SolverError` if a step exceeds a limit."""
     for limit in problem.limits:
         if limit.response in columns and limit.exceeded(columns[limit.response]).any():
             at = int(np.argmax(columns[limit.response])) + 1
             raise SolverError(f"step {at} exceeds the limit on {limit.label}")
-
-
-def _margins(problem: States, steps: Sequence[Step]) -> Mapping[str, float]:
-    """Return the margins of a plan where they count, and require that it stands where it must."""
-    if problem.standing is None and not any(goal.of_margins for goal in problem.goals):
-        return {}
-    return proven_margins(problem, steps)
+    margins, out = proven_margins(problem, steps), list[float]()
+    for k, goal in enumerate(problem.goals):
+        if goal.of_margins:
+            require_margin(goal.response, claimed[k], margins[goal.response])
+            out.append(claimed[k])
+        elif goal.measure is Measure.MAKESPAN:
+            twin = twin_of(goal.measure)
+            out.append(claimed[k] if twin is None else twin.value(problem, steps, starts))
+        else:
+            costs = _costs(problem, goal, columns, steps)
+            out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
+    return tuple(out)
 
 
 def _state_columns(
@@ -300,7 +244,26 @@ def _state_columns(
     return out
 
 
-def _travel_of(problem: States, steps: Sequence[Step]) -> float:
+def _costs(
+    problem: States, goal: Goal, columns: Mapping[str, np.ndarray], steps: Sequence[Step]
+) -> np.ndarray:
+    """Return what a goal takes of every step, (n,)."""
+    if goal.measure is Measure.STEPS:
+        return np.ones(len(steps))
+    if goal.measure is Measure.REGRIPS:
+        return np.array([step.kind is StepKind.REPOSITION for step in steps], dtype=float)
+    if goal.measure is Measure.TRAVEL:
+        return np.array([_travel(problem, steps)])
+    bricks, out = np.array([step.bricks for step in steps]), np.zeros(len(steps))
+    for stand in {*bricks.tolist()}:  # an empty site takes nothing but responses
+        rows = np.flatnonzero(bricks == stand)
+        found = {name: values[rows] for name, values in columns.items()}
+        if goal.response or stand:
+            out[rows] = goal_values(problem, goal, found, stand, np.ones(len(rows), dtype=bool))
+    return out
+
+
+def _travel(problem: States, steps: Sequence[Step]) -> float:
     """Return how far robots go straight from one grip to the next, m."""
     scene, site, total = problem.network.scene, problem.rules.begin, 0.0
     before = () if site is None else (site.stays or site.holds(scene), site.holds(scene))
@@ -309,17 +272,3 @@ def _travel_of(problem: States, steps: Sequence[Step]) -> float:
         for ends in pairwise(held):
             total += float(np.linalg.norm(np.subtract(*ends)))
     return total
-
-
-def _costs(
-    problem: States, goal: Goal, columns: Mapping[str, np.ndarray], bricks: Sequence[int]
-) -> np.ndarray:
-    """Return what a goal takes of every step (n,), in which so many bricks stand."""
-    if goal.response:
-        return columns[goal.response]
-    out = np.zeros(len(bricks))
-    for stand in {*bricks} - {0}:  # an empty site takes nothing
-        rows = np.flatnonzero(np.array(bricks) == stand)
-        found = {name: values[rows] for name, values in columns.items()}
-        out[rows] = problem.criterion.costs(found, stand, len(rows))
-    return out

@@ -24,7 +24,7 @@ from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import Layers, _require_carried, steps_over, travel
 from seqopt.graph.scenarios import ScenarioLayers, engine_for, largest_of
 from seqopt.graph.solution import StatePath
-from seqopt.judge._shape_rules import check_shape
+from seqopt.judge._step_checks import check_shape
 from seqopt.judge.certificate import _require_anew, certify_partial
 from seqopt.plan._guard import require_fit, require_proof, require_time
 from seqopt.plan._paths import find_path

@@ -413,7 +413,7 @@ class Plan(ShownBuild):
         `seqopt.stability.steps.stability_table`.
         """
         if mortar is None and isinstance(self.graph, States):
-            from seqopt.judge._standing_proof import certified  # noqa: PLC0415  # of states
+            from seqopt.judge._step_checks import certified  # noqa: PLC0415  # of states
 
             return stability_table(self.steps, certified(self.graph, self.steps))
         return super().stability("dry" if mortar is None else mortar)

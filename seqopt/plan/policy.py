@@ -192,18 +192,13 @@ class Policy(FrozenValue):
     def _place(self) -> dict[int | None, int]:
         return {int(node): i for i, node in enumerate(self.nodes, start=1)}
 
-    @cached_property
-    def _parks(self) -> bool:
-        """Whether it counts where free robots held last."""
-        return bool((self.held < 0).any())
-
     def _row_of(self, site: Site) -> int:
         grips = site.grips or (None,) * len(self.robots)
         stays = site.stays or (None,) * len(self.robots)
-        key = [site.bricks]
+        key, parks = [site.bricks], (self.held < 0).any()  # whether it counts where they held last
         for kind in self.kinds:
             places = [
-                self._place.get(grips[r], -self._place.get(stays[r], 0) if self._parks else 0)
+                self._place.get(grips[r], -self._place.get(stays[r], 0) if parks else 0)
                 for r in kind
             ]
             key += sorted(places, reverse=True)
@@ -227,7 +222,8 @@ class Policy(FrozenValue):
         names = ("goals", "robots", "kinds", "checked", "keeps_range")
         told = {name: getattr(self, name) for name in names}
         arrays = {name: getattr(self, name) for name in ARRAYS}
-        arrays["held"] = _small(self.held)
+        least = min(int(self.held.min(initial=0)), -int(self.held.max()) - 1)
+        arrays["held"] = self.held.astype(np.min_scalar_type(least))
         buffer = io.BytesIO()
         np.savez_compressed(buffer, allow_pickle=False, told=json.dumps(told), **arrays)
         return buffer.getvalue()
@@ -251,7 +247,8 @@ def _checked(told: Any, archive: Archive, where: str) -> Policy:
         raise FileError(f"{where}: told is {short(told)}; {', '.join(names)} belong there")
     goals, robots, kinds = (told[name] for name in names[:3])
     words = [*goals, *robots] if isinstance(goals, list) and isinstance(robots, list) else [None]
-    every = [*chain.from_iterable(kinds)] if _are_lists(kinds) else []
+    lists = isinstance(kinds, list) and all(isinstance(kind, list) for kind in kinds)
+    every = [*chain.from_iterable(kinds)] if lists else []
     right = goals and all(isinstance(word, str) for word in words)
     right = right and all(type(each) is int and 0 <= each < len(robots) for each in every)
     if not right or not every or len({*every}) < len(every):
@@ -278,18 +275,7 @@ def _checked(told: Any, archive: Archive, where: str) -> Policy:
     return Policy(*named, *arrays, told["checked"], told["keeps_range"])
 
 
-def _are_lists(value: object) -> bool:
-    return isinstance(value, list) and all(isinstance(each, list) for each in value)
-
-
 ARRAYS = ("order", "nodes", "bricks", "held", "values", "following")
-
-
-def _small(values: Ints) -> Ints:
-    """Return whole numbers in the smallest type that holds them."""
-    return values.astype(
-        np.min_scalar_type(min(int(values.min(initial=0)), -int(values.max()) - 1))
-    )
 
 
 def find_policy(

@@ -125,7 +125,7 @@ class StandingSets:
             )
         self._demands = demands = _without_implied(demands or (standing,))
         self._network, self._mortar = network, standing.mortar
-        self._proofs, self._others = Proofs(network), list[StandingSets]()
+        self._proofs, self._others = Proofs(), list[StandingSets]()
         self._screens = self._screened()
         self._margins = Margins(network, standing.mortar)
         self._tilts_known: dict[int, Screen] = {}

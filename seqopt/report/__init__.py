@@ -13,10 +13,10 @@ this page does not import.
 >>> comparison.table.loc[["cascade", "overlap_dp"], "gap"].astype(float).round(3).tolist()
 [0.069, 0.0]
 >>> print(format_comparison(comparison, scene, criterion).splitlines()[0])
-chain 9: 9 bricks; largest response of any step
+chain 9: 9 bricks, 3 robots
 """
 
+from seqopt.report._compared import format_comparison
 from seqopt.report.comparison import Comparison, compare, largest, method_tables
-from seqopt.report.text import format_comparison
 
 __all__ = ["Comparison", "compare", "format_comparison", "largest", "method_tables"]

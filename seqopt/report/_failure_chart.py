@@ -29,68 +29,54 @@ _COLORS = {
 @styled
 def failure_figure(found: FailureMap) -> Figure:
     """Return which share of steps falls in every case, and where along the builds they do."""
-    names = [f"{build}, {holds}" for build, holds in _rows(found.cases)]
-    figure = new_figure(1.1 + 2 * _ROW * len(names))
+    cases, value = found.cases, found.usual
+    rows = [*dict.fromkeys(zip(cases["build"], cases["holds"], strict=True))]
+    figure = new_figure(1.1 + 2 * _ROW * len(rows))
     over, along = figure.subplots(2, 1)
-    axis = AXIS_WORDS[str(found.cases["axis"].iloc[0])]
-    _shares(over, found, names)
+    axis = AXIS_WORDS[str(cases["axis"].iloc[0])]
+    _draw_shares(over, cases, rows)
     over.set(title="steps that fall, of all steps", xlabel=axis)
-    value = found.usual
-    _along(along, found.steps[found.steps["value"] == value], names)
+    _draw_along(along, found.steps[found.steps["value"] == value], rows)
     along.set(title=f"along the build, {axis} {value:.3g}", xlabel="bricks placed")
+    for axes in (over, along):
+        axes.set_yticks(np.arange(len(rows)) + 0.5, [", ".join(row) for row in rows])
+        axes.tick_params(length=0)
+        axes.invert_yaxis()
+        axes.spines[:].set_visible(False)
     return figure
 
 
-def _rows(table: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return every build with what holds it, in order."""
-    return [*dict.fromkeys(zip(table["build"], table["holds"], strict=True))]
-
-
-def _shares(axes: Axes, found: FailureMap, names: list[str]) -> None:
-    """Draw how many steps of how many fall, a row for every build."""
-    cases, values = found.cases, sorted(found.cases["value"].unique())
-    share = np.full((len(names), len(values)), np.nan)  # where a build is not possible
+def _draw_shares(axes: Axes, cases: pd.DataFrame, rows: list[tuple[str, str]]) -> None:
+    """Draw how many steps of how many fall, a row for every build and what holds it."""
+    values = sorted(cases["value"].unique())
+    share = np.full((len(rows), len(values)), np.nan)  # where a build is not possible
     for case in cases.to_dict(orient="records"):
-        i, k = names.index(f"{case['build']}, {case['holds']}"), values.index(case["value"])
+        i, k = rows.index((case["build"], case["holds"])), values.index(case["value"])
         share[i, k] = case["fall"] / case["steps"]
         color = "white" if share[i, k] > 0.6 else "black"
         said = f"{case['fall']} of {case['steps']}"
         axes.text(k + 0.5, i + 0.5, said, ha="center", va="center", fontsize=SMALL, color=color)
     axes.pcolormesh(share, cmap="OrRd", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=1.0)
     axes.set_xticks(np.arange(len(values)) + 0.5, [f"{value:.3g}" for value in values])
-    _name(axes, names)
 
 
-def _along(axes: Axes, steps: pd.DataFrame, names: list[str]) -> None:
-    """Draw the worst verdict at every number of bricks, a row for every build."""
-    order: dict[Any, int] = {verdict: i for i, verdict in enumerate(_COLORS)}
-    rank = steps["verdict"].map(order)
+def _draw_along(axes: Axes, steps: pd.DataFrame, rows: list[tuple[str, str]]) -> None:
+    """Draw the worst verdict at every number of bricks, likewise."""
+    rank = steps["verdict"].map({verdict: i for i, verdict in enumerate(_COLORS)})
     most = int(steps["bricks"].max())
-    picture = np.zeros((len(names), most))
-    for i, (build, holds) in enumerate(_rows(steps)):
-        mine = (steps["build"] == build) & (steps["holds"] == holds)
-        worst = rank[mine].groupby(steps["bricks"][mine]).max()
-        picture[i, worst.index.to_numpy() - 1] = worst.to_numpy()
-    edges = np.arange(most + 1) + 0.5
-    colors = ListedColormap([*_COLORS.values()])
-    axes.pcolormesh(
-        edges, np.arange(len(names) + 1), picture, cmap=colors, vmin=-0.5, vmax=3.5,
-        edgecolors="white", linewidth=0.5,
-    )  # fmt: skip
+    picture = np.zeros((len(rows), most))
+    worst = rank.groupby([steps["build"], steps["holds"], steps["bricks"]]).max().reset_index()
+    for build, holds, bricks, verdict in worst.to_numpy().tolist():
+        picture[rows.index((build, holds)), bricks - 1] = verdict
+    edges = np.arange(most + 1) + 0.5, np.arange(len(rows) + 1)
+    how: Any = {"cmap": ListedColormap([*_COLORS.values()]), "vmin": -0.5, "vmax": 3.5}
+    axes.pcolormesh(*edges, picture, **how, edgecolors="white", linewidth=0.5)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     words = {"every step stands": Verdict.STANDS, "some step falls": Verdict.FALLS}
     if (steps["verdict"] == Verdict.UNDECIDED.value).any():
         words["some step is undecided"] = Verdict.UNDECIDED
     marks = [Patch(color=_COLORS[verdict.value], label=word) for word, verdict in words.items()]
     axes.legend(handles=marks, loc="upper right", bbox_to_anchor=(1.0, 1.25), ncols=len(marks))
-    _name(axes, names)
-
-
-def _name(axes: Axes, names: list[str]) -> None:
-    axes.set_yticks(np.arange(len(names)) + 0.5, names)
-    axes.tick_params(length=0)
-    axes.invert_yaxis()
-    axes.spines[:].set_visible(False)
 
 
 @styled

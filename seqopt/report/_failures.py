@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,7 @@ def failure_page(engine: Engine, builds: Builds, found: FailureMap) -> str:
 
     ``engine``: of the scene; ``builds``: those mapped.
     """
-    scene, value = engine.network.scene, found.usual
+    value, axis = found.usual, AXIS_WORDS[str(found.cases["axis"].iloc[0])]
     shown = [
         Build(
             name,
@@ -80,14 +80,14 @@ def failure_page(engine: Engine, builds: Builds, found: FailureMap) -> str:
         )
         for name, steps in builds.items()
     ]
-    axis = AXIS_WORDS[str(found.cases["axis"].iloc[0])]
     fall = found.cases["fall"].gt(0).groupby(found.cases["build"], sort=False).any()
-    ways = f"{len(shown)} way{'s' * (len(shown) != 1)} to build {scene.name}"
+    ways = f"{len(shown)} way{'s' * (len(shown) != 1)} to build {engine.network.scene.name}"
     sentence = (
         f"Where {ways} fail{'s' * (len(shown) == 1)}: {int(fall.sum())} of them somewhere on the "
         f"map. Step by step, with {axis} {value:.3g}: a step that falls can be shown as it falls."
     )
-    return report_page(engine, shown, sentence, [(_caption(axis), cases_shown(found, axis))])
+    caption = f"Steps that fall, by what holds the joints and by {axis}; a click shows the build"
+    return report_page(engine, shown, sentence, [(caption, _cases_shown(found, axis))])
 
 
 def load_page(
@@ -115,19 +115,15 @@ def load_page(
     return report_page(engine, builds, sentence, tables)
 
 
-def _caption(axis: str) -> str:
-    return f"Steps that fall, by what holds the joints and by {axis}; a click shows the build"
-
-
-def cases_shown(found: FailureMap, axis: str) -> pd.DataFrame:
+def _cases_shown(found: FailureMap, axis: str) -> pd.DataFrame:
     """Return the cases of a map as people read them: only what is known."""
     table = found.cases.assign(bond_needed_Pa=found.cases["bond_needed_Pa"] / 1e3)
     falls = table["fall"] > 0
     for name in ("bond_needed_Pa", "friction_needed"):
         table[name] = table[name].where(falls & np.isfinite(table[name]))
     table["first_step"] = table["first_step"].where(falls)
-    undecided = ["undecided"] * int(not table["undecided"].any())
-    table = table.drop(columns=["axis", "bricks", *undecided])
+    none = [] if table["undecided"].any() else ["undecided"]
+    table = table.drop(columns=["axis", "bricks", *none])
     return table.rename(columns={**SHOWN, "value": axis})
 
 
@@ -155,3 +151,51 @@ def cure_words(case: Mapping[Any, Any]) -> str:
     said = f"every step stands with {' or '.join(enough)}" if enough else none
     more = "" if pd.isna(node) else f"; one more robot at node {int(node)} would hold this step"
     return f"{said}{more}"
+
+
+_NAME = 26  # columns of a build with what holds it
+
+
+def failure_blocks(scene: Scene, found: FailureMap, wrapped: Callable[[str], str]) -> list[str]:
+    """Return how many steps fall, then what would cure it: lines under a heading."""
+    return ["\n".join(block) for block in (_table(scene, found), _cures(found, wrapped)) if block]
+
+
+def _table(scene: Scene, found: FailureMap) -> Iterator[str]:
+    """Yield how many steps fall, a line for every build and what holds it."""
+    cases = found.cases
+    axis = AXIS_WORDS[str(cases["axis"].iloc[0])]
+    yield f"{scene.name}: steps that fall, by {axis}"
+    values = sorted(cases["value"].unique())
+    yield f"{'':{_NAME}}{'steps':>5}" + "".join(f"{value:8.3g}" for value in values)
+    for (build, holds), rows in cases.groupby(["build", "holds"], sort=False):
+        steps = rows["steps"].unique()
+        counts = {
+            case["value"]: _count(case, differ=len(steps) > 1) for case in rows.to_dict("records")
+        }
+        cells = "".join(f"{counts.get(value, ''):>8}" for value in values)
+        yield f"{f'{build}, {holds}':{_NAME}}{steps[0] if len(steps) == 1 else '':5}{cells}"
+
+
+def _count(case: Mapping[Any, Any], *, differ: bool) -> str:
+    """Return how many steps of a case fall, and of how many where numbers of steps differ."""
+    of = f"/{case['steps']}" if differ else ""
+    open_ = f" ({case['undecided']}?)" if case["undecided"] else ""
+    return f"{case['fall']}{of}{open_}"
+
+
+def _cures(found: FailureMap, wrapped: Callable[[str], str]) -> Sequence[str]:
+    """Return what fails first in every build, and what would cure it."""
+    value = found.usual
+    axis = AXIS_WORDS[str(found.cases["axis"].iloc[0])]
+    here = found.cases[(found.cases["value"] == value) & (found.cases["fall"] > 0)]
+    lines = [wrapped(_first_words(case)) for case in here.to_dict(orient="records")]
+    title = f"What falls first, {axis} {value:.3g}, and what would cure it"
+    return [title, *lines] if lines else []
+
+
+def _first_words(case: Mapping[Any, Any]) -> str:
+    """Return what falls first in a case, and what would cure it."""
+    joint = f", joint {case['joint']} {case['motion']}" if case["joint"] else ""
+    where = f"step {case['first_step']}, brick {case['brick']}{joint}"
+    return f"{case['build']}, {case['holds']}: {where}; {cure_words(case)}"

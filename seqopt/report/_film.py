@@ -21,13 +21,12 @@ from matplotlib.animation import FFMpegWriter
 from matplotlib.figure import Figure
 from PIL import Image  # comes with matplotlib
 
-from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ExtraError, FileError
-from seqopt.report._pictures import VIEW, _build_box, _cell, _draw_step, _frame
+from seqopt.report._pictures import VIEW, Stage
 from seqopt.report._robots import Arms
 from seqopt.report._style import new_picture, styled
-from seqopt.report.draw import _draw_robots, draw_grips
+from seqopt.report.draw import draw_grips
 from seqopt.sequence.steps import Step
 
 _DPI, _WIDTH, _COLORS = 80, 6.0, 128  # of a GIF; inches
@@ -69,8 +68,7 @@ class Film:
         self.require(path)
         try:
             if path.suffix == ".gif":
-                frames = [_shown(figure) for figure in self._figures()]
-                path.write_bytes(_animated(frames, self.seconds))
+                path.write_bytes(_gif(self._figures(), self.seconds))
             else:
                 self._write_video(path)
         except OSError as error:
@@ -115,38 +113,31 @@ class Film:
 
     def _figures(self, size: tuple[float, float] | None = None) -> Iterator[Figure]:
         """Yield a figure for every step: the same one, drawn anew."""
-        cell = _cell(self.engine, self.steps, self.arms, forces=self.forces)
-        (left, low), (right, high) = box = _build_box(cell)
-        if size is not None:
-            box = _filling(box, size[0] * 0.96 / (size[1] * 0.88))
-        wide, tall = size or (_WIDTH, max(_WIDTH * (high - low) / (right - left), 2.0) + 0.5)
+        how: Any = {"forces": self.forces, "magnify": self.magnify, "arms": self.arms}
+        stage = Stage(self.engine, self.steps, **how)
+        low, high = stage.box
+        wide, tall = _WIDTH, max(_WIDTH * (high - low)[1] / (high - low)[0], 2.0) + 0.5
+        if size is not None:  # what is seen fills it
+            wide, tall = size
+            ratio, middle, room = wide * 0.96 / (tall * 0.88), (low + high) / 2, high - low
+            half = 0.5 * np.array([max(room[0], ratio * room[1]), max(room[1], room[0] / ratio)])
+            stage.box = middle - half, middle + half
         figure = new_picture(wide, tall, "none")
         axes = figure.add_axes((0.02, 0.02, 0.96, 0.88))
         for at, step in enumerate(self.steps):
             axes.clear()
-            if not self.forces:
-                _draw_robots(axes, cell, cell.arms(step, at), VIEW)
-            _draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
+            stage.draw(axes, at)
             draw_grips(axes, self.engine.network, step.grips, VIEW)
-            _frame(axes, cell.scene, step, self.steps[-1].number, box)
             yield figure
 
 
-def _filling(box: tuple[Floats, Floats], ratio: float) -> tuple[Floats, Floats]:
-    """Return a box around another one, as wide over its height as asked."""
-    middle, size = (box[0] + box[1]) / 2, box[1] - box[0]
-    half = 0.5 * np.array([max(size[0], ratio * size[1]), max(size[1], size[0] / ratio)])
-    return middle - half, middle + half
-
-
-def _shown(figure: Figure) -> Image.Image:
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=_DPI)
-    return Image.open(out).convert("RGB")
-
-
-def _animated(frames: Sequence[Image.Image], seconds: float) -> bytes:
-    """Return images as a GIF of few colors, the same in all: less than half of the bytes."""
+def _gif(figures: Iterator[Figure], seconds: float) -> bytes:
+    """Return figures as a GIF of few colors, the same in all: less than half of the bytes."""
+    frames = []
+    for figure in figures:
+        shown = io.BytesIO()
+        figure.savefig(shown, format="png", dpi=_DPI)
+        frames.append(Image.open(shown).convert("RGB"))
     wide, high = frames[0].size
     some = [frames[k * (len(frames) - 1) // 3] for k in range(4)]
     sample = Image.new("RGB", (wide, len(some) * high))

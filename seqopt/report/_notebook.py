@@ -23,9 +23,8 @@ from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
-from seqopt.report._pages import WORDS
 from seqopt.report.comparison import largest
-from seqopt.report.text import typed
+from seqopt.report.text import IN_UNITS, typed
 from seqopt.responses.quantities import _number_text
 from seqopt.responses.table import OUTSIDE, REMEDY
 from seqopt.scene.boxes import boxes
@@ -62,15 +61,14 @@ def card(value: object) -> str:
         f'<td style="text-align:left">{escape(str(content))}</td></tr>'
         for name, content in shown.rows.items()
     )
-    pictures: list[str] = []
+    images = ""
     with suppress(ExtraError):
-        pictures = [b64encode(_small(figure)).decode() for figure in shown.draw()]
-    images = "".join(
-        f'<img alt="{title}" src="data:image/png;base64,{png}" '
-        'style="display:block;max-width:100%;height:auto;background:#fff;border-radius:6px;'
-        'margin-bottom:0.5em">'
-        for png in pictures
-    )
+        for figure in shown.draw():
+            source = f"data:image/png;base64,{b64encode(_small(figure)).decode()}"
+            images += (
+                f'<img alt="{title}" src="{source}" style="display:block;max-width:100%;'
+                'height:auto;background:#fff;border-radius:6px;margin-bottom:0.5em">'
+            )
     return (
         '<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:flex-start">'
         f'<table><thead><tr><th colspan="2" style="text-align:left">{title}</th></tr>'
@@ -181,17 +179,15 @@ def _build(value: ShownBuild) -> _Card:
     except ProblemError:  # costs alone were given
         return _Card("Plan", {"": repr(value)})
     small = len(scene.bricks) <= SMALL
-    rows: dict[str, object] = {}
-    if not small:
-        rows["linear range"] = "see departures: not computed here"
-    elif left := "; ".join(map(str, value.departures)):
+    rows: dict[str, object] = {} if small else {"linear range": "see departures: not computed here"}
+    if small and (left := "; ".join(map(str, value.departures))):
         rows[OUTSIDE] = f"{left}. {REMEDY}"
     rows["found by"] = typed(value.title)
     if isinstance(value, Plan):
         posed = value.states if isinstance(value.graph, States) else value.layers
         rows |= {"criterion": posed.criterion.name} if posed.criterion.name else {}
-    rows |= {"result": value.result, "steps": len(value.steps), **(_worst(value) if small else {})}
-    rows |= _standing(value) if small else {"stability": "see verdicts: not computed here"}
+    rows |= {"result": value.result, "steps": len(value.steps)}
+    rows |= _computed(value) if small else {"stability": "see verdicts: not computed here"}
     if value.seconds:
         rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
 
@@ -199,41 +195,34 @@ def _build(value: ShownBuild) -> _Card:
         paint, count = display("steps_picture"), len(value.steps)
         from seqopt.report._pictures import spread_steps  # noqa: PLC0415  # matplotlib is an extra
 
-        shown = spread_steps(value.steps, 3) if small else value.steps[count // 2].number
-        pictures = [paint(value.engine, value.steps, shown)]
-        return [
-            *pictures,
-            *([value.gantt(None, value.steps[min(count, STEPS) - 1].number)] if small else []),
-        ]
+        if not small:
+            return [paint(value.engine, value.steps, value.steps[count // 2].number)]
+        last = value.steps[min(count, STEPS) - 1].number
+        shown = spread_steps(value.steps, 3)
+        return [paint(value.engine, value.steps, shown), value.gantt(None, last)]
 
     return _Card(f"Plan for {scene.name}", rows, draw)
 
 
-def _standing(value: ShownBuild) -> Rows:
-    prover = BuildProver(value.engine.network)
-    found = prover.of_builds({"": value.steps}).get("", ())
-    said = {f"stability, {each.how}": str(each).partition(": ")[2] for each in found}
-    return said or {"stability": f"not proven; {prover.refusal}"}
-
-
-def _worst(value: ShownBuild) -> Rows:
-    """Return the largest responses of any step."""
+def _computed(value: ShownBuild) -> Rows:
+    """Return the largest responses of any step, and whether steps stand."""
     found = largest(value.engine.network.scene, value.responses())
-    rows = {f"largest {said}": _number_text(found[name]) for name, said in WORDS.items()}
+    rows = {f"largest {said}": _number_text(found[name]) for name, said in IN_UNITS.items()}
     grips = value.grips()
     row = grips.iloc[int(grips["largest_force_N"].argmax())]
     where = f"{row['robot']} at node {row['node']} of brick {row['brick']}, step {row['at_step']}"
-    return rows | {"at the largest grip force": where}
+    rows["at the largest grip force"] = where
+    prover = BuildProver(value.engine.network)
+    verdicts = prover.of_builds({"": value.steps}).get("", ())
+    said = {f"stability, {each.how}": str(each).partition(": ")[2] for each in verdicts}
+    return rows | (said or {"stability": f"not proven; {prover.refusal}"})
 
 
 @facts.register
 def _stability(value: Stability) -> _Card:
-    margins = {
-        "bond needed, Pa": value.bond,
-        "friction needed": value.friction,
-        "largest grip force, N": value.grip,
-    }
     rows: dict[str, object] = {"verdict": value.verdict.value, "proven by": value.proof}
+    names = ("bond needed, Pa", "friction needed", "largest grip force, N")
+    margins = dict(zip(names, (value.bond, value.friction, value.grip), strict=True))
     rows |= {name: f"{found:.4g}" for name, found in margins.items() if not np.isnan(found)}
     if value.jammed:
         rows["jammed"] = "stands only because it is wedged in place: do not trust it"

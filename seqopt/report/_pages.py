@@ -12,7 +12,6 @@ import pandas as pd
 
 from seqopt._showing import Page, display
 from seqopt.arms._plan_postures import arm_faults
-from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ExtraError, FileError, ProblemError, SeqoptError
 from seqopt.plan.build import ShownBuild
@@ -23,7 +22,7 @@ from seqopt.report._robots import _known_arms
 from seqopt.report._speed._table import SpeedTable
 from seqopt.report.comparison import CLOSED, Comparison, fixed_methods, largest, shown_table
 from seqopt.report.page import Build, Scatter, _Drawn, _grips_off, report_page
-from seqopt.report.text import _worst_along, in_words
+from seqopt.report.text import IN_UNITS, _worst_along, in_words
 from seqopt.responses.table import (
     OUTSIDE,
     REMEDY,
@@ -37,16 +36,9 @@ from seqopt.responses.table import (
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule_file import read_plan
-from seqopt.sequence.steps import Step
 from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
 
-WORDS = {
-    "F_rob": "grip force, N",
-    "M_sup": "support moment, N m",
-    "T_max": "tension, N",
-    "D_max": "displacement, µm",
-}  # as of seqopt.report.comparison.LARGEST
 OVER = "over payload"
 LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: REMEDY[:-1]}
 FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once
@@ -71,30 +63,11 @@ def _builds(
         over = len(payloads) == 1 and overloads(scene, table)
         bounds = {"F_largest": max(payloads)} if over else {}
         steps = _steps_in_table(scene, table)
-        stands = verdicts.get(name, ())
-        left, arms = departures.get(name, ()), _known_arms(scene, steps)
+        arms = _known_arms(scene, steps)
         faults = arm_faults(scene, steps) if arms else ()
-        out.append(Build(name, steps, table, stands, bounds, left, arms=arms, faults=faults))
+        known = verdicts.get(name, ()), bounds, departures.get(name, ())
+        out.append(Build(name, steps, table, *known, arms=arms, faults=faults))
     return out
-
-
-def _steps_of(scene: Scene, tables: Tables) -> dict[str, list[Step]]:
-    """Return the steps of builds by their tables."""
-    return {name: _steps_in_table(scene, table) for name, table in tables.items()}
-
-
-def _outside(builds: Sequence[Build]) -> str:
-    """Return which builds leave the linear range and what to do; of a single one by what."""
-    said = builds_in_words({build.name: build.departures for build in builds})
-    if said and len(builds) == 1:
-        said = (*map(str, builds[0].departures),)
-    return f"{OUTSIDE.capitalize()}: {'; '.join(said)}. Do not rely on it. " if said else ""
-
-
-def _with_legend(caption: str, table: pd.DataFrame) -> str:
-    """Return the caption of a table of builds, with a legend where it marks what is wrong."""
-    said = "".join(f". {name.capitalize()}: {why}" for name, why in LEGEND.items() if name in table)
-    return f"{caption}{said}. Such steps are marked in red" if said else caption
 
 
 def _page(
@@ -105,17 +78,26 @@ def _page(
     scatter: Scatter | None = None,
 ) -> str:
     """Return a page of several builds, whose sentence also says what is wrong with some."""
+    said = builds_in_words({build.name: build.departures for build in builds})
+    if said and len(builds) == 1:
+        said = (*map(str, builds[0].departures),)
+    outside = f"{OUTSIDE.capitalize()}: {'; '.join(said)}. Do not rely on it. " if said else ""
     count = sum(bool(build.overloads(engine.network.scene)) for build in builds)
     over = f"; in {count} of them a robot would hold more than its payload" if count else ""
-    return report_page(engine, builds, f"{_outside(builds)}{sentence}{over}.", tables, scatter)
+    return report_page(engine, builds, f"{outside}{sentence}{over}.", tables, scatter)
+
+
+def _captioned(caption: str, table: pd.DataFrame) -> tuple[str, pd.DataFrame]:
+    """Return a table of builds under its caption, with a legend where it marks what is wrong."""
+    said = "".join(f". {name.capitalize()}: {why}" for name, why in LEGEND.items() if name in table)
+    return f"{caption}{said}. Such steps are marked in red" if said else caption, table
 
 
 def _worded(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table with responses in words; displacements in mm where the largest is one."""
-    out = table.rename(columns=WORDS)
-    if WORDS["D_max"] in out and out[WORDS["D_max"]].max() >= _MM:
-        out = out.assign(**{WORDS["D_max"]: out[WORDS["D_max"]] / _MM})
-        out = out.rename(columns={WORDS["D_max"]: "displacement, mm"})
+    out, moved = table.rename(columns=IN_UNITS), IN_UNITS["D_max"]
+    if moved in out and out[moved].max() >= _MM:
+        out = out.assign(**{moved: out[moved] / _MM}).rename(columns={moved: "displacement, mm"})
     return out
 
 
@@ -131,9 +113,8 @@ def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFra
         ]
     if any(build.departures for build in builds):
         found[OUTSIDE] = ["yes" if build.departures else "" for build in builds]
-    found = found.join(_falls(builds))
-    caption = _with_legend("Largest responses", found)
-    return caption, _worded(found).rename_axis("build").reset_index()
+    found = _worded(found.join(_falls(builds))).rename_axis("build").reset_index()
+    return _captioned("Largest responses", found)
 
 
 def _falls(builds: Sequence[Build]) -> pd.DataFrame:
@@ -166,26 +147,27 @@ def plan_page(
     if small:
         tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
     prover = prover or BuildProver(engine.network, SHOWN if small else {})
-    verdicts = prover.of_builds(_steps_of(scene, tables))
+    verdicts = prover.of_builds({key: _steps_in_table(scene, t) for key, t in tables.items()})
     left = plan._within.of_builds(tables)  # knows the plan's own steps
     first, *rest = _builds(scene, tables, left, verdicts)
-    first = replace(first, along=_along(plan, first.table), tasks=tasks or {})
-    offs = plan._within.offs
-    sentence = first.sentence(scene, _grips_off(engine, first, offs))
+    along = None
+    if isinstance(plan, Plan):  # what it made small, where it is the largest step that counts
+        criterion = getattr(plan.graph, "criterion", None) or plan.layers.criterion
+        with suppress(SeqoptError):  # what no table has
+            along = _worst_along(scene, first.table, plan.goals[0], criterion)
+    builds = [replace(first, along=along, tasks=tasks or {}), *rest]
     found = f"Found by: {in_words(name)} ({plan.result})."
-    builds = [first, *rest]
+    return _sole_page(engine, builds, plan._within.offs, found)
+
+
+def _sole_page(
+    engine: Engine, builds: Sequence[Build], offs: dict[_Key, float], found: str = ""
+) -> str:
+    """Return the page whose sentence is about the first of some builds."""
+    scene, first = engine.network.scene, builds[0]
+    sentence = first.sentence(scene, _grips_off(engine, first, offs))
     shown = [_worst_table(scene, builds)]
     return report_page(engine, builds, sentence, shown, found=found, offs=offs)
-
-
-def _along(plan: ShownBuild, table: pd.DataFrame) -> Floats | None:
-    """Return what a plan made small of every step, where it is the largest that counts."""
-    if not isinstance(plan, Plan):
-        return None
-    criterion = getattr(plan.graph, "criterion", None) or plan.layers.criterion
-    with suppress(SeqoptError):  # what no table has
-        return _worst_along(plan.engine.network.scene, table, plan.goals[0], criterion)
-    return None
 
 
 def comparison_page(engine: Engine, result: Comparison) -> str:
@@ -194,18 +176,16 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     builds = _builds(scene, result.tables, result.departures, result.verdicts)
     marks = {"overloaded": OVER, "outside": OUTSIDE}
     marks = {name: said for name, said in marks.items() if result.table[name].any()}
-    columns = ["problem", "objective", "gap", *WORDS, *marks, "models", "seconds"]
+    columns = ["problem", "objective", "gap", *IN_UNITS, *marks, "models", "seconds"]
     shown = result.table[columns].replace({True: "yes", False: ""})
     shown = shown.assign(gap=100 * shown["gap"].astype(float))
-    shown = _worded(shown.rename(columns=marks | {"gap": GAP}))
-    shown = shown.join(_falls(builds))
+    shown = _worded(shown.rename(columns=marks | {"gap": GAP})).join(_falls(builds))
     shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
     shown["problem"] = shown["problem"].map(in_words)
     shown = shown.rename_axis("method or formulation").reset_index()
-    tables: list[tuple[str, pd.DataFrame | _Drawn]] = (
-        [] if result.speed is None else [*_speed_parts(result.speed)]
-    )
-    tables += [(_with_legend("Methods and formulations; a click shows the build", shown), shown)]
+    tables: list[tuple[str, pd.DataFrame | _Drawn]] = []
+    tables += [] if result.speed is None else _speed_parts(result.speed)
+    tables.append(_captioned("Methods and formulations; a click shows the build", shown))
     if result.printed is not None:
         printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
         printed["largest"] = printed["largest"].str.replace("1e-3 mm", "µm")
@@ -237,9 +217,7 @@ def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:
     """Return the page of the plans in a folder that a command has written."""
     scene, builds = engine.network.scene, folder_builds(engine, folder, prover)
     if len(builds) == 1:
-        offs: dict[_Key, float] = {}
-        sentence = builds[0].sentence(scene, _grips_off(engine, builds[0], offs))
-        return report_page(engine, builds, sentence, [_worst_table(scene, builds)], offs=offs)
+        return _sole_page(engine, builds, {})
     sentence = f"{scene.name}, built in {len(builds)} ways, step by step"
     return _page(engine, builds, sentence, [_worst_table(scene, builds)])
 
@@ -267,15 +245,14 @@ def front_page(
     verdicts: Mapping[str, Sequence[BuildVerdicts]],
 ) -> str:
     """Return the page of a Pareto set: its points, and what is known of each plan, by its name."""
-    scene, table = engine.network.scene, shown_table(front.table)
-    builds = []
+    scene, builds = engine.network.scene, []
     for (name, plan), own in zip(plans.items(), front.engines, strict=True):
         placed = own.network.scene
         (build,) = _builds(placed, {name: plan}, departures, verdicts)
         another = placed.build_order != scene.build_order
         builds.append(replace(build, order=placed.build_order) if another else build)
-    words = {"F_largest": WORDS["F_rob"]}  # another name for the same
-    points = table.rename(columns=words).set_axis([*plans])
+    words = {"F_largest": IN_UNITS["F_rob"]}  # another name for the same
+    points = shown_table(front.table).rename(columns=words).set_axis([*plans])
     points = _worded(points.assign(**{n: 1e6 * points[n] for n in ["D_max"] if n in points}))
     shown = points.join(_falls(builds)).rename_axis("plan").reset_index()
     if departures:
@@ -284,14 +261,13 @@ def front_page(
     if len(plans) > 1:
         sentence = f"{len(plans):,} plans for {scene.name}, of which none beats another everywhere"
     scatter = Scatter("The Pareto set: every point is a plan; a click shows it", points)
-    shows = [(_with_legend("The Pareto set; a click shows a plan", shown), shown)]
-    return _page(engine, builds, sentence, shows, scatter)
+    table = _captioned("The Pareto set; a click shows a plan", shown)
+    return _page(engine, builds, sentence, [table], scatter)
 
 
 def build_page(plan: ShownBuild, *others: ShownBuild) -> Page:
     """Return a page that shows a plan step by step, beside others for the same scene."""
-    engine = plan.engine
-    scene, tables = engine.network.scene, {plan.title: plan.responses()}
+    scene, tables = plan.engine.network.scene, {plan.title: plan.responses()}
     for other in others:
         if other.engine.network.scene != scene:
             raise ProblemError(
@@ -300,5 +276,4 @@ def build_page(plan: ShownBuild, *others: ShownBuild) -> Page:
             )
         names = chain([other.title], (f"{other.title} ({number})" for number in count(2)))
         tables[next(name for name in names if name not in tables)] = other.responses()
-    table = tables.pop(plan.title)
-    return Page(plan_page(plan, table=table, others=tables))
+    return Page(plan_page(plan, table=tables.pop(plan.title), others=tables))

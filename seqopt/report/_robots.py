@@ -41,31 +41,26 @@ class Cell:
     """Where the robots of a scene stand, and how they hold nodes.
 
     ``arms``: lines that are known; the others are sketched. ``sketched``: those that were before,
-    by robot and node; more are added.
+    by robot and node; more are added. It has the ``corners`` of all bricks, (k, 3), the ``level``
+    of the ground, that of the lowest corner, the ``size`` of the structure, its longest diagonal,
+    and its ``middle`` on the ground, (3,), m.
     """
 
     def __init__(
         self, scene: Scene, arms: Arms | None = None, sketched: Sketches | None = None
     ) -> None:
         self.scene, self._arms = scene, arms or {}
+        self._sketched: Sketches = {} if sketched is None else sketched
         self.up = np.array(scene.up)
         self.corners = np.vstack([vertices_of(brick)[0] for brick in scene.bricks])
-        self._found: Sketches = {} if sketched is None else sketched
-
-    @cached_property
-    def level(self) -> float:
-        """Height of the ground, m: that of the lowest corner of a brick."""
-        return float((self.corners @ self.up).min())
-
-    @cached_property
-    def size(self) -> float:
-        """The longest diagonal of the structure, m."""
-        return float(np.linalg.norm(np.ptp(self.corners, axis=0)))
-
-    @cached_property
-    def middle(self) -> Floats:
-        """The middle of the structure, on the ground, (3,), m."""
-        return self._on_ground(0.5 * (self.corners.min(axis=0) + self.corners.max(axis=0)))
+        low, high = self.corners.min(axis=0), self.corners.max(axis=0)
+        self.level = float((self.corners @ self.up).min())
+        self.size = float(np.linalg.norm(high - low))
+        self.middle = self._on_ground(0.5 * (low + high))
+        first = self._away(np.eye(3)[int(np.abs(self.up).argmin())])
+        self._sides = np.stack([first, np.cross(self.up, first)])  # level directions (2, 3)
+        every = [arm for own in self._arms.values() for arm in own if arm is not None]
+        self._known = [*{id(arm): arm for arm in every}.values()]
 
     @cached_property
     def stands(self) -> Floats:
@@ -81,11 +76,6 @@ class Cell:
         bodies = [body for arm in self._known if isinstance(arm, PosedArm) for body in arm.bodies]
         return np.vstack([np.zeros((0, 3)), *lines, *bodies])
 
-    @cached_property
-    def _known(self) -> list[Floats | PosedArm]:
-        every = [arm for own in self._arms.values() for arm in own if arm is not None]
-        return [*{id(arm): arm for arm in every}.values()]
-
     def arms(self, step: Step, at: int) -> list[Floats | PosedArm | None]:
         """Return what there is of every robot in a step, the ``at``-th of those of known arms."""
         pairs = zip(self.scene.robots, step.grips, strict=True)
@@ -97,13 +87,11 @@ class Cell:
     @cached_property
     def yard(self) -> Floats:
         """Corners of a level rectangle (4, 3) around the structure and the feet of robots, m."""
-        first = self._away(np.eye(3)[int(np.abs(self.up).argmin())])
-        sides = np.stack([first, np.cross(self.up, first)])
-        flat = (np.vstack([self.corners, self.stands]) - self.middle) @ sides.T
+        flat = (np.vstack([self.corners, self.stands]) - self.middle) @ self._sides.T
         room = 0.1 * self.size
         (left, near), (right, far) = flat.min(axis=0) - room, flat.max(axis=0) + room
         around = np.array([(left, near), (right, near), (right, far), (left, far)])
-        return np.asarray(self.middle + around @ sides)
+        return np.asarray(self.middle + around @ self._sides)
 
     @cached_property
     def shoulders(self) -> dict[str, tuple[Floats, float]]:
@@ -118,24 +106,20 @@ class Cell:
                 out[robot.name] = (np.array(reach.center), reach.radius)
             elif isinstance(reach, Side):
                 beside.append((robot, self._away(np.array(reach.toward))))
+        along = self._sides[np.ptp(self.corners @ self._sides.T, axis=0).argmax()]  # it is longest
         for robot in self.scene.robots:
             if not isinstance(robot.reach, Sphere | Side):
-                ends = self._along * np.array([[1.0], [-1.0]])
+                ends = along * np.array([[1.0], [-1.0]])
                 beside.append((robot, min(ends, key=lambda end: sum(o @ end for _, o in beside))))
         for robot, away in beside:
             same = [each.name for each, other in beside if away @ other > 0.5]
             place = same.index(robot.name) - 0.5 * (len(same) - 1)
-            foot = self._beside(away) + _APART * self.size * place * np.cross(self.up, away)
+            out_to = float(((self.corners - self.middle) @ away).max()) + _BESIDE * self.size
+            foot = self.middle + out_to * away
+            foot = foot + _APART * self.size * place * np.cross(self.up, away)
             far = float(np.linalg.norm(self.corners - foot, axis=1).max())
             out[robot.name] = (foot + _HIGH * far * self.up, far)
         return out
-
-    @cached_property
-    def _along(self) -> Floats:
-        """The level direction in which the structure is longest, (3,)."""
-        first = self._away(np.eye(3)[int(np.abs(self.up).argmin())])
-        sides = np.stack([first, np.cross(self.up, first)])
-        return np.asarray(sides[np.ptp(self.corners @ sides.T, axis=0).argmax()])
 
     def reach(self, robot: Robot) -> list[float] | None:
         """Return the middle of the circle on the ground up to which a robot reaches, and its size.
@@ -163,56 +147,46 @@ class Cell:
     def arm(self, robot: Robot, node: int | None) -> Floats:
         """Return the points of a robot's arm that holds a node, or of one that is idle."""
         key = (robot.name, node)
-        if key not in self._found:
-            self._found[key] = self._idle(robot) if node is None else self._holding(robot, node)
-        return self._found[key]
+        if key not in self._sketched:
+            self._sketched[key] = self._sketch(robot, node)
+        return self._sketched[key]
+
+    def _sketch(self, robot: Robot, node: int | None) -> Floats:
+        """Return the points of an arm, elbow up, whose tool comes as that of a task does.
+
+        That of nobody is folded over its base; long arms are drawn short.
+        """
+        shoulder, reach = self.shoulders[robot.name]
+        foot, link = self._on_ground(shoulder), min(0.5 * reach, _LONGEST * self.size)
+        if node is None:
+            ahead = self._away(self.middle - shoulder)
+            bent = [shoulder + link * (up * self.up + on * ahead) for up, on in _FOLDED]
+            return np.array([foot, shoulder, *bent])
+        held, brick = hold(self.scene, robot, node), self.scene.brick_of_node[node]
+        tip = np.array(held.grip.point)
+        wrist = tip - (held.depth + _TOOL * max(brick.dimensions)) * held.grip.axes[2]
+        span = wrist - shoulder
+        size = float(np.linalg.norm(span))
+        along = span / size if size > 0 else self.up
+        rise = np.sqrt(max((_SPARE * max(link, 0.5 * size)) ** 2 - 0.25 * size**2, 0.0))
+        across = _unit(self.up - (self.up @ along) * along)
+        elbow = shoulder + 0.5 * span + rise * (self._away(along) if across is None else across)
+        return np.array([foot, shoulder, elbow, wrist, tip])
 
     def _on_ground(self, point: Floats) -> Floats:
         return np.asarray(point - (point @ self.up - self.level) * self.up)
 
     def _away(self, toward: Floats) -> Floats:
         """Return the level direction to a side, (3,); any level one where a side is above."""
-        flat = toward - (toward @ self.up) * self.up
-        if np.linalg.norm(flat) < 1e-6:
-            flat = np.cross(self.up, np.eye(3)[int(np.abs(self.up).argmin())])
-        return np.asarray(flat / np.linalg.norm(flat))
+        flat = _unit(toward - (toward @ self.up) * self.up)
+        any_ = np.cross(self.up, np.eye(3)[int(np.abs(self.up).argmin())])
+        return np.asarray(any_ / np.linalg.norm(any_)) if flat is None else flat
 
-    def _beside(self, away: Floats) -> Floats:
-        """Return the place on the ground before the middle of the structure on a side, (3,), m."""
-        far = float(((self.corners - self.middle) @ away).max())
-        return np.asarray(self.middle + (far + _BESIDE * self.size) * away)
 
-    def _holding(self, robot: Robot, node: int) -> Floats:
-        """Return the points of an arm whose tool comes as that of a task does, elbow up."""
-        held, brick = hold(self.scene, robot, node), self.scene.brick_of_node[node]
-        tip = np.array(held.grip.point)
-        wrist = tip - (held.depth + _TOOL * max(brick.dimensions)) * held.grip.axes[2]
-        shoulder, reach = self.shoulders[robot.name]
-        span = wrist - shoulder
-        link = _SPARE * max(self._link(reach), 0.5 * float(np.linalg.norm(span)))
-        rise = np.sqrt(max(link**2 - 0.25 * float(span @ span), 0.0))
-        elbow = shoulder + 0.5 * span + rise * self._across(span)
-        return np.array([self._on_ground(shoulder), shoulder, elbow, wrist, tip])
-
-    def _link(self, reach: float) -> float:
-        """Return the length of both links, m: those of long arms are drawn short."""
-        return min(0.5 * reach, _LONGEST * self.size)
-
-    def _across(self, span: Floats) -> Floats:
-        """Return the unit vector square to a line that points up most, (3,)."""
-        size = float(np.linalg.norm(span))
-        along = span / size if size > 0 else self.up
-        flat = self.up - (self.up @ along) * along
-        if np.linalg.norm(flat) < 1e-6:
-            return self._away(along)
-        return np.asarray(flat / np.linalg.norm(flat))
-
-    def _idle(self, robot: Robot) -> Floats:
-        """Return the points of an arm that is folded over its base."""
-        shoulder, reach = self.shoulders[robot.name]
-        ahead = self._away(self.middle - shoulder)
-        bent = [shoulder + self._link(reach) * (up * self.up + on * ahead) for up, on in _FOLDED]
-        return np.array([self._on_ground(shoulder), shoulder, *bent])
+def _unit(vector: Floats) -> Floats | None:
+    """Return the direction of a vector, (3,); None where there is none."""
+    size = float(np.linalg.norm(vector))
+    return np.asarray(vector / size) if size >= 1e-6 else None
 
 
 def _line(arm: Floats | PosedArm) -> Floats:

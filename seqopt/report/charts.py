@@ -14,8 +14,8 @@ from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 
 from seqopt.engines.interface import Engine
 from seqopt.plan.front import Front
-from seqopt.plan.plan import Plan
-from seqopt.report._pictures import gantt_picture, steps_picture
+from seqopt.report._gantt import gantt_picture
+from seqopt.report._pictures import steps_picture
 from seqopt.report._style import (
     BLUE,
     GRAY,
@@ -28,9 +28,9 @@ from seqopt.report._style import (
     plain,
     styled,
 )
-from seqopt.report.comparison import LARGEST, Comparison, _in_shown_unit, _worst_of
+from seqopt.report.comparison import Comparison, _in_shown_unit, _worst_of
 from seqopt.report.page import Build
-from seqopt.report.text import in_words, typed
+from seqopt.report.text import UNITS, in_words, typed
 from seqopt.study.published import PUBLISHED
 
 EXACT = 1e-7  # %: gaps below are rounding
@@ -71,15 +71,6 @@ LEAST = 0.01  # share of its numbers that an axis spans at least
 FAR = 2.5  # a method so much worse than the set makes an axis logarithmic
 
 
-def comparison_figures(result: Comparison) -> dict[str, Figure]:
-    """Return the figures of a comparison of a scene that has a loop of its robots."""
-    return {
-        "maxima": _maxima(result),
-        "responses": _responses_figure(result.tables),
-        "gap_against_cost": _gaps(result),
-    }
-
-
 @styled
 def _softness_chart(
     table: pd.DataFrame, builds: Sequence[str], band: tuple[float, float] | None = None
@@ -92,7 +83,7 @@ def _softness_chart(
     panels = figure.subplots(2, 2, sharex=True).ravel()
     finite, rigid = (table[np.isfinite(table["stiffness"]) == each] for each in (True, False))
     end = 4 * float(finite["stiffness"].max())
-    for panel, (response, unit) in zip(panels, LARGEST.items(), strict=True):
+    for panel, (response, unit) in zip(panels, UNITS.items(), strict=True):
         if band is not None:
             panel.axvspan(*band, color=GRAY, alpha=0.2, lw=0, zorder=0, label="industrial arms")
         for name, style in looks(builds).items():
@@ -101,18 +92,13 @@ def _softness_chart(
             panel.plot(own["stiffness"], own[response], **line)
             last = rigid.loc[rigid["build"] == name, response]
             panel.plot([end] * len(last), last, style.marker, color=style.color)
-        panel.set(xscale="log", yscale="log", title=f"{TITLES[response]} [{_read(unit)}]")
+        panel.set(xscale="log", yscale="log", title=f"{TITLES[response]} [{unit}]")
         plain(panel.yaxis)
     dress(*panels)
     for panel in panels[2:]:
         panel.set_xlabel("stiffness of grips [N/m]; marks on the right: rigid")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
-
-
-def _read(unit: str) -> str:
-    """Return a unit of tables as people read it."""
-    return unit.replace("1e-3 mm", "µm")
 
 
 @styled
@@ -122,11 +108,11 @@ def _maxima(result: Comparison) -> Figure:
     figure.suptitle("Largest response of any step", x=0.01, ha="left")
     panels = figure.subplots(2, 2, sharey=True).ravel()
     colors = [VERMILION if name == PUBLISHED else BLUE for name in names]
-    for panel, (column, unit) in zip(panels, LARGEST.items(), strict=True):
+    for panel, (column, unit) in zip(panels, UNITS.items(), strict=True):
         values = result.table[column].astype(float)
         bars = panel.barh([typed(name) for name in names], values, color=colors, height=0.7)
         panel.bar_label(bars, [f" {value:.3g}" for value in values], fontsize=SMALL)
-        panel.set_title(f"{TITLES[column]}, {column} [{_read(unit)}]")
+        panel.set_title(f"{TITLES[column]}, {column} [{unit}]")
         panel.margins(x=0.14)
         panel.tick_params(axis="y", length=0)
     panels[0].invert_yaxis()
@@ -142,7 +128,8 @@ def _responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
     tables = {}
     for first, names in merged(builds).items():
         called = typed(first) if len(names) == 1 else f"the same plan: {', '.join(names)}"
-        tables[called] = _worst_steps(builds[first])
+        numbers = builds[first].select_dtypes("number")
+        tables[called] = numbers.groupby("bricks").max().reset_index()
     figure = new_figure(6.6 + 0.2 * len(tables))
     figure.suptitle("Worst step at every number of bricks", x=0.01, ha="left")
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
@@ -183,28 +170,6 @@ def _gaps(result: Comparison) -> Figure:
     return figure
 
 
-@styled
-def trace_figure(plans: Sequence[Plan]) -> Figure:
-    """Return the choices (filled) and bounds (hollow) of plans for one problem against time."""
-    figure = new_figure(3.6)
-    axes = figure.subplots()
-    known_by = looks(plan.formulation.name for plan in plans)
-    hollow: dict[str, Any] = {"mfc": "white", "lw": 0.8}
-    for plan in plans:
-        name = plan.formulation.name
-        rows = [(found.seconds, found.objective, found.bound) for found in plan.trace]
-        seconds, *curves = np.array(rows, dtype=float).reshape(-1, 3).T
-        for values, more in zip(curves, ({"label": typed(name)}, hollow), strict=True):
-            known = np.isfinite(values)
-            look = known_by[name].line() | more
-            axes.step(seconds[known], values[known], where="post", **look)
-    axes.plot([], [], "o-", color=GRAY, **hollow, label="lower bound")
-    axes.set(xscale="log", xlabel="time [s]", ylabel="objective, and what bounds it below")
-    dress(axes)
-    axes.legend()
-    return figure
-
-
 def draw_responses(
     axes: Sequence[Axes], tables: Mapping[str, pd.DataFrame], columns: Mapping[str, str]
 ) -> None:
@@ -228,22 +193,13 @@ def draw_responses(
     axes[0].legend(frameon=False, ncols=min(len(tables), 4), fontsize=SMALL)
 
 
-def _worst_steps(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the largest responses while each number of bricks stands, a row for each."""
-    return table.select_dtypes("number").groupby("bricks").max().reset_index()
-
-
 def merged(tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[str, ...]]:
     """Return the names of tables by the first with the same numbers: a line would hide another."""
     out: dict[str, tuple[str, ...]] = {}
     numbers = {name: table.select_dtypes("number") for name, table in tables.items()}
     for name, own in numbers.items():
-        alike = (
-            n
-            for n in out
-            if numbers[n].shape == own.shape and np.allclose(numbers[n], own, equal_nan=True)
-        )
-        twin = next(alike, name)
+        alike = (n for n in out if numbers[n].shape == own.shape)
+        twin = next((n for n in alike if np.allclose(numbers[n], own, equal_nan=True)), name)
         out[twin] = (*out.get(twin, ()), name)
     return out
 
@@ -273,13 +229,13 @@ def front_figure(
             axes.plot(*ways, "o", ms=4, mfc="none", mec=GRAY, mew=0.8, label=f"{label}, its set")
         x, y = (_in_shown_unit(table[c], c) for c in (first, name))
         dots = axes.scatter(x, y, c=table["steps"], cmap="viridis", s=18, zorder=2)
-        _mark(axes, marks, (first, name))
+        look: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none", "mew": 2}
+        for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
+            if first in worst and name in worst:
+                at = [_in_shown_unit(worst[c], c) for c in (first, name)]
+                axes.plot(*at, marker, label=in_words(method), zorder=3, **look)
         axes.set(xlabel=LABELS.get(first, first), ylabel=LABELS.get(name, name))
-        if axes.get_ylim()[1] > FAR * float(pd.Series(y).max()):
-            axes.set_yscale("log")
-            axes.yaxis.set_major_formatter(LogFormatter())
-            axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(2, 0.5)))
-        _widen(axes)
+        _scale(axes, FAR * float(pd.Series(y).max()))
         dress(axes)
     for axes in panels[len(others) :]:
         axes.set_axis_off()
@@ -291,17 +247,15 @@ def front_figure(
     return figure
 
 
-def _mark(axes: Axes, marks: Mapping[str, Mapping[str, float]], names: tuple[str, str]) -> None:
-    """Mark where methods stand that make no choice."""
-    look: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none", "mew": 2}
-    for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
-        if all(name in worst for name in names):
-            at = [_in_shown_unit(worst[name], name) for name in names]
-            axes.plot(*at, marker, label=in_words(method), zorder=3, **look)
+def _scale(axes: Axes, far: float) -> None:
+    """Make the axis up logarithmic if it goes far, and keep rounding from looking like a trade-off.
 
-
-def _widen(axes: Axes) -> None:
-    """Keep rounding from looking like a trade-off: axes span a hundredth of what they show."""
+    Linear axes span a hundredth of what they show.
+    """
+    if axes.get_ylim()[1] > far:
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(LogFormatter())
+        axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(2, 0.5)))
     for axis in (axes.xaxis, axes.yaxis):
         if axis.get_scale() == "linear":
             low, high = axis.get_view_interval()
@@ -309,6 +263,15 @@ def _widen(axes: Axes) -> None:
             if high - low < least:
                 axis.set_view_interval(middle - least / 2, middle + least / 2, ignore=True)
             axis.set_major_formatter(ScalarFormatter(useOffset=False))
+
+
+def comparison_figures(result: Comparison) -> dict[str, Figure]:
+    """Return the figures of a comparison of a scene that has a loop of its robots."""
+    return {
+        "maxima": _maxima(result),
+        "responses": _responses_figure(result.tables),
+        "gap_against_cost": _gaps(result),
+    }
 
 
 def plan_figures(engine: Engine, builds: Sequence[Build]) -> dict[str, bytes]:

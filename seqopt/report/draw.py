@@ -29,7 +29,6 @@ from seqopt.network.network import Network, PartKind
 from seqopt.report._robots import ROBOT_COLORS, Cell
 from seqopt.report._style import BLUE, SMALL, VERMILION
 from seqopt.scene.boxes import boxes, vertices_of
-from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import normal_of
 
@@ -89,25 +88,21 @@ def aside(marks: Floats, segments: Sequence[Floats]) -> list[tuple[float, float]
     reach = SHARE * float(np.ptp(marks, axis=0).max())
     around = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     ends = np.asarray(segments, dtype=float).reshape(-1, 2, 2)
+    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    length = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
     placed = np.empty((0, 2))
     out = []
     for spots in marks[:, None] + reach * around:
+        away = spots[:, None] - start
+        share = np.clip((away * along).sum(axis=2) / length, 0.0, 1.0)
+        lines = np.linalg.norm(away - share[..., None] * along, axis=2).min(axis=1)
         parts = (spots[:, None] - placed) / [WIDE, 1.0]
         others = np.linalg.norm(parts, axis=2).min(axis=1, initial=np.inf)
-        best = int(np.minimum(_from_lines(spots, ends), others).argmax())
+        best = int(np.minimum(lines, others).argmax())
         placed = np.concatenate([placed, spots[best : best + 1]])
         x, y = (POINTS * around[best]).tolist()
         out.append((x, y))
     return out
-
-
-def _from_lines(spots: Floats, ends: Floats) -> Floats:
-    """Return how far spots (n, 2) are from the nearest of lines between ends (E, 2, 2)."""
-    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
-    away = spots[:, None] - start
-    length = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
-    share = np.clip((away * along).sum(axis=2) / length, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(away - share[..., None] * along, axis=2).min(axis=1))
 
 
 def _drawing_order(corners: Floats, toward: Floats) -> list[int]:
@@ -123,7 +118,9 @@ def _drawing_order(corners: Floats, toward: Floats) -> list[int]:
     [1, 0]
     """
     seen = corners @ toward.T
-    pairs = _overlapping(seen[..., :2])
+    low, high = seen[..., :2].min(axis=1), seen[..., :2].max(axis=1)
+    over = (low[:, None] < high[None]).all(axis=2)  # rectangles around them in the picture
+    pairs = np.argwhere(np.triu(over & over.T, 1)).astype(np.int64)
     behind: list[set[int]] = [set() for _ in corners]
     for pair, side in zip(pairs.tolist(), _in_front(seen, pairs).tolist(), strict=True):
         if side:
@@ -138,13 +135,6 @@ def _drawing_order(corners: Floats, toward: Floats) -> list[int]:
         for waits in behind:
             waits.discard(i)
     return order
-
-
-def _overlapping(seen: Floats) -> Ints:
-    """Return the pairs (P, 2) whose rectangles around them overlap in the picture."""
-    low, high = seen.min(axis=1), seen.max(axis=1)
-    over = (low[:, None] < high[None]).all(axis=2)
-    return np.argwhere(np.triu(over & over.T, 1)).astype(np.int64)
 
 
 def _in_front(seen: Floats, pairs: Ints) -> Ints:
@@ -256,24 +246,31 @@ def draw_bricks(  # what is drawn, and how, each by its name
         turned = np.cross(twist[:bricks, None, 3:], boxed - boxed.mean(axis=1, keepdims=True))
         boxed = boxed + magnify * (twist[:bricks, None, :3] + turned)
     polygons, colors, rims = [], [], []
-    rim = (0.25, 0.15, 0.1, alpha)
-    for b in _drawing_order(boxed, view.axes()):
-        brick = network.scene.placed[b]
-        points, faces = _solid(brick, boxed[b], None if twist is None else magnify * twist[b])
-        seen, inner = points @ view.axes().T, _inner_edges(points, faces) if brick.shape else set()
+    rim, toward = (0.25, 0.15, 0.1, alpha), view.axes()
+    for b in _drawing_order(boxed, toward):
+        brick, points, faces, inner = network.scene.placed[b], boxed[b], FACES, set()
+        if brick.shape is not None:
+            points, shape = vertices_of(brick)
+            faces = tuple(map(tuple, shape))
+            if twist is not None:
+                shift, turn = np.split(magnify * twist[b], 2)
+                points = points + shift + np.cross(turn, points - brick.position)
+            inner = _inner_edges(points, faces)
+        seen = points @ toward.T
         for face in sorted(map(list, faces), key=lambda face: float(seen[face, 2].mean())):
-            if brick.shape is None or normal_of(seen[face])[2] > 0:  # not turned away
-                polygons.append(seen[face, :2])
-                normal = normal_of(points[face])  # whose direction says how bright a face is
-                light = 0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal)
-                colors.append((*(light * (MARKED if brick.name in marked else CLAY)), alpha))
-                sides = [*zip(face, face[1:] + face[:1], strict=True)]
-                outer = [side for side in sides if frozenset(side) not in inner]
-                rims.append(rim if outer == sides else colors[-1])
-                for side in outer if outer != sides else ():  # each as a polygon of two corners
-                    polygons.append(seen[[*side], :2])
-                    colors.append(rim)
-                    rims.append(rim)
+            if brick.shape is not None and normal_of(seen[face])[2] <= 0:  # turned away
+                continue
+            polygons.append(seen[face, :2])
+            normal = normal_of(points[face])  # whose direction says how bright a face is
+            light = 0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal)
+            colors.append((*(light * (MARKED if brick.name in marked else CLAY)), alpha))
+            sides = [*zip(face, face[1:] + face[:1], strict=True)]
+            outer = [side for side in sides if frozenset(side) not in inner]
+            rims.append(rim if outer == sides else colors[-1])
+            for side in outer if outer != sides else ():  # each as a polygon of two corners
+                polygons.append(seen[[*side], :2])
+                colors.append(rim)
+                rims.append(rim)
     drawn: Any = {"facecolors": colors, "edgecolors": rims, "linewidths": 0.4}
     axes.add_collection(PolyCollection(polygons, **drawn))
     _frame(axes)
@@ -319,28 +316,24 @@ def _draw_robots(
     ``arms``: of every robot in a step: its bodies are drawn where its posture is known, otherwise
     the line from its foot to its grip; see `seqopt.report._robots`.
     """
-    seen = view.axes()[:2]
-    axes.add_patch(Polygon(cell.yard @ seen.T, fc=GROUND, lw=0, zorder=0.1))
+    right, up, toward = view.axes()
+    seen = np.stack([right, up]).T
+    axes.add_patch(Polygon(cell.yard @ seen, fc=GROUND, lw=0, zorder=0.1))
     for i, arm in enumerate(arms):
         if arm is None:
             continue
         points = arm.line if isinstance(arm, PosedArm) else arm
-        near = (points[0] - cell.middle) @ view.axes()[2] > 0
-        look: Any = {"color": grip_mark(i)["color"], "order": 4.0 if near else 0.5}
+        color = grip_mark(i)["color"]
+        order = 4.0 if (points[0] - cell.middle) @ toward > 0 else 0.5
         if isinstance(arm, PosedArm):
-            _draw_bodies(axes, arm, view, **look)
-        else:
-            _draw_line(axes, points @ seen.T, **look)
-
-
-def _draw_line(axes: Axes, line: Floats, *, color: str, order: float) -> None:
-    """Draw an arm as the line that is seen of it, (k, 2), its tool thin."""
-    wide = ARM if len(line) > 2 else 0.5 * ARM
-    for width, paint in ((wide + 1.6, "white"), (wide, color)):
-        look: Any = {"fill": False, "capstyle": "round", "joinstyle": "round", "zorder": order}
-        axes.add_patch(PathPatch(Path(line[:-1]), lw=width, ec=paint, **look))
-    ends: Any = {"fill": False, "capstyle": "round", "zorder": order}
-    axes.add_patch(PathPatch(Path(line[-2:]), lw=0.6 * ARM, ec=INK, **ends))
+            _draw_bodies(axes, arm, view, color=color, order=order)
+            continue
+        line, wide = points @ seen, ARM if len(points) > 2 else 0.5 * ARM
+        look: Any = {"fill": False, "capstyle": "round", "zorder": order}
+        for width, paint in ((wide + 1.6, "white"), (wide, color)):
+            links = PathPatch(Path(line[:-1]), lw=width, ec=paint, joinstyle="round", **look)
+            axes.add_patch(links)
+        axes.add_patch(PathPatch(Path(line[-2:]), lw=0.6 * ARM, ec=INK, **look))  # its tool
 
 
 def _draw_bodies(axes: Axes, arm: PosedArm, view: View, *, color: str, order: float) -> None:
@@ -372,13 +365,3 @@ def grip_mark(robot: int) -> dict[str, Any]:
     """Return color and shape of the mark of a robot's grip."""
     color, marker = (each[robot % len(each)] for each in (ROBOT_COLORS, ROBOT_MARKERS))
     return {"color": color, "marker": marker}
-
-
-def _solid(brick: Brick, corners: Floats, motion: Floats | None) -> tuple[Floats, Faces]:
-    """Return vertices (V, 3), m, and faces of a brick: of its moved box, or of its shape, moved."""
-    if brick.shape is None:
-        return corners, FACES
-    points, faces = vertices_of(brick)
-    if motion is not None:
-        points = points + motion[:3] + np.cross(motion[3:], points - brick.position)
-    return points, tuple(map(tuple, faces))

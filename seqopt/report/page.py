@@ -66,6 +66,7 @@ PARTS = {
     "marks": "marks.js",
     "viewer": "viewer.js",
 }
+_WANT = Want.EDGES | Want.BRICKS | Want.SUPPORT
 MOST = 6_000_000  # numbers of fields in a page: about 8 MB
 NARROW = 600  # pixels up to which a screen shows the narrow form of a picture
 LEFT_OUT = "Displacements and axial forces of some builds are left out"
@@ -144,9 +145,18 @@ class _Drawn:
 
 
 def _structure_data(network: Network) -> dict[str, object]:
-    """Return a structure as lists, ready for JSON; edges end with their brick count."""
-    scene = network.scene
+    """Return a structure as lists, ready for JSON.
+
+    Edges end with their brick count; ``carried`` are the bricks that every node moves with, none
+    for those that are fixed.
+    """
+    scene, springs = network.scene, network.springs
     cell = Cell(scene)
+    parts = (network.node_kind, network.node_brick, network.node_spring)
+    moving = [
+        [] if kind == PartKind.BASE.value else [brick] if brick >= 0 else springs.bodies[k].tolist()
+        for kind, brick, k in zip(*(part.tolist() for part in parts), strict=True)
+    ]
     return {
         "name": scene.name,
         "bricks": [
@@ -159,7 +169,7 @@ def _structure_data(network: Network) -> dict[str, object]:
             for node in brick.nodes
         },
         "points": _rounded(network.node_position),
-        "carried": _carried(network),
+        "carried": [[body for body in bodies if body != GROUND] for bodies in moving],
         "edges": np.column_stack([network.edge_nodes, network.edge_since]).tolist(),
         "grounds": [
             {"at": _rounded(ground.anchor), "brick": ground.brick} for ground in scene.grounds
@@ -180,36 +190,31 @@ def _structure_data(network: Network) -> dict[str, object]:
     }
 
 
+def _rounded(values: ArrayLike) -> object:
+    return np.asarray(values).round(6).tolist()
+
+
 def _solid(brick: Brick) -> dict[str, object]:
-    """Return corners (k, 3) and faces of a brick; the viewer draws a face as a fan."""
+    """Return corners (k, 3) and faces of a brick, each from a vertex that sees all of it, if any.
+
+    The viewer draws a face as a fan.
+    """
     points, faces = vertices_of(brick)
-    return {"corners": _rounded(points), "faces": [_fan(points, tuple(face)) for face in faces]}
+    fans = []
+    for face in faces:
+        fan, normal = tuple(face), normal_of(points[list(face)])
+        for k in range(len(face)):
+            turned = (*face[k:], *face[:k])
+            spokes = points[list(turned[1:])] - points[turned[0]]
+            if (np.cross(spokes[:-1], spokes[1:]) @ normal >= 0).all():
+                fan = turned
+                break
+        fans.append(fan)
+    return {"corners": _rounded(points), "faces": fans}
 
 
-def _fan(points: Floats, face: tuple[int, ...]) -> tuple[int, ...]:
-    """Return a face from a vertex that sees all of it, if it has one."""
-    normal = normal_of(points[list(face)])
-    for k in range(len(face)):
-        turned = (*face[k:], *face[:k])
-        spokes = points[list(turned[1:])] - points[turned[0]]
-        if (np.cross(spokes[:-1], spokes[1:]) @ normal >= 0).all():
-            return turned
-    return face
-
-
-def _carried(network: Network) -> list[list[int]]:
-    """Return the bricks that every node moves with, none for those that are fixed."""
-    out = []
-    parts = (network.node_kind, network.node_brick, network.node_spring)
-    for kind, brick, spring in zip(*(part.tolist() for part in parts), strict=True):
-        bodies = [brick] if brick >= 0 else network.springs.bodies[spring].tolist()
-        fixed = kind == PartKind.BASE.value
-        out.append([] if fixed else [body for body in bodies if body != GROUND])
-    return out
-
-
-class _Asked(NamedTuple):
-    """What was asked of states of builds so far, by bricks and what is held; who holds.
+class _Known(NamedTuple):
+    """What is known of states of builds, by bricks and what is held; who holds.
 
     ``offs``: how far grips may be off, m; ``fields``: of bricks, edges and ground ends;
     ``sketched``: arms, by robot and node.
@@ -221,25 +226,23 @@ class _Asked(NamedTuple):
 
 
 def _build_data(
-    engine: Engine, build: Build, known: _Asked | None = None, *, fields: bool = True
+    engine: Engine, build: Build, known: _Known | None = None, *, fields: bool = True
 ) -> dict[str, object]:
     """Return the steps of a build as lists, ready for JSON.
 
-    Rows of the table of responses are text; ``marks`` says what is wrong with each step; the packed
-    fields ``twist``, ``edge``, ``push`` and ``turn`` (force and moment of every ground end) have
-    the ``scale`` of each step, or are None. ``known``: what was asked before.
+    Rows of the table of responses are text; ``stands`` says whether every step stands with every
+    mortar, ``marks`` what is wrong with it; the packed fields ``twist``, ``edge``, ``push`` and
+    ``turn`` (force and moment of every ground end) have the ``scale`` of each step, or are None.
     """
-    known = _Asked({}, {}, {}) if known is None else known
+    known = _Known({}, {}, {}) if known is None else known
     lines = [line.split(",") for line in csv_text(build.table).splitlines()]
     scene, off = engine.network.scene, _grips_off(engine, build, known.offs)
-    own = scene.build_order
-    found: dict[str, Floats | None] = {"fall": build.falls}
-    found |= _fields(engine, build, known.fields) if fields else dict.fromkeys(FIELDS)
+    stands = [[f"{WORDS[v]} {each.how}" for v in each.verdicts] for each in build.verdicts]
     return {
         "name": build.name,
         "bounds": dict(build.bounds),
-        "rank": [build.order.index(name) for name in own] if build.order else None,
-        "stands": _stands(build.verdicts),
+        "rank": [build.order.index(n) for n in scene.build_order] if build.order else None,
+        "stands": [" and ".join(said) for said in zip(*stands, strict=True)],
         "marks": _marks(scene, build),
         "verdicts": [
             {"how": each.how, "of": [WORDS[verdict] for verdict in each.verdicts]}
@@ -248,7 +251,9 @@ def _build_data(
         "decides": _deciding_step(scene, build.table, build.verdicts, build.along),
         "sentence": build.sentence(scene, off),
         "words": in_words(build.name),
-        "off": [] if off is None else [_off_said(far) for far in off.tolist()],
+        "off": []
+        if off is None
+        else [f"Grips {_far_off(far)}." if far < np.inf else "" for far in off.tolist()],
         "arms": arm_data(scene, build.steps, build.arms, known.sketched),
         "steps": [
             {
@@ -262,7 +267,8 @@ def _build_data(
         "columns": lines[0],
         "rows": lines[1:],
         "forces": [force_column(robot) for robot in scene.robots],
-        **{name: None if part is None else _packed(part) for name, part in found.items()},
+        "fall": None if build.falls is None else _packed(build.falls),
+        **(_fields(engine, build, known.fields) if fields else dict.fromkeys(FIELDS)),
     }
 
 
@@ -275,23 +281,6 @@ def _grips_off(engine: Engine, build: Build, known: dict[_Key, float]) -> Floats
     if not is_linear(engine) or len(scene.bricks) > _FEW or build.order:
         return None
     return each_tolerance(engine, held_in_steps(scene, build.steps), known)
-
-
-def _ask_all(
-    engine: Engine, builds: Sequence[Build], known: _Asked, shown: Sequence[Build]
-) -> None:
-    """Ask of all builds at once how far grips may be off, and of those with fields these."""
-    every = [step for build in builds if not build.order for step in build.steps]
-    if every:
-        _grips_off(engine, Build("", every, pd.DataFrame()), known.offs)
-    states = _distinct(build.steps for build in shown)
-    want = Want.EDGES | Want.BRICKS | Want.SUPPORT
-    known.fields.update(zip(states, _each_fields(engine, states.values(), want), strict=True))
-
-
-def _off_said(far: float) -> str:
-    """Return how far grips of a step may be off, in words; none where nobody holds."""
-    return f"Grips {_far_off(far)}." if far < np.inf else ""
 
 
 def _marks(scene: Scene, build: Build) -> list[str]:
@@ -311,29 +300,22 @@ def _marks(scene: Scene, build: Build) -> list[str]:
     return out
 
 
-def _stands(verdicts: Sequence[BuildVerdicts]) -> list[str]:
-    """Return whether every step stands with every mortar, in words; none if it was not asked."""
-    found = [[f"{WORDS[v]} {each.how}" for v in each.verdicts] for each in verdicts]
-    return [" and ".join(said) for said in zip(*found, strict=True)]
-
-
 def _fields(
     engine: Engine, build: Build, known: Mapping[tuple[int, Grips], Fields]
-) -> dict[str, Floats]:
-    """Return twists (steps, B, 6), edge forces (steps, E), and what ground ends exert."""
+) -> dict[str, object]:
+    """Return twists (steps, B, 6), edge forces (steps, E), and what ground ends exert, packed."""
     network = engine.network
     count = len(build.steps)
     twist = np.zeros((count, len(network.inner), 6))
     edge = np.zeros((count, len(network.edge_nodes)))
     support = np.zeros((count, len(network.springs.support), 6))
     for i, step in enumerate(build.steps):
-        found = known.get((step.bricks, step.grips)) or step_fields(
-            engine, step, Want.EDGES | Want.BRICKS | Want.SUPPORT
-        )
+        found = known.get((step.bricks, step.grips)) or step_fields(engine, step, _WANT)
         twist[i, : step.bricks] = found.brick_twist[0]
         edge[i, : found.edge_force.shape[1]] = found.edge_force[0]
         support[i] = found.support[0]
-    return dict(zip(FIELDS, (twist, edge, support[..., :3], support[..., 3:]), strict=True))
+    parts = (twist, edge, support[..., :3], support[..., 3:])
+    return {name: _packed(part) for name, part in zip(FIELDS, parts, strict=True)}
 
 
 def _packed(values: Floats) -> dict[str, object]:
@@ -341,13 +323,12 @@ def _packed(values: Floats) -> dict[str, object]:
     flat = values.reshape(len(values), -1)
     size = np.abs(flat).max(axis=1, initial=0.0)
     scale = np.where(size > 0, size / LARGEST, 1.0)
-    numbers = np.round(flat / scale[:, None]).astype("<i2")
-    data = b64encode(gzip.compress(numbers.tobytes(), 9, mtime=0)).decode("ascii")
+    data = _compressed(np.round(flat / scale[:, None]).astype("<i2").tobytes())
     return {"scale": [float(f"{s:.6g}") for s in scale], "width": flat.shape[1], "data": data}
 
 
-def _rounded(values: ArrayLike) -> object:
-    return np.asarray(values).round(6).tolist()
+def _compressed(data: bytes) -> str:
+    return b64encode(gzip.compress(data, 9, mtime=0)).decode("ascii")
 
 
 def report_page(
@@ -376,7 +357,7 @@ def report_page(
     >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
     True
     """
-    data = json.dumps(_data(engine, builds, scatter, offs), separators=(",", ":"))
+    data = _data(engine, builds, offs) | {"scatter": None if scatter is None else scatter.data()}
     scene = engine.network.scene
     loading = f" Counted, and not drawn: {scene.loading}." if scene.loading else ""
     loading += "".join(f" Of {note}." for note in shape_notes(scene))
@@ -385,44 +366,49 @@ def report_page(
         sentence=escape(sentence + loading),
         found=escape(found),
         tables="".join(_part(caption, part) for caption, part in tables),
-        data=data.replace("<", "\\u003c"),  # so that it cannot end the script it stands in
+        data=_as_json(data),
     )
-
-
-def _hashed(text: str) -> str:
-    """Return a part of the page as its policy names it."""
-    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
 def _filled(**parts: str) -> str:
     """Return the page with its parts in their places, and the policy that lets its own run."""
-    own = {part: _asset(name) for part, name in PARTS.items()}
-    style, *scripts = map(_hashed, own.values())
+    viewer = resources.files("seqopt") / "data/viewer"
+    own = {part: (viewer / name).read_text(encoding="utf-8") for part, name in PARTS.items()}
+    digests = (b64encode(sha256(text.encode()).digest()).decode() for text in own.values())
+    style, *scripts = (f"'sha256-{digest}'" for digest in digests)
     policy = (
         f"default-src 'none'; script-src {' '.join(scripts)}; style-src {style}; "
         "img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
-    page = _asset("page.html")
+    page = (viewer / "page.html").read_text(encoding="utf-8")
     for name, content in {"policy": policy, **parts, **own}.items():
         page = page.replace(f"<!-- {name} -->", content, 1)
     return page
 
 
+def _as_json(data: Mapping[str, object]) -> str:
+    """Return what the viewer reads; no ``<`` in it can end the script it stands in."""
+    return json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+
+
 def _data(
-    engine: Engine,
-    builds: Sequence[Build],
-    scatter: Scatter | None,
-    offs: dict[_Key, float] | None = None,
+    engine: Engine, builds: Sequence[Build], offs: dict[_Key, float] | None
 ) -> dict[str, object]:
-    """Return what the viewer reads, fields for as many builds as there is room for."""
+    """Return what the viewer reads of builds, fields of as many as there is room for."""
     if not builds:
         raise ProblemError("a report of nothing; give at least one build")
     network = engine.network
     numbers = 6 * len(network.inner) + len(network.edge_nodes)  # of the fields of a step
     ends = np.cumsum([numbers * len(build.steps) for build in builds])
     drawn = [bool(end <= MOST) and not b.order for b, end in zip(builds, ends, strict=True)]
-    known = _Asked({} if offs is None else offs, {}, {})
-    _ask_all(engine, builds, known, [*compress(builds, drawn)])
+    known = _Known({} if offs is None else offs, {}, {})
+    every = [step for build in builds if not build.order for step in build.steps]
+    if every:
+        _grips_off(engine, Build("", every, pd.DataFrame()), known.offs)
+    states = _distinct(build.steps for build in compress(builds, drawn))
+    known.fields.update(zip(states, _each_fields(engine, states.values(), _WANT), strict=True))
+    why = "they place bricks in another order than the scene" if len(drawn) > sum(drawn) else ""
+    why = "there are too many steps" if ends[-1] > MOST else why
     return {
         "structure": _structure_data(network),
         "builds": [
@@ -431,41 +417,26 @@ def _data(
             for build, fields in zip(builds, drawn, strict=True)
         ],
         "responses": RESPONSES,
-        "scatter": None if scatter is None else scatter.data(),
-        "note": _left_out(builds, int(ends[-1])),
+        "note": f"{LEFT_OUT}: {why}." if why else "",
     }
 
 
 def _tasks(engine: Engine, build: Build) -> dict[str, str]:
-    """Return what robots do in a build as CSV and JSON, compressed: to copy and to keep.
-
-    Arms are in their postures; where nothing computes these, grips are proposals.
-    """
-    return {
-        kind: b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode("ascii")
-        for kind, text in (build.tasks or _task_texts(engine.network.scene, build.steps)).items()
-    }
+    """Return what robots do in a build as CSV and JSON, compressed: to copy and to keep."""
+    texts = build.tasks or _task_texts(engine.network.scene, build.steps)
+    return {kind: _compressed(text.encode()) for kind, text in texts.items()}
 
 
 def _task_texts(scene: Scene, steps: Sequence[Step]) -> dict[str, str]:
-    """Return what robots do in a build as CSV and JSON."""
+    """Return what robots do in a build as CSV and JSON.
+
+    Arms are in their postures; where nothing computes these, grips are proposals.
+    """
     try:
         tasks = [*_known_tasks(scene, steps)]
     except (ExtraError, SceneError):
         tasks = [*plan_tasks(scene, steps)]
     return {"csv": tasks_csv(tasks), "json": tasks_json(scene, tasks)}
-
-
-def _left_out(builds: Sequence[Build], numbers: int) -> str:
-    """Return why fields of some builds, numbers in all, are left out; nothing if none are."""
-    if numbers > MOST:
-        return f"{LEFT_OUT}: there are too many steps."
-    ordered = any(build.order for build in builds)
-    return f"{LEFT_OUT}: they place bricks in another order than the scene." if ordered else ""
-
-
-def _asset(name: str) -> str:
-    return resources.files("seqopt").joinpath(f"data/viewer/{name}").read_text(encoding="utf-8")
 
 
 def _part(caption: str, part: pd.DataFrame | _Drawn) -> str:

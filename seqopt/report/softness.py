@@ -5,18 +5,19 @@ Builds stay as they are, step by step; what varies is how robots give way where 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import permutations
 
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine
 from seqopt.errors import SceneError
 from seqopt.graph.scenarios import engine_for
 from seqopt.report.comparison import LARGEST
+from seqopt.report.text import IN_UNITS, QUANTITIES
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import solve_sets
 from seqopt.responses.quantities import CHOSEN_BY
@@ -25,17 +26,9 @@ from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell, with_progress
 
 SHARE = "payload_share"  # column: the largest force of a grip over its robot's payload
-_NAMES = [*LARGEST][1:]  # of responses beside the forces of robots
-_UNITS = {name: CHOSEN_BY[name].scale for name in _NAMES}
 _CLEAR = 0.01  # by how much one must be less than another to be said to be
 _HALF = 0.5
 _BETWEEN = 4  # stiffnesses that are looked at in each decade
-WORDS = {
-    "F_rob": "grip force",
-    "M_sup": "support moment",
-    "T_max": "tension",
-    "D_max": "displacement",
-}
 
 
 def _grip_range(softest: float, stiffest: float) -> tuple[float, ...]:
@@ -74,66 +67,65 @@ def held_softly(
     >>> held_softly(engine, tables, [1e6, float("inf")])["D_max"].round(1).tolist()
     [380.6, 15.7]
     """
-    scene = engine.network.scene
-    rows, robots = [], scene.robots
+    scene, rows = engine.network.scene, []
+    states = _states(scene, tables)
     for size in with_progress("grips", stiffness, progress):
-        own = None if size == np.inf else size
-        ways = ((robot, robot.arm and replace(robot.arm, joint_stiffness=())) for robot in robots)
-        softer = engine_for(
-            engine, scene.with_robots(*(replace(r, stiffness=own, arm=arm) for r, arm in ways))
-        )
-        found = _largest(softer, tables)
-        rows += [{"build": name, "stiffness": size, **each} for name, each in found.items()]
+        robots = [
+            replace(
+                robot,
+                stiffness=None if size == np.inf else size,
+                arm=robot.arm and replace(robot.arm, joint_stiffness=()),
+            )
+            for robot in scene.robots
+        ]
+        largest = {name: dict.fromkeys([*LARGEST, SHARE], 0.0) for name in tables}
+        for builds, found in _responses(engine_for(engine, scene.with_robots(*robots)), states):
+            for build in builds:
+                largest[build] = {key: max(v, found[key]) for key, v in largest[build].items()}
+        rows += [{"build": name, "stiffness": size, **each} for name, each in largest.items()]
     return pd.DataFrame(rows)
 
 
-def _largest(engine: Engine, tables: Mapping[str, pd.DataFrame]) -> dict[str, dict[str, float]]:
-    """Return the largest responses of builds, each grip set solved once for all of them."""
-    scene = engine.network.scene
-    out = {name: dict.fromkeys([*LARGEST, SHARE], 0.0) for name in tables}
-    payload = np.array([robot.payload for robot in scene.robots])
-    for (bricks, count), states in _states(scene, tables).items():
-        grips = np.array([numbers for numbers, _ in states], dtype=np.int64).reshape(
-            len(states), count
-        )
-        props = scene.prop_numbers(bricks, held=bool(count))
-        solved = solve_sets(engine, Block(bricks, grips, tuple(_NAMES), screen=False, props=props))
-        for row, ((_, robots), builds) in zip(solved, states.items(), strict=True):
-            forces = row[len(_NAMES) :]
-            found = {name: value * _UNITS[name] for name, value in zip(_NAMES, row, strict=False)}
-            found["F_rob"] = float(forces.max(initial=0.0))
-            found[SHARE] = float((forces / payload[list(robots)]).max(initial=0.0))
-            for build in builds:
-                out[build] = {key: max(value, found[key]) for key, value in out[build].items()}
-    return out
-
-
 _State = tuple[tuple[int, ...], tuple[int, ...]]  # numbers of grips, and which robots hold
+_States = dict[tuple[int, int], dict[_State, set[str]]]  # builds, by brick and grip count, by state
 
 
-def _states(
-    scene: Scene, tables: Mapping[str, pd.DataFrame]
-) -> dict[tuple[int, int], dict[_State, set[str]]]:
+def _states(scene: Scene, tables: Mapping[str, pd.DataFrame]) -> _States:
     """Return the builds that pass each grip set, by brick count and number of grips, ascending."""
-    out: dict[tuple[int, int], dict[_State, set[str]]] = {}
+    out: _States = {}
     columns = [f"{robot.name}_node" for robot in scene.robots]
     for name, table in tables.items():
         pairs = zip(table["bricks"], table[columns].to_numpy(object), strict=True)
         for bricks, row in pairs:
             nodes = [int(node) if pd.notna(node) else None for node in row]
             robots = tuple(i for i, node in enumerate(nodes) if node is not None)
-            state = scene.grip_numbers(nodes), robots
             level = out.setdefault((int(bricks), len(robots)), {})
-            level.setdefault(state, set()).add(name)
+            level.setdefault((scene.grip_numbers(nodes), robots), set()).add(name)
     return dict(sorted(out.items()))
+
+
+def _responses(engine: Engine, states: _States) -> Iterator[tuple[set[str], dict[str, float]]]:
+    """Yield builds and what they have in a state, each grip set solved once for all of them."""
+    scene, names = engine.network.scene, [*LARGEST][1:]
+    payload = np.array([robot.payload for robot in scene.robots])
+    for (bricks, count), own in states.items():
+        grips = np.array([numbers for numbers, _ in own], dtype=np.int64).reshape(len(own), count)
+        props = scene.prop_numbers(bricks, held=bool(count))
+        block = Block(bricks, grips, tuple(names), screen=False, props=props)
+        for row, ((_, robots), builds) in zip(solve_sets(engine, block), own.items(), strict=True):
+            forces = row[len(names) :]
+            values = zip(names, row, strict=False)
+            found = {name: float(value) * CHOSEN_BY[name].scale for name, value in values}
+            found["F_rob"] = float(forces.max(initial=0.0))
+            found[SHARE] = float((forces / payload[list(robots)]).max(initial=0.0))
+            yield builds, found
 
 
 def turning_points(table: pd.DataFrame, fixed: Sequence[str] = ()) -> tuple[str, ...]:
     """Return where conclusions of the stiffest grips turn as they become softer, a line each.
 
     Which build has the least of a response; which has less than half of what another one has, of
-    those named ``fixed`` and the best; and which robots carry more than their payload. Between
-    stiffnesses of the table values are taken to follow a power of it.
+    those named ``fixed`` and the best; and which robots carry more than their payload.
 
     ``table``: of `held_softly`.
 
@@ -144,92 +136,60 @@ def turning_points(table: pd.DataFrame, fixed: Sequence[str] = ()) -> tuple[str,
     ("displacement: below about 2.6e+06 N/m a has more than half of b's",)
     """
     lines: list[str] = []
-    for response in LARGEST:
-        wide = table.pivot_table(response, "stiffness", "build", sort=False).sort_index()
-        wide = wide.iloc[::-1]  # from the stiffest
+    for response, word in QUANTITIES.items():
+        wide = _from_stiffest(table, response)
         best = str(wide.iloc[0].idxmin())
-        lines += _no_longer_least(wide, best, WORDS[response])
-        lines += _no_longer_half(wide, [best, *(name for name in fixed if name != best)], response)
-    share = table.pivot_table(SHARE, "stiffness", "build", sort=False).sort_index().iloc[::-1]
-    return (*dict.fromkeys(lines), *_payload_lines(share))
+        less = wide.min(axis=1) < (1 - _CLEAR) * wide[best]
+        if less.any():
+            other = str(wide.iloc[int(less.argmax())].idxmin())
+            at = _crossing(wide[best] / wide[other], 1.0, less)
+            lines.append(f"{word}: below about {at} N/m {other} has the least, not {best}")
+        for one, more in permutations([best, *(name for name in fixed if name != best)], 2):
+            ratio = wide[one] / wide[more].where(wide[more] > 0)
+            if ratio.iloc[0] <= _HALF and (ratio > _HALF).any():
+                at = _crossing(ratio, _HALF, ratio > _HALF)
+                lines.append(f"{word}: below about {at} N/m {one} has more than half of {more}'s")
+    for name, share in _from_stiffest(table, SHARE).items():
+        over = share > 1
+        if (turns := over != over.iloc[0]).any():
+            side = f"{'above' if over.iloc[0] else 'below'} about {_crossing(share, 1.0, turns)}"
+            lines.append(f"payload: {side} N/m {name} asks more of a robot than it carries")
+    return tuple(dict.fromkeys(lines))
 
 
-def _no_longer_least(wide: pd.DataFrame, best: str, word: str) -> Iterator[str]:
-    """Yield where another build than the best of the stiffest grips has the least, if it does."""
-    for before, after in pairwise(wide.index):
-        other = str(wide.loc[after].idxmin())
-        if wide.loc[after, other] < (1 - _CLEAR) * wide.loc[after, best]:
-            at = _crossing(wide[best] / wide[other], 1.0, before, after)
-            yield f"{word}: below about {at} N/m {other} has the least, not {best}"
-            return
+def _from_stiffest(table: pd.DataFrame, column: str) -> pd.DataFrame:
+    """Return a column with a row for every stiffness, the stiffest first, and a build a column."""
+    return table.pivot_table(column, "stiffness", "build", sort=False).sort_index().iloc[::-1]
 
 
-def _no_longer_half(wide: pd.DataFrame, names: Sequence[str], response: str) -> Iterator[str]:
-    """Yield where a build no longer has less than half of what another one has."""
-    for less in names:
-        for more in names:
-            ratio = wide[less] / wide[more].where(wide[more] > 0)
-            if less == more or not ratio.iloc[0] <= _HALF:
-                continue
-            for before, after in pairwise(wide.index):
-                if ratio[after] > _HALF:
-                    at = _crossing(ratio, _HALF, before, after)
-                    said = f"below about {at} N/m {less} has more than half of {more}'s"
-                    yield f"{WORDS[response]}: {said}"
-                    break
+def _crossing(values: pd.Series[float], level: float, beyond: pd.Series[bool]) -> str:
+    """Return the stiffness at which values cross a level, before the first beyond it, two digits.
 
-
-def _payload_lines(share: pd.DataFrame) -> Iterator[str]:
-    """Yield from which stiffness on builds ask more than a payload of robots, or no longer do."""
-    for name in share.columns:
-        for before, after in pairwise(share.index):
-            over = share.loc[[before, after], name] > 1
-            if over[before] != over[after]:
-                at = _crossing(share[name], 1.0, before, after)
-                side = "above" if over[before] else "below"
-                yield f"payload: {side} about {at} N/m {name} asks more of a robot than it carries"
-                break
-
-
-def _crossing(values: pd.Series[float], level: float, stiff: float, soft: float) -> str:
-    """Return the stiffness at which values cross a level between two, two digits."""
+    Between stiffnesses they follow a power of it.
+    """
+    k = int(beyond.to_numpy().argmax())
+    stiff, soft = (float(values.index[at]) for at in (k - 1, k))
     if stiff == np.inf:
         return f"{soft:.2g}"
-    ends = np.log([values[stiff], values[soft]])
+    ends = np.log(values.to_numpy(float)[[k - 1, k]])
     share = (np.log(level) - ends[0]) / (ends[1] - ends[0])
     return f"{np.exp(np.log(stiff) + share * np.log(soft / stiff)):.2g}"
 
 
 def _softness_lines(table: pd.DataFrame, builds: Sequence[str]) -> list[str]:
     """Return a table of some builds in text: the largest responses at every decade, 80 columns."""
-    shown = _decades(np.unique(table["stiffness"]))
-    lines = []
-    for response, unit in LARGEST.items():
-        wide = table.pivot_table(response, "build", "stiffness", sort=False)
-        heads = ["rigid" if k == np.inf else _in_short(k) for k in shown]
-        said = f"{WORDS[response]}, {unit}".replace("1e-3 mm", "µm")
-        lines.append(f"{said:<24}" + "".join(f"{head:>8}" for head in heads))
-        for name in builds:
-            values = wide.loc[name, list(shown)].to_numpy(float)
-            lines.append(
-                f"  {name:<22}" + "".join(f"{_three(float(value)):>8}" for value in values)
-            )
-    return lines
-
-
-def _three(value: float) -> str:
-    """Return a number of three digits or more, written out."""
-    return f"{value:.0f}" if 100 <= abs(value) < 1e7 else f"{value:.3g}"
-
-
-def _in_short(stiffness: float) -> str:
-    """Return a stiffness in a few letters, as 3e6."""
-    return f"{stiffness:.0e}".replace("e+0", "e").replace("e+", "e")
-
-
-def _decades(known: Floats | Ints) -> tuple[float, ...]:
-    """Return up to six stiffnesses to show and the stiffest, whole decades as far as there are."""
+    known = np.unique(table["stiffness"])
     finite = [float(k) for k in known if k < np.inf]
     whole = [k for k in finite if abs(np.log10(k) - round(np.log10(k))) < 1e-9] or finite
-    step = -(-len(whole) // 6)
-    return (*whole[::-1][::step][::-1], float(max(known)))
+    shown = (*whole[:: -max(1, math.ceil(len(whole) / 6))][::-1], float(max(known)))
+    heads = [f"{k:.0e}".replace("e+0", "e").replace("e+", "e") for k in shown]  # as 3e6
+    heads = ["rigid" if k == np.inf else head for k, head in zip(shown, heads, strict=True)]
+    lines = []
+    for response, words in IN_UNITS.items():
+        wide = table.pivot_table(response, "build", "stiffness", sort=False)
+        lines.append(f"{words:<24}" + "".join(f"{head:>8}" for head in heads))
+        for name in builds:
+            values = wide.loc[name, list(shown)].to_numpy(float)
+            cells = (f"{v:.0f}" if 100 <= abs(v) < 1e7 else f"{v:.3g}" for v in values)
+            lines.append(f"  {name:<22}" + "".join(f"{cell:>8}" for cell in cells))
+    return lines

@@ -6,14 +6,15 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from operator import itemgetter
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.problem.criteria import RankSum
-from seqopt.problem.requirements import Criterion, Excess, _prop_faults, _response_along, overloads
-from seqopt.report.comparison import LARGEST, Comparison, LoopFacts
+from seqopt.problem.requirements import Criterion, _prop_faults, _response_along, overloads
+from seqopt.report.comparison import Comparison
 from seqopt.responses.quantities import RESPONSES, _plain, length_text, robot_response
 from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
 from seqopt.scene.scene import Scene
@@ -112,19 +113,27 @@ def _in_a_sentence(
     used = [robot for robot in scene.robots if table[f"{robot.name}_node"].notna().any()]
     verb = ("take down", "takes down") if (table["type"] == "remove").any() else ("build", "builds")
     does = f"1 robot {verb[1]}" if len(used) == 1 else f"{len(used)} robots {verb[0]}"
-    over, fallen = _overloaded(scene, table), _fallen(verdicts)
+    over = _overloaded(scene, table)
+    fallen = [phrase for each in verdicts[-1:] if each.first for phrase in _falls(each)]
     wrong = [*over, *faults, *fallen]
-    outside = f"{OUTSIDE.capitalize()}: {'; '.join(map(str, departures))}. Do not rely on it. "
     said = [f"{does} {scene.name} in {len(table):,} steps"]
     if wrong:
         said = [f"Not buildable: {'; '.join(wrong)}"]
-    held = verdicts[:-1] if fallen else verdicts
-    said += [] if over else _carried(scene, table)
+    if not over:
+        shares = _payload_shares(scene, table)
+        step, robot = divmod(int(shares.argmax()), len(scene.robots))
+        who = f"{_robot_words(scene.robots[robot].name)} in step {int(table['step'].iloc[step])}"
+        said.append(f"all within payload, {100 * shares.max():.0f} % at most ({who})")
     moves = _settlement_said(scene) if verdicts else ""
-    said += [*_stands(held), *([moves] if moves else [])] or (
+    said += [*_stands(verdicts[:-1] if fallen else verdicts), *([moves] if moves else [])] or (
         [] if verdicts else ["whether its steps stand was not asked"]
     )
-    said += [] if off is None or wrong else _off_said(scene, table, off)
+    least = np.inf if off is None or wrong else float(off.min(initial=np.inf))
+    if off is not None and np.isfinite(least):
+        gives = any(robot.stiffness or robot.arm for robot in scene.robots)
+        where = f" in step {int(table['step'].iloc[off.argmin()])}" if least < _SHORTEST else ""
+        said.append(f"{'' if gives else 'rigid '}grips {_far_off(least)}{where}")
+    outside = f"{OUTSIDE.capitalize()}: {'; '.join(map(str, departures))}. Do not rely on it. "
     return (outside if departures else "") + "; ".join(said) + "."
 
 
@@ -134,34 +143,16 @@ def _overloaded(scene: Scene, table: pd.DataFrame) -> list[str]:
     if over := overloads(scene, table):
         steps = sorted({number for excess in over for number in excess.steps})
         worst = max(over, key=lambda excess: excess.largest / excess.limit.bound)
-        where = f"{len(steps):,} of {len(table):,} steps"
+        does = f"hold up to {worst.largest:,.0f} N"
+        if worst.brick is not None:
+            does = f"carry {worst.largest:,.0f} N (brick {worst.brick})"
         out.append(
-            f"payload exceeded in {where}, first in step {steps[0]} ({_robot_words(worst.robot)} "
-            f"would {_borne(worst)} and can hold {worst.limit.bound:,.4g} N)"
+            f"payload exceeded in {len(steps):,} of {len(table):,} steps, first in step {steps[0]} "
+            f"({_robot_words(worst.robot)} would {does} and can hold {worst.limit.bound:,.4g} N)"
         )
     for excess in _prop_faults(scene, table):
         out.append(f"a prop bears more than it may in {len(excess.steps):,} steps")
     return out
-
-
-def _borne(excess: Excess) -> str:
-    """Return what a robot would hold, or which brick it would carry by itself, in words."""
-    if excess.brick is None:
-        return f"hold up to {excess.largest:,.0f} N"
-    return f"carry {excess.largest:,.0f} N (brick {excess.brick})"
-
-
-def _carried(scene: Scene, table: pd.DataFrame) -> list[str]:
-    """Return how much of its payload the robot with the largest share of it uses."""
-    shares = _payload_shares(scene, table)
-    step, robot = divmod(int(shares.argmax()), len(scene.robots))
-    who, number = _robot_words(scene.robots[robot].name), int(table["step"].iloc[step])
-    return [f"all within payload, {100 * shares.max():.0f} % at most ({who} in step {number})"]
-
-
-def _fallen(verdicts: Sequence[BuildVerdicts]) -> list[str]:
-    """Return that steps fall with the last mortar, and what fails first; nothing if none does."""
-    return [phrase for each in verdicts[-1:] if each.first for phrase in _falls(each)]
 
 
 def _falls(each: BuildVerdicts) -> list[str]:
@@ -184,15 +175,6 @@ def _stands(verdicts: Sequence[BuildVerdicts]) -> Iterator[str]:
             return  # with more than this it stands too
 
 
-def _off_said(scene: Scene, table: pd.DataFrame, off: Floats) -> list[str]:
-    """Return how far grips may be off in every step, where robots hold."""
-    least = float(off.min(initial=np.inf))
-    gives = any(robot.stiffness or robot.arm for robot in scene.robots)
-    where = f" in step {int(table['step'].iloc[off.argmin()])}" if least < _SHORTEST else ""
-    said = f"{'' if gives else 'rigid '}grips {_far_off(least)}{where}"
-    return [said] if np.isfinite(least) else []
-
-
 def _far_off(length: float) -> str:
     """Return how far grips may be off, in words.
 
@@ -205,6 +187,14 @@ def _far_off(length: float) -> str:
 
 
 WIDTH = 80  # columns
+QUANTITIES = {
+    "F_rob": "grip force",
+    "M_sup": "support moment",
+    "T_max": "tension",
+    "D_max": "displacement",
+}
+UNITS = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "µm"}  # in which people read these
+IN_UNITS = {name: f"{words}, {UNITS[name]}" for name, words in QUANTITIES.items()}
 WORDS = {
     "sequential": "sequential",
     "cantilever": "cantilever",
@@ -233,41 +223,22 @@ WORDS = {
 }
 
 
-def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion) -> str:
-    """Return methods, notes and formulations, one after the other.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What to tell.
-    scene : Scene
-        Which was compared.
-    criterion : Criterion
-        With which the formulations were compared.
-
-    Returns
-    -------
-    str
-        Of many lines.
-    """
-    notes = "\n".join(["Notes", *(_wrapped(f"- {note}") for note in comparison.notes or ["none"])])
-    plans = f"Loop of robots: not possible here; {comparison.refusal}"
-    if comparison.loop is not None:
-        plans = _formulations(comparison.table, comparison.loop, criterion)
-    return "\n\n".join([_methods(comparison, scene), notes, plans, *_expert(comparison)])
-
-
 def format_details(comparison: Comparison, scene: Scene) -> str:
     """Return forces of robots, plans under both objectives of ranks, and published ranks."""
-    return "\n\n".join([_methods(comparison, scene), *_expert(comparison)])
-
-
-def _expert(comparison: Comparison) -> Iterator[str]:
-    """Yield what an expert of ranks wants to know, as far as there is something."""
+    blocks = [_methods(comparison, scene)]
     if comparison.table["conditional"].notna().any():
-        yield _objectives(comparison.table)
-    if comparison.loop is not None and comparison.loop.ranks is not None:
-        yield _ranks(comparison.loop.ranks)
+        blocks.append(_objectives(comparison.table))
+    if comparison.loop is not None and (ranks := comparison.loop.ranks) is not None:
+        blocks.append("Where the published plan's nodes rank, optimization by optimization")
+        ways = {"rank_in_window": "cascade", "rank_overlap": "overlap", "rank_peak": "minimax"}
+        for column, label in ways.items():
+            own = ranks[column]
+            first, three = (own == 1).sum(), (own <= 3).sum()
+            text = f"  {label:21}first in {first} of {len(own)}, among three in {three}: "
+            text += " ".join(map(str, own))
+            how: Any = {"subsequent_indent": " " * 23, "break_on_hyphens": False}
+            blocks[-1] += "\n" + textwrap.fill(text, WIDTH, **how)
+    return "\n\n".join(blocks)
 
 
 def _methods(comparison: Comparison, scene: Scene) -> str:
@@ -287,45 +258,12 @@ def _methods(comparison: Comparison, scene: Scene) -> str:
     return "\n".join(lines)
 
 
-def _formulations(table: pd.DataFrame, loop: LoopFacts, criterion: Criterion) -> str:
-    """Return a line for every method and formulation, those of one problem under its name."""
-    title = f"{loop.method.capitalize()} loop, criterion {criterion.name}; models"
-    lines = [f"{title}: the different ones that each looks at"]
-    if loop.paper_models is not None:
-        cascading, overlap = loop.paper_models
-        lines = [
-            f"{title} counted as in the paper: {cascading:,} cascading,",
-            f"{overlap:,} with the full overlap; below, the different ones that each looks at",
-        ]
-    names = "".join(f"{name:>8}" for name in LARGEST)
-    lines += ["", f"{'':22}{'objective':>11}{'gap':>8}{names}{'models':>8}{'seconds':>9}"]
-    for problem, rows in table.groupby("problem", sort=False):
-        lines += [f"{problem}:", *(_line(f"  {name}", row) for name, row in rows.iterrows())]
-    lines += [
-        "(N, N m, N, µm; ! a payload is exceeded; gap to the exact optimum of the same aim:",
-        "minimax has its own, free the worst step over what the fixed methods reach; seconds to",
-        "choose and to check: all formulations of the loop share",
-        f"{loop.seconds['respond']:.4f} s for the responses of all choices, "
-        f"{loop.seconds['rank']:.4f} s for ranking them)",
-    ]
-    return "\n".join(lines)
-
-
-def _line(name: str, row: pd.Series[float]) -> str:
-    def cell(value: float, width: int, form: str) -> str:
-        return f"{format(value, form) if np.isfinite(value) else '-':>{width}}"
-
-    return (
-        f"{name:22}{cell(row['objective'], 11, '.2f')}{cell(row['gap'], 8, '.2%')}"
-        f"{_number(row['F_rob']):>7}{'!' if row['overloaded'] else ' '}"
-        + "".join(f"{_number(row[column]):>8}" for column in LARGEST if column != "F_rob")
-        + cell(row["models"], 8, ",.0f")
-        + cell(row["seconds"], 9, ".4f")
-    )
+def _number(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
 
 
 def _objectives(table: pd.DataFrame) -> str:
-    """Return what every plan is worth under both objectives, and the parts of heuristics' gaps."""
+    """Return the value of every plan under both objectives, and the parts of heuristics' gaps."""
     lines = [
         "Ranks over all pairs, and given the choice before; a heuristic's gap in two",
         "parts: what it loses by not looking ahead, and what the change of objective",
@@ -342,27 +280,6 @@ def _objectives(table: pd.DataFrame) -> str:
                 line += "".join(f"{round(part, 2) + 0.0:8.2f}%" for part in parts)
             lines.append(line)
     return "\n".join(lines)
-
-
-def _ranks(table: pd.DataFrame) -> str:
-    """Return where the published plan's nodes rank, a line for each way to rank them."""
-    ways = {"rank_in_window": "cascade", "rank_overlap": "overlap", "rank_peak": "minimax"}
-    lines = ["Where the published plan's nodes rank, optimization by optimization"]
-    for column, label in ways.items():
-        ranks = table[column]
-        said = f"first in {(ranks == 1).sum()} of {len(ranks)}, among three in {(ranks <= 3).sum()}"
-        lines.append(_wrapped(f"  {label:21}{said}: {' '.join(map(str, ranks))}", 23))
-    return "\n".join(lines)
-
-
-def _wrapped(text: str, indent: int = 2) -> str:
-    """Return a text in lines of `WIDTH` columns."""
-    return textwrap.fill(text, WIDTH, subsequent_indent=" " * indent, break_on_hyphens=False)
-
-
-def _number(value: object) -> str:
-    number = float(str(value))
-    return "-" if np.isnan(number) else f"{number:.1f}" if abs(number) < 1e4 else f"{number:,.0f}"
 
 
 def in_words(name: str) -> str:

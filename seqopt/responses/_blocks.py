@@ -251,7 +251,7 @@ class Store:
         write_bytes(self.path(block), self._checksum(block, content) + content)
 
     def _checksum(self, block: Block, content: bytes) -> bytes:
-        """Return the checksum of what is to be known of a block."""
+        """Return the checksum of a block's answers, with its key."""
         return hashlib.sha256(f"{self._recipe.key} {self._key(block)} ".encode() + content).digest()
 
 
@@ -482,7 +482,7 @@ def _open_steps(schedule: Schedule) -> Iterator[tuple[OpenStep, int]]:
 def require_memory(schedule: Schedule, wanted: Wanted, most: float | None = None) -> bool:
     """Return whether the responses of all choices can be kept, and not only their costs.
 
-    ``most``: bytes that may be used; by default `_SHARE` of what is free. Raises
+    ``most``: bytes that may be used; by default `_SHARE` of the free memory. Raises
     `MemoryShortError` if not even the costs can be kept.
     """
     most = _SHARE * free_memory() if most is None else most

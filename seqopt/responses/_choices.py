@@ -5,7 +5,7 @@ force of each (``F_`` and its name, as `robot_response` writes it), of the one t
 (``F_move``) and the largest (``F_largest``), sizes without sign.
 
 Where the responses of all choices are more than the memory that may be used, they come one brick
-count after the other, and whoever needs costs alone keeps these.
+count after the other, so that costs alone can be kept.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class Enough(Terse):
 
     ``engine``: its name; ``others``: what more detailed ones would change here, in words;
     ``joint``, ``step``: which joint comes closest to its elastic limits, and where; empty where
-    that is not known; ``below_limit``: by how much it stays below, Pa; negative beyond them;
+    that is not known; ``below_limit``: its margin to these, Pa; negative beyond them;
     ``left_out``: of the model.
     """
 

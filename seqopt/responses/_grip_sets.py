@@ -1,6 +1,6 @@
 """Responses of grip sets, computed when they are first needed, and kept.
 
-For whoever searches among more sets than need to be solved: all sets that are asked for at once are
+For searches among more sets than need to be solved: all sets that are asked for at once are
 solved in batches, each of them once.
 """
 

@@ -20,7 +20,7 @@ import pandas as pd
 from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.engines._hands import Hands, read_hands
+from seqopt.engines._grip_compliance import GripCompliance, read_compliance
 from seqopt.engines.interface import Fields, grip_columns
 from seqopt.engines.rigid._mechanism import Ungripped, ungripped_system
 from seqopt.engines.rigid._mixed import edge_forces, reactions, solve_load, split_pairs
@@ -148,8 +148,8 @@ def next_state(parts: Ungripped, before: StagedState, step: Step, placing: Placi
         load[grip] -= before.grips[grip][:3]
         turn[grip // 2] -= before.grips[grip][3:]
     state = replace(state, grips={grip: before.grips.get(grip, np.zeros(6)) for grip in held})
-    hands = read_hands(network, columns, numbers, None)
-    return _loaded(parts, state, (load, turn), before.bricks, hands)
+    compliance = read_compliance(network, columns, numbers, None)
+    return _loaded(parts, state, (load, turn), before.bricks, compliance)
 
 
 def state_fields(parts: Ungripped, state: StagedState) -> Fields:
@@ -172,12 +172,12 @@ def _loaded(
     state: StagedState,
     pulls: tuple[Floats, Floats],
     before: int,
-    hands: Hands | None,
+    compliance: GripCompliance | None,
 ) -> StagedState:
     """Return a state with further forces (2b, 3) at inner nodes and moments (b, 3) on bricks.
 
-    Nodes that are held are kept still, or as their ``hands`` let them be. What loads it, and which
-    ground end moves, since there were ``before`` bricks, is added.
+    Nodes that are held stay, or go as far as the ``compliance`` of their grips lets them. What
+    loads it, and which ground end moves, since there were ``before`` bricks, is added.
     """
     load, turn = pulls
     network, applied = parts.network, parts.network.applied(state.bricks, before)
@@ -190,7 +190,7 @@ def _loaded(
     pull = parts.motion[inner].T @ load.ravel() * parts.twist_unit / parts.unit
     pull += applied.ravel() * parts.twist_unit / parts.unit
     pull += np.pad(turn, ((0, 0), (3, 0))).ravel() * parts.twist_unit / parts.unit
-    solution = solve_load(parts, columns, pull, moved, hands)
+    solution = solve_load(parts, columns, pull, moved, compliance)
     load += np.repeat(0.5 * applied[:, :3], 2, axis=0)
     force = solution.force.copy()
     load[columns] += force[0]

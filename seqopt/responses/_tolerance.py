@@ -118,7 +118,7 @@ class _Group:
         return self.own.reshape(-1, 3), self.change.reshape(-1, *shape[2:]), self.most.ravel()
 
     def proven(self, direction: Floats) -> float:
-        """Return what no rate of the one grip set exceeds."""
+        """Return an upper bound of the rates of the one grip set."""
         return float(proven_rates(*self._flat, direction.reshape(-1, 3))[1].max())
 
 

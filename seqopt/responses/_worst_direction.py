@@ -1,4 +1,4 @@
-r"""How much of what is allowed a misplacement uses up, in the worst of all directions.
+r"""The share of a limit that a misplacement uses up, in the worst of all directions.
 
 Grips that are off by :math:`\delta_i` change a vector of a structure, the force of a grip or the
 displacement of a node, from :math:`\lambda` to :math:`\lambda + \sum_i A_i \delta_i`. Of all
@@ -14,7 +14,7 @@ long: each :math:`\delta_i` points along :math:`A_i^T u`. It reaches a length :m
 Any direction gives a lower bound of :math:`m`. An upper one comes from :math:`2 |v| \le w |v|^2 +
 1/w`, by which the sum is below a quadratic form, and weak duality; where that is not close, from
 spherical triangles: in the cone of three directions the convex :math:`h(u) + m u^T \lambda` is
-nowhere above the largest of its values at these over the distance of their plane.
+at most the largest of its values at these over the distance of their plane.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ class Resources:
     cache : str or pathlib.Path, optional
         A folder that keeps the answers to states by content; it is made if it is not there.
     max_memory : float, optional
-        Bytes that responses and costs may take; by default four fifths of what is free.
+        Bytes that responses and costs may take; by default four fifths of the free memory.
     progress : callable, optional
         Told in a few words how far a computation is that takes more than a second.
 
@@ -60,7 +60,7 @@ class Resources:
             raise ProblemError(f"max_memory is {most!r}; give a number of bytes above zero")
 
     def alone(self) -> Resources:
-        """Return the same for what is too little to share. Result: one process, and nobody told."""
+        """Return them for little work: one process, and no reports of progress."""
         return replace(self, workers=1, executor=None, progress=None)
 
 

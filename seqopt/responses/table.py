@@ -168,7 +168,7 @@ class LinearRange:
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
     def of_steps(self, builds: Mapping[str, Sequence[Step]]) -> dict[str, tuple[Departure, ...]]:
-        """Return the same of builds by their steps: of all states no more is computed."""
+        """Return the limits that builds leave, by their steps: each state is computed once."""
         states, shift = _distinct(builds.values()), RESPONSES["D_max"]
         fields = _each_fields(self.engine, states.values(), Want.DISPLACEMENTS)
         moved = {
@@ -451,13 +451,14 @@ def _solved_alike(
 ) -> Iterator[tuple[list[_Key], Fields]]:
     """Yield states with as many bricks and grips, each once, and their fields, solved at once.
 
-    By ascending brick counts: engines grow with the build. Where nothing stands, nothing is solved.
+    By ascending brick counts, as engines grow with the build, and those with most grips first, as
+    these hold bricks that the others hold. Where nothing stands, nothing is solved.
     """
     same = defaultdict[tuple[int, int], dict[_Key, None]](dict)
     for key in keys:
         if key[0]:
             same[key[0], len(key[1])][key] = None
-    for (bricks, count), alike in sorted(same.items()):
+    for (bricks, count), alike in sorted(same.items(), key=lambda item: (item[0][0], -item[0][1])):
         sets = np.array([held for _, held in alike], dtype=np.int64).reshape(len(alike), count)
         yield [*alike], engine.solve(bricks, sets, want)
 

@@ -124,12 +124,11 @@ def _until(scene: Scene, robot: Robot) -> Floats:
 
 
 def go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
-    """Return which states (n,) have postures that go together while so many bricks stand.
+    """Return which states (n,) of a scene with arms have postures that go together.
 
-    ``held`` (n, R): places in build order that robots hold, from 1; none above 0 is a free robot.
+    ``bricks``: how many stand; ``held`` (n, R): places in build order that robots hold, from 1;
+    none above 0 is a free robot.
     """
-    if not scene.has_arms:
-        return np.ones(len(held), dtype=bool)
     out: Bools = _asked("permits")(scene).allowed(bricks, held)
     return out
 

@@ -108,7 +108,7 @@ def settle(value: object, **content: object) -> None:
 
 
 def check(value: object, where: str, **checks: Callable[[str, Any], object]) -> None:
-    """Set fields of a frozen value to what checks return, which are told what the field is."""
+    """Set fields of a frozen value to what checks return, which get the name of the field."""
     for name, checked in checks.items():
         settle(value, **{name: checked(f"{where}: {name}", getattr(value, name))})
 

@@ -79,7 +79,7 @@ def find_overlaps(
 ) -> Iterator[Overlap]:
     """Yield pairs of solids that interpenetrate by more than what either tolerates, m.
 
-    ``progress``: told how far it is.
+    ``progress``: called with how far it is.
 
     Examples
     --------

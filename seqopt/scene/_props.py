@@ -83,7 +83,7 @@ def _unit(where: str, values: Iterable[float]) -> Vector:
 
 
 def settled_props(props: Sequence[Prop], bricks: Mapping[int, Brick]) -> tuple[Prop, ...]:
-    """Return props, those that are said by a position at the nodes of bricks next to these."""
+    """Return props, those given by a position at the nearest nodes of bricks."""
     out = tuple(p if p.position is None else _at_node(p, p.position, bricks) for p in props)
     for i, prop in enumerate(out):
         if prop.node not in bricks:

@@ -263,7 +263,8 @@ def _brick(shape: ArchShape, b: int, pose: tuple[Floats, Floats, Floats], line_n
 def _spring(shape: ArchShape, position: Floats, direction: Floats, along: Floats) -> dict[str, Any]:
     """Return what the joints and ground ends of an arch have in common."""
     stiffness = (shape.translational_stiffness, shape.rotational_stiffness)
-    fields = spring_fields(position, along, _across(direction), stiffness)
+    rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
+    fields = spring_fields(position, along, np.asarray(rest / np.linalg.norm(rest)), stiffness)
     return {**fields, "thickness": shape.thickness}
 
 
@@ -275,9 +276,3 @@ def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) ->
 def _ground(shape: ArchShape, brick: int, end: Floats, tangent: Floats, sign: float) -> Ground:
     anchor = as_vector(end + sign * shape.stub * tangent)
     return Ground(brick=brick, anchor=anchor, **_spring(shape, end, tangent, tangent))
-
-
-def _across(direction: Floats) -> Floats:
-    """Return the unit vector to the left at right angles to a direction."""
-    rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
-    return np.asarray(rest / np.linalg.norm(rest))

@@ -312,7 +312,7 @@ class Scene(Shown):
     def with_grips(
         self, stiffness: float | Vector | None, rotational_stiffness: float | Vector | None = None
     ) -> Scene:
-        """Return the same scene with grips of all robots as stiff as said.
+        """Return the same scene with grips of all robots of a given stiffness.
 
         Joints of arms give way no more: what is given stands for them as well.
 

@@ -93,15 +93,10 @@ def _of_joints(scene: Scene) -> Iterator[str]:
     placed = [(spring.label, spring.position, end) for spring in springs for end in spring.ends]
     placed += [(load.label, load.position, load.brick) for load in scene.loads if load.position]
     for label, position, end in placed:
-        away = _distance(bricks[end], position)
+        at = np.abs(bricks[end].frame @ (np.array(position) - np.array(bricks[end].position)))
+        away = float(np.linalg.norm(np.maximum(at - 0.5 * np.array(bricks[end].dimensions), 0.0)))
         if away > _FAR_AWAY * max(bricks[end].dimensions):
             yield f"{label}: it lies {away:.4g} m from brick {end}"
-
-
-def _distance(brick: Brick, point: Vector) -> float:
-    """Return the distance of a point from a brick, m."""
-    at = np.abs(brick.frame @ (np.array(point) - np.array(brick.position)))
-    return float(np.linalg.norm(np.maximum(at - 0.5 * np.array(brick.dimensions), 0.0)))
 
 
 def _named(bricks: list[Brick]) -> str:
@@ -375,7 +370,13 @@ def _parse_scene(text: str, source: str = "text") -> Scene:
     """Return the scene that a JSON document describes, if it obeys the schema."""
     entries = partial(_entries, source)
     document = parse_json(text, f"scene {source}", SceneError, object_pairs_hook=entries)
-    _check_schema(document, source)
+    import jsonschema  # noqa: PLC0415  # slow to import, and needed for files only
+
+    validator = jsonschema.Draft202012Validator(schema())
+    error = jsonschema.exceptions.best_match(validator.iter_errors(document))
+    if error is not None:
+        entry = error.json_path.removeprefix("$").removeprefix(".") or "document"
+        raise SceneError(f"scene {source}: {entry}: {cut(error.message, 160)}")
     return _scene_from_dict(document)
 
 
@@ -500,14 +501,3 @@ def _from(folder: Path | None, model: str) -> Path:
 
 def _reach(entry: dict[str, Any]) -> Reach:
     return _REACHES[entry["kind"]](**{key: value for key, value in entry.items() if key != "kind"})
-
-
-def _check_schema(document: object, source: str) -> None:
-    """Raise a `SceneError` that names the first entry where a document breaks the schema."""
-    import jsonschema  # noqa: PLC0415  # slow to import, and needed for files only
-
-    validator = jsonschema.Draft202012Validator(schema())
-    error = jsonschema.exceptions.best_match(validator.iter_errors(document))
-    if error is not None:
-        entry = error.json_path.removeprefix("$").removeprefix(".") or "document"
-        raise SceneError(f"scene {source}: {entry}: {cut(error.message, 160)}")

@@ -45,7 +45,7 @@ def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
 
 
 def _ages(scene: Scene, count: int, told: object) -> tuple[float, ...]:
-    """Return for how long bricks that stand have been there, s; just placed if nothing is said."""
+    """Return for how long bricks that stand have been there, s; by default just placed."""
     names = [brick.name for brick in scene.placed[:count]]
     if not isinstance(told, Mapping) or any(name not in map(str, names) for name in told):
         raise StepError(f"ages {short(told)}; give seconds by brick, of those that stand")
@@ -85,7 +85,7 @@ def _standing(scene: Scene, told: object, where: str) -> tuple[Scene, int]:
 
 
 def _by_robot(scene: Scene, told: object, where: str) -> tuple[int | None, ...] | None:
-    """Return nodes by robot; None where nothing is said."""
+    """Return nodes by robot; None where none are given."""
     if told is None:
         return None
     names = [robot.name for robot in scene.robots]

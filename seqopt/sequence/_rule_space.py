@@ -71,9 +71,12 @@ class StateRows(Terse):
 
     def for_arms(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) arms can be in while so many bricks stand, (n,)."""
-        held = np.zeros((len(states), len(self.network.scene.robots)), dtype=np.int64)
+        scene = self.network.scene
+        if not scene.has_arms:  # nothing is copied for nobody: this is asked of all states
+            return np.ones(len(states), dtype=bool)
+        held = np.zeros((len(states), len(scene.robots)), dtype=np.int64)
         held[:, [r for kind in self.kinds for r in kind.robots]] = states[:, : self.robots]
-        return go_together(self.network.scene, bricks, held)
+        return go_together(scene, bricks, held)
 
     def codes(self, states: Ints) -> Ints:
         """Return a number (n,) for every state (n, c) that no other one of its level has."""
@@ -238,7 +241,9 @@ class FreeSpace(StateRows):
 
     def lawful(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, (n,)."""
-        propped = self._propped(bricks)
+        scene = self.network.scene
+        props = scene.standing_props(bricks, held=True) if bricks else ()
+        propped = [scene.since[scene.brick_of_node[prop.node].name] - 1 for prop in props]
         ok = self._lawful(bricks, states, propped)
         if propped and bricks == self.levels:  # where nobody holds, props are struck
             bare = self.grips(states) == 0
@@ -246,7 +251,7 @@ class FreeSpace(StateRows):
         return ok
 
     def _lawful(self, bricks: int, states: Ints, propped: Sequence[int]) -> Bools:
-        """Return the same with props at bricks, by place in build order from 0."""
+        """Return which states keep the rules with props at bricks, places in build order from 0."""
         held = states[:, : self.robots]
         least = self.rules.fewest_grips(self.network.scene) - len(propped) if bricks > 1 else 0
         ok = np.asarray(self.grips(states) >= least)
@@ -262,12 +267,6 @@ class FreeSpace(StateRows):
                 continue
             ok &= np.isin((held - 1) // 2, bricks_of).any(axis=1)
         return ok
-
-    def _propped(self, bricks: int) -> list[int]:
-        """Return the bricks that props hold while so many stand, by place in build order from 0."""
-        scene = self.network.scene
-        props = scene.standing_props(bricks, held=True) if bricks else ()
-        return [scene.since[scene.brick_of_node[prop.node].name] - 1 for prop in props]
 
     def ended(self, states: Ints) -> Bools:
         """Return which states with all bricks end the build, (n,)."""

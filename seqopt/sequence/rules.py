@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
@@ -114,7 +114,14 @@ class FreeRules:
         for name, kind in _CHOICES:
             object.__setattr__(self, name, _choice(name, kind, getattr(self, name)))
         for name in ("robots", "placers"):
-            object.__setattr__(self, name, _names(name, getattr(self, name)))
+            given = getattr(self, name)
+            names = (given,) if isinstance(given, str) else given
+            if not isinstance(names, tuple | list) or not all(isinstance(n, str) for n in names):
+                raise StepError(f"rule {name}: {short(given)}; give names of robots")
+            twice = [n for n in names if names.count(n) > 1]
+            if twice:
+                raise StepError(f"rule {name}: {twice[0]} occurs twice; name it once")
+            object.__setattr__(self, name, tuple(names))
         for name in ("least_grips", "regrips"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _count(name, getattr(self, name)))
@@ -276,6 +283,42 @@ def _usual_grips(robots: int) -> int:
     return max(0, min(2, robots - 1))
 
 
+_COUNTS = ("least_grips", "regrips")
+_UNBOUND = {("regrips", "any"): None, ("placers", "any"): (), ("candidates", "all"): ""}
+RULES = ("newest", "payload", "ending", "placers", "candidates", *_COUNTS)
+"""Names of rules in words."""
+
+
+def parse_rules(
+    given: FreeRules | str | Sequence[FreeRules | str],
+    robots: tuple[str, ...] = (),
+    where: str = "rules",
+) -> FreeRules:
+    """Return rules that are given as such, or in words, ``least_grips=1``, for robots by name.
+
+    ``where``: for messages.
+    """
+    several = (given,) if isinstance(given, str | FreeRules) else given
+    if not isinstance(several, Sequence):
+        raise StepError(f"{where} {short(given)}: give a seqopt.FreeRules, or as least_grips=1")
+    found = FreeRules()
+    for each in several:
+        found = each if isinstance(each, FreeRules) else _with_rule(found, each, where)
+    return replace(found, robots=robots) if robots else found
+
+
+def _with_rule(rules: FreeRules, words: str, where: str) -> FreeRules:
+    """Return rules with one from ``NAME=VALUE``."""
+    name, _, text = words.partition("=")
+    if name not in RULES:
+        hint, known = did_you_mean(name, RULES), ", ".join(RULES)
+        raise StepError(f"{where} {words} does not exist{hint}; give one of {known}")
+    value: object = int(text) if name in _COUNTS and text.isdecimal() else text
+    if name == "placers":
+        value = tuple(part.strip() for part in text.split(","))
+    return replace(rules, **{name: _UNBOUND.get((name, text), value)})  # type: ignore[arg-type]
+
+
 def with_robots(scene: Scene, count: int) -> Scene:
     """Return a scene with one to five robots: its own first, then mobile ones.
 
@@ -309,16 +352,6 @@ def _choice(name: str, kind: type[Enum], given: object) -> Enum:
         raise StepError(
             f"rule {name}: {short(given)}{hint}; give one of {', '.join(known)}"
         ) from None
-
-
-def _names(name: str, given: object) -> tuple[str, ...]:
-    names = (given,) if isinstance(given, str) else given
-    if not isinstance(names, tuple | list) or not all(isinstance(n, str) for n in names):
-        raise StepError(f"rule {name}: {short(given)}; give names of robots")
-    twice = [n for n in names if names.count(n) > 1]
-    if twice:
-        raise StepError(f"rule {name}: {twice[0]} occurs twice; name it once")
-    return tuple(names)
 
 
 def _count(name: str, given: object) -> int:

@@ -31,8 +31,8 @@ class Site:
         Number of the step that led there: steps are numbered on from it. By default 1, and 0 for
         the empty site.
     ages : tuple of float, optional
-        For how long bricks, in build order, have been in their places, s, where mortar cures; those
-        of which nothing is said were placed just now.
+        For how long bricks, in build order, have been in their places, s, where mortar cures; by
+        default they were placed just now.
 
     Examples
     --------

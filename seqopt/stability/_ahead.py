@@ -8,7 +8,7 @@ structure is proven before one of the steps is. It may be of no use; it is never
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from enum import Enum
 from functools import partial
 from itertools import accumulate, groupby, islice
@@ -18,11 +18,11 @@ from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.mortar import Mortar
 from seqopt.network.network import Network
 from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._step_verdicts import given_out, parts_sent, shared_out
+from seqopt.stability._step_verdicts import parts_sent
 from seqopt.stability._verdict_chain import VerdictChain, Way
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import compile_equilibrium
-from seqopt.work._workers import Crew
+from seqopt.work._workers import Crew, map_ordered
 
 _DEAR = 50  # bricks from which on a proof takes much longer than trying others
 _TOGETHER = 1500  # bricks in all steps that are sought for beside each other, where it is not dear
@@ -60,7 +60,8 @@ def quick_verdicts(
     built: Network | PartialAssemblies, steps: Sequence[Step], mortar: Mortar
 ) -> Iterator[Verdict]:
     """Yield the verdict of every step as soon as it is found; best by ascending brick counts."""
-    parts = PartialAssemblies(built, _most(steps)) if isinstance(built, Network) else built
+    most = max((step.bricks for step in steps), default=1) or 1
+    parts = PartialAssemblies(built, most) if isinstance(built, Network) else built
     prove = VerdictChain(parts, lambda each: bonded(each, mortar), compile_equilibrium, near=True)
     for dear, same in groupby(steps, lambda step: step.bricks > _DEAR):
         if dear:
@@ -70,21 +71,19 @@ def quick_verdicts(
 
 
 def _each_small(prove: VerdictChain, steps: Sequence[Step]) -> Iterator[Verdict]:
-    """Yield verdicts of which those that earlier proofs leave open are sought beside each other."""
+    """Yield verdicts; cases that earlier proofs leave open are solved as one batch."""
+
+    def seek(number: int) -> None:
+        near = [*islice(steps, number, number + _TOGETHER)]
+        total = accumulate(step.bricks for step in near)
+        few = [step for step, bricks in zip(near, total, strict=True) if bricks <= _TOGETHER]
+        prove.search([*dict.fromkeys((step.bricks, step.grips) for step in few if step.bricks)])
+
     for number, step in enumerate(steps):
-        if step.bricks:
-            before = partial(_seek, prove, steps, number)
-            yield _verdict_of(prove(step.bricks, step.grips, before)[1])
-        else:
+        if not step.bricks:
             yield Verdict.STANDS
-
-
-def _seek(prove: VerdictChain, steps: Sequence[Step], number: int) -> None:
-    """Seek what proves a step and those that follow."""
-    near = [*islice(steps, number, number + _TOGETHER)]
-    total = accumulate(step.bricks for step in near)
-    few = [step for step, bricks in zip(near, total, strict=True) if bricks <= _TOGETHER]
-    prove.search([*dict.fromkeys((step.bricks, step.grips) for step in few if step.bricks)])
+        else:
+            yield _verdict_of(prove(step.bricks, step.grips, partial(seek, number))[1])
 
 
 def _each_dear(prove: VerdictChain, steps: Sequence[Step], network: Network) -> Iterator[Verdict]:
@@ -107,51 +106,22 @@ def _each_dear(prove: VerdictChain, steps: Sequence[Step], network: Network) -> 
             yield _verdict_of(proven)
 
 
-def _most(steps: Iterable[Step]) -> int:
-    return max((step.bricks for step in steps), default=1) or 1
-
-
-class SharedVerdicts:
-    """The verdicts of steps with one mortar after the other, shared with workers.
-
-    They begin at once, so that something else can be done here before verdicts are taken.
-    """
-
-    def __init__(
-        self, network: Network, asked: Sequence[tuple[Mortar, Sequence[Step]]], crew: Crew
-    ) -> None:
-        crew.submit(_ready)  # one starts while this prepares
-        self._parts = PartialAssemblies(network, _most(step for _, each in asked for step in each))
-        self._portions = [part for mortar, steps in asked for part in _cut(steps, mortar)]
-        self._crew, self._task = crew, partial(_sent, pickle.dumps(self._parts))
-        first = self._portions[: len(self._portions) // 3]  # the rest by whoever is free
-        self._begun = [given_out(crew, self._task, portion) for portion in first]
-
-    def __iter__(self) -> Iterator[Verdict]:
-        """Yield the verdicts, in the order in which they were asked."""
-        return shared_out(self._task, self._portions, self._crew, self._here, self._begun)
-
-    def _here(self, portion: _Portion) -> Iterator[Verdict]:
-        return quick_verdicts(self._parts, *portion)
-
-
 _Portion = tuple[Sequence[Step], Mortar]
 
 
-def _cut(steps: Sequence[Step], mortar: Mortar) -> Iterator[_Portion]:
-    """Yield steps in portions that end between brick counts."""
-    part: list[Step] = []
+def shared_verdicts(
+    parts: PartialAssemblies, steps: Sequence[Step], mortar: Mortar, crew: Crew
+) -> Iterator[Verdict]:
+    """Yield the same as `quick_verdicts`, by workers; portions end between brick counts."""
+    portions, part = list[_Portion](), list[Step]()
     for _, same in groupby(steps, attrgetter("bricks")):
         part += same
         if len(part) * _PORTIONS >= len(steps):
-            yield part, mortar
+            portions.append((part, mortar))
             part = []
-    if part:
-        yield part, mortar
-
-
-def _ready() -> None:
-    """Do nothing: a worker that can has started."""
+    portions += [(part, mortar)] if part else []
+    for found in map_ordered(partial(_sent, pickle.dumps(parts)), portions, crew):
+        yield from found
 
 
 def _sent(parts: bytes, portion: _Portion) -> tuple[Verdict, ...]:

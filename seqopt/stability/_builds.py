@@ -17,7 +17,7 @@ from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._ahead import SharedVerdicts, quick_verdicts
+from seqopt.stability._ahead import quick_verdicts, shared_verdicts
 from seqopt.stability._screens import OPEN, STANDS, Screen
 from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import Verdict
@@ -33,7 +33,6 @@ _State = tuple[int, Grips]  # bricks that stand, and nodes held
 _Found = Iterator[tuple[_State, Verdict]]
 _Told = Callable[[], Iterator[Step]]  # steps, told as they are asked
 _Way = Callable[[Sequence[Step], Mortar, _Told], _Found]
-_Begun = tuple[Sequence[Step], SharedVerdicts]  # steps, and what another process finds of them
 WORDS = {Verdict.STANDS: "stands", Verdict.FALLS: "falls", Verdict.UNDECIDED: "is undecided"}
 _MANY = {Verdict.FALLS: "fall", Verdict.UNDECIDED: "are undecided"}
 
@@ -93,8 +92,8 @@ class BuildProver:
     """Says which steps of builds stand; what was asked once is known.
 
     ``network``: of the scene in the order in which the builds place bricks; ``mortars``: by what
-    they are called, that of the scene last; without any, nothing is asked; ``progress``: told how
-    far it is; ``refusal``: why nothing can be said, where bricks do not touch; empty otherwise.
+    they are called, that of the scene last; without any, nothing is asked; ``progress``: called
+    with the progress; ``refusal``: why no verdict is found, where bricks do not touch; else empty.
     """
 
     def __init__(
@@ -105,7 +104,6 @@ class BuildProver:
         self._parts: Network | PartialAssemblies = network
         self._most = 1  # bricks of any step so far: what is known of one may be asked again
         self._crew: Crew | None = None
-        self._shared: dict[str, _Begun | None] = {}
         self.refusal = ""
 
     @property
@@ -130,27 +128,14 @@ class BuildProver:
 
     @contextmanager
     def begun(self, steps: Sequence[Step]) -> Iterator[None]:
-        """Let another process begin with a large build, while something else is done here."""
-        first = [*self._mortars][:1]
-        asked = [(name, self._new(name, steps)) for name in first]
-        work = sum(step.bricks for _, new in asked for step in new) * len(self._mortars)
-        shares = work >= _SHARED and cores() > 1
-        with hire(workers=2 if shares else 1, beside=True) as crew:
+        """Let two processes share a large build, within: a command may start them, no script."""
+        work = sum(step.bricks for step in steps) * len(self._mortars)
+        with hire(workers=2 if work >= _SHARED and cores() > 1 else 1) as crew:
             self._crew = crew
-            self._shared = {name: self._begin(name, new) for name, new in asked}
             try:
                 yield
             finally:
-                self._crew, self._shared = None, {}
-
-    def _begin(self, name: str, new: Sequence[Step]) -> _Begun | None:
-        """Share steps with another process, if there is one, and they are not many at once."""
-        if self._crew is None or self._many(new):
-            return None
-        try:
-            return new, SharedVerdicts(self._network, [(self._mortars[name], new)], self._crew)
-        except SceneError:  # said where it is asked
-            return None
+                self._crew = None
 
     def _ask(self, steps: Iterable[Step]) -> bool:
         """Ask what is not known of steps yet; return whether anything is asked at all."""
@@ -172,7 +157,7 @@ class BuildProver:
         what, mortar = f"proving what stands, {name}", self._mortars[name]
         tell = partial(with_progress, what, new, self._progress)
         found = {}
-        for state, verdict in self._way(name, new)(new, mortar, tell):
+        for state, verdict in self._way(new)(new, mortar, tell):
             self._known[name][state] = found[state] = verdict
         for other, held in self._mortars.items():
             sure = {Verdict.STANDS} if _is_as_strong(held, mortar) else set()
@@ -180,37 +165,34 @@ class BuildProver:
             implied = {state: verdict for state, verdict in found.items() if verdict in sure}
             self._known[other] = implied | self._known[other]
 
-    def _way(self, name: str, new: Sequence[Step]) -> _Way:
+    def _way(self, new: Sequence[Step]) -> _Way:
         """Return what proves most quickly which of some steps stand."""
         self._most = max(self._most, *(step.bricks for step in new))
-        begun = self._shared.get(name) or self._begin(name, new)
-        if begun is not None and begun[0] == new:
-            return partial(_as_found, iter(begun[1]))
         if not isinstance(self._parts, PartialAssemblies) or self._parts.bricks < self._most:
             self._parts = PartialAssemblies(self._network, self._most)
-        return partial(_screened if self._many(new) else _one_by_one, self._parts)
+        counts = {step.bricks for step in new}
+        if len(new) > _SETS * len(counts) and len(self._network.inner) <= SCREENED:
+            return partial(_screened, self._parts)  # a program for all grips of a brick count pays
+        if self._crew is not None:
+            return partial(_by_workers, self._crew, self._parts)
+        return partial(_one_by_one, self._parts)
 
     def _new(self, name: str, steps: Sequence[Step]) -> list[Step]:
         """Return the steps that are not known with a mortar, in the order in which they are asked.
 
-        Equal ones are asked once.
+        Equal ones are asked once; one that fewer hold before others, which its forces prove.
         """
         known = self._known[name]
-        return sorted(
-            {s: step for step in steps if (s := _state(step)) not in known}.values(), key=_asking
-        )
-
-    def _many(self, steps: Sequence[Step]) -> bool:
-        """Return whether steps are so many that a program for all grips of a brick count pays."""
-        counts = {step.bricks for step in steps}
-        return len(steps) > _SETS * len(counts) and len(self._network.inner) <= SCREENED
+        new = {s: step for step in steps if (s := _state(step)) not in known}
+        return sorted(new.values(), key=lambda step: (step.bricks, len(step.held)))
 
     def _of_build(self, steps: Sequence[Step], name: str) -> BuildVerdicts:
         verdicts = tuple(self._known[name][_state(step)] for step in steps)
         for step, verdict in zip(steps, verdicts, strict=True):
             if verdict is Verdict.FALLS:
-                failing = _failing(self._parts, step, self._mortars[name])
-                return BuildVerdicts(name, verdicts, step.number, *failing, steps[0].number)
+                (found,) = each_verdict(self._parts, [step], self._mortars[name])
+                first = found.first_block, found.first_contact
+                return BuildVerdicts(name, verdicts, step.number, *first, steps[0].number)
         return BuildVerdicts(name, verdicts, begins=steps[0].number if steps else 1)
 
 
@@ -218,15 +200,17 @@ def _one_by_one(
     parts: PartialAssemblies, steps: Sequence[Step], mortar: Mortar, tell: _Told | None = None
 ) -> _Found:
     """Yield the verdicts of partial structures, by what was found for those before."""
-    told = steps if tell is None else tell()
-    for step, found in zip(told, quick_verdicts(parts, steps, mortar), strict=True):
+    each = quick_verdicts(parts, steps, mortar)
+    for step, found in zip(steps if tell is None else tell(), each, strict=True):
         yield _state(step), found
 
 
-def _as_found(found: Iterator[Verdict], _: Sequence[Step], __: Mortar, tell: _Told) -> _Found:
-    """Yield verdicts as others find them, in the order in which they were asked."""
-    for step in tell():
-        yield _state(step), next(found)
+def _by_workers(
+    crew: Crew, parts: PartialAssemblies, steps: Sequence[Step], mortar: Mortar, tell: _Told
+) -> _Found:
+    """Yield the same, shared with workers."""
+    for step, found in zip(tell(), shared_verdicts(parts, steps, mortar, crew), strict=True):
+        yield _state(step), found
 
 
 def _screened(parts: PartialAssemblies, _: Sequence[Step], mortar: Mortar, tell: _Told) -> _Found:
@@ -246,17 +230,6 @@ def _screened(parts: PartialAssemblies, _: Sequence[Step], mortar: Mortar, tell:
                 yield from _one_by_one(parts, [step], mortar)
             else:
                 yield _state(step), Verdict.STANDS if each == STANDS else Verdict.FALLS
-
-
-def _failing(parts: Network | PartialAssemblies, step: Step, mortar: Mortar) -> tuple[str, str]:
-    """Return the brick and the joint that fail first in a step that falls."""
-    (found,) = each_verdict(parts, [step], mortar)
-    return found.first_block, found.first_contact
-
-
-def _asking(step: Step) -> tuple[int, int]:
-    """Return when a step is asked: one that fewer hold before others, which its forces prove."""
-    return step.bricks, sum(node is not None for node in step.grips)
 
 
 def _state(step: Step) -> _State:

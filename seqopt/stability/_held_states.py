@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact._prop_grips import added, prop_grips
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import Contacts, bare_assembly
+from seqopt.contact.faces import bare_assembly
 from seqopt.errors import plugins
 from seqopt.network.network import Network
 from seqopt.stability.limit_analysis import (
@@ -50,57 +49,8 @@ def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
     return compiled(assembly, case)
 
 
-_SIDES = 8  # of a cone to start with, the axes of its contact among them
-_SPREAD = np.array([p for p in product((-1.0, 0.0, 1.0), repeat=3) if any(p)])
-_GAIN = 1e-7  # least gain for which a direction joins, over the largest entry of the motion
 _TIGHT = 1e-8  # largest violation of forces that prove, over the force scale and max(1, z)
 _IDLE = 1e-10  # a grip's force treated as zero, over the force scale
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Directions(FrozenValue):
-    """Directions in which corners and grips act.
-
-    ``owner`` (n,): corner, or grip counted on after the corners. ``unit`` (n, 3): unit vectors;
-    those of a corner have no normal part.
-    """
-
-    owner: Ints
-    unit: Floats
-
-    def joined(self, other: Directions) -> Directions:
-        """Return these directions and others after them."""
-        owner = np.concatenate([self.owner, other.owner])
-        return Directions(owner, np.concatenate([self.unit, other.unit]))
-
-
-def first_directions(corners: int, grips: int) -> Directions:
-    """Return directions to start with, the same ones for every corner and for every grip.
-
-    Examples
-    --------
-    >>> len(first_directions(4, 1).owner)
-    58
-    """
-    angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
-    flat = np.stack([np.zeros(_SIDES), np.cos(angle), np.sin(angle)], axis=1)
-    space = _SPREAD / np.linalg.norm(_SPREAD, axis=1, keepdims=True)
-    of_corners = Directions(np.repeat(np.arange(corners), _SIDES), np.tile(flat, (corners, 1)))
-    of_grips = corners + np.repeat(np.arange(grips), len(space))
-    return of_corners.joined(Directions(of_grips, np.tile(space, (grips, 1))))
-
-
-def better_directions(known: Directions, along: Floats, wanted: Bools) -> Directions:
-    """Return the best directions of corners and grips where those known are not as good.
-
-    ``along`` (m, 3): what a force of every corner or grip is worth, per component; the normal parts
-    of corners are zero. ``wanted`` (m,): whose directions are asked for.
-    """
-    best = np.zeros(len(along))
-    np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))
-    size = np.linalg.norm(along, axis=1)
-    which = np.flatnonzero(wanted & (size - best > _GAIN))
-    return Directions(which, along[which] / size[which, None])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -239,14 +189,12 @@ _Settled = Callable[[Floats], Bools]
 """Says which brackets (S, 2) are narrow enough."""
 
 
-def node_assembly(
-    network: Network, bricks: int, known: Contacts | None = None, *, held: bool = True
-) -> Assembly:
+def node_assembly(network: Network, bricks: int, *, held: bool = True) -> Assembly:
     """Return a partial structure with a grip without payload at every inner node.
 
     ``held``: whether a robot holds any of these, so that props hold.
     """
-    bare = bare_assembly(network, bricks, known)
+    bare = bare_assembly(network, bricks)
     nodes, props = network.inner[:bricks].ravel(), prop_grips(network, bricks, held=held)
     line = np.zeros((len(nodes) if props.line.any() else 0, 3))
     if len(line):

@@ -14,7 +14,7 @@ import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import Contacts, step_assembly
+from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import network_of
@@ -75,7 +75,7 @@ class LoadFactor(FrozenValue):
 def load_factor(
     assembly: Assembly, mortar: Mortar, compiled: Compile = compile_equilibrium
 ) -> LoadFactor:
-    """Return the largest multiple of what is applied to an assembly with which it stands."""
+    """Return the largest multiple of its applied loads with which an assembly stands."""
     size = float(np.abs(assembly.applied_load).max())  # over the force scale
     force = float(np.linalg.norm(assembly.applied[:, :3], axis=1).sum())
     scaled = replace(assembly, applied=assembly.applied / (size or 1.0))  # so that z is no share
@@ -139,9 +139,8 @@ def load_factors(
             f"scene {network.scene.name}: load factors know no props that only push; leave out "
             "their directions"
         )
-    known = Contacts(network)
     return tuple(
-        load_factor(step_assembly(network, step.bricks, step.grips, known), mortar)
+        load_factor(step_assembly(network, step.bricks, step.grips), mortar)
         for step in with_progress("finding load factors", require_steps(steps), progress)
     )
 

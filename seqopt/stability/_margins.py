@@ -15,14 +15,13 @@ from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.stability._held_states import CompileHeld, HeldStates, compile_held, node_assembly
-from seqopt.stability._prover import DIRECTIONS, FINE, NEAR, in_every_direction, sideways
+from seqopt.stability._prover import DIRECTIONS, FINE, NEAR, hulls, sideways
 from seqopt.stability._screens import FALLS, STANDS, Part, Screen, held_parts
 from seqopt.stability.assessment import ROUGHEST, bonded
 from seqopt.stability.limit_analysis import CAP, GAP, Case
@@ -61,7 +60,7 @@ class Margins:
         self, network: Network | Scene, mortar: Mortar | str, compiled: CompileHeld = compile_held
     ) -> None:
         self.network, self.mortar = network_of(network), find_mortar(mortar)
-        self._compile, self._contacts = compiled, Contacts(self.network)
+        self._compile = compiled
         self._levels: dict[tuple[str, Part], tuple[HeldStates, ...]] = {}
         self.screens = {self.mortar.friction: Screen(self.network, self.mortar, 0.0, compiled)}
 
@@ -129,9 +128,9 @@ class Margins:
         brackets = np.array(self._brackets(f"tilt {count}", pulls, bricks, grips))
         angles = 2 * np.pi * np.arange(count) / count
         known = np.where(np.isfinite(brackets[..., 0]), np.maximum(brackets[..., 0], 0.0), np.nan)
-        least = [np.nan_to_num(in_every_direction(angles, row)[0]) for row in known.T]
+        least = np.nan_to_num(hulls(angles, known.T)[0])
         most = np.maximum(brackets[..., 1].min(axis=0), 0.0)
-        return np.asarray(np.arctan(np.stack([np.array(least), most], axis=1)))
+        return np.asarray(np.arctan(np.stack([least, most], axis=1)))
 
     def friction(
         self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None, step: float = 2.0**-7
@@ -178,7 +177,7 @@ class Margins:
         out: list[Floats] = []
         for rows, part, places, loads in held_parts(self.network, bricks, *grips):
             if (name, part) not in self._levels:
-                assembly = node_assembly(self.network, bricks, self._contacts, held=part[1])
+                assembly = node_assembly(self.network, bricks, held=part[1])
                 self._levels[name, part] = tuple(
                     HeldStates(assembly, case, self._compile) for case in cases(assembly)
                 )

@@ -53,8 +53,8 @@ class Proven(FrozenValue):
 class Prover:
     """Solves cases of one assembly and proves the answers; counts what the solver claims.
 
-    ``claims``: how the solver said it ended, over all cases; ``unproven``: cases of which nothing
-    was proven.
+    ``claims``: how the solver ended by its own account, over all cases; ``unproven``: cases of
+    which nothing was proven.
     """
 
     def __init__(self, assembly: Assembly, compiled: Compile) -> None:
@@ -120,6 +120,7 @@ def _held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
 
 DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
 FINE = 8 * DIRECTIONS  # where these leave open what a grip set survives
+_ROUNDED = 1e-9  # share of half a turn that is rounding
 _MORE = 8  # directions at most that are added where the bound for all others is least
 NEAR = 5e-3  # share of the least pull by which the bound may fall short before any is added
 
@@ -143,7 +144,7 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
     pulls = [prove(case) for case in sideways(fixed, up)]
     while True:
         held = np.array([pull.held for pull in pulls])
-        worst, angle = in_every_direction(angles, held)
+        (worst,), (angle,) = (each.tolist() for each in hulls(angles, held[None]))
         short = worst < (1 - NEAR) * np.fmin.reduce(held)
         if not short or len(pulls) == DIRECTIONS + _MORE or np.isnan(held[DIRECTIONS:]).any():
             return pulls, worst
@@ -151,40 +152,49 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
         pulls.append(prove(_pulled(fixed, up, angle)))
 
 
-def in_every_direction(angles: Floats, pulls: Floats) -> tuple[float, float]:
-    """Return the pull that is survived in every direction, by what is in some.
+def hulls(angles: Floats, pulls: Floats) -> tuple[Floats, Floats]:
+    """Return the pull that is survived in every direction, by what is in some, and its angle.
 
-    ``angles``, ``pulls`` (n,): directions, rad, and what is survived there; NaN where that is not
-    known. Results: ``pull``, ``angle``: the least and where it is; NaN if those known leave half of
+    ``angles`` (F,), ``pulls`` (S, F): directions, rad, and what is survived there; NaN where that
+    is not known. Results (S,), (S,): the least, and where it is; NaN if those known leave half of
     all directions out.
 
     Examples
     --------
-    >>> pull, angle = in_every_direction(np.pi / 2 * np.arange(4), np.array([1, 1, 3, 3]))
-    >>> round(pull, 4), round(angle, 4)
+    >>> pull, angle = hulls(np.pi / 2 * np.arange(4), np.array([[1.0, 1, 3, 3]]))
+    >>> round(float(pull[0]), 4), round(float(angle[0]), 4)
     (0.7071, 0.7854)
     """
-    known = np.isfinite(pulls)
-    order = np.argsort(angles[known])
-    angles, pulls = angles[known][order], pulls[known][order]
-    turns = np.diff(angles, append=angles[:1] + 2 * np.pi)
-    if len(angles) < 3 or turns.max() >= np.pi:
-        return np.nan, np.nan
-    ends = pulls[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    along = np.roll(ends, -1, axis=0) - ends
-    size = np.maximum(np.square(along).sum(axis=1), np.finfo(float).tiny)
-    nearest = ends + np.clip(-(ends * along).sum(axis=1) / size, 0.0, 1.0)[:, None] * along
-    distance = np.linalg.norm(nearest, axis=1)
-    worst = int(distance.argmin())
-    x, y = nearest[worst]
-    return float(distance[worst]), float(np.arctan2(y, x) % (2 * np.pi))
+    order, count = np.argsort(angles), len(angles)
+    angles, pulls = angles[order], pulls[:, order]
+    known, way = np.isfinite(pulls), np.arange(count)
+    after = np.where(np.hstack([known, known]), np.arange(2 * count), 2 * count)
+    after = np.minimum.accumulate(after[:, ::-1], axis=1)[:, ::-1][:, 1 : count + 1]
+    ends = np.where(known, pulls, 0.0)[..., None] * np.stack([np.cos(angles), np.sin(angles)], 1)
+    along = np.take_along_axis(ends, (after % count)[..., None], axis=1) - ends
+    size = np.maximum(np.square(along).sum(axis=2), np.finfo(float).tiny)
+    nearest = ends + np.clip(-(ends * along).sum(axis=2) / size, 0.0, 1.0)[..., None] * along
+    distance = np.where(known, np.linalg.norm(nearest, axis=2), np.inf)
+    worst = distance.argmin(axis=1)[:, None]
+    turn = angles[after % count] + 2 * np.pi * (after >= count) - angles[way]
+    half = np.where(known, turn, 0.0).max(axis=1, initial=0.0) >= np.pi * (1 - _ROUNDED)
+    unsure = half | (known.sum(axis=1) < 3)
+    x, y = np.take_along_axis(nearest, worst[..., None], axis=1)[:, 0].T
+    least = np.take_along_axis(distance, worst, axis=1)[:, 0]
+    where = np.arctan2(y, x) % (2 * np.pi)
+    return np.where(unsure, np.nan, least), np.where(unsure, np.nan, where)
 
 
-def _pulled(fixed: Case, up: Vector, angle: float) -> Case:
-    """Return the case of the largest acceleration in a direction."""
+def horizontal(up: Vector, angle: float) -> Floats:
+    """Return the unit vector (3,) at right angles to one in a direction, rad."""
     axis = np.array(up)
     first = np.eye(3)[np.abs(axis).argmin()]
     first = first - axis * (axis @ first)
     first /= np.linalg.norm(first)
-    x, y, z = (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first)).tolist()
+    return np.asarray(np.cos(angle) * first + np.sin(angle) * np.cross(axis, first))
+
+
+def _pulled(fixed: Case, up: Vector, angle: float) -> Case:
+    """Return the case of the largest acceleration in a direction."""
+    x, y, z = horizontal(up, angle).tolist()
     return replace(fixed, sense=Sense.LARGEST, pull=(x, y, z))

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact._prop_grips import prop_grips
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import GripError
 from seqopt.network.build import network_of
@@ -37,13 +36,11 @@ Part = tuple[int, bool]  # how many bricks stand, and whether the props hold tha
 class Proofs:
     """What screens of one scene share: what one proves, another need not ask.
 
-    ``contacts``: of the scene; by brick count and mortar ``upright``, by these ``tilted``: what is
-    known of structures; ``answers``: by brick count, what the programs of all mortars found, if
-    they are kept.
+    ``upright``, ``tilted``: what is known of structures by brick count and mortar; ``answers``: by
+    brick count, what the programs of all mortars found, if they are kept.
     """
 
-    def __init__(self, network: Network) -> None:
-        self.contacts = Contacts(network)
+    def __init__(self) -> None:
         self.upright: dict[tuple[Part, Mortar], HeldStates] = {}
         self.tilted: dict[tuple[Part, Mortar], TiltedStates] = {}
         self.keeps = False
@@ -85,7 +82,7 @@ class Screen:
     ) -> None:
         self.network, self.mortar = network_of(network), find_mortar(mortar)
         self.tilt = tilt
-        self._compile, self._proofs = compiled, proofs or Proofs(self.network)
+        self._compile, self._proofs = compiled, proofs or Proofs()
         self._assemblies: dict[Part, Assembly] = {}
 
     @property
@@ -105,27 +102,28 @@ class Screen:
         same. Result (S,): 1 where it is proven that the structure stands, -1 where it is proven
         that it falls, and 0 where neither is. Raises `GripError` as `held_places` does.
         """
-        out = np.zeros(len(np.asarray(held)), dtype=np.int8)
-        for own, part, places, loads in held_parts(self.network, bricks, held, payload):
-            found = _verdicts(self._upright(part).bracket(places, loads, _decided))
-            rows = np.flatnonzero(found == STANDS) if self.tilt else ()
-            if len(rows):
-                survived = self._tilted(part).survive
-                found[rows] = _of_both(*survived(np.tan(self.tilt), places[rows], loads[rows]))
-            out[own] = found
-        return out
+        return self._found(bricks, held, payload, solve=True)
 
     def recalled(
         self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None
     ) -> NDArray[np.int8]:
-        """Return the same by what is known already: no program is solved."""
+        """Return verdicts by known proofs alone: no program is solved."""
+        return self._found(bricks, held, payload, solve=False)
+
+    def _found(
+        self, bricks: int, held: ArrayLike, payload: ArrayLike | None, *, solve: bool
+    ) -> NDArray[np.int8]:
         out = np.zeros(len(np.asarray(held)), dtype=np.int8)
         for own, part, places, loads in held_parts(self.network, bricks, held, payload):
-            found = _verdicts(self._upright(part).known(places, loads))
+            states = self._upright(part)
+            asked = places, loads
+            bracket = states.bracket(*asked, _decided) if solve else states.known(*asked)
+            found = _of_both(bracket[:, 1] <= EXACT, bracket[:, 0] > EXACT)
             rows = np.flatnonzero(found == STANDS) if self.tilt else ()
             if len(rows):
-                known = self._tilted(part).known
-                found[rows] = _of_both(*known(np.tan(self.tilt), places[rows], loads[rows]))
+                tilted = self._tilted(part)
+                ask = tilted.survive if solve else tilted.known
+                found[rows] = _of_both(*ask(np.tan(self.tilt), places[rows], loads[rows]))
             out[own] = found
         return out
 
@@ -146,8 +144,7 @@ class Screen:
     def _assembly(self, part: Part) -> Assembly:
         if part not in self._assemblies:
             bricks, propped = part
-            contacts = self._proofs.contacts
-            self._assemblies[part] = node_assembly(self.network, bricks, contacts, held=propped)
+            self._assemblies[part] = node_assembly(self.network, bricks, held=propped)
         return self._assemblies[part]
 
 
@@ -165,11 +162,6 @@ def _lacking(
 def _decided(bracket: Floats) -> Bools:
     """Return where brackets (S, 2) prove that no bond is lacking, or that some is."""
     return np.asarray((bracket[:, 1] <= EXACT) | (bracket[:, 0] > EXACT))
-
-
-def _verdicts(bracket: Floats) -> NDArray[np.int8]:
-    """Return verdicts by brackets (S, 2) of the bond that is lacking."""
-    return _of_both(bracket[:, 1] <= EXACT, bracket[:, 0] > EXACT)
 
 
 def _of_both(stands: Bools, falls: Bools) -> NDArray[np.int8]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pickle
-from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, wait
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -30,10 +30,8 @@ from seqopt.stability.assessment import (
     bonded,
 )
 from seqopt.stability.limit_analysis import Claim, Compile, compile_equilibrium
-from seqopt.work._workers import Crew, hire, map_ordered
+from seqopt.work._workers import hire, map_ordered
 
-_AHEAD = 2  # portions given out or waiting, for every worker
-_PATIENCE = 1.0  # s without an answer, after which workers are looked after
 _PORTIONS = 8  # for every worker, of neighboring steps, which are proven by one another
 
 
@@ -70,36 +68,23 @@ def _without_margins(assembly: Assembly, proven: Proven, proof: str) -> Stabilit
         motion = proven.answer.motion / np.abs(proven.answer.motion).max()
     block, contact = _first_to_fail(assembly, motion)
     return Stability(
-        verdict=verdict,
-        proof=proof,
-        bond=np.nan,
-        friction=np.nan,
-        pull=np.full(DIRECTIONS, np.nan),
-        tilt=np.nan,
-        grip=np.nan,
+        verdict,
+        proof,
         motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
         first_block=block,
         first_contact=contact,
-        jammed=None,
-        claims={},
         unproven=int(verdict is Verdict.UNDECIDED),
     )
 
 
 _NOTHING = Stability(
-    verdict=Verdict.STANDS,
+    Verdict.STANDS,
     proof="nothing stands",
     bond=0.0,
     friction=0.0,
     pull=np.full(DIRECTIONS, np.inf),
     tilt=np.pi / 2,
     grip=0.0,
-    motion=np.zeros((0, 6)),
-    first_block="",
-    first_contact="",
-    jammed=None,
-    claims={},
-    unproven=0,
 )  # of the empty site, where a take-down ends
 
 
@@ -144,26 +129,16 @@ def each_stability(
     numbers = {step.number for step in steps} if at is None else at
     whole = _Portion(tuple(steps), mortar, margins, numbers if margins else ())
     most = max((step.bricks for step in steps), default=1) or 1
-    with hire(*shared, beside=True) as crew:
+    parts = PartialAssemblies(network, most)
+    with hire(*shared) as crew:
         if crew is None:
-            yield from _each(PartialAssemblies(network, most), whole)
+            yield from _each(parts, whole)
             return
-        crew.submit(_ready)  # one starts while this prepares
-        parts = PartialAssemblies(network, most)
-        helpers = crew.workers + (shared[0] is None)
-        size = -(-len(steps) // (_PORTIONS * helpers)) or 1
+        size = -(-len(steps) // (_PORTIONS * crew.workers)) or 1
         cut = [whole.steps[i : i + size] for i in range(0, len(steps), size)]
         portions = [replace(whole, steps=part) for part in cut]
-        task = partial(_sent, pickle.dumps(parts))
-        if shared[0] is None:
-            yield from shared_out(task, portions, crew, lambda portion: _each(parts, portion))
-            return
-        for found in map_ordered(task, portions, crew):
+        for found in map_ordered(partial(_sent, pickle.dumps(parts)), portions, crew):
             yield from found
-
-
-def _ready() -> None:
-    """Do nothing: a worker that can has started."""
 
 
 def _sent(parts: bytes, portion: _Portion) -> tuple[Stability, ...]:
@@ -175,61 +150,6 @@ def parts_sent(parts: bytes) -> PartialAssemblies:
     """Return what a worker is sent for all portions of a build."""
     out: PartialAssemblies = pickle.loads(parts)  # our own, of `each_stability`
     return out
-
-
-_Task = TypeVar("_Task")
-_Found = TypeVar("_Found")
-
-
-def shared_out(
-    task: Callable[[_Task], tuple[_Found, ...]],
-    portions: Sequence[_Task],
-    crew: Crew,
-    here: Callable[[_Task], Iterator[_Found]],
-    begun: Sequence[Future[tuple[_Found, ...]]] = (),
-) -> Iterator[_Found]:
-    """Yield what is found of portions, in their order: by workers, and meanwhile here.
-
-    ``begun``: the calls of the first portions, if they are given out already.
-    """
-    left, given = deque(range(len(begun), len(portions))), dict(enumerate(begun))
-    found, taken = dict[int, tuple[_Found, ...]](), 0
-    while taken < len(portions):
-        if taken in given and (given[taken].done() or not left):
-            found[taken] = _answered(given.pop(taken), crew) or tuple(here(portions[taken]))
-        if taken in found:
-            yield from found.pop(taken)
-            taken += 1
-            continue
-        mine = left.popleft()
-        while left and sum(not each.done() for each in given.values()) < _AHEAD * crew.workers:
-            given[left[0]] = given_out(crew, task, portions[left[0]])
-            left.popleft()
-        if mine == taken:  # told as it is found
-            yield from here(portions[mine])
-            taken += 1
-        else:
-            found[mine] = tuple(here(portions[mine]))
-
-
-def given_out(
-    crew: Crew, task: Callable[[_Task], tuple[_Found, ...]], portion: _Task
-) -> Future[tuple[_Found, ...]]:
-    """Return the call of a portion; one that has failed where workers take no more."""
-    try:
-        return crew.submit(task, portion)
-    except BrokenExecutor as error:
-        call = Future[tuple[_Found, ...]]()
-        call.set_exception(error)
-        return call
-
-
-def _answered(call: Future[tuple[_Found, ...]], crew: Crew) -> tuple[_Found, ...] | None:
-    """Return what a worker answers; None if it died, or an error that is then raised here."""
-    while not call.done():
-        wait([call], timeout=_PATIENCE)
-        crew.look_after()
-    return None if call.exception() else call.result()
 
 
 def _each(parts: PartialAssemblies, portion: _Portion) -> Iterator[Stability]:
@@ -280,23 +200,19 @@ def format_rows(rows: Sequence[Mapping[str, Any]]) -> str:
     ``rows``: as of `stability_row`.
     """
     found, proofs = (Counter(row[name] for row in rows) for name in ("verdict", "proof"))
-    words = zip(Verdict, ("stand", "do not stand", "are undecided"), strict=True)
-    said = ", ".join(f"{found[verdict.value]} {word}" for verdict, word in words)
+    each = zip(Verdict, ("stand", "do not stand", "are undecided"), strict=True)
+    said = ", ".join(f"{found[verdict.value]} {word}" for verdict, word in each)
     jammed = sum(bool(row["jammed"]) for row in rows)
     said += f" ({jammed} only jammed: do not trust these)" if jammed else ""
     by = ", ".join(f"{count} by {proof}" for proof, count in proofs.most_common())
     unproven = sum(row["unproven"] for row in rows)
     ends = f"; {unproven} cases unproven" if unproven else ""
-    return f"{len(rows)} steps: {said}; proven {by}{ends}{''.join(_extremes(rows))}"
-
-
-def _extremes(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the margin of the worst step, of every kind that was found."""
-    for column, name, said, scale in _MARGINS:
+    for column, name, words, scale in _MARGINS:  # of the worst step
         values = np.array([row[column] for row in rows], dtype=float)
         if np.isnan(values).all():
             continue
         worst = int(np.nanargmin(values) if column == _TILT else np.nanargmax(values))
-        value = f"{values[worst] * scale:.4g}"
-        ends = said.format(value) if np.isfinite(values[worst]) else "no value is enough"
-        yield f"; {name}: {ends} (step {rows[worst]['step']})"
+        value = words.format(f"{values[worst] * scale:.4g}")
+        value = value if np.isfinite(values[worst]) else "no value is enough"
+        ends += f"; {name}: {value} (step {rows[worst]['step']})"
+    return f"{len(rows)} steps: {said}; proven {by}{ends}"

@@ -16,13 +16,14 @@ from seqopt.arrays import Bools, Floats, Ints, Vector
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.stability._held_states import CompileHeld, HeldStates
-from seqopt.stability._prover import FINE, sideways
+from seqopt.stability._prover import FINE, hulls, sideways
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import CAP, GAP
 
 _FIRST = tuple(range(0, FINE, FINE // 4))
 _FAR = 1.5  # times the pull that must be survived: what is survived by so much is far enough
 _TURN = 2 * np.pi / FINE
+_ANGLES: Floats = _TURN * np.arange(FINE, dtype=float)
 
 
 class TiltedStates:
@@ -50,7 +51,7 @@ class TiltedStates:
         ``pull``: over gravity; ``places``, ``payload`` (S, r): as of `HeldStates.bracket`.
         """
         survived, least = self._brackets(places, payload)
-        return _hulls(survived)[0] >= pull, least < pull
+        return hulls(_ANGLES, survived)[0] >= pull, least < pull
 
     def survive(self, pull: float, places: Ints, payload: Floats) -> tuple[Bools, Bools]:
         """Return the same, of sets that stand without a pull, asking what is not known."""
@@ -58,12 +59,12 @@ class TiltedStates:
         asked = np.zeros(survived.shape, dtype=bool)
         rows = np.arange(len(places))
         while True:
-            safe, angle = _hulls(survived[rows])
+            safe, angle = hulls(_ANGLES, survived[rows])
             open_ = ~(safe >= pull) & (least[rows] >= pull)
             rows, ways = rows[open_], self._next(angle[open_], asked[rows[open_]])
             rows, ways = rows[ways >= 0], ways[ways >= 0]
             if not len(rows):
-                return _hulls(survived)[0] >= pull, least < pull
+                return hulls(_ANGLES, survived)[0] >= pull, least < pull
             for way in np.unique(ways).tolist():
                 own = rows[ways == way]
                 found = self._ask(way, pull, places[own], payload[own])
@@ -85,7 +86,7 @@ class TiltedStates:
         return out
 
     def _ask(self, way: int, pull: float, places: Ints, payload: Floats) -> Floats:
-        """Return the brackets (S, 2) of what is survived in a direction."""
+        """Return brackets (S, 2) of the critical pull in a direction."""
         if way not in self._states:
             case = self._cases[way]
             self._states[way] = HeldStates(self._assembly, case, self._compile)
@@ -104,38 +105,7 @@ class TiltedStates:
 
 
 def _settled(pull: float, bracket: Floats) -> Bools:
-    """Return which brackets (S, 2) of what is survived are narrow enough, or far from a pull."""
+    """Return converged brackets (S, 2) of the critical pull, and those far from a given pull."""
     low, high = bracket.T
     narrow = high - low <= GAP * np.maximum(1e-2, high)
     return np.asarray((high < pull) | (low >= _FAR * pull) | narrow | (low >= CAP))
-
-
-def _hulls(survived: Floats) -> tuple[Floats, Floats]:
-    """Return what is survived in every direction, and where that is least; NaN if it is unknown.
-
-    ``survived`` (S, F): in directions evenly spread, NaN where unknown. Results (S,), (S,): as of
-    `seqopt.stability._prover.in_every_direction` of every row.
-
-    Examples
-    --------
-    >>> safe, angle = _hulls(np.ones((1, 4)))
-    >>> round(float(safe[0]), 4)
-    0.7071
-    """
-    count = survived.shape[1]
-    known, way = np.isfinite(survived), np.arange(count)
-    after = np.where(np.hstack([known, known]), np.arange(2 * count), 2 * count)
-    after = np.minimum.accumulate(after[:, ::-1], axis=1)[:, ::-1][:, 1 : count + 1]
-    angle = 2 * np.pi * way / count
-    ends = np.where(known, survived, 0.0)[..., None] * np.stack([np.cos(angle), np.sin(angle)], 1)
-    along = np.take_along_axis(ends, (after % count)[..., None], axis=1) - ends
-    size = np.maximum(np.square(along).sum(axis=2), np.finfo(float).tiny)
-    nearest = ends + np.clip(-(ends * along).sum(axis=2) / size, 0.0, 1.0)[..., None] * along
-    distance = np.where(known, np.linalg.norm(nearest, axis=2), np.inf)
-    worst = distance.argmin(axis=1)[:, None]
-    wide = np.where(known, after - way, 0).max(axis=1, initial=0) >= count / 2
-    unsure = wide | (known.sum(axis=1) < 3)
-    x, y = np.take_along_axis(nearest, worst[..., None], axis=1)[:, 0].T
-    least = np.take_along_axis(distance, worst, axis=1)[:, 0]
-    where = np.arctan2(y, x) % (2 * np.pi)
-    return np.where(unsure, np.nan, least), np.where(unsure, np.nan, where)

@@ -170,7 +170,7 @@ class VerdictChain:
             way = Way.FORCES
 
     def _sought_near(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
-        """Yield the same of what changes near new blocks and grips, or near what fell before."""
+        """Yield proofs by candidate motions and forces near changes, or near what fell before."""
         part = self._bearing(assembly) if self._stood else self._falling(assembly)
         if part is None or part.blocks.mean() > _NEAR:
             return

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -78,7 +78,7 @@ class Stability(Shown, FrozenValue):
         contact forces that nothing makes develop. Do not trust that it stands. None if the friction
         is not asked for, or it does not stand.
     claims : mapping of Claim to int
-        How the solver said it ended, over all cases that were solved.
+        How the solver ended by its own account, over all cases that were solved.
     unproven : int
         Cases whose answers proved nothing.
 
@@ -96,17 +96,17 @@ class Stability(Shown, FrozenValue):
 
     verdict: Verdict
     proof: str
-    bond: float
-    friction: float
-    pull: Floats
-    tilt: float
-    grip: float
-    motion: Floats
-    first_block: str
-    first_contact: str
-    jammed: bool | None
-    claims: Mapping[Claim, int]
-    unproven: int
+    bond: float = np.nan
+    friction: float = np.nan
+    pull: Floats = field(default_factory=lambda: np.full(DIRECTIONS, np.nan))
+    tilt: float = np.nan
+    grip: float = np.nan
+    motion: Floats = field(default_factory=lambda: np.zeros((0, 6)))
+    first_block: str = ""
+    first_contact: str = ""
+    jammed: bool | None = None
+    claims: Mapping[Claim, int] = field(default_factory=dict)
+    unproven: int = 0
 
     def __repr__(self) -> str:
         tilt = f", survives a tilt of {np.degrees(self.tilt):.3g} degrees"

@@ -7,7 +7,7 @@ and only those that still fall with it are asked again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
@@ -26,6 +26,7 @@ from seqopt.network.build import build_network
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
+from seqopt.stability._prover import horizontal
 from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.work.progress import Tell, with_progress
@@ -61,11 +62,10 @@ class FailureMap:
     steps : pandas.DataFrame
         The ``verdict`` of every ``step`` of these, and of how many ``bricks`` it is.
     motions : mapping of str to (steps, B, 6) float
-        By build, how its steps fall with what is first said to hold, at the ``usual`` value; zero
+        By build, how its steps fall with the first of what holds, at the ``usual`` value; zero
         for those that stand.
     usual : float
-        The value that is nearest to what is taken where nothing is said: the friction of `DRY`, no
-        tilt, or all bricks.
+        The value nearest to the default: the friction of `DRY`, no tilt, or all bricks.
     """
 
     cases: pd.DataFrame
@@ -107,17 +107,15 @@ class _Case:
         if self.whole is not None:
             return self.whole.found[: len(self.steps)]
         each = [[*each_verdict(parts, self.steps, self.mortar)] for parts in self.turned]
-        return tuple(min(same, key=_badness) for same in zip(*each, strict=True))
+        worst = (Verdict.FALLS, Verdict.UNDECIDED, Verdict.STANDS)
+        pairs = zip(*each, strict=True)
+        return tuple(min(same, key=lambda one: worst.index(one.verdict)) for same in pairs)
 
     @property
     def falling(self) -> list[Step]:
         """The steps that fall."""
         pairs = zip(self.steps, self.found, strict=True)
         return [step for step, found in pairs if found.verdict is Verdict.FALLS]
-
-
-def _badness(found: Stability) -> int:
-    return (Verdict.FALLS, Verdict.UNDECIDED, Verdict.STANDS).index(found.verdict)
 
 
 def failure_map(
@@ -197,18 +195,12 @@ def _brick_map(
         bricks: failure_map(scene, builds, holds, "bricks placed", [bricks], progress)
         for bricks, (scene, builds) in scenes.items()
     }
-    cases, steps = (
-        _side_by_side([getattr(each, name) for each in found.values()])
-        for name in ("cases", "steps")
-    )
-    return FailureMap(cases, steps, found[usual].motions, usual)
-
-
-def _side_by_side(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """Return tables of several numbers of bricks as one, by build and what holds it."""
-    whole = pd.concat(tables).assign(axis="bricks")
-    groups = [rows for _, rows in whole.groupby(["build", "holds"], sort=False)]
-    return pd.concat(groups, ignore_index=True)
+    tables = list[pd.DataFrame]()
+    for name in ("cases", "steps"):
+        whole = pd.concat([getattr(each, name) for each in found.values()]).assign(axis="bricks")
+        groups = [rows for _, rows in whole.groupby(["build", "holds"], sort=False)]
+        tables.append(pd.concat(groups, ignore_index=True))
+    return FailureMap(tables[0], tables[1], found[usual].motions, usual)
 
 
 def _values(scene: Scene, axis: str, values: Sequence[float]) -> tuple[Sequence[float], float]:
@@ -266,14 +258,10 @@ def _tilted(scene: Scene, degrees: float) -> tuple[PartialAssemblies, ...]:
     """Return a scene tilted towards all sides."""
     if not degrees:
         return (_parts(scene),)
-    up, size = np.array(scene.up), float(np.linalg.norm(scene.gravity))
-    first = np.eye(3)[np.abs(up).argmin()]
-    first = first - up * (up @ first)
-    first /= np.linalg.norm(first)
+    up, size, tilt = np.array(scene.up), np.linalg.norm(scene.gravity), np.radians(degrees)
     out = []
     for angle in 2 * np.pi * np.arange(_TILTED) / _TILTED:
-        side = np.cos(angle) * first + np.sin(angle) * np.cross(up, first)
-        pull = size * (np.sin(np.radians(degrees)) * side - np.cos(np.radians(degrees)) * up)
+        pull = size * (np.sin(tilt) * horizontal(scene.up, angle) - np.cos(tilt) * up)
         x, y, z = pull.tolist()
         out.append(_parts(replace(scene, gravity=(x, y, z))))
     return tuple(out)
@@ -324,16 +312,13 @@ def _motion_word(assembly: Assembly, found: Stability) -> str:
     return "turns" if turned >= _HINGE * abs(opening) else "lifts off"
 
 
-_STRONGER: Mapping[str, Callable[[Mortar, float], Mortar]] = {
-    "bond": lambda mortar, bond: _no_weaker(bond_mortar(bond, mortar.friction), mortar),
-    "friction": _rougher,
-}
-
-
-def _no_weaker(mortar: Mortar, than: Mortar) -> Mortar:
-    """Return a mortar with the larger strengths of two."""
-    tension = max(mortar.tensile_strength, than.tensile_strength)
-    return replace(mortar, tensile_strength=tension, cohesion=max(mortar.cohesion, than.cohesion))
+def _stronger(mortar: Mortar, what: str, needed: float) -> Mortar:
+    """Return a mortar with at least a bond, Pa, or with a friction."""
+    if what == "friction":
+        return _rougher(mortar, needed)
+    bond = bond_mortar(needed, mortar.friction)
+    tension = max(bond.tensile_strength, mortar.tensile_strength)
+    return replace(bond, tensile_strength=tension, cohesion=max(bond.cohesion, mortar.cohesion))
 
 
 def _cure(case: _Case, what: str) -> float:
@@ -352,7 +337,7 @@ def _cure(case: _Case, what: str) -> float:
             if not np.isfinite(own):
                 return float(own)
             needed = max(needed, float(own) * (1 + _SURE))
-            mortar = _STRONGER[what](case.mortar, needed)
+            mortar = _stronger(case.mortar, what, needed)
             found = each_verdict(parts, left, mortar)
             pairs = zip(left, [*found], strict=True)
             left = [each for each, now in pairs if now.verdict is not Verdict.STANDS]

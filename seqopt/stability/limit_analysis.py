@@ -67,7 +67,7 @@ class Case:
         return start, growth
 
     def amounts(self, assembly: Assembly) -> tuple[float, float]:
-        """Return the sizes of all loads in sum at z = 0, and the growth of what is applied, N."""
+        """Return the sizes of all loads in sum at z = 0, and the growth of applied loads, N."""
         weight, applied = assembly.amounts
         return weight + self.applied[0] * applied, self.applied[1] * applied
 
@@ -172,7 +172,7 @@ def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
 
     A motion proves nothing, 0 or `CAP`, if the load does less work in it than is taken up, or if
     a corner closes by more than `_CLOSING`. Less than that is charged with a corner force of
-    `LARGEST_FORCE` times the sum of weights, of what is applied beside them, and of payloads.
+    `LARGEST_FORCE` times the sum of weights, applied loads and payloads.
     """
     nothing = 0.0 if case.sense is Sense.SMALLEST else CAP
     if not is_finite(assembly, answer):

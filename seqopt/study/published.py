@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib import resources
 
 import pandas as pd
@@ -9,6 +10,7 @@ import pandas as pd
 from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.graph.layers.layers import Layers
+from seqopt.problem._limit_words import NAMES, number_word, split_word
 from seqopt.problem.criteria import (
     OVER_METHODS,
     WORST_OVER_METHODS,
@@ -18,6 +20,7 @@ from seqopt.problem.criteria import (
     equal,
 )
 from seqopt.problem.requirements import Criterion
+from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.table import support_columns
 from seqopt.scene.parts import Anywhere, Robot, Side
@@ -81,16 +84,32 @@ Examples
 """
 
 
-def find_criterion(criterion: Criterion | str) -> Criterion:
-    """Return a criterion, by name of `seqopt.CRITERIA` or itself."""
+_BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
+
+
+def find_criterion(criterion: Criterion | str, where: str = "criterion") -> Criterion:
+    """Return a criterion: itself, by name of `seqopt.CRITERIA`, or ranks, as ``T_max,M_sup=2``.
+
+    A weight is 1 by default; ``where``: for messages.
+
+    >>> find_criterion("T_max,F_move=2").before
+    (('T_max', 1.0), ('F_move', 2.0))
+    """
     if not isinstance(criterion, str):
         return criterion
-    if criterion not in CRITERIA:
-        raise ProblemError(
-            f"criterion {criterion!r} does not exist{did_you_mean(criterion, CRITERIA)}; give "
-            f"one of {', '.join(CRITERIA)}"
-        )
-    return CRITERIA[criterion]
+    if criterion in CRITERIA:
+        return CRITERIA[criterion]
+    terms = []
+    for part in _BETWEEN.split(criterion):
+        name, weight = split_word(part)
+        if name not in (*NAMES, "F_each") and not name.startswith("F_"):
+            names = (*CRITERIA, *CHOICE_RESPONSES, "F_each")
+            hint, known = did_you_mean(name, names), ", ".join(names)
+            raise ProblemError(
+                f"{where} {name} does not exist{hint}; give one of {known}, F_ROBOT, or several"
+            )
+        terms.append((name, number_word(weight or "1", f"{where} {part}")))
+    return RankSum(criterion, tuple(terms), tuple(terms))
 
 
 SOURCE = "Bruun et al., Three Cooperative Robotic Fabrication Methods, arXiv 2104.04856"

@@ -1,15 +1,15 @@
-"""How long builds take at least, by how many grips robots hold: a bound without their states.
+"""A combinatorial lower bound of the makespan: builds by how many grips robots hold.
 
 Who holds which node is forgotten: what is left is how many bricks stand, and how many robots of
 every kind hold. Every build is a path through these counts that takes as much of the time of all
-and of robots, ways aside; so the priced time of the shortest one bounds all builds. There are a few
-hundred counts where there are millions of states.
+and of robots, ways aside; so the time of the shortest one, by multipliers, bounds all builds. There
+are a few hundred counts where there are millions of states.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -28,21 +28,13 @@ from seqopt.sequence.schedule import Schedule
 _Counts = tuple[int, tuple[int, ...]]  # bricks that stand, and grips by kind
 
 
-@dataclass
-class _Arcs:
-    """Moves between counts: from, to, and what they take of the time of all and of kinds, s."""
-
-    source: list[_Counts] = field(default_factory=list)
-    target: list[_Counts] = field(default_factory=list)
-    work: list[list[float]] = field(default_factory=list)
-
-
 @dataclass(frozen=True)
 class _Counted:
     """A build by counts.
 
     ``kinds``: how long robots take, and how many take as long; ``least``: grips that are held from
-    the second brick on; ``span``: bricks where it begins and ends; ``held``: grips at first.
+    the second brick on; ``span``: bricks where it begins and ends; ``held``: grips at first;
+    ``bare``: whether nobody holds at the end.
     """
 
     kinds: tuple[tuple[Durations, int], ...]
@@ -51,61 +43,55 @@ class _Counted:
     held: tuple[int, ...]
     bare: bool
 
-    def arcs(self) -> _Arcs:
-        """Return all moves, more of them than rules allow."""
-        out, (first, last) = _Arcs(), self.span
+    def arcs(self) -> Iterator[tuple[_Counts, _Counts, list[float]]]:
+        """Yield moves between counts, more than rules allow, and their work."""
+        first, last = self.span
         every = product(range(first, last + 1), product(*(range(n + 1) for _, n in self.kinds)))
         for here in [(first, self.held), *every]:
+            bricks, grips = here
             for k, (own, size) in enumerate(self.kinds):
-                bricks, grips = here
-                up, down = self._moved(grips, k, 1), self._moved(grips, k, -1)
+                up, down = ((*grips[:k], grips[k] + more, *grips[k + 1 :]) for more in (1, -1))
                 if grips[k] < size and bricks < last and self._holds(bricks + 1, up):
-                    self._add(out, here, (bricks + 1, up), (own.place, k, own.fetch))
+                    yield here, (bricks + 1, up), _work(grips, own.place, own.fetch, k)
                 if grips[k] < size and bricks:
-                    self._add(out, here, (bricks, up), (own.grip, k, own.approach))
+                    yield here, (bricks, up), _work(grips, own.grip, own.approach, k)
                 if grips[k] and (self._holds(bricks, down) or (self.bare and bricks == last)):
-                    self._add(out, here, (bricks, down), (own.release, None, 0.0))
-            if self.bare and here[0] == last and any(here[1]):
-                acts = max(d.release for (d, _), n in zip(self.kinds, here[1], strict=True) if n)
-                self._add(out, here, (last, (0,) * len(self.kinds)), (acts, None, 0.0))
-        return out
-
-    def _moved(self, grips: tuple[int, ...], kind: int, more: int) -> tuple[int, ...]:
-        return tuple(n + more * (k == kind) for k, n in enumerate(grips))
+                    yield here, (bricks, down), _work(grips, own.release)
+            if self.bare and bricks == last and any(grips):
+                acts = max(d.release for (d, _), n in zip(self.kinds, grips, strict=True) if n)
+                yield here, (last, (0,) * len(grips)), _work(grips, acts)
 
     def _holds(self, bricks: int, grips: tuple[int, ...]) -> bool:
         """Return whether rules may be kept with so many grips."""
         return bricks < 2 or sum(grips) >= self.least
 
-    def _add(
-        self, out: _Arcs, here: _Counts, to: _Counts, what: tuple[float, int | None, float]
-    ) -> None:
-        acts, kind, prepares = what
-        out.source.append(here)
-        out.target.append(to)
-        busy = [acts * (n + (k == kind)) for k, n in enumerate(here[1])]
-        out.work.append([acts, *(b + prepares * (k == kind) for k, b in enumerate(busy))])
+
+def _work(
+    grips: tuple[int, ...], acts: float, prepares: float = 0.0, taker: int | None = None
+) -> list[float]:
+    """Return how long a move takes of the time of all, and of robots of every kind, s."""
+    busy = (acts * (n + (k == taker)) + prepares * (k == taker) for k, n in enumerate(grips))
+    return [acts, *busy]
 
 
 def least_by_counts(network: Network, rules: FreeRules | Schedule) -> float:
-    """Return what no build by some rules takes less than, s; it holds whatever else is asked.
+    """Return the lower bound of the makespan of all builds by some rules, s.
 
-    Of a schedule nothing is said: minus infinity.
+    Minus infinity of a schedule, whose steps are given.
     """
     if isinstance(rules, Schedule):
         return -np.inf
     counted = _counted(network, rules)
-    arcs = counted.arcs()
+    sources, targets, work = zip(*counted.arcs(), strict=True)
     start = (counted.span[0], counted.held)
-    nodes = {each: i for i, each in enumerate(dict.fromkeys([start, *arcs.source, *arcs.target]))}
-    source = np.array([nodes[each] for each in arcs.source], dtype=np.int32)
-    target = np.array([nodes[each] for each in arcs.target], dtype=np.int32)
-    work = np.array(arcs.work)
-    last = counted.span[1]
-    ends = [b == last and n > 0 and not (counted.bare and any(h)) for n, (b, h) in enumerate(nodes)]
-    graph = Graph(source, target, work, (False,) * work.shape[1], np.array(ends))
+    nodes = {each: i for i, each in enumerate(dict.fromkeys([start, *sources, *targets]))}
+    source, target = (np.array([nodes[n] for n in own], np.int32) for own in (sources, targets))
+    bare, last = counted.bare, counted.span[1]
+    ends = [b == last and n > 0 and not (bare and any(held)) for n, (b, held) in enumerate(nodes)]
+    peaks = (False,) * (1 + len(counted.kinds))
+    graph = Graph(source, target, np.array(work), peaks, np.array(ends))
     sizes = np.array([1.0, *(size for _, size in counted.kinds)])
-    return max(least_sum(graph, graph.amounts @ each) for each in _prices(graph, sizes))
+    return max(least_sum(graph, graph.amounts @ each) for each in _multipliers(graph, sizes))
 
 
 def _counted(network: Network, rules: FreeRules) -> _Counted:
@@ -120,8 +106,8 @@ def _counted(network: Network, rules: FreeRules) -> _Counted:
     return _Counted(kinds, least, rules.span(scene), held, rules.how_it_ends is not Ending.HELD)
 
 
-def _prices(graph: Graph, sizes: Floats) -> Iterator[Floats]:
-    """Yield prices of the time of all and of robots of kinds, at most one together over all."""
+def _multipliers(graph: Graph, sizes: Floats) -> Iterator[Floats]:
+    """Yield multipliers of the time of all and of robots of kinds, at most one together."""
     from scipy.optimize import linprog  # noqa: PLC0415  # it takes long to load
 
     yield np.eye(1, len(sizes))[0]
@@ -136,5 +122,5 @@ def _prices(graph: Graph, sizes: Floats) -> Iterator[Floats]:
     solve: Any = linprog  # its stubs know no sparse rows
     found = solve(cost, shares, np.zeros(len(sizes)), flow, begin, method="highs")
     if found.x is not None:
-        prices = np.maximum(-found.ineqlin.marginals, 0.0)
-        yield prices / max(1.0, float(prices @ sizes))
+        multipliers = np.maximum(-found.ineqlin.marginals, 0.0)
+        yield multipliers / max(1.0, float(multipliers @ sizes))

@@ -15,7 +15,7 @@ from seqopt.arrays import Floats
 from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.curing import Curing
-from seqopt.contact.faces import Contacts
+from seqopt.contact.faces import contact_at
 from seqopt.contact.mortar import Mortar
 from seqopt.errors import SceneError, StepError
 from seqopt.network.network import Network
@@ -38,8 +38,10 @@ class JointsInTime:
     """
 
     def __init__(self, network: Network, curing: Curing) -> None:
-        contacts, springs = Contacts(network), network.springs
-        self.names = tuple(contacts[i][0] for i in springs.acting(len(network.inner)).tolist())
+        springs = network.springs
+        self.names = tuple(
+            contact_at(network, i)[0] for i in springs.acting(len(network.inner)).tolist()
+        )
         unknown = [name for name, _ in curing.joints if name not in self.names]
         if unknown:
             raise SceneError(

@@ -1,4 +1,4 @@
-"""Motions in which states fall unless joints have bond enough: what no wait may be shorter than.
+"""Lower bounds of waits for mortar: motions in which states fall unless joints have bond enough.
 
 A motion of the blocks takes up work in joints in proportion to their bonds, and in grips. Where
 loads do more, the state falls: an inequality on the bonds of its joints, of all states with as many
@@ -7,12 +7,11 @@ bricks at once. Who has motions has a floor under every wait.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar
 from seqopt.network.network import Network
 from seqopt.stability._held_states import node_assembly
@@ -43,7 +42,6 @@ class FallCuts:
 
     def __init__(self, network: Network, mortar: Mortar, joints: JointsInTime) -> None:
         self._network, self._mortar, self.joints = network, mortar, joints
-        self._contacts = Contacts(network)
         self._cuts: dict[int, list[_Cut]] = {}
         self._loads: dict[int, tuple[float, float]] = {}  # a force, and the sum of loads over it
         self._known: dict[bytes, Floats] = {}
@@ -66,7 +64,7 @@ class FallCuts:
 
     def _cut(self, motion: Floats) -> _Cut:
         bricks = len(motion)
-        assembly = node_assembly(self._network, bricks, self._contacts)
+        assembly = node_assembly(self._network, bricks)
         case = bonded(assembly, self._mortar)
         flat = (motion * np.repeat([1.0, assembly.scales[1]], 3)).ravel()
         flat = np.ldexp(flat, -np.frexp(np.abs(flat).max())[1])
@@ -131,3 +129,41 @@ class FallCuts:
 
     def _at(self, bricks: int, grips: tuple[Ints, Floats], placed: Floats, times: Floats) -> Bools:
         return self.fall(bricks, grips, self.joints.at(bricks, times, placed))
+
+
+class _Floor(Protocol):
+    """What says how long states wait for mortar at least."""
+
+    def starts(
+        self, bricks: int, grips: tuple[Ints, Floats], placed: Floats, start: Floats
+    ) -> Floats:
+        """Return since when states are not known to fall; as of `FallCuts.starts`."""
+
+
+class CuringStates(NamedTuple):
+    """What states of a build in time ask of mortar that cures.
+
+    ``floor``: under waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): the grips, as
+    of `FallCuts`; ``full`` (b,): at which age all joints that a brick closes have their full bond,
+    s; ``placed`` (b,): when bricks that stand at first were in their places, s, zero of others.
+    """
+
+    floor: _Floor
+    bricks: Ints
+    held: Ints
+    payload: Floats
+    full: Floats
+    placed: Floats
+
+    def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
+        """Return from when on, no sooner than times (k,), s, states may begin, for all known.
+
+        ``placed`` (k, b): when bricks were in their places; that which a step places counts then.
+        """
+        out = start.copy()
+        for bricks in np.unique(self.bricks[state]).tolist():
+            rows = np.flatnonzero(self.bricks[state] == bricks)
+            if bricks:
+                grips = self.held[state[rows]], self.payload[state[rows]]
+                out[rows] = self.floor.starts(bricks, grips, placed[rows], start[rows])
+        return out

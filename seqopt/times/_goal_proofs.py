@@ -1,10 +1,8 @@
-"""Goals of builds in time, proven one after the other on the judge's own graph."""
+"""Goals of builds in time, bounded one after the other on the judge's own graph."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,145 +12,128 @@ from seqopt.graph.duality import cut, potentials
 from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import tied
 from seqopt.graph.solution import StatePath
-from seqopt.graph.states.states import States
-from seqopt.judge._proof import Levels
-from seqopt.judge._rule_moves import RuleTables, ScheduleTables
+from seqopt.judge._proof import Rebuilt
+from seqopt.judge._states import StateEvaluator
 from seqopt.problem.problem import Measure
 from seqopt.sequence._durations import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.times._label_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
-from seqopt.times._mortar_floors import CuredRows, cured_rows
+from seqopt.times._acts import Acts, Team, acts_of_rows
+from seqopt.times._label_proof import Closed, Limits, kept_below, limit_below
+from seqopt.times._mortar_floors import cured_rows
 
-Fallen = Callable[[int, Ints], Bools]
+
+def label_bounds(
+    evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: StatePath
+) -> Callable[[Graph], tuple[float, ...]]:
+    """Return what bounds the goals after those about margins, by labels, on rebuilt subgraphs.
+
+    ``values``: of all goals; ``found``: what is claimed, with labels. The function raises
+    `SolverError` if labels are given that do not prove what is claimed.
+    """
+    rows = _TimedRows(evaluator, rebuilt, values, found)
+    return lambda graph: _GoalProofs(rows, graph, values, found).bounds()
 
 
-@dataclass(frozen=True, eq=False)
-class TimedStates:
-    """The states that a better build could pass, by level, and the moves between them.
+class _TimedRows:
+    """The states that a better build could pass, by number, in the columns of the judge.
 
-    ``levels``: of rows (n, c), numbered one level after the other; ``which``: their levels, of
-    which the first may come twice, as where the build begins; ``fallen``: which rows (k,) of a
-    level are proven to fall; ``cured``: what all of them ask of mortar, where it cures.
+    ``level`` (n,); ``rows`` (n, c).
     """
 
-    problem: States
-    tables: RuleTables | ScheduleTables
-    levels: Sequence[Ints]
-    which: Sequence[int]
-    graph: Graph
-    fallen: Fallen
-    cured: CuredRows | None = None
-
-    @property
-    def starts(self) -> Ints:
-        """The number of the first state of every level."""
-        return np.cumsum([0, *map(len, self.levels)])[:-1]
-
-    def moves(self, graph: Graph) -> TimedMoves:
-        """Return what moves of a graph of these states take of the time of robots."""
-        rows = np.concatenate([each[:, : self.tables.robots] for each in self.levels])
-        level = np.repeat(self.which, [*map(len, self.levels)])
-        places = level[graph.target] > level[graph.source]
-        rules = self.problem.rules
-        if isinstance(rules, Schedule):
-            kinds = [False, *(step.kind is StepKind.PLACE for step in rules.steps)]
-            places = np.array(kinds)[level[graph.target]]
-        return TimedMoves(graph, rows.astype(np.int64), places, self._team(), self.cured)
-
-    def _team(self) -> Team:
-        scene, tables = self.problem.network.scene, self.tables
-        own = require_durations(scene, tables.team)
+    def __init__(
+        self, evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: StatePath
+    ) -> None:
+        self.evaluator, self._rebuilt = evaluator, rebuilt
+        self._margins = values[: evaluator.margins]
+        tables, problem = evaluator.tables, evaluator.problem
+        self.level = np.array(rebuilt.parts)[rebuilt.part_of()]
+        self.rows = np.concatenate([own[:, : tables.robots] for own in rebuilt.states])
+        columns = [r for kind in problem.space.kinds for r in kind.robots]
+        self._columns = [columns.index(r) for r in tables.team]  # of the search
+        self.cured = cured_rows(evaluator, rebuilt, found.motions)
+        scene, own = problem.network.scene, require_durations(problem.network.scene, tables.team)
         times = np.array([[d.fetch, d.place, d.approach, d.grip, d.release] for d in own])
         slow = np.array([0.0 if d.speed is None else 1 / d.speed for d in own])
         at = [scene.node_position(node) for node in tables.nodes[1:].tolist()]
-        places = np.array([(0.0, 0.0, 0.0), *at])
-        return Team(times, slow, tables.groups, places, self.problem.parks)
+        self._team = Team(times, slow, tables.groups, np.array([(0.0,) * 3, *at]), problem.parks)
 
-    def numbers(self, proof: LabelProof) -> tuple[Ints, Floats]:
+    def acts(self, graph: Graph) -> Acts:
+        """Return who may act in the moves of a graph of these states, and for how long."""
+        places = self.level[graph.target] > self.level[graph.source]
+        rules = self.evaluator.problem.rules
+        if isinstance(rules, Schedule):
+            kinds = [False, *(step.kind is StepKind.PLACE for step in rules.steps)]
+            places = np.array(kinds)[self.level[graph.target]]
+        return acts_of_rows(graph, self.rows.astype(np.int64), places, self._team, self.cured)
+
+    def multipliers(self, proof: LabelProof) -> Floats:
+        """Return multipliers (L, 1 + c) of the time of all and of robots, by columns."""
+        count = len(self._columns)
+        if proof.prices.ndim != 2 or proof.prices.shape[1] != 1 + count:
+            raise SolverError("there is no price for every robot")
+        return np.asarray(proof.prices[:, [0, *(1 + c for c in self._columns)]])
+
+    def labels(self, proof: LabelProof) -> tuple[Ints, Floats]:
         """Return labels by the numbers of their states, as far as there are such states.
 
         Entries of robots that could change places are sorted, and with them their readiness.
         """
-        columns = [r for kind in self.problem.space.kinds for r in kind.robots]
-        order = [columns.index(r) for r in self.tables.team]
-        count = len(order)
-        if (
-            proof.states.ndim != 2
-            or proof.labels.ndim != 2
-            or (
-                len(proof.states) != len(proof.labels)
-                or proof.states.shape[1] < 1 + count
-                or proof.labels.shape[1] < 1 + count
-            )
-        ):
+        count, tables = len(self._columns), self.evaluator.tables
+        given = proof.states, proof.labels
+        wide = all(each.ndim == 2 and each.shape[1] >= 1 + count for each in given)
+        if not wide or len(proof.states) != len(proof.labels):
             raise SolverError("labels are none of this build: they have other columns")
-        entries = proof.states[
-            :, [*(1 + np.array(order)), *range(1 + count, proof.states.shape[1])]
-        ]
-        values = proof.labels[
-            :, [0, *(1 + np.array(order)), *range(1 + count, proof.labels.shape[1])]
-        ]
-        team = self._team()
-        for group in team.groups:
-            own, times = entries[:, group], values[:, [1 + c for c in group]]
-            sort = np.lexsort((times, -own), axis=1)
-            values[:, [1 + c for c in group]] = np.take_along_axis(times, sort, axis=1)
-        entries = self.tables.in_order(entries.astype(self.tables.start().dtype))
-        numbers, labels = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-        for level, rows, first in zip(self.which, self.levels, self.starts, strict=True):
-            own = np.flatnonzero(proof.states[:, 0] == level)
+        order = [0, *(1 + c for c in self._columns)]
+        states = proof.states[:, [*order, *range(1 + count, proof.states.shape[1])]]
+        values = proof.labels[:, [*order, *range(1 + count, proof.labels.shape[1])]]
+        for group in self._team.groups:
+            columns = [1 + c for c in group]
+            sort = np.lexsort((values[:, columns], -states[:, columns]), axis=1)
+            values[:, columns] = np.take_along_axis(values[:, columns], sort, axis=1)
+        entries = tables.in_order(states[:, 1:].astype(tables.start().dtype))
+        none = np.zeros(0, dtype=np.int64)
+        numbers, labels = [none], [none]  # where builds begin a state may come twice
+        firsts = np.cumsum([0, *map(len, self._rebuilt.states)])
+        pairs = zip(self._rebuilt.parts, self._rebuilt.states, firsts[:-1], strict=True)
+        for level, rows, first in pairs:
+            own = np.flatnonzero(states[:, 0] == level)
             if len(own) and len(rows):
-                codes = self.tables.codes(rows)
+                codes, wanted = tables.codes(rows), tables.codes(entries[own])
                 sort = np.argsort(codes)
-                wanted = self.tables.codes(entries[own])
-                at = np.searchsorted(codes, wanted, sorter=sort).clip(max=len(rows) - 1)
-                found = codes[sort[at]] == wanted
-                numbers.append(first + sort[at[found]])
-                labels.append(own[found])
+                at = sort[np.searchsorted(codes, wanted, sorter=sort).clip(max=len(rows) - 1)]
+                same = codes[at] == wanted
+                numbers.append(first + at[same])
+                labels.append(own[same])
         number, label = np.concatenate(numbers), np.concatenate(labels)
         known = np.isfinite(values[label]).all(axis=1)
         return number[known], values[label[known]]
 
-    def all_fallen(self, states: Ints) -> Bools:
-        """Return which states of some numbers are proven to fall."""
+    def fallen(self, states: Ints) -> Bools:
+        """Return which states of some numbers are proven to fall; where it begins none is."""
         out = np.zeros(len(states), dtype=bool)
-        every = zip(self.which, self.levels, self.starts, strict=True)
-        for level, rows, first in [*every][1:]:  # in the first one it begins, whatever it takes
-            own = np.flatnonzero((states >= first) & (states < first + len(rows)))
-            if len(own):
-                out[own] = self.fallen(level, rows[states[own] - first])
+        if not self.evaluator.demands(self._margins):
+            return out
+        for level in np.unique(self.level[states]).tolist():
+            own = np.flatnonzero((self.level[states] == level) & (states > 0))
+            out[own] = ~self.evaluator.may_stand(level, self.rows[states[own]], self._margins)
         return out
 
 
-class Claim(NamedTuple):
-    """What is claimed of a build in time.
-
-    ``values``: of all goals; ``bounds``: what no build stays below; ``proofs``: of the latter;
-    ``motions``: in which states fall while mortar cures.
-    """
-
-    values: Sequence[float]
-    bounds: Sequence[float]
-    proofs: Sequence[LabelProof]
-    motions: Sequence[Floats] = ()
-
-
-class GoalProofs:
+class _GoalProofs:
     """Bounds on the goals of a build in time, each where those before it are at their values."""
 
-    def __init__(self, states: TimedStates, claim: Claim) -> None:
-        self._states, self._claim, values = states, claim, claim.values
-        problem = states.problem
+    def __init__(
+        self, rows: _TimedRows, graph: Graph, values: Sequence[float], found: StatePath
+    ) -> None:
+        self._rows, self._graph, self._values, self._found = rows, graph, values, found
+        problem = rows.evaluator.problem
         self._aims = len(problem.aims)
         self._is_time = [goal.measure is Measure.MAKESPAN for goal in problem.goals]
-        self._graph = states.graph
-        caps = zip(range(self._aims, len(values)), problem.budgets, strict=True)
         self._time, self._sums = np.inf, list[tuple[int, float]]()
-        for k, cap in caps:
+        for k, cap in zip(range(self._aims, len(values)), problem.budgets, strict=True):
             self._cap(k, tied(cap))
-        self._filtered = not problem.budgets and states.cured is None
-        self.states = 0
+        self._filtered = not problem.budgets and rows.cured is None
 
     def _cap(self, k: int, most: float) -> None:
         """Let builds take no more of a goal from now on."""
@@ -163,11 +144,11 @@ class GoalProofs:
         else:
             self._sums.append((k, most))
 
-    def bounds(self, first: int) -> tuple[float, ...]:
-        """Return what no build stays below in every aim from the first one that is not known."""
-        proofs, out = iter(self._claim.proofs), list[float]()
-        for k in range(first, self._aims):
-            value = self._claim.values[k]
+    def bounds(self) -> tuple[float, ...]:
+        """Return lower bounds of the aims after those about margins."""
+        proofs, out = iter(self._found.proofs), list[float]()
+        for k in range(self._rows.evaluator.margins, self._aims):
+            value = self._values[k]
             if self._filtered and not self._is_time[k]:
                 proven = cut if self._graph.peaks[k] else potentials
                 bound, kept = proven(self._graph, k, value)
@@ -181,8 +162,8 @@ class GoalProofs:
         return tuple(out)
 
     def _by_labels(self, k: int, proof: LabelProof) -> float:
-        """Return the bound of a goal that labels prove, or prices alone."""
-        claimed, graph = min(self._claim.bounds[k], self._claim.values[k]), self._graph
+        """Return the bound of a goal that labels prove, or multipliers alone."""
+        claimed, graph = min(self._found.bound[k], self._values[k]), self._graph
         if not np.isfinite(claimed):
             return -np.inf
         columns = [column for column, _ in self._sums]
@@ -195,57 +176,17 @@ class GoalProofs:
         else:
             columns, strict = [*columns, k], [*strict, True]
             caps.append(limit_below(claimed))
-        moves = self._states.moves(graph)
         limits = Limits(caps[0], np.array(caps[1:]), np.array(strict))
-        prices = self._in_order(proof.prices)
-        closed = Closed(moves, graph.amounts[:, columns], prices, limits)
-        labels = self._states.numbers(proof)
-        cured = self._states.cured
-        bricks = 0 if cured is None else len(cured.floors.full)
-        width = 1 + self._states.tables.robots + len(columns) + bricks
+        acts, multipliers = self._rows.acts(graph), self._rows.multipliers(proof)
+        closed = Closed(acts, graph.amounts[:, columns], multipliers, limits)
+        labels, cured = self._rows.labels(proof), self._rows.cured
+        bricks = 0 if cured is None else len(cured.full)
+        width = 1 + acts.entries.shape[1] + len(columns) + bricks
         if labels[1].shape[1] != width:
             labels = labels[0][:0], np.zeros((0, width))
-        is_proof, count = closed.is_proof(labels, self._states.all_fallen)
-        self.states += count
-        if is_proof:
+        if closed.is_proof(labels, self._rows.fallen):
             return claimed
         if len(proof.labels):
-            goal = self._states.problem.names[k]
+            goal = self._rows.evaluator.problem.names[k]
             raise SolverError(f"{goal}: labels do not prove that no build is below {claimed:.9g}")
         return min(closed.bound, claimed) if self._is_time[k] else -np.inf
-
-    def _in_order(self, prices: Floats) -> Floats:
-        """Return prices (L, 1 + c) by the columns of the judge."""
-        columns = [r for kind in self._states.problem.space.kinds for r in kind.robots]
-        order = [1 + columns.index(r) for r in self._states.tables.team]
-        if prices.ndim != 2 or prices.shape[1] != 1 + len(order):
-            raise SolverError("there is no price for every robot")
-        return np.asarray(prices[:, [0, *order]])
-
-
-def label_bounds(
-    levels: Levels, values: Sequence[float], found: StatePath
-) -> Callable[[Graph], tuple[float, ...]]:
-    """Return what bounds the goals after those about margins, by labels, on a subgraph of levels.
-
-    ``values``: of all goals; ``found``: what is claimed, with labels. The function raises
-    `SolverError` if labels are given that do not prove what is claimed.
-    """
-    passable = levels.passable
-    first, tables = passable.margins, passable.tables
-    margins, claim = values[:first], Claim(values, found.bound, found.proofs, found.motions)
-
-    def fallen(level: int, rows: Ints) -> Bools:
-        if not passable.stands.asked(margins):
-            return np.zeros(len(rows), dtype=bool)
-        return ~passable.may_stand(level, rows, margins)
-
-    bricks = [tables.bricks_at(level) if level else 0 for level in levels.levels]
-    grips = [passable.held_by(rows) for rows in levels.states]
-    cured = cured_rows(passable.problem, bricks, grips, claim.motions)
-
-    def bounds(graph: Graph) -> tuple[float, ...]:
-        own = tables, levels.states, levels.levels, graph, fallen, cured
-        return GoalProofs(TimedStates(passable.problem, *own), claim).bounds(first)
-
-    return bounds

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._explore import Visited
 from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.graph import Graph
@@ -15,38 +14,7 @@ from seqopt.graph.states.states import States
 from seqopt.sequence._durations import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.times._fall_cuts import FallCuts
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class CuringStates(FrozenValue):
-    """What states of a build in time ask of mortar that cures.
-
-    ``cuts``: motions in which states fall, a floor under waits; ``bricks`` (n,): that stand;
-    ``held`` (n, r), ``payload`` (n, r): the grips of states, as of `FallCuts`; ``full`` (b,): at
-    which age all joints that a brick closes have their full bond, s; ``placed`` (b,): when bricks
-    that stand at first were in their places, s, zero of others.
-    """
-
-    cuts: FallCuts
-    bricks: Ints
-    held: Ints
-    payload: Floats
-    full: Floats
-    placed: Floats
-
-    def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
-        """Return from when on, no sooner than times (n,), s, states may begin, for all known.
-
-        ``placed`` (n, b): when bricks were in their places; that which a step places counts then.
-        """
-        out = start.copy()
-        for bricks in np.unique(self.bricks[state]).tolist():
-            rows = np.flatnonzero(self.bricks[state] == bricks)
-            if bricks:
-                grips = self.held[state[rows]], self.payload[state[rows]]
-                out[rows] = self.cuts.starts(bricks, grips, placed[rows], start[rows])
-        return out
+from seqopt.times._fall_cuts import CuringStates, FallCuts
 
 
 class _Moves(NamedTuple):

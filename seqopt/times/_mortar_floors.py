@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.curing import Curing
-from seqopt.graph.states.states import States
+from seqopt.judge._proof import Rebuilt
+from seqopt.judge._states import StateEvaluator
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.times._curing import JointsInTime
-from seqopt.times._fall_cuts import FallCuts
+from seqopt.times._fall_cuts import CuringStates, FallCuts
 
 Grips = tuple[Ints, Floats]
 CLOSE = 1e-9  # of a time: what rounding may take from an age
 
 
 class Floors:
-    """How long states wait for mortar at least, by motions in which they fall; each is checked.
+    """Lower bounds of waits for mortar, by motions in which states fall; each is checked.
 
-    ``motions``: as told, (b, 6) in m and rad.
+    ``motions``: that are claimed, (b, 6) in m and rad.
     """
 
     def __init__(self, network: Network, standing: Standing, motions: Sequence[Floats]) -> None:
@@ -75,43 +75,24 @@ class Floors:
         return out
 
 
-class CuredRows(NamedTuple):
-    """What rows of states ask of mortar that cures.
-
-    ``floors``: under waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): grips;
-    ``placed`` (b,): when bricks came that stand at first, s, zero of others.
-    """
-
-    floors: Floors
-    bricks: Ints
-    held: Ints
-    payload: Floats
-    placed: Floats
-
-    def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
-        """Return from when on, no sooner than times (k,), s, states may begin; see `Floors`."""
-        out = start.copy()
-        for bricks in np.unique(self.bricks[state]).tolist():
-            rows = np.flatnonzero(self.bricks[state] == bricks)
-            grips = self.held[state[rows]], self.payload[state[rows]]
-            out[rows] = self.floors.starts(bricks, grips, placed[rows], start[rows])
-        return out
-
-
 def cured_rows(
-    problem: States, bricks: Sequence[int], grips: Sequence[Grips], motions: Sequence[Floats]
-) -> CuredRows | None:
-    """Return what rows of states, level by level, ask of mortar; None where none cures.
+    evaluator: StateEvaluator, rebuilt: Rebuilt, motions: Sequence[Floats]
+) -> CuringStates | None:
+    """Return what rebuilt states ask of mortar; None where none cures.
 
-    ``bricks``: how many stand; ``grips``: as of `Floors.starts`.
+    ``motions``: that are claimed, (b, 6) in m and rad.
     """
-    standing = problem.standing
+    problem = evaluator.problem
+    standing, begin = problem.standing, problem.rules.begin
     if standing is None or standing.curing is None:
         return None
+    bricks = np.array(
+        [evaluator.tables.bricks_at(level) if level else 0 for level in rebuilt.parts]
+    )
+    grips = [evaluator.held_to_stand(rows) for rows in rebuilt.states]
     held, payload = (np.concatenate([each[k] for each in grips]) for k in (0, 1))
-    count = np.repeat(bricks, [len(each) for each, _ in grips])
-    begin, floors = problem.rules.begin, Floors(problem.network, standing, motions)
+    floors = Floors(problem.network, standing, motions)
     placed = np.zeros(len(floors.full))
     for k, age in enumerate(() if begin is None else begin.ages):
         placed[k] = -age
-    return CuredRows(floors, count, held, payload, placed)
+    return CuringStates(floors, bricks[rebuilt.part_of()], held, payload, floors.full, placed)

@@ -8,7 +8,7 @@ import numpy as np
 
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.curing import Curing
-from seqopt.contact.faces import Contacts, step_assembly
+from seqopt.contact.faces import step_assembly
 from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
 from seqopt.network.network import Network
@@ -100,11 +100,11 @@ def check_cured(
     ends = step_ends(network.scene, steps, starts, begin)
     if curing is None:
         return
-    known, found = Contacts(network), dict[object, Verdict]()
+    found = dict[object, Verdict]()
     placed = dict.fromkeys(range(0 if begin is None else begin.bricks), 0.0)
     placed |= {k: -age for k, age in enumerate(() if begin is None else begin.ages)}
     for step, start, end in zip(steps, starts, ends, strict=True):
-        whole = step_assembly(network, step.bricks, step.grips, known)
+        whole = step_assembly(network, step.bricks, step.grips)
         bond = tuple(
             _share(curing, name, start, [placed.get(int(body)) for body in bodies if body >= 0])
             for name, bodies in zip(whole.contact_name, whole.bodies, strict=True)

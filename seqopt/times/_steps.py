@@ -21,9 +21,9 @@ ended, and since when every other robot is free.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from seqopt.errors import StepError
 from seqopt.scene._durations import Durations
@@ -31,7 +31,7 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence._durations import require_durations
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.site import Site, _begin_step
-from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind, check_sequence
+from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 from seqopt.times._curing import Waits
 
 
@@ -75,80 +75,99 @@ def step_times(
     """
     if steps and steps[0].number > 1 and begin is None:
         raise StepError(f"steps from {steps[0].number} on: times are of whole builds; give all")
-    robots = range(len(scene.robots))
     before: Sequence[object] = _begin_step(scene, begin).grips
-    busy = [r for r in robots if any(g[r] is not None for g in (before, *(s.grips for s in steps)))]
-    durations = dict(zip(busy, require_durations(scene, busy), strict=True))
-    free, last = dict.fromkeys(busy, 0.0), dict[int, object](enumerate(_lasts(scene, begin)))
-    now, out, placed = 0.0, list[StepTime](), [] if begin is None else begin.placed
+    every = zip(before, *(step.grips for step in steps), strict=True)
+    busy = [r for r, grips in enumerate(every) if any(grip is not None for grip in grips)]
+    team = _Team(scene, dict(zip(busy, require_durations(scene, busy), strict=True)), waits)
+    clock, out = _begin_clock(scene, begin), list[StepTime]()
     for step in steps:
-        acting = tuple(r for r in busy if step.grips[r] != before[r])
-        taker = next((r for r in acting if step.grips[r] is not None), None)
-        placing = step.kind is StepKind.PLACE
-        prepares = ready = None
-        acts, start = max((durations[r].release for r in acting), default=0.0), now
-        if taker is not None:
-            own, node, prepares = durations[taker], step.grips[taker], free[taker]
-            ready = prepares + (own.fetch if placing else own.approach)
-            ready += way_seconds(scene, own, last.get(taker), node)
-            start, last[taker] = max(now, ready), node
-            acts = own.place if placing else own.grip
-        cures, joint = (None, "") if waits is None else waits(step, placed, start)
-        start = start if cures is None else cures
-        if start == math.inf:
-            raise StepError(_never(step))
-        now = start + acts
-        out.append(StepTime(step.number, acting, prepares, ready, start, now, cures, joint))
-        placed += [now] * placing
-        if taker is None:
-            free |= dict.fromkeys(acting, now)
+        changes = {r: step.grips[r] for r in busy if step.grips[r] != before[r]}
+        clock, time = team.act(clock, step, changes)
+        if time.start == math.inf:
+            which = "before the joints that it closes have any bond"
+            which = which if step.kind is StepKind.PLACE else "with all mortar cured"
+            raise StepError(
+                f"step {step.number} ({step.kind.value}): it is not proven to stand {which}; no "
+                "wait helps, but more grips may"
+            )
+        out.append(time)
         before = step.grips
     return tuple(out)
 
 
-def _lasts(scene: Scene, begin: Site | None) -> Grips:
-    """Return the node that every robot holds, or held last, where a build begins."""
-    holds = _begin_step(scene, begin).grips
-    stays = begin.stays if begin is not None and begin.stays else (None,) * len(holds)
-    return tuple(s if h is None else h for h, s in zip(holds, stays, strict=True))
+class _Clock(NamedTuple):
+    """What the times of a build depend on after a step.
+
+    ``end``: of the last step, s; ``since``: since when robots are free, s; zero of those who hold;
+    ``last``: node that each holds or held last; ``placed``: when bricks were in their places, s.
+    """
+
+    end: float
+    since: tuple[float, ...]
+    last: tuple[Any, ...]
+    placed: tuple[float, ...]
 
 
-def _never(step: AnyStep) -> str:
-    """Return why a step is never done."""
-    if step.kind is StepKind.PLACE:
-        why = "before the joints that it closes have any bond; no wait helps, but more grips may"
-    else:
-        why = "with all mortar cured; no wait helps, but more grips may"
-    return f"step {step.number} ({step.kind.value}): it is not proven to stand {why}"
+def _begin_clock(scene: Scene, begin: Site | None) -> _Clock:
+    """Return the clock where a build begins, with robots that are free from then on."""
+    grips = _begin_step(scene, begin).grips
+    stays = begin.stays if begin is not None and begin.stays else (None,) * len(grips)
+    last = tuple(s if h is None else h for h, s in zip(grips, stays, strict=True))
+    return _Clock(0.0, (0.0,) * len(grips), last, () if begin is None else tuple(begin.placed))
 
 
-def way_seconds(scene: Scene, own: Durations, last: object, node: object) -> float:
-    """Return how long a robot goes from one node to another, s; nothing if that is not known."""
-    if own.speed is None or not isinstance(last, int) or not isinstance(node, int):
-        return 0.0
-    return math.dist(scene.node_position(last), scene.node_position(node)) / own.speed
+class _Team(NamedTuple):
+    """Robots by index, how long they take, and how long steps wait for mortar, where it cures."""
+
+    scene: Scene
+    durations: Mapping[int, Durations]
+    waits: Waits | None
+
+    def act(
+        self, clock: _Clock, step: AnyStep, changes: Mapping[int, Any]
+    ) -> tuple[_Clock, StepTime]:
+        """Return the clock after a step, and when it happens; never where no wait is enough.
+
+        ``changes``: by robot that acts the node that it takes, None where it lets go.
+        """
+        taker = next((r for r, node in changes.items() if node is not None), None)
+        placing, prepares, ready = step.kind is StepKind.PLACE, None, None
+        start, acts = clock.end, max((self.durations[r].release for r in changes), default=0.0)
+        since, last = list(clock.since), list(clock.last)
+        if taker is not None:
+            own, node, prepares = self.durations[taker], changes[taker], clock.since[taker]
+            ready = prepares + (own.fetch if placing else own.approach)
+            if own.speed is not None and isinstance(last[taker], int) and isinstance(node, int):
+                at = self.scene.node_position
+                ready += math.dist(at(last[taker]), at(node)) / own.speed
+            start, acts = max(start, ready), own.place if placing else own.grip
+            since[taker], last[taker] = 0.0, node
+        cures, joint = None, ""
+        if self.waits is not None:
+            start, joint = self.waits(step, clock.placed, start)
+            cures = start
+        end = start + acts
+        for r in changes if taker is None else ():
+            since[r] = end
+        ages = placing and self.waits is not None  # else nothing depends on them
+        placed = (*clock.placed, end) if ages else clock.placed
+        time = StepTime(step.number, tuple(changes), prepares, ready, start, end, cures, joint)
+        return _Clock(end, tuple(since), tuple(last), placed), time
 
 
 _NOTHING = -1  # in the place of the number of a grip
-_Part = TypeVar("_Part")
 May = Callable[[int, Hold], bool]
 
 
 class _Label(NamedTuple):
     """What one choice of robots comes to.
 
-    ``end``: of the last step, s; ``since``: since when robots are free, s; of those who hold zero;
-    ``has``: number of the grip of every robot; ``last``: node that each held last; ``chosen``: the
-    robots of all grips by then, the last one first; ``placed``: where mortar cures, when bricks
-    were in their places, s.
+    ``has``: number of the grip of every robot; ``chosen``: grips by then, with their robots.
     """
 
-    end: float
-    since: tuple[float, ...]
+    clock: _Clock
     has: tuple[int, ...]
-    last: tuple[int | None, ...]
-    chosen: tuple[int, Any] | None  # a robot, and what was chosen before it
-    placed: tuple[float, ...] = ()
+    chosen: tuple[tuple[int, int], ...] = ()
 
 
 def reassigned_steps(
@@ -166,116 +185,60 @@ def reassigned_steps(
     says that there is no such choice.
     """
     team = range(len(scene.robots)) if team is None else team
-    own = dict(zip(team, require_durations(scene, team), strict=True))
-    at_first = _begin_step(scene, begin)
-    whole = (at_first, *steps) if at_first.held else steps
+    own = _Team(scene, dict(zip(team, require_durations(scene, team), strict=True)), waits)
+    first = _begin_step(scene, begin)
+    whole = (first, *steps) if first.held else steps
     every = sorted(holds(scene, whole), key=lambda hold: (hold.first, hold.robot))
-    moves = any(durations.speed for durations in own.values())
-    labels = [_first_label(scene, every, begin)]
+    begun = {hold.robot: i for i, hold in enumerate(every) if hold.first == first.number}
+    has = tuple(begun.get(r, _NOTHING) for r in range(len(scene.robots)))
+    labels = [_Label(_begin_clock(scene, begin), has, tuple((i, r) for r, i in begun.items()))]
     for step in steps:
-        ended = [i for i, hold in enumerate(every) if hold.last == step.number - 1]
-        begun = [i for i, hold in enumerate(every) if hold.first == step.number]
-        found = list[_Label]()
-        for label in labels:
-            if ended:
-                ready = _cured(label, step, label.end, waits)
-                if ready.end < math.inf:
-                    found.append(_let_go(ready, [label.has.index(i) for i in ended], own))
-                continue
-            for i in begun:
-                able = [r for r in team if label.has[r] == _NOTHING and may(r, every[i])]
-                after = [_take(scene, label, (r, i, every[i]), own[r], (step, waits)) for r in able]
-                found += [each for each in after if each.end < math.inf]
-        labels = _undominated(found, moves=moves)
+        found = (after for each in labels for after in _successors(own, each, step, every, may))
+        labels = _undominated(found, parks=any(each.speed for each in own.durations.values()))
     if not labels:
         raise StepError("no robot may have a grip of the steps; nobody can be reassigned")
-    chosen, link = list[int](), min(labels, key=lambda label: label.end).chosen
-    while link is not None:
-        chosen.append(link[0])
-        link = link[1]
-    order = [i for step in steps for i, hold in enumerate(every) if hold.first == step.number]
-    by = {i: hold.robot for i, hold in enumerate(every) if hold.first == at_first.number}
-    by |= dict(zip(order, chosen[::-1], strict=True))
-    return check_sequence(scene, _with_robots(scene, steps, every, by), at_first)
-
-
-def _first_label(scene: Scene, every: Sequence[Hold], begin: Site | None) -> _Label:
-    """Return what it comes to before the first step: who holds there, and when bricks came."""
-    none, number = (0.0,) * len(scene.robots), _begin_step(scene, begin).number
-    has = [_NOTHING] * len(none)
-    for i, hold in enumerate(every):
-        if hold.first == number:
-            has[hold.robot] = i
-    placed = () if begin is None else tuple(begin.placed)
-    return _Label(0.0, none, tuple(has), _lasts(scene, begin), None, placed)
-
-
-def _cured(label: _Label, step: Step, start: float, waits: Waits | None) -> _Label:
-    """Return a label that ends no sooner than a time, and than mortar lets a step be done."""
-    return label._replace(end=start if waits is None else waits(step, label.placed, start)[0])
-
-
-def _take(
-    scene: Scene,
-    label: _Label,
-    which: tuple[int, int, Hold],
-    own: Durations,
-    asked: tuple[Step, Waits | None],
-) -> _Label:
-    """Return what follows where a robot takes a grip in a step."""
-    robot, number, hold = which
-    placing = hold.places is not None
-    ready = label.since[robot] + (own.fetch if placing else own.approach)
-    ready += way_seconds(scene, own, label.last[robot], hold.node)
-    step, waits = asked
-    start = _cured(label, step, max(label.end, ready), waits).end
-    end = start + (own.place if placing else own.grip)
-    return _Label(
-        end,
-        _put(label.since, robot, 0.0),
-        _put(label.has, robot, number),
-        _put(label.last, robot, hold.node),
-        (robot, label.chosen),
-        label.placed if waits is None or not placing else (*label.placed, end),
-    )
-
-
-def _let_go(label: _Label, robots: Sequence[int], own: Mapping[int, Durations]) -> _Label:
-    """Return what follows where robots let go, all at once."""
-    end = label.end + max(own[r].release for r in robots)
-    since, has = label.since, label.has
-    for r in robots:
-        since, has = _put(since, r, end), _put(has, r, _NOTHING)
-    return label._replace(end=end, since=since, has=has)
-
-
-def _put(values: tuple[_Part, ...], place: int, value: _Part) -> tuple[_Part, ...]:
-    return (*values[:place], value, *values[place + 1 :])
-
-
-def _undominated(labels: Sequence[_Label], *, moves: bool) -> list[_Label]:
-    """Return the labels that no other one of the same grips is nowhere above."""
-    kept: dict[object, list[_Label]] = {}
-    for label in sorted(labels, key=lambda each: (each.end, each.since, each.placed)):
-        own = kept.setdefault((label.has, label.last if moves else None), [])
-        if not any(_nowhere_above(other, label) for other in own):
-            own.append(label)
-    return [label for own in kept.values() for label in own]
-
-
-def _nowhere_above(first: _Label, second: _Label) -> bool:
-    pairs = zip((*first.since, *first.placed), (*second.since, *second.placed), strict=True)
-    return all(a <= b for a, b in pairs)
-
-
-def _with_robots(
-    scene: Scene, steps: Sequence[Step], every: Sequence[Hold], chosen: dict[int, int]
-) -> list[Step]:
+    by = dict(min(labels, key=lambda label: label.clock.end).chosen)
     out = []
     for step in steps:
-        grips: list[int | None] = [None] * len(scene.robots)
-        for i, hold in enumerate(every):
-            if hold.first <= step.number <= hold.last:
-                grips[chosen[i]] = hold.node
-        out.append(replace(step, grips=tuple(grips)))
+        lasting = [i for i, hold in enumerate(every) if hold.first <= step.number <= hold.last]
+        nodes = {by[i]: every[i].node for i in lasting}
+        out.append(replace(step, grips=tuple(map(nodes.get, range(len(scene.robots))))))
+    return check_sequence(scene, out, first)
+
+
+def _successors(
+    team: _Team, label: _Label, step: Step, every: Sequence[Hold], may: May
+) -> Iterator[_Label]:
+    """Yield the labels after a step, one for every robot that may act in it."""
+    ended = [i for i, hold in enumerate(every) if hold.last == step.number - 1]
+    begun = [i for i, hold in enumerate(every) if hold.first == step.number]
+    choices = (
+        [({label.has.index(i): None for i in ended}, _NOTHING)]
+        if ended
+        else [
+            ({r: every[i].node}, i)
+            for i in begun
+            for r in team.durations
+            if label.has[r] == _NOTHING and may(r, every[i])
+        ]
+    )
+    for changes, number in choices:
+        clock, time = team.act(label.clock, step, changes)
+        if time.end < math.inf:
+            has = tuple(number if r in changes else i for r, i in enumerate(label.has))
+            chosen = () if number == _NOTHING else tuple((number, r) for r in changes)
+            yield _Label(clock, has, (*label.chosen, *chosen))
+
+
+def _undominated(labels: Iterable[_Label], *, parks: bool) -> list[_Label]:
+    """Return labels that no other one of the same grips dominates; ``parks``: and last nodes."""
+    kept: dict[object, list[tuple[float, ...]]] = {}
+    out = list[_Label]()
+    clocks = ("end", "since", "placed")
+    for label in sorted(labels, key=lambda each: [getattr(each.clock, name) for name in clocks]):
+        times = (*label.clock.since, *label.clock.placed)
+        own = kept.setdefault((label.has, label.clock.last if parks else None), [])
+        if not any(all(a <= b for a, b in zip(each, times, strict=True)) for each in own):
+            own.append(times)
+            out.append(label)
     return out

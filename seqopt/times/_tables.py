@@ -7,7 +7,7 @@ while they were softer, is left out, and so is what creeps.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -207,3 +207,44 @@ def _who_carries(scene: Scene, steps: Sequence[Step]) -> Callable[[int, Hold], b
         return all(able[robot][scene.since[brick] - 1] for brick in both if brick is not None)
 
     return carries
+
+
+def softer_lines(
+    scene: Scene, full: pd.DataFrame, aged: pd.DataFrame, over: Sequence[str]
+) -> Iterator[str]:
+    """Yield what a build comes to with joints as stiff as they are, beside full stiffness.
+
+    ``over``: payloads that are exceeded then.
+    """
+    softest = 100 * aged[SHARE].min()
+    yield (
+        f"with joints as stiff as they are when each step begins, from {softest:.3g} % on, beside "
+        "full stiffness:"
+    )
+    columns = {"D_max_1e-3mm": "displacements up to", "F_max_N": "tension up to"}
+    columns |= {force_column(robot): f"{robot.name} holds up to" for robot in scene.robots}
+    for column, what in columns.items():
+        was, now = (table.set_index("step")[column].abs() for table in (full, aged))
+        if now.notna().any():
+            unit = "µm" if column.startswith("D_") else "N"
+            most = f"{now.max():.4g} {unit} in step {now.idxmax()}"
+            yield f"  {what} {most}, not {was.max():.4g} {unit}"
+    yield from (f"  payload exceeded: {each}" for each in over)
+    if not over:
+        yield "  no payload is exceeded"
+
+
+def spent_lines(busy: pd.DataFrame) -> Iterator[str]:
+    """Yield how long each robot does what."""
+    for row in busy.to_dict("records"):
+        spent = (
+            f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
+        )
+        yield f"  {row['robot']}: {', '.join(spent)}"
+
+
+def total_lines(name: str, steps: int, given: float, least: float | None) -> Iterator[str]:
+    """Yield how long a build takes."""
+    yield f"{name}: {steps} steps take {given:.6g} s"
+    if least is not None:
+        yield f"the same grips by other robots: {least:.6g} s, the least"

@@ -237,9 +237,7 @@ class _Given:
 
 
 @contextmanager
-def hire(
-    executor: Executor | None = None, workers: int = 1, *, beside: bool = False
-) -> Iterator[Crew | None]:
+def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | None]:
     """Hire workers for the duration of a with block.
 
     Parameters
@@ -248,8 +246,6 @@ def hire(
         Any; by default processes of our own.
     workers : int, optional
         How many processes, or how many tasks the executor works on at once if it does not say.
-    beside : bool, optional
-        Whether this process works as well, so that one of our own less is hired.
 
     Yields
     ------
@@ -264,7 +260,7 @@ def hire(
         most = known if isinstance(known, int) else 16  # where it does not say
         yield _Given(executor, workers if workers > 1 else most)
     elif workers > 1:
-        processes = _Processes(workers - beside)
+        processes = _Processes(workers)
         try:
             yield processes
         except BaseException:

@@ -127,14 +127,14 @@ def test_limits_standing_and_scenarios_go_on_too():
     scene = with_robots(small_arch(4), 3)
     plan = seqopt.optimize(scene, "free", ONES, aim="minmax,steps")
     begin = Site.after(plan.steps, 3)
-    limit = Limit("T_max", 1e3)
+    limit, rules = Limit("T_max", 1e3), FreeRules(begin=begin)
     some = seqopt.scenarios(scene, count=2, seed=1)
     for more in ({"limits": [limit]}, {"stands": "epoxy"}, {"scenarios": some}):
-        rest = seqopt.optimize(scene, "free", ONES, aim="minmax,steps", begin=begin, **more)
+        rest = seqopt.optimize(scene, "free", ONES, aim="minmax,steps", rules=rules, **more)
         whole = seqopt.optimize(scene, "free", ONES, aim="minmax,steps", **more)
         assert rest.status == whole.status == "optimal"
         assert rest.steps[0].number == 4
-    budget = seqopt.optimize(scene, "free", ONES, aim="minmax", begin=begin, budgets="steps=9")
+    budget = seqopt.optimize(scene, "free", ONES, aim="minmax", rules=rules, budgets="steps=9")
     assert len(budget.steps) <= 9
 
 

@@ -190,7 +190,7 @@ def test_bases_of_arms_that_give_way_are_all_solved(scene):
         own = {"position": base.position, "x_axis": base.x_axis, "y_axis": base.y_axis}
         there = soft.with_robots(soft.robots[0], replace(soft.robots[1], arm=replace(moved, **own)))
         try:
-            plan = seqopt.optimize(there, "free", aim="D_max", least_grips=1)
+            plan = seqopt.optimize(there, "free", aim="D_max", rules="least_grips=1")
         except InfeasibleError:
             continue
         values.append(plan.objective["D_max"])

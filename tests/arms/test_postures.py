@@ -181,17 +181,17 @@ def test_no_step_of_a_plan_has_a_contact(schedule, scene, table, witness):
 
 def test_the_judge_finds_a_search_that_forgets_arms(tight, monkeypatch):
     pair = tight.with_robots(*tight.robots[:2])
-    assert seqopt.optimize(pair, "free", aim="minmax", least_grips=1).arms.best
+    assert seqopt.optimize(pair, "free", aim="minmax", rules="least_grips=1").arms.best
     monkeypatch.setattr(StateRows, "for_arms", lambda self, n, rows: np.ones(len(rows), bool))
     with pytest.raises(StepError, match="arms cannot hold"):
-        seqopt.optimize(pair, "free", aim="minmax", least_grips=1)
+        seqopt.optimize(pair, "free", aim="minmax", rules="least_grips=1")
 
 
 def test_the_judge_finds_a_search_that_allows_arms_too_little(scene, monkeypatch):
     never_both = lambda self, n, rows: ~(rows[:, :2] > 0).all(axis=1)  # noqa: E731
     monkeypatch.setattr(StateRows, "for_arms", never_both)
     with pytest.raises(InfeasibleError, match="claimed by schedule_search, and not proven"):
-        seqopt.optimize(scene.with_robots(*scene.robots[:2]), "free", least_grips=1)
+        seqopt.optimize(scene.with_robots(*scene.robots[:2]), "free", rules="least_grips=1")
 
 
 def test_steps_are_checked_by_themselves(scene):
@@ -245,7 +245,7 @@ def test_given_steps_say_who_is_in_the_way(tight):
 def test_no_plan_is_said_where_arms_reach_nothing(scene):
     far = hostile(scene.with_robots(*scene.robots[:2]))
     with pytest.raises(InfeasibleError, match=r"brick 1 .* with arms that reach more, or stand"):
-        seqopt.optimize(far, "free", aim="steps", least_grips=1)
+        seqopt.optimize(far, "free", aim="steps", rules="least_grips=1")
 
 
 def test_no_plan_is_said_where_arms_are_in_each_others_way():
@@ -255,14 +255,14 @@ def test_no_plan_is_said_where_arms_are_in_each_others_way():
     with pytest.raises(
         InfeasibleError, match=r"newest=free \(--rule newest=free\) or arms that are out of each"
     ) as error:
-        seqopt.optimize(both, "free", aim="steps", least_grips=1)
+        seqopt.optimize(both, "free", aim="steps", rules="least_grips=1")
     assert "reach more" not in str(error.value)
     apart = [replace(r, arm=replace(r.arm, keeps_apart=False)) for r in both.robots]
     alone = find_postures(both.with_robots(*apart))
     assert find_postures(both).collide.any()
     assert not alone.collide.any()
     assert (alone.found == find_postures(both).found).all()
-    plan = seqopt.optimize(both.with_robots(*apart), "free", aim="steps", least_grips=1)
+    plan = seqopt.optimize(both.with_robots(*apart), "free", aim="steps", rules="least_grips=1")
     assert plan.steps  # the control: what is said to help does
 
 

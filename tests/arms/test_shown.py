@@ -36,7 +36,7 @@ pytest.importorskip("compas_fab")
 
 @pytest.fixture(scope="module")
 def plan():
-    return seqopt.optimize(two_arms(), "free", aim="minmax", least_grips=1)
+    return seqopt.optimize(two_arms(), "free", aim="minmax", rules="least_grips=1")
 
 
 def test_tasks_have_the_joints_and_the_tool_of_the_posture(plan):

@@ -187,7 +187,7 @@ LONG = (pytest.mark.slow, pytest.mark.long)
 )
 def test_free_schedules_agree_with_brute_force(aim, size):
     scene = soft(*size)
-    plan = seqopt.optimize(scene, "free", FORCE, aim=aim, least_grips=1)
+    plan = seqopt.optimize(scene, "free", FORCE, aim=aim, rules="least_grips=1")
     assert plan.status == "optimal"
     assert plan.objective[aim] == pytest.approx(brute_force(scene, aim), rel=1e-8)
 
@@ -298,13 +298,20 @@ def test_orders_are_searched_with_arms_that_give_way():
 @pytest.mark.long
 def test_workers_and_scenarios_hold_in_the_same_postures():
     scene = soft()
-    alone, shared = (seqopt.optimize(scene, "free", FORCE, workers=n) for n in (1, 2))
+    alone, shared = (
+        seqopt.optimize(scene, "free", FORCE, search=seqopt.Search(workers=n)) for n in (1, 2)
+    )
     assert alone.objective == shared.objective
     drawn = seqopt.scenarios(scene, count=2).with_grips((0.2, 0.5)).scenes
-    plans = [seqopt.optimize(scene, "free", FORCE, scenarios=drawn, workers=n) for n in (1, 2)]
+    plans = [
+        seqopt.optimize(scene, "free", FORCE, scenarios=drawn, search=seqopt.Search(workers=n))
+        for n in (1, 2)
+    ]
     assert plans[0].status == "optimal"
     assert plans[0].objective == plans[1].objective
-    loop = seqopt.optimize(scene, "three-robot", FORCE, "minimax", scenarios=drawn, workers=2)
+    loop = seqopt.optimize(
+        scene, "three-robot", FORCE, "minimax", scenarios=drawn, search=seqopt.Search(workers=2)
+    )
     assert np.isfinite([*loop.objective.values()]).all()
 
 

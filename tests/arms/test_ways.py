@@ -100,7 +100,7 @@ def test_checked_ways_leave_fewer_postures_and_less_room(scenes, tables):
     assert (checked.found <= without.found).all()
     assert checked.found.sum() < without.found.sum()
     assert len(checked.robot)
-    plan = seqopt.optimize(scenes[1], "free", aim="minmax", least_grips=1)
+    plan = seqopt.optimize(scenes[1], "free", aim="minmax", rules="least_grips=1")
     assert plan.arms.best
     assert not plan.arms.postures.unreached
 

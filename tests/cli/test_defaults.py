@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from dataclasses import replace
 
 import pytest
 
 import seqopt
+from seqopt import doors
+from seqopt._cli.arguments import COMMANDS
 from seqopt._cli.main import main
 from seqopt.scene.scene_file import save_scene
 from seqopt.work.progress import Stage
 from tests.builders import anywhere, small_arch
 
+DURATIONS = "fetch=30,place=10,approach=10,grip=7,release=5"
 UNLIKE = ("seconds", "models_paper_count", "stability")  # of one run, or added by the command
 
 
@@ -106,7 +110,7 @@ def test_a_chain_that_opens_its_joints_has_a_plan_in_python_too():
 
 def test_compare_in_python_is_the_command(capsys, arch):
     found = answered(capsys, "compare", arch, "--no-stability", "--criteria", "worst-ratio")
-    same = seqopt.compare(arch, no_stability=True, criterion="worst-ratio")
+    same = seqopt.compare(arch, stability=False, criterion="worst-ratio")
     assert [row["name"] for row in found["rows"]] == [*same.table.index]
     assert [row["F_rob"] for row in found["rows"]] == [*same.table["F_rob"]]
 
@@ -114,7 +118,7 @@ def test_compare_in_python_is_the_command(capsys, arch):
 def test_pareto_in_python_is_the_command(capsys, arch, tmp_path):
     words = ("--aim", "F_largest,steps", "--rule", "least_grips=1")
     found = answered(capsys, "pareto", arch, *words)["points"]
-    same = seqopt.pareto(seqopt.load_scene(arch), aim="F_largest,steps", least_grips=1)
+    same = seqopt.pareto(seqopt.load_scene(arch), aim="F_largest,steps", rules="least_grips=1")
     assert [row["F_largest"] for row in found] == [*same.table["F_largest"]]
     seqopt.pareto(
         arch, aim="F_largest,M_sup", limits=[seqopt.Limit("F_largest", 1e6)], out=tmp_path / "set"
@@ -141,12 +145,21 @@ def test_replan_in_python_is_the_command(capsys, arch, tmp_path):
     words = ("--at", "4", "--lost", "rob3", "--rule", "least_grips=1")
     found = answered(capsys, "replan", tmp_path / "p", *words)
     for built in (plan, tmp_path / "p"):
-        same = seqopt.replan(built, at=4, lost=["rob3"], least_grips=1)
+        same = seqopt.replan(built, at=4, lost=["rob3"], rules="least_grips=1")
         assert [row["step"] for row in found["plan"]] == [step.number for step in same.steps]
 
 
-def test_a_word_that_python_does_not_know_names_those_that_it_does():
-    with pytest.raises(seqopt.SeqoptError, match=r"^pareto has no 'aims' \(did you mean aim\?\)"):
+def test_every_command_has_a_function_of_python():
+    """Those that describe a scene, read one or look a move up have values that do the same."""
+    assert {*doors.__all__} == COMMANDS.keys() - {"next", "scene", "import", "completion"}
+    for name in doors.__all__:
+        taken = inspect.signature(getattr(doors, name)).parameters.values()
+        assert all(each.kind is not each.VAR_KEYWORD for each in taken), name
+        assert len(taken) <= 20, name
+
+
+def test_a_word_that_python_does_not_know_is_refused():
+    with pytest.raises(TypeError, match="aims"):
         seqopt.pareto("arch25", aims="D_max")
     with pytest.raises(seqopt.SeqoptError, match=r"^engine 'complianc' does not exist .*give "):
         seqopt.pareto("arch25", engine="complianc")
@@ -154,7 +167,39 @@ def test_a_word_that_python_does_not_know_names_those_that_it_does():
         seqopt.assess("arch26")
 
 
+def test_tables_of_python_are_those_of_the_command(capsys, arch):
+    rows = answered(capsys, "analyze", arch, "--method", "cantilever")["steps"]
+    table = doors.analyze(arch, method="cantilever")
+    assert [row["F_max_N"] for row in rows] == [*table["F_max_N"]]
+    spent = answered(capsys, "times", arch, "--method", "cantilever", "--durations", DURATIONS)
+    table = doors.times(arch, method="cantilever", durations=DURATIONS)
+    assert [row["end_s"] for row in spent["steps"]] == [*table["end_s"]]
+    reached = answered(capsys, "reach", arch)["reach"]
+    assert [row["reached"] for row in reached] == [*doors.reach(arch)["reached"]]
+
+
+def test_what_commands_write_python_gives(capsys, arch, tmp_path):
+    blocks = answered(capsys, "export", arch, "--format", "csv")["text"]
+    assert doors.export(arch) == doors.export(arch, out=tmp_path / "blocks.csv") == blocks
+    facts = answered(capsys, "instance", arch, "--schedule", "free", "--out", tmp_path / "a.npz")
+    facts = {name: facts[name] for name in ("nodes", "arcs")}
+    found = doors.instance(arch, schedule="free", out=tmp_path / "b.npz")
+    assert json.loads(json.dumps(found.facts_of(), default=str)).items() >= facts.items()
+    assert (tmp_path / "b.npz").is_file()
+    (page,) = doors.report(arch, out=tmp_path / "page.html", stability=False)
+    assert page.is_file()
+
+
+def test_one_grammar_reads_rules(arch):
+    rules = seqopt.FreeRules(least_grips=1, newest="placing")
+    words = ["least_grips=1", "newest=placing"]
+    plans = [seqopt.optimize(arch, "free", rules=each) for each in (rules, words, words[::-1])]
+    assert all(plan.problem.moves == rules for plan in plans)
+    one, same = (seqopt.pareto(arch, aim="F_largest", rules=each) for each in (rules, words))
+    assert one.steps == same.steps
+
+
 def test_whoever_waits_for_python_is_told(arch):
     told = []
-    seqopt.compare(arch, no_stability=True, progress=told.append)
+    seqopt.compare(arch, stability=False, progress=told.append)
     assert {each.what for each in told if isinstance(each, Stage)} >= {"comparing"}

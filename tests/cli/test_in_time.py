@@ -12,7 +12,7 @@ import pytest
 
 import seqopt
 from seqopt import Prop
-from seqopt._cli.arguments import parser
+from seqopt._cli.arguments import request
 from seqopt._cli.commands import analyze, optimize, pareto, replan
 from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
@@ -35,8 +35,6 @@ def ended(command, words, when, how=KeyboardInterrupt):
 
     As ``how``: an interrupt, or the end of the time, which comes between two instructions too.
     """
-    options = parser(words[0]).parse_args([*map(str, words)])
-    options.words = words
     told = []
 
     def tell(what):
@@ -44,8 +42,8 @@ def ended(command, words, when, how=KeyboardInterrupt):
         if when in told[-1] and sum(when in each for each in told) == 1:
             raise how
 
-    options.tell = tell
-    answer = command.run(options)
+    _, asked = request([*map(str, words)], tell)
+    answer = command.run(asked)
     assert any(when in each for each in told)
     return answer
 

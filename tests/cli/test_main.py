@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from seqopt._cli.arguments import parser
+from seqopt._cli.arguments import request
 from seqopt._cli.commands import analyze as analyze_command
 from seqopt._cli.main import main
 from seqopt.responses.table import analyze, step_fields
@@ -160,9 +160,8 @@ def ends_in_step(number, how=TimeoutError):
 def test_a_time_limit_of_analyze_leaves_the_rows_so_far(tmp_path):
     path, fields = tmp_path / "rows.csv", tmp_path / "fields.npz"
     words = ["analyze", "--method", "cantilever", "--out", str(path), "--fields", str(fields)]
-    options = parser("analyze").parse_args([*words, "--time-limit", "1e9"])
-    options.tell = ends_in_step(4)
-    answer = analyze_command.run(options)
+    _, asked = request([*words, "--time-limit", "1e9"], ends_in_step(4))
+    answer = analyze_command.run(asked)
     assert answer.status == 4
     assert answer.failures == (
         "seqopt: error: --time-limit 1e9: 3 of 49 steps computed; give more seconds",
@@ -177,9 +176,9 @@ def test_an_interrupt_of_analyze_leaves_the_rows_so_far(tmp_path):
     """Dry steps take discrete elements, and it is said that these take long."""
     path = tmp_path / "rows.csv"
     words = ["analyze", "wall:columns=2,courses=2", "--method", "sequential", "--out", str(path)]
-    options = parser("analyze").parse_args([*words, "--engine", "auto", "--mortar", "dry"])
-    options.tell = ends_in_step(3, KeyboardInterrupt)
-    answer = analyze_command.run(options)
+    tell = ends_in_step(3, KeyboardInterrupt)
+    _, asked = request([*words, "--engine", "auto", "--mortar", "dry"], tell)
+    answer = analyze_command.run(asked)
     assert answer.status == 130
     (said,) = answer.failures
     assert said.startswith("seqopt: interrupted; 2 of ")

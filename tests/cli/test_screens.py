@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 
-from seqopt._cli import screens
-from seqopt._cli.arguments import COMMANDS, parser
+from seqopt._cli import arguments
+from seqopt._cli.arguments import COMMANDS, LINES, first_screen, parser
 from seqopt._cli.main import main
-from seqopt._cli.screens import LINES, first_screen, question
+from seqopt._cli.options import Asked, word
+from seqopt._cli.signatures import fill, given, page_of
+from seqopt.errors import ProblemError
+
+WRITTEN = "What is written and printed?"
 
 
 @pytest.fixture
@@ -51,7 +57,7 @@ def test_help_fits_one_screen_and_shows_examples(printed, name):
     assert max(map(len, out.splitlines())) <= 80
     assert all(text.count("(") == text.count(")") for text in out.split("\n\n"))
     if name:
-        for example in COMMANDS[name].load().EXAMPLES:
+        for example in page_of(COMMANDS[name].asked).lines["Examples"]:
             assert f"\n  {example}\n" in out
 
 
@@ -76,7 +82,11 @@ def test_the_screen_has_what_must_be_given_and_what_examples_use(printed, name):
     for action in command._actions:
         if action.required and action.option_strings:
             assert action.option_strings[0] in shown
-    used = {word for example in COMMANDS[name].load().EXAMPLES for word in example.split()}
+    used = {
+        word
+        for example in page_of(COMMANDS[name].asked).lines["Examples"]
+        for word in example.split()
+    }
     assert {word for word in used if word in flags(command)} <= {*shown}
     if "--help-all has" in out:
         more = int(out.rpartition("--help-all has ")[2].split()[0])
@@ -90,18 +100,86 @@ def test_what_one_needs_first_of_optimize(printed):
     assert {"SCENE", "--schedule", "--aim", "--criteria", "--stands", "--out"} <= {*shown}
 
 
-def test_a_question_is_asked_once(monkeypatch):
+@dataclass(frozen=True, kw_only=True)
+class Reasoned(Asked):
+    """Why?
+
+    One or the other.
+
+    reason : WORD
+        what for; and more
+    needed : CHOICE
+        this; and this of {choices}
+    often : N
+        how often
+    """
+
+    reason: str | None = None
+    needed: str = word(choices=("a", "b"))
+    often: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Excused(Reasoned):
+    """Give an excuse.
+
+    How?
+    loud :
+        louder
+
+    Why?
+    excuse : FILE
+        where it is
+
+    Examples
+    --------
+    seqopt excuse --loud
+    """
+
+    loud: bool = False
+    excuse: Path | None = None
+
+
+@pytest.fixture
+def excused():
+    """The parser of a command that is made of classes."""
     command = argparse.ArgumentParser()
-    first = question(command, "Why?", "One or the other.")
-    assert question(command, "Why?") is first
-    assert question(command, "How?") is not first
-    monkeypatch.setattr(screens, "LINES", 0)  # a screen is too small for anything
-    first.add_argument("--reason", help="what for; and more")
-    first.add_argument("--needed", required=True, help="this; and this")
-    text = first_screen(command)
+    fill(command, Excused)
+    return command
+
+
+def test_a_question_is_asked_once(excused, monkeypatch):
+    titles = [group.title for group in excused._action_groups]
+    assert titles == ["positional arguments", "options", "Why?", "How?", WRITTEN]
+    why = next(group for group in excused._action_groups if group.title == "Why?")
+    assert why.description == "One or the other."
+    assert [a.dest for a in why._group_actions] == ["reason", "needed", "often", "excuse"]
+    monkeypatch.setattr(arguments, "LINES", 0)  # a screen is too small for anything
+    text = first_screen(excused)
     assert "this" in text
+    assert "--loud" in text
     assert "--reason" not in text
     assert "and this" not in text
+
+
+def test_fields_say_how_options_are_read(excused, capsys):
+    found = excused.parse_args(
+        ["--needed", "a", "--often", "1", "--often", "2", "--excuse", "x", "--loud"]
+    )
+    assert (found.needed, found.often, found.excuse) == ("a", ["1", "2"], Path("x"))
+    assert (found.loud, found.reason, found.json) == (True, None, False)
+    for wrong in ("", "--needed c", "--needed a --json --quiet"):
+        with pytest.raises(SystemExit):
+            excused.parse_args(wrong.split())
+    assert capsys.readouterr().err
+
+
+def test_values_of_python_are_the_same_words():
+    found = given(Excused, {"needed": "a", "often": 2, "excuse": "x", "reason": [1, 2.5]})
+    assert (found.often, found.excuse, found.reason) == (("2",), Path("x"), "1,2.5")
+    assert given(Excused, {"needed": "a", "often": [1, 2]}).often == ("1", "2")
+    with pytest.raises(ProblemError, match=r"^needed 'c' does not exist; give a, b$"):
+        given(Excused, {"needed": "c"})
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import seqopt
 from seqopt._cli.arguments import COMMANDS, EXAMPLES, parser
 from seqopt._cli.commands.completion import _commands
 from seqopt._cli.main import main
+from seqopt._cli.signatures import page_of
 from tests.builders import ROOT
 
 
@@ -96,9 +97,9 @@ def test_a_missing_argument_is_named_where_nothing_is_mistyped(capsys):
 
 def test_every_example_of_help_can_be_parsed():
     for name, command in COMMANDS.items():
-        module = command.load()
-        assert len(module.EXAMPLES) >= 1
-        for example in module.EXAMPLES:
+        examples = page_of(command.asked).lines["Examples"]
+        assert len(examples) >= 1
+        for example in examples:
             if name != "completion":  # whose examples are lines of a shell
                 assert parser().parse_args(example.split()[1:]).command == name
 

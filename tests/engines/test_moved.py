@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seqopt.engines._hands import read_hands
+from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.registry import ENGINES
@@ -67,7 +67,7 @@ def test_engines_agree(engine):
     net = engine.network
     moved = in_plane(net, drawn(SETS, 1e-8))
     columns = grip_columns(net, 6, SETS)
-    direct = solve_dense(net, 6, columns, read_hands(net, columns, SETS, moved))
+    direct = solve_dense(net, 6, columns, read_compliance(net, columns, SETS, moved))
     assert apart(engine.solve(6, SETS, Want.ALL, moved), direct) <= 1e-5
     assert apart(engine.solve(6, SETS, Want.ALL), direct) > 1e-3  # the measure can fail
 
@@ -120,7 +120,7 @@ def test_what_is_corrected_moves_too(arch25, kind):
     net = build_network(scenes[kind])
     sets = [(36, 37, 39), (34, 36, 39), (25, 31, 38), (26, 27, 37)]
     moved, columns = drawn(sets, 4e-4), grip_columns(net, 20, sets)
-    exact = solve_mixed(net, 20, columns, read_hands(net, columns, sets, moved))
+    exact = solve_mixed(net, 20, columns, read_compliance(net, columns, sets, moved))
     assert apart(ComplianceEngine(net).solve(20, sets, Want.ALL, moved), exact) <= 1e-9
     assert apart(ComplianceEngine(net).solve(20, sets, Want.ALL), exact) > 1e-3
 

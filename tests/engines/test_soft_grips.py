@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.engines._hands import read_hands
+from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.registry import Recipe, make_engine
@@ -155,7 +155,7 @@ def test_some_are_rigid(arch25, ways, grips):
     scene, bricks = robots(scene, *ways), 20
     net, numbers = build_network(scene), np.array([scene.grip_numbers(grips)])
     columns = grip_columns(net, bricks, numbers)
-    sure = solve_mixed(net, bricks, columns, read_hands(net, columns, numbers, None))
+    sure = solve_mixed(net, bricks, columns, read_compliance(net, columns, numbers, None))
     engine = ComplianceEngine(net)
     assert apart(engine.solve(bricks, numbers, Want.ALL), sure) <= 1e-9
     strong = make_engine("discrete", net, "bond=1e12")
@@ -206,7 +206,7 @@ def test_two_on_one_brick_share_by_their_stiffness(arch25):
         first, second = force @ axis
         assert second == pytest.approx(3 * first, rel=1e-9)
         columns = grip_columns(net, 18, [grips])
-        sure = solve_mixed(net, 18, columns, read_hands(net, columns, [grips], None))
+        sure = solve_mixed(net, 18, columns, read_compliance(net, columns, [grips], None))
         assert force == pytest.approx(sure.grip_force[0], rel=1e-9, abs=1e-7)
 
 

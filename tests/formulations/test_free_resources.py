@@ -17,7 +17,8 @@ AIM = "minmax,steps"
 
 
 def solved(schedule="free", **means):
-    return seqopt.optimize(small_arch(5), schedule, ONES, aim=AIM, **means)
+    search = seqopt.Search(**means)
+    return seqopt.optimize(small_arch(5), schedule, ONES, aim=AIM, search=search)
 
 
 @pytest.mark.parametrize("schedule", ["free", "three-robot"])

@@ -13,6 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import seqopt
+from seqopt import Search
 from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines._auto import AutoEngine, Level
@@ -444,12 +445,16 @@ def test_the_short_cut_does_what_the_long_way_does():
         ({"criterion": "equations-2-3"}, "equations-2-3: it ranks the choices of a move"),
         ({"formulation": "overlap_mip"}, "overlap_mip: a largest cost is no sum; take"),
         ({"formulation": "pareto_zones"}, "states of a build are asked for; use .*schedule_search"),
-        ({"workers": 0}, "workers is 0; give a whole number from 1"),
+        ({"search": Search(workers=0)}, "workers is 0; give a whole number from 1"),
         ({"rules": {"regrips": 0}}, "rules {'regrips': 0}: give a seqopt.FreeRules"),
+        ({"rules": "regrip=0"}, r"rules regrip=0 does not exist \(did you mean regrips\?\)"),
         ({"robots": 9}, "9 robots: the free schedule takes one to 5"),
         ({"robots": "rob9"}, "robot 'rob9' does not exist; give some of rob1"),
-        ({"width": 3, "depth": 1}, "option depth: schedule_search has width"),
-        ({"schedule": "loop", "newest": "free"}, "option newest: only the free schedule has it"),
+        (
+            {"search": Search(options={"width": 3, "depth": 1})},
+            "option depth: schedule_search has width",
+        ),
+        ({"schedule": "loop", "rules": "newest=free"}, "rules: only the free schedule has them"),
     ],
 )
 def test_the_short_cut_says_in_a_line_what_does_not_fit(words, said):

@@ -27,7 +27,6 @@ from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import NARROW, Standing, StandingSets, _without_implied, slack
 from seqopt.responses.quantities import CHOSEN_BY, lengths
-from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.stability._margins import Margins
@@ -35,6 +34,7 @@ from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import GAP
 from tests.builders import small_arch
+from tests.plain_rules import PlainBook
 from tests.strategies import free_builds
 
 slow, long = pytest.mark.slow, (pytest.mark.slow, pytest.mark.long)
@@ -65,7 +65,7 @@ def stands(network, bricks, grips, mortar):
 
 def brute_force(engine, rules, mortar):
     """The least peak of all plans whose states stand, by every state that can be reached."""
-    book = RuleBook(engine.network, rules)
+    book = PlainBook(engine.network, rules)
     start = (0, (None,) * len(engine.network.scene.robots), 0)
     graph, work = nx.DiGraph(), [start]
     graph.add_node(start, worth=0.0)

@@ -15,8 +15,8 @@ from seqopt.judge._rule_moves import RuleTables
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
-from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.steps import StepKind
+from tests.plain_rules import PlainBook
 from tests.strategies import free_builds
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
@@ -42,7 +42,7 @@ def told(book, tables, bricks, state):
 def test_tables_say_what_the_book_says(build, data):
     """All states that rules lead to, robots that could change places told apart."""
     scene, rules = build
-    book = RuleBook(build_network(scene), rules)
+    book = PlainBook(build_network(scene), rules)
     tables = RuleTables(book, [])
     reached = {(0, tuple(tables.start()[0].tolist()))}
     work = [*reached]
@@ -52,7 +52,7 @@ def test_tables_say_what_the_book_says(build, data):
         states = np.array([row], dtype=np.int32)
         found = {
             (follows.level, tuple(after), follows.regrip)
-            for follows in tables.follow(bricks, states)
+            for follows in tables.successors(bricks, states)
             for after in follows.states.tolist()
         }
         assert found == expected

@@ -15,7 +15,7 @@ from seqopt.errors import SolverError
 from seqopt.graph import Explorer
 from seqopt.graph.layers._partial_costs import PartialCosts
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.orders import AllOrders, OrderStates
+from seqopt.graph.orders import AllOrders, OrderStates, whole_bound
 from seqopt.graph.paths import keep_best, least_peak
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import explore, floors_of_goals
@@ -23,17 +23,18 @@ from seqopt.graph.states.states import build_states
 from seqopt.judge import _budget_proof as budget_proof
 from seqopt.judge._budget_proof import case_of, least_within
 from seqopt.judge._orders import finds_better_order
-from seqopt.judge._proof import Passable, Proof
+from seqopt.judge._proof import Proof
+from seqopt.judge._states import StateEvaluator
 from seqopt.judge.certificate import TOLERANCE, certify_partial
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
-from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Ending, FreeRules, with_robots
 from tests.builders import small_arch
 from tests.layered import Costs
+from tests.plain_rules import PlainBook
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 FREE_RULES = FreeRules()
@@ -46,7 +47,7 @@ def posed(aim, scene=None, limits=(), count=5, rules=FREE_RULES):
 
 def states_below(problem, bound, join):
     """How many states plans may pass whose values, joined, are within a bound: in plain words."""
-    book, engine = RuleBook(problem.network, problem.rules), problem.engine
+    book, engine = PlainBook(problem.network, problem.rules), problem.engine
     work = [(0.0, 0, 0, (None,) * len(problem.network.scene.robots))]
     done, values, pushed = set(), {}, 0
     while work:
@@ -85,7 +86,7 @@ def test_what_all_plans_have_in_common_bounds_every_path(ending, robots, regrips
     rules = FreeRules(ending=ending, regrips=regrips, least_grips=1)
     problem = posed("minmax,steps", with_robots(small_arch(5), robots), rules=rules)
     floors = floors_of_goals(problem)
-    assert Passable(problem).least() == pytest.approx(floors, rel=1e-12)
+    assert StateEvaluator(problem).least() == pytest.approx(floors, rel=1e-12)
     graph = explore(problem).graph().graph
     assert least_peak(graph, 0) >= floors[0] * (1 - 1e-12)
     fewest = keep_best(graph, 1)[1]
@@ -182,6 +183,18 @@ def test_what_was_left_out_for_a_threshold_bounds_all_orders():
     assert finds_better_order(problem, best) is False
     assert finds_better_order(problem, best * 1.01)
     assert finds_better_order(problem, best * 1.01, most=3) is None  # the whole arch is below that
+
+
+def test_a_soft_first_robot_does_not_raise_the_bound_of_the_whole():
+    """The judge took all grips for those of the first robot; stiffer ones hold better."""
+    scene, held = small_arch(3), FreeRules(ending=Ending.HELD)
+    soft = replace(scene.robots[0], stiffness=(1e5,) * 3)
+    softer = replace(scene, robots=(soft, *scene.robots[1:]))
+    problem, alike = (AllOrders(posed("D_max", each, rules=held)) for each in (softer, scene))
+    best = seqopt.solve(problem).order.selection.objective
+    assert finds_better_order(problem, best) is False
+    assert finds_better_order(problem, best * 1.01)
+    assert whole_bound(problem) == pytest.approx(whole_bound(alike))  # two can hold it alone
 
 
 def test_a_plan_with_more_regrips_is_found_within_the_same_peak():

@@ -12,7 +12,7 @@ import pytest
 import seqopt
 from seqopt.engines._kinds import linear_limit
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError, TimeUpError
-from seqopt.judge._shape_rules import check_shape
+from seqopt.judge._step_checks import check_shape
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._range import NONE_KEEPS, UNKNOWN, keeping
 from seqopt.plan._status import Status

@@ -25,7 +25,8 @@ def test_a_limit_that_a_fixed_step_exceeds_is_infeasible(arch25):
         seqopt.optimize(arch25, limits=[seqopt.Limit("F_largest", 20.0)])
     with pytest.raises(InfeasibleError, match="no grip is left to choose"):
         seqopt.optimize(
-            arch25, "modified-sequential", formulation="cascade", proof=False,
+            arch25, "modified-sequential", formulation="cascade",
+            search=seqopt.Search(proof=False),
             limits=payload_limits(weak(arch25, 150.0)),
         )  # fmt: skip
 

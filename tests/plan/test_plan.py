@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import seqopt
+from seqopt import Search
 from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError, StepError
 from seqopt.graph.formulation import FormulationKind, On
@@ -157,9 +158,13 @@ def test_the_short_cut_does_what_the_long_way_does(arch25, engine25):
         ({"schedule": "ring"}, StepError, "give one of three-robot, modified-sequential"),
         ({"criterion": "ranks"}, ProblemError, "give one of equations-2-3"),
         ({"formulation": "dp"}, ProblemError, "give one of beam, best_first, cascade"),
-        ({"width": 3}, ProblemError, "option width: overlap_dp has seconds, max_memory"),
         (
-            {"formulation": "beam", "horizon": 3},
+            {"search": Search(options={"width": 3})},
+            ProblemError,
+            "option width: overlap_dp has seconds, max_memory",
+        ),
+        (
+            {"formulation": "beam", "search": Search(options={"horizon": 3})},
             ProblemError,
             "option horizon: beam has seconds, max_memory",
         ),
@@ -185,7 +190,7 @@ def test_every_plan_has_one_summary():
     scene, ones = small_arch(5), seqopt.CRITERIA["worst-ratio"]
     plans = [
         seqopt.optimize(scene, criterion=ones),
-        seqopt.optimize(scene, criterion=ones, formulation="cascade", proof=False),
+        seqopt.optimize(scene, criterion=ones, formulation="cascade", search=Search(proof=False)),
         seqopt.optimize(scene, criterion=ones, formulation="path_dp"),
         seqopt.optimize(scene, "free"),
         seqopt.optimize(scene, criterion=ones, scenarios=seqopt.scenarios(scene, count=2)),

@@ -13,12 +13,12 @@ import seqopt
 from seqopt import Prop
 from seqopt.errors import InfeasibleError, SolverError, StepError
 from seqopt.judge._proof import Proof
-from seqopt.judge._prop_rules import check_props, props_that_hold
+from seqopt.judge._rule_moves import check_free
+from seqopt.judge._step_checks import check_props, props_that_hold
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.plan.solving import states_of
 from seqopt.responses.quantities import PROP_EXCESS
-from seqopt.sequence._rule_check import check_free
 from tests.brute_force import ONES, best_values
 from tests.builders import small_arch
 

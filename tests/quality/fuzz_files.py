@@ -21,7 +21,7 @@ import numpy as np
 import seqopt
 from seqopt._cli.commands.assess import Rows
 from seqopt._cli.commands.replan import _told
-from seqopt._cli.words.bases import asked_places
+from seqopt.arms._base_words import asked_places
 from seqopt.arms._postures import PostureTable
 from seqopt.arms._reached import Site as ArmSite
 from seqopt.arms._tables import _read as read_postures

@@ -13,7 +13,7 @@ from seqopt.engines.registry import make_engine
 from seqopt.responses import _blocks as batches
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import HERE, Resources
-from seqopt.workflow import optimize
+from seqopt.workflow import Search, optimize
 
 distributed = pytest.importorskip("distributed", reason="extra dask")
 
@@ -49,7 +49,7 @@ def test_results_are_the_same_on_a_cluster(client, loop25, expected):
 
 
 def test_a_whole_optimization_runs_on_a_cluster(client):
-    plan = optimize("arch25", executor=client.get_executor())
+    plan = optimize("arch25", search=Search(executor=client.get_executor()))
     assert plan.nodes == optimize("arch25").nodes
 
 

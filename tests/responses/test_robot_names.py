@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt._cli.main import main
-from seqopt._cli.values import parse_criterion
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import candidate_layers, steps_over
 from seqopt.network.build import build_network
@@ -26,7 +25,7 @@ from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.published import EQUATIONS, WORST_RATIO
+from seqopt.study.published import EQUATIONS, WORST_RATIO, find_criterion
 from tests.builders import six_bricks
 
 NAMES = [
@@ -137,7 +136,7 @@ def test_names_as_they_were(name):
 def test_words_of_the_command_line(name):
     text = robot_response(name)
     assert parse_limits([f"{text}=300"], six_bricks()) == (Limit(text, 300.0),)
-    criterion = parse_criterion(f"T_max,{text}=2,M_sup")
+    criterion = find_criterion(f"T_max,{text}=2,M_sup")
     assert criterion.before == (("T_max", 1.0), (text, 2.0), ("M_sup", 1.0))
 
 

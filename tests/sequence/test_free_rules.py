@@ -8,13 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt.errors import StepError
+from seqopt.judge._rule_moves import check_free
 from seqopt.network.build import build_network
 from seqopt.sequence._robot_kinds import node_numbers, sort_robots
-from seqopt.sequence._rule_check import RuleBook, check_free
 from seqopt.sequence._rule_space import free_space
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.steps import Step, StepKind
 from tests.builders import small_arch
+from tests.plain_rules import PlainBook
 from tests.strategies import free_builds
 
 
@@ -112,7 +113,7 @@ def all_of_space(space):
 
 def all_of_book(network, rules):
     """The same by plain rules, one state after the other, robots of one kind as a set."""
-    book, kinds = RuleBook(network, rules), sort_robots(network, rules)
+    book, kinds = PlainBook(network, rules), sort_robots(network, rules)
 
     def name(bricks, grips, regrips):
         held = tuple(frozenset(grips[r] for r in k.robots if grips[r] is not None) for k in kinds)
@@ -173,6 +174,9 @@ def test_a_sequence_that_breaks_a_rule_is_seen():
         check_free(network, FreeRules(), steps_of(*begun))
     with pytest.raises(StepError, match="no rule allows it"):
         check_free(network, FreeRules(placers=("rob2", "rob3")), steps_of(*begun))
+    own = FreeRules(robots=("rob2", "rob3"), newest="free")
+    with pytest.raises(StepError, match=r"step 1 .* no rule allows it"):  # who takes no part holds
+        check_free(network, own, steps_of((place, 1, (first[0], first[1], None))))
 
 
 def test_too_many_states_to_number_are_refused():

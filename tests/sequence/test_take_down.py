@@ -16,16 +16,17 @@ from seqopt.exchange.exports import plan_csv
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import build_states
+from seqopt.judge._rule_moves import check_free
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
 from seqopt.plan.policy import find_policy
 from seqopt.responses import analyze_staged
-from seqopt.sequence._rule_check import RuleBook, check_free
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind, _turned_round, check_sequence
 from tests.brute_force import ONES, allowed
+from tests.plain_rules import PlainBook
 
 ARCH = seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V")
 DOWN = seqopt.FreeRules(direction="take-down")
@@ -259,7 +260,7 @@ def test_searched_states_follow_by_the_book():
     """Every move of the search is one of the rules in plain words."""
     engine = small_wall()
     states = build_states(engine, DOWN, ONES, "minmax")
-    found, book = explore(states), RuleBook(engine.network, states.rules)
+    found, book = explore(states), PlainBook(engine.network, states.rules)
     graph, rows = found.graph()
     space, numbers = (
         states.space,

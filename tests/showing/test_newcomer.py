@@ -41,7 +41,7 @@ def test_own_robots_build_the_same_scene():
     pair = [seqopt.Robot(name=name, payload=300.0, reach=near) for name in ("left", "right")]
     own = scene.with_robots(*pair)
     assert (own.robots, own.bricks) == (tuple(pair), scene.bricks)
-    plan = seqopt.optimize(own, "free", least_grips=1)
+    plan = seqopt.optimize(own, "free", rules="least_grips=1")
     assert set(plan.grips()["robot"]) == {"left", "right"}
     with pytest.raises(seqopt.SeqoptError, match="robots"):
         scene.with_robots("left")
@@ -58,12 +58,12 @@ def test_a_report_shows_plans_side_by_side():
 
 
 def test_rules_can_be_given_one_by_one_or_as_a_value():
-    one = seqopt.optimize("wall:columns=2,courses=2", "free", newest="placing")
+    one = seqopt.optimize("wall:columns=2,courses=2", "free", rules="newest=placing")
     rules = seqopt.FreeRules(newest="placing")
     assert one.steps == seqopt.optimize("wall:columns=2,courses=2", "free", rules=rules).steps
     assert one.problem.moves == rules
-    with pytest.raises(seqopt.SeqoptError, match="option newest: only the free schedule has it"):
-        seqopt.optimize("wall:columns=2,courses=2", newest="placing")
+    with pytest.raises(seqopt.SeqoptError, match="rules: only the free schedule has them"):
+        seqopt.optimize("wall:columns=2,courses=2", rules=rules)
 
 
 def test_a_given_sequence_shows_itself_as_a_plan_does():

@@ -69,9 +69,9 @@ def test_another_process_that_begins_says_the_same(flat, builds, found, monkeypa
     monkeypatch.setattr(_builds, "cores", lambda: 2)
     prover, steps = BuildProver(flat), builds["cantilever"]
     with prover.begun(steps):
-        assert prover._shared["dry"] is not None
+        assert prover._crew is not None
         assert prover.of_builds({"cantilever": steps})["cantilever"] == found["cantilever"]
-    assert not prover._shared
+    assert prover._crew is None
 
 
 @pytest.mark.parametrize(("names", "left"), [(("dry", "epoxy"), True), (("epoxy", "dry"), False)])

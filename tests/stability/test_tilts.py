@@ -15,16 +15,8 @@ from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.stability._margins import Margins
-from seqopt.stability._prover import (
-    _MORE,
-    DIRECTIONS,
-    Prover,
-    in_every_direction,
-    safe_pull,
-    sideways,
-)
+from seqopt.stability._prover import _MORE, DIRECTIONS, Prover, hulls, safe_pull, sideways
 from seqopt.stability._screens import FALLS, STANDS, Screen
-from seqopt.stability._tilted import _hulls
 from seqopt.stability.assessment import Verdict, assess, bonded
 
 UP = (0.0, 0.0, 1.0)
@@ -81,7 +73,7 @@ def test_the_worst_of_eight_directions_is_not_safe():
 def test_what_lies_between_two_pulls_is_on_the_line_between_them():
     angles = np.array([0.0, 1.0, 2.0, 3.5, 5.0])
     pulls = np.array([1.0, 2.0, 1.5, 1.0, 3.0])
-    worst, at = in_every_direction(angles, pulls)
+    (worst,), (at,) = hulls(angles, pulls[None])
     ends = pulls[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     share = np.linspace(0, 1, 2001)[:, None]
     lines = [a + share * (b - a) for a, b in zip(ends, np.roll(ends, -1, axis=0), strict=True)]
@@ -95,9 +87,9 @@ def test_what_lies_between_two_pulls_is_on_the_line_between_them():
 def test_directions_of_which_nothing_is_known_are_left_out():
     angles = 2 * np.pi * np.arange(8) / 8
     some = np.where(np.arange(8) == 2, np.nan, 1.0)
-    assert in_every_direction(angles, some)[0] == pytest.approx(np.sqrt(0.5))
+    assert hulls(angles, some[None])[0] == pytest.approx(np.sqrt(0.5))
     half = np.where(np.arange(8) < 5, 1.0, np.nan)
-    assert np.isnan(in_every_direction(angles, half)).all()
+    assert np.isnan(hulls(angles, half[None])).all()
 
 
 def test_a_tilt_is_proven_by_forces_alone():
@@ -167,8 +159,10 @@ def test_hulls_of_many_are_those_of_each(known):
     for row in survived:
         row[rng.choice(15, min(known, 15), replace=False)] = rng.uniform(0.2, 2.0, min(known, 15))
     angles = 2 * np.pi * np.arange(15) / 15
-    each = np.array([in_every_direction(angles, row) for row in survived])
-    safe, angle = _hulls(survived)
+    there = np.isfinite(survived)
+    pairs = zip(survived, there, strict=True)  # of each alone, without what is not known
+    each = np.array([hulls(angles[own], row[None, own]) for row, own in pairs])[..., 0]
+    safe, angle = hulls(angles, survived)
     np.testing.assert_allclose(safe, each[:, 0], rtol=1e-12)
     np.testing.assert_allclose(np.cos(angle - each[:, 1]), np.where(np.isnan(safe), np.nan, 1.0))
     assert np.isfinite(safe).any() == (known > 2)

@@ -17,7 +17,7 @@ from experiments.harness.scenes import running_bond
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import Contacts, step_assembly
+from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -68,8 +68,7 @@ def random_steps(network, length, seed, most=None):
 
 
 def one_by_one(network, steps, mortar):
-    known = Contacts(network)
-    return tuple(verdict(step_assembly(network, s.bricks, s.grips, known), mortar) for s in steps)
+    return tuple(verdict(step_assembly(network, s.bricks, s.grips), mortar) for s in steps)
 
 
 WHOLE = {name: (scene, None) for name, scene in SCENES.items()} | {
@@ -84,10 +83,10 @@ WHOLE = {name: (scene, None) for name, scene in SCENES.items()} | {
 def test_parts_cut_from_the_whole_are_those_built_alone(name):
     make, most = WHOLE[name]
     network = build_network(make())
-    cut, known = PartialAssemblies(network, most or len(network.inner)), Contacts(network)
+    cut = PartialAssemblies(network, most or len(network.inner))
     for step in random_steps(network, 12, 5, most):
         part = cut(step.bricks, step.grips)
-        alone = step_assembly(network, step.bricks, step.grips, known)
+        alone = step_assembly(network, step.bricks, step.grips)
         assert part == alone
         for own in ("corner_area", "area", "axes", "scales", "stress_scale"):
             np.testing.assert_array_equal(getattr(part, own), getattr(alone, own), own)

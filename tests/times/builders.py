@@ -9,11 +9,11 @@ from itertools import count
 import numpy as np
 
 import seqopt
-from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.steps import StepKind
 from tests.brute_force import ONES, allowed, distance
 from tests.builders import small_arch
+from tests.plain_rules import PlainBook
 
 WORDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 SCALES = np.array([scale for _, scale in ONES.limits])
@@ -46,7 +46,7 @@ def least_makespan(engine, rules=RULES, most=np.inf, regrips=None):
     """
     scene, book, worst = (
         engine.network.scene,
-        RuleBook(engine.network, rules),
+        PlainBook(engine.network, rules),
         worsts(engine, rules),
     )
     robots, tick = scene.robots, count()

@@ -11,9 +11,9 @@ import numpy as np
 from seqopt.contact.curing import _find_curing
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY
-from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict
+from tests.plain_rules import PlainBook
 from tests.times.builders import begun, worsts
 
 
@@ -47,7 +47,7 @@ def least_cured_makespan(engine, rules, words, most=np.inf):
     Nothing is taken for granted of waits: a step is tried at its earliest time and at all later
     ones of the grid, as far as builds that end by a time could do it. Infinite where none does.
     """
-    book, tick = RuleBook(engine.network, rules), count()
+    book, tick = PlainBook(engine.network, rules), count()
     worst, stands = worsts(engine, rules), stands_with(engine.network)
     curing, none = _find_curing(words), (None,) * len(engine.network.scene.robots)
     (first, grips, _), _ = begun(engine.network.scene, rules)

@@ -132,7 +132,7 @@ def test_from_every_step_of_the_arch_the_rest_is_as_good():
     plan = seqopt.optimize(scene, "free", aim="minmax,makespan")
     for count in range(1, len(plan.steps)):
         site = Site.after(plan.steps, count)
-        rest = seqopt.optimize(scene, "free", aim="minmax,makespan", begin=site)
+        rest = seqopt.optimize(scene, "free", aim="minmax,makespan", rules=FreeRules(begin=site))
         own = step_times(scene, plan.steps[count:], begin=site)[-1].end
         assert rest.objective["minmax"] <= plan.objective["minmax"] * (1 + 1e-9)
         assert rest.makespan <= own * (1 + 1e-9)

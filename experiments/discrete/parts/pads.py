@@ -11,7 +11,7 @@ from scipy import sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._hands import Hands
+from seqopt.engines._grip_compliance import GripCompliance
 from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.engines.discrete._equilibrium_path import Held
 from seqopt.engines.discrete._system import System
@@ -54,11 +54,15 @@ class PaddedEngine(DiscreteEngine):
         self._pinch = pinch
 
     def _hold(
-        self, system: System, columns: Ints, hands: Hands | None, springs: list[_Spring]
+        self,
+        system: System,
+        columns: Ints,
+        compliance: GripCompliance | None,
+        springs: list[_Spring],
     ) -> Held:
         if self._pinch is None:
-            return super()._hold(system, columns, hands, springs)
-        far = (hands or Hands()).far(1, len(columns))[0]
+            return super()._hold(system, columns, compliance, springs)
+        far = (compliance or GripCompliance()).offsets(1, len(columns))[0]
         blocks = [sparse.csr_array((6, 6))] * (len(system.load) // 6)
         units, pull = np.outer(system.unit[:6], system.unit[:6]), np.zeros_like(system.load)
         inner = self.network.node_position[self.network.inner.ravel()]

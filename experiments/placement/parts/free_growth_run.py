@@ -19,7 +19,8 @@ ROOM = 1.7e9  # bytes
 def run(bricks: int, robots: int) -> dict[str, object]:
     scene = with_robots(scene_named(f"chain{bricks}"), robots)
     start = time.process_time()
-    plan = seqopt.optimize(scene, "free", engine="compliance", max_memory=ROOM)
+    search = seqopt.Search(max_memory=ROOM)
+    plan = seqopt.optimize(scene, "free", engine="compliance", search=search)
     certificate = plan.certificate
     row = {"bricks": bricks, "robots": robots, "status": plan.status}
     row |= {"worst": plan.selection.objective[0], "bound": plan.selection.bound[0]}

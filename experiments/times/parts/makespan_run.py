@@ -30,8 +30,7 @@ def run(bricks: int, robots: str, formulation: str, seconds: float) -> dict[str,
         CRITERION,
         formulation,
         aim="minmax,makespan",
-        time_limit=seconds,
-        max_memory=ROOM,
+        search=seqopt.Search(time_limit=seconds, max_memory=ROOM),
     )
     spent = time.process_time() - start
     proof = plan.certificate

@@ -2,58 +2,56 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.options import declare, form_options
-from seqopt._cli.screens import question
+from seqopt._cli.options import Asked, word
 from seqopt.errors import SolverError
 from seqopt.graph.instance import Instance
 from seqopt.instances._files import read_instance
 from seqopt.instances.answers import judge_instance
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
-DESCRIPTION = (
-    "Check a path through an instance, and bounds on all others, with arithmetic alone. No scene "
-    "is needed. What is claimed without proof is called claimed. The exit status is 1 if "
-    "something does not hold."
-)
-EXAMPLES = (
-    "seqopt judge arch25.npz mine.txt",
-    "seqopt judge arch25.npz mine.json --bound potentials.json",
-)
+
+@dataclass(frozen=True, kw_only=True)
+class Judge(Asked):
+    """Check a path through an instance, and bounds on all others, with arithmetic alone.
+
+    No scene is needed. What is claimed without proof is called claimed. The exit status is 1 if
+    something does not hold.
+
+    What is judged?
+    instance : INSTANCE
+        file of seqopt instance
+    solution : SOLUTION
+        file with the nodes of a path, or after the word arcs its arcs, after acts its acts: text,
+        CSV or JSON
+    bound : FILE
+        JSON file with a bound for every goal and what proves it: potentials, a cut, prices,
+        weights, shares, labels (default: the judge looks for a proof itself)
+
+    Examples
+    --------
+    seqopt judge arch25.npz mine.txt
+    seqopt judge arch25.npz mine.json --bound potentials.json
+    """
+
+    instance: Path = word(place=True)
+    solution: Path = word(place=True)
+    bound: Path | None = None
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``judge``."""
-    takes = question(command, "What is judged?")
-    takes.add_argument("instance", metavar="INSTANCE", type=Path, help="file of seqopt instance")
-    takes.add_argument(
-        "solution",
-        metavar="SOLUTION",
-        type=Path,
-        help="file with the nodes of a path, or after the word arcs its arcs, after acts its acts: "
-        "text, CSV or JSON",
-    )
-    about = {
-        "--bound FILE": "JSON file with a bound for every goal and what proves it: potentials, a "
-        "cut, prices, weights, shares, labels (default: the judge looks for a proof itself)"
-    }
-    declare(takes, about)
-    form_options(command)
-
-
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Judge) -> Answer:
     """Check a solution, and say what is proven of it."""
-    instance = read_instance(options.instance)
-    bounds = () if options.bound is None else Path(options.bound)
+    instance = read_instance(asked.instance)
+    bounds = () if asked.bound is None else asked.bound
     try:
-        proof = judge_instance(instance, options.solution, bounds)
+        proof = judge_instance(instance, asked.solution, bounds)
     except SolverError as error:
         facts = {**instance.facts_of(), "holds": False, "why": str(error)}
-        failed = f"seqopt: {options.solution}: {error}"
+        failed = f"seqopt: {asked.solution}: {error}"
         return Answer(
             facts=facts, text="it does not hold", failures=(failed,), status=Status.DOES_NOT_HOLD
         )

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import pandas as pd
 
@@ -22,21 +23,8 @@ from seqopt._cli.asked import (
     scene_facts,
     strictly,
 )
-from seqopt._cli.options import (
-    BUILT,
-    CSV_OUT,
-    MOVES,
-    POSTURES,
-    STEPS_USAGE,
-    WRITTEN,
-    declare,
-    engine_options,
-    form_options,
-    scene_options,
-    steps_options,
-)
+from seqopt._cli.options import Computed, Fixed, Postures, Strict, word
 from seqopt._cli.outputs import keep_apart, put_table
-from seqopt._cli.screens import question
 from seqopt._cli.values import parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
@@ -68,86 +56,86 @@ from seqopt.stability.steps import assess_steps
 from seqopt.work._clock import Clock
 from seqopt.work.progress import with_progress
 
-DESCRIPTION = (
-    "Compute how the structure responds in every step of one sequence, and write a table with the "
-    "columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in 0.001 mm."
-)
-USAGE = STEPS_USAGE
-EXAMPLES = (
-    "seqopt analyze arch25 --method cantilever --out cantilever.csv",
-    "seqopt analyze my.json --plan plan.csv --out responses.csv",
-    "seqopt analyze arch25 --method sequential --json",
-)
-
-
 INTERRUPTED = "seqopt: interrupted; the steps are those that were computed"
 UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``analyze``."""
-    scene_options(question(command, BUILT))
-    steps_options(question(command, MOVES))
-    how = engine_options(command)
-    how.add_argument(
-        "--staged",
-        choices=tuple(way.value for way in Placing),
-        help="carry what each step locks in on to the next, instead of analyzing every step from "
-        "scratch: bricks come without stress, fitted to the deformed structure or set down where "
-        "they are planned, and grips close where they find their nodes",
-    )
-    how.add_argument(
-        "--tolerance",
-        nargs="?",
-        const="",
-        metavar="LENGTH",
-        help="also find how far every grip may be from where it should be before a robot carries "
-        "more than its payload, in the worst direction: a column tolerance_mm; of a length, such "
-        "as 0.4mm, also how soft grips must be to be so far off",
-    )
-    about = {
-        "--fields FILE": "also write every edge force, node displacement and reaction, as a NumPy "
-        "archive (.npz)",
-        "--time-limit SECONDS": "limit of the whole command, with what is said of the steps: those "
-        "that were computed by then are written, and what there was no time for is named",
-    }
-    declare(how, POSTURES)
-    declare(question(command, WRITTEN), CSV_OUT | about)
-    form_options(command, strict=True)
+@dataclass(frozen=True, kw_only=True)
+class Analyze(Strict, Postures, Computed, Fixed):
+    """Compute how the structure responds in every step of one sequence, and write a table.
+
+    It has the columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in
+    0.001 mm.
+
+    Usage
+    [SCENE] [--method NAME] [--out FILE] [other options]
+    [SCENE] --plan FILE [--out FILE] [other options]
+    PLAN_DIR [--out FILE] [other options]
+
+    How are responses computed?
+    staged : CHOICE
+        carry what each step locks in on to the next, instead of analyzing every step from scratch:
+        bricks come without stress, fitted to the deformed structure or set down where they are
+        planned, and grips close where they find their nodes
+    tolerance : LENGTH
+        also find how far every grip may be from where it should be before a robot carries more than
+        its payload, in the worst direction: a column tolerance_mm; of a length, such as 0.4mm, also
+        how soft grips must be to be so far off
+
+    What is written and printed?
+    out : FILE
+        CSV file to write (default: standard output)
+    fields : FILE
+        also write every edge force, node displacement and reaction, as a NumPy archive (.npz)
+    time_limit : SECONDS
+        limit of the whole command, with what is said of the steps: those that were computed by then
+        are written, and what there was no time for is named
+
+    Examples
+    --------
+    seqopt analyze arch25 --method cantilever --out cantilever.csv
+    seqopt analyze my.json --plan plan.csv --out responses.csv
+    seqopt analyze arch25 --method sequential --json
+    """
+
+    staged: str | None = word(None, choices=[way.value for way in Placing])
+    tolerance: str | None = word(None, const="")
+    fields: Path | None = None
+    time_limit: str | None = None
 
 
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Analyze) -> Answer:
     """Analyze every step of a sequence."""
-    keep_apart(options, options.out, options.fields)
-    clock, faults = Clock(parse_time_limit(options.time_limit)), dict[int, SeqoptError]()
+    keep_apart(asked, asked.out, asked.fields)
+    clock, faults = Clock(parse_time_limit(asked.time_limit)), dict[int, SeqoptError]()
     with clock.needed("reading scene and steps"):
-        engine, steps = _asked(options)
+        engine, steps = _asked(asked)
     network, within = engine.network, LinearRange(engine)
     scene = network.scene
-    in_time = _InTime(_step_answers(options, within, steps), clock)
+    in_time = _InTime(_step_answers(asked, within, steps), clock)
     solved = _solved(engine, in_time, faults)
-    answers = solved if options.fields is None else list(solved)
+    answers = solved if asked.fields is None else list(solved)
     table = response_table(network, answers)
     reached = len(table) + len(faults)
-    late, ended = _late(options, reached, len(steps), engine, in_time)
+    late, ended = _late(asked, reached, len(steps), engine, in_time)
     failures, status = (*_faults_said(faults, reached), *late), _status_of(faults, ended)
     if table.empty:
         none = _with_faults(scene, table, steps, faults)
-        said = put_table(options.out, none, _counted(none, faults)) if faults else {}
+        said = put_table(asked.out, none, _counted(none, faults)) if faults else {}
         return Answer(facts={"steps": none}, failures=failures, status=status, **said)
     computed = [step for step in steps[:reached] if step.number not in faults]
-    tolerances = partial(_with_tolerances, options, engine, computed, table)
+    tolerances = partial(_with_tolerances, asked, engine, computed, table)
     table, off = clock.spare("tolerances", tolerances, (table, tuple[str, ...]()))
-    staged = None if options.staged is None else staged_fields(network, computed, options.staged)
+    staged = None if asked.staged is None else staged_fields(network, computed, asked.staged)
     departures = partial(within.departures, table, staged)
     outside = clock.spare(
         "whether they are in the linear range", departures, tuple[Departure, ...]()
     )
     whole = _with_faults(scene, table, steps, faults) if faults else table
-    said = put_table(options.out, whole, _counted(whole, faults))
-    if options.fields is not None:
-        write_bytes(options.fields, archive(network, answers))
-        said["written"] = (*said.get("written", ()), options.fields)
+    said = put_table(asked.out, whole, _counted(whole, faults))
+    if asked.fields is not None:
+        write_bytes(asked.fields, archive(network, answers))
+        said["written"] = (*said.get("written", ()), asked.fields)
     found = partial(what_was_enough, within, {"": table}, staged=staged is not None)
     enough = clock.spare("which model is enough", found, None)
     facts = {"scene": scene_facts(scene), "units": UNITS, "steps": whole, **provenance(engine)}
@@ -155,7 +143,7 @@ def run(options: argparse.Namespace) -> Answer:
         facts={**facts, "enough": None if enough is None else enough.facts()},
         notes=(
             *off,
-            *level_notes(options, engine),
+            *level_notes(asked, engine),
             *_notes(within, steps, table, enough),
             *_not_done(clock),
         ),
@@ -164,15 +152,15 @@ def run(options: argparse.Namespace) -> Answer:
         **said,
     )
     unreached = arm_notes(scene, {"": computed})
-    return strictly(answer, options, exceeded(scene, table), outside, unreached=unreached)
+    return strictly(answer, asked, exceeded(scene, table), outside, unreached=unreached)
 
 
-def _asked(options: argparse.Namespace) -> tuple[Engine, tuple[Step, ...]]:
+def _asked(asked: Analyze) -> tuple[Engine, tuple[Step, ...]]:
     """Return the steps that are asked for, and what computes their responses."""
-    scene = asked_scene(options)
-    find_postures(scene, options.cache, options.tell)
+    scene = asked_scene(asked)
+    find_postures(scene, asked.cache, asked.tell)
     network = build_network(scene)
-    return asked_engine(options, network), asked_steps(options, network)
+    return asked_engine(asked, network), asked_steps(asked, network).steps
 
 
 def _notes(
@@ -249,13 +237,13 @@ def _status_of(faults: Mapping[int, SeqoptError], ended: Status) -> Status:
 
 
 def _with_tolerances(
-    options: argparse.Namespace, engine: Engine, steps: Sequence[Step], table: pd.DataFrame
+    asked: Analyze, engine: Engine, steps: Sequence[Step], table: pd.DataFrame
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Return a table with how far grips may be off, if that is asked for, and what is said."""
-    if options.tolerance is None:
+    if asked.tolerance is None:
         return table, ()
     table = with_tolerances(engine, steps, table)
-    return table, _tolerance_notes(engine, steps, table, options.tolerance)
+    return table, _tolerance_notes(engine, steps, table, asked.tolerance)
 
 
 def _tolerance_notes(
@@ -277,7 +265,7 @@ def _tolerance_notes(
 
 
 def _late(
-    options: argparse.Namespace, computed: int, steps: int, engine: Engine, in_time: _InTime
+    asked: Analyze, computed: int, steps: int, engine: Engine, in_time: _InTime
 ) -> tuple[tuple[str, ...], Status]:
     """Return a line if steps ended before the last one, else none, and the status of that."""
     if computed == steps:
@@ -289,7 +277,7 @@ def _late(
         so_far += f", {dear} by discrete elements, which are what takes long"
     if in_time.interrupted:
         return (f"seqopt: interrupted; {so_far}",), Status.INTERRUPTED
-    said = f"seqopt: error: --time-limit {options.time_limit}: {so_far}; give more seconds"
+    said = f"seqopt: error: --time-limit {asked.time_limit}: {so_far}; give more seconds"
     return (said,), Status.FAILED
 
 
@@ -297,13 +285,13 @@ _Answered = tuple[Step, Fields | SeqoptError]
 
 
 def _step_answers(
-    options: argparse.Namespace, within: LinearRange, steps: Sequence[Step]
+    asked: Analyze, within: LinearRange, steps: Sequence[Step]
 ) -> Iterator[_Answered]:
     """Return steps with their fields, each from scratch or with what earlier ones lock in.
 
     One that is not solved from scratch has its error.
     """
-    each, engine = with_progress("steps", steps, options.tell), within.engine
+    each, engine = with_progress("steps", steps, asked.tell), within.engine
 
     def answer(step: Step) -> Fields | SeqoptError:
         try:
@@ -311,14 +299,14 @@ def _step_answers(
         except (MechanismError, SolverError) as error:
             return error
 
-    if options.staged is None:
+    if asked.staged is None:
         return ((step, answer(step)) for step in each)
-    if options.engine not in (None, USUAL):
+    if asked.engine not in (None, USUAL):
         raise SceneError(
-            f"--engine {options.engine}: --staged goes with exactly rigid bricks alone; "
+            f"--engine {asked.engine}: --staged goes with exactly rigid bricks alone; "
             "give --engine compliance"
         )
-    return zip(each, staged_fields(engine.network, steps, options.staged), strict=True)
+    return zip(each, staged_fields(engine.network, steps, asked.staged), strict=True)
 
 
 class _InTime:

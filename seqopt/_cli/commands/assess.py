@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -23,53 +22,110 @@ from seqopt._cli.asked import (
     carrying_notes,
     scene_facts,
 )
-from seqopt._cli.options import (
-    BUILT,
-    HOLDS,
-    MOVES,
-    POSTURES,
-    PROVES,
-    STEPS_USAGE,
-    WRITTEN,
-    declare,
-    form_options,
-    scene_options,
-    steps_options,
-)
-from seqopt._cli.outputs import keep_apart, put_table, require_out, write_outputs
-from seqopt._cli.screens import question
-from seqopt._cli.values import MOST_WORKERS, asked_mortars, count_word
-from seqopt._cli.words.given import plan_name
+from seqopt._cli.options import Fixed
+from seqopt._cli.outputs import keep_apart, put_table, require_out, write_outputs, written_to
+from seqopt._cli.values import MOST_WORKERS, count_word, mortar_word
 from seqopt._files import csv_text, read_text
 from seqopt._showing import PAGE
-from seqopt.contact.mortar import Mortar, _with_mortar
+from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar
 from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import FileError, ProblemError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.problem._limit_words import number_word
 from seqopt.responses.quantities import _steps_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.steps import Step
 from seqopt.stability._load_factor import format_load_factors, load_factor_table, load_factors
 from seqopt.stability._step_verdicts import each_stability, find_margins, format_rows, stability_row
-from seqopt.stability.assessment import MARGINS, Verdict
+from seqopt.stability.assessment import Verdict
 from seqopt.work.progress import with_progress
 
-LOADS = {
-    "--load-factor": "find the largest multiple of the scene's loads (forces on bricks and wind, "
-    "weights as they are) with which every step stands, and how it gives way then; --out is a "
-    "folder"
-}
+
+@dataclass(frozen=True, kw_only=True)
+class Assess(Fixed):
+    """Prove of every step of a sequence that it stands, or that it does not.
+
+    Bricks are rigid, and their joints may open and slide. Say which brick and joint fail first; on
+    request also how much bond, friction and robot force a step needs, and which tilt it survives.
+
+    Usage
+    [SCENE] [--method NAME] [--out FILE] [other options]
+    [SCENE] --plan FILE [--out FILE] [other options]
+    PLAN_DIR [--out FILE] [other options]
+    [SCENE] --map AXIS [--out DIR] [other options]
+
+    What must hold?
+    With --map, --holds says what is in the joints.
+
+    mortar : MORTAR
+        what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing), or
+        bond=STRENGTH (Pa) (default: dry, then epoxy, which alone decides the exit status)
+    friction : F
+        coefficient of friction, in place of the mortar's own
+    tensile_strength : PA
+        what a joint holds in tension, Pa, in place of the mortar's own
+    cohesion : PA
+        what a joint holds in shear without any pressure, Pa, in place of the mortar's own
+
+    What is asked beside verdicts?
+    One of: --margins with --steps, --load-factor, and --map with --holds.
+
+    margins : NAMES
+        margins beside the verdicts: {margins} or all, with commas between them; each takes several
+        times as long (default: none; with --steps: all)
+    steps : FROM:TO
+        steps of which margins are found, as 40:60 (default: all)
+    load_factor :
+        find the largest multiple of the scene's loads (forces on bricks and wind, weights as they
+        are) with which every step stands, and how it gives way then; --out is a folder
+    map : AXIS
+        map where builds fail, over what holds their joints and over friction, tilt (degrees) or
+        bricks, with values of your own as tilt=0,2,5; of the fixed methods, a loop and a free
+        schedule, or of --method or --plan alone; bricks: of how many a scene in words is built,
+        else how many are placed
+    holds : NAMES
+        with --map: what holds the joints, of dry, bond=STRENGTH (Pa) and epoxy, with commas between
+        them (default: dry,epoxy)
+
+    Who chooses and proves, and how long?
+    workers : N
+        processes to share the steps among (default: 1)
+    cache : DIR
+        where robots have arms: keep their postures there, and use what is there
+
+    What is written and printed?
+    out : FILE
+        CSV file to write (default: standard output); with --map a folder
+
+    Examples
+    --------
+    seqopt assess arch25 --method cantilever --out stands.csv
+    seqopt assess arch25 --method sequential --mortar dry --margins bond,tilt
+    seqopt assess arch25 --method sequential --steps 40:49
+    seqopt assess arch:span=2,rise=0.8 --map friction --out map
+    """
+
+    mortar: Any = None
+    friction: str | None = None
+    tensile_strength: str | None = None
+    cohesion: str | None = None
+    margins: str | None = None
+    steps: str | None = None
+    load_factor: bool = False
+    map: str | None = None
+    holds: str | None = None
+    workers: str | None = None
 
 
-def answer_load_factor(options: argparse.Namespace) -> Answer:
+def answer_load_factor(asked: Assess) -> Answer:
     """Answer how much load every step of a sequence bears."""
-    scene = asked_scene(options)
-    require_out(options)
-    network, mortars = build_network(scene), asked_mortars(options)
-    steps, each, tables = asked_steps(options, network), {}, []
+    scene = asked_scene(asked)
+    require_out(asked)
+    network, mortars = build_network(scene), _asked_mortars(asked)
+    (title, steps), each, tables = asked_steps(asked, network), {}, []
     for name, mortar in mortars.items():
-        found = each[name] = load_factors(network, steps, mortar, options.tell)
+        found = each[name] = load_factors(network, steps, mortar, asked.tell)
         tables.append(load_factor_table(steps, found).assign(mortar=name))
     table = pd.concat(tables, ignore_index=True)[["mortar", *tables[0].columns[:-1]]]
     said = {name: format_load_factors(steps, found) for name, found in each.items()}
@@ -78,11 +134,11 @@ def answer_load_factor(options: argparse.Namespace) -> Answer:
         from seqopt.report._failures import load_page  # noqa: PLC0415  # only where files are written
 
         engine = make_engine(USUAL, network, None)
-        page = load_page(engine, plan_name(options), steps, each, said)
+        page = load_page(engine, title, steps, each, said)
         return {"load_factors.csv": csv_text(table), PAGE: page}
 
-    written = write_outputs(options, files)
-    where = f"written to {options.out}; {options.out / PAGE} shows how steps give way"
+    written = write_outputs(asked, files)
+    where = written_to(asked.out, what="how steps give way")
     lines = [f"{_with_mortar(name)}: {text}" for name, text in said.items()]
     last = tables[-1]  # the mortar that the build counts on
     failing = (last["load_factor"] < 1) | (last["unloaded"] != Verdict.STANDS.value)
@@ -169,80 +225,24 @@ def _plain(number: Any) -> object:
     return number.item()
 
 
-DESCRIPTION = (
-    "Prove of every step of a sequence that it stands, or that it does not, as rigid bricks whose "
-    "joints may open and slide, and say which brick and joint fail first. On request also how much "
-    "bond, friction and robot force a step needs, and which tilt it survives."
-)
-USAGE = (*STEPS_USAGE, "[SCENE] --map AXIS [--out DIR] [other options]")
-EXAMPLES = (
-    "seqopt assess arch25 --method cantilever --out stands.csv",
-    "seqopt assess arch25 --method sequential --mortar dry --margins bond,tilt",
-    "seqopt assess arch25 --method sequential --steps 40:49",
-    "seqopt assess arch:span=2,rise=0.8 --map friction --out map",
-)
-
-
-STRENGTH = {
-    "--friction F": "coefficient of friction, in place of the mortar's own",
-    "--tensile-strength PA": "what a joint holds in tension, Pa, in place of the mortar's own",
-    "--cohesion PA": "what a joint holds in shear without any pressure, Pa, in place of the "
-    "mortar's own",
-}
-HOW = {
-    "--margins NAMES": f"margins beside the verdicts: {', '.join(MARGINS)} or all, with commas "
-    "between them; each takes several times as long (default: none; with --steps: all)",
-    "--steps FROM:TO": "steps of which margins are found, as 40:60 (default: all)",
-}
-MAP = {
-    "--map AXIS": "map where builds fail, over what holds their joints and over friction, tilt "
-    "(degrees) or bricks, with values of your own as tilt=0,2,5; of the fixed methods, a loop and "
-    "a free schedule, or of --method or --plan alone; bricks: of how many a scene in words is "
-    "built, else how many are placed",
-    "--holds NAMES": "with --map: what holds the joints, of dry, bond=STRENGTH (Pa) and epoxy, "
-    "with commas between them (default: dry,epoxy)",
-}
-WORKERS = {"--workers N": "processes to share the steps among (default: 1)"}
-OUT = {"--out FILE": "CSV file to write (default: standard output); with --map a folder"}
-OF_HOLDS = "With --map, --holds says what is in the joints."
-OF_ASKED = "One of: --margins with --steps, --load-factor, and --map with --holds."
-
-
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``assess``."""
-    scene_options(question(command, BUILT))
-    steps_options(question(command, MOVES))
-    holds = question(command, HOLDS, OF_HOLDS)
-    holds.add_argument(
-        "--mortar",
-        help="what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing), "
-        "or bond=STRENGTH (Pa) (default: dry, then epoxy, which alone decides the exit status)",
-    )
-    declare(holds, STRENGTH)
-    declare(question(command, "What is asked beside verdicts?", OF_ASKED), HOW | LOADS | MAP)
-    declare(question(command, PROVES), WORKERS | POSTURES)
-    declare(question(command, WRITTEN), OUT)
-    form_options(command)
-
-
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Assess) -> Answer:
     """Assess every step of a sequence, or map builds; tables are written whatever the verdicts."""
-    if options.map is not None:
+    if asked.map is not None:
         from seqopt._cli.mapping import answer_map  # noqa: PLC0415  # for maps only
 
-        return answer_map(options)
-    if options.load_factor:
-        return answer_load_factor(options)
-    keep_apart(options, options.out)
-    scene, mortars = asked_scene(options), asked_mortars(options)
+        return answer_map(asked, asked.map, (asked.holds or "dry,epoxy").split(","))
+    if asked.load_factor:
+        return answer_load_factor(asked)
+    keep_apart(asked, asked.out)
+    scene, mortars = asked_scene(asked), _asked_mortars(asked)
     network = build_network(scene)
-    steps = asked_steps(options, network)
-    kept = _found(options, network, steps, mortars)
+    steps = asked_steps(asked, network).steps
+    kept = _found(asked, network, steps, mortars)
     rows = kept.rows
     went_on = f"kept: {kept.taken_up} of {len(rows)} verdicts, found before, from {kept.path}"
     each = {name: [row for row in rows if row["mortar"] == name] for name in mortars}
     lines = [f"{_with_mortar(name)}: {format_rows(own)}" for name, own in each.items()]
-    answer = put_table(options.out, rows, "\n".join(lines) + ";")
+    answer = put_table(asked.out, rows, "\n".join(lines) + ";")
     kept.done()
     counts = {name: _counted(own) for name, own in each.items()}
     undecided = [row["step"] for row in rows if row["verdict"] == Verdict.UNDECIDED.value]
@@ -269,6 +269,22 @@ def run(options: argparse.Namespace) -> Answer:
     )
 
 
+def _asked_mortars(asked: Assess) -> dict[str, Mortar]:
+    """Return the mortar that is named, or dry joints and the epoxy, by what they are called.
+
+    The last is what the build counts on. Numbers that are given take the place of its own, and
+    friction in dry joints as well.
+    """
+    given = {
+        name: number_word(text, f"--{name.replace('_', '-')}", zero=True)
+        for name in ("friction", "tensile_strength", "cohesion")
+        if (text := getattr(asked, name)) is not None
+    }
+    own = replace(mortar_word(asked.mortar or "epoxy", "--mortar"), **given)
+    dry = () if asked.mortar else (Mortar(friction=own.friction),)
+    return {_mortar_name(mortar): mortar for mortar in (*dry, own)}
+
+
 def _counted(rows: Sequence[Row]) -> dict[str, int]:
     """Return how many steps have each verdict."""
     found = Counter(row["verdict"] for row in rows)
@@ -276,22 +292,19 @@ def _counted(rows: Sequence[Row]) -> dict[str, int]:
 
 
 def _found(
-    options: argparse.Namespace,
-    network: Network,
-    steps: Sequence[Step],
-    mortars: Mapping[str, Mortar],
+    asked: Assess, network: Network, steps: Sequence[Step], mortars: Mapping[str, Mortar]
 ) -> Rows:
     """Return the rows of all steps, mortar by mortar; those kept of an earlier run are taken up."""
-    margins, at = _asked_margins(options, steps)
-    workers = count_word(options.workers, "--workers", MOST_WORKERS, usual=1)
-    kept = options.out is not None  # else nobody takes them up
-    asked = (dump_scene(network.scene), steps, mortars, margins, at, versions()) if kept else ()
-    rows = Rows(options.out, asked)
+    margins, at = _asked_margins(asked, steps)
+    workers = count_word(asked.workers, "--workers", MOST_WORKERS, usual=1)
+    kept = asked.out is not None  # else nobody takes them up
+    same = (dump_scene(network.scene), steps, mortars, margins, at, versions()) if kept else ()
+    rows = Rows(asked.out, same)
     try:
         for before, (name, mortar) in enumerate(mortars.items()):
             if not (left := steps[max(0, len(rows.rows) - before * len(steps)) :]):
                 continue
-            told = with_progress(f"assessing steps, {_with_mortar(name)}", left, options.tell)
+            told = with_progress(f"assessing steps, {_with_mortar(name)}", left, asked.tell)
             found = each_stability(network, left, mortar, margins, at, (None, workers))
             for step, result in zip(told, found, strict=True):
                 rows.add({"mortar": name, **stability_row(step, result)})
@@ -301,20 +314,18 @@ def _found(
     return rows
 
 
-def _asked_margins(
-    options: argparse.Namespace, steps: Sequence[Step]
-) -> tuple[tuple[str, ...], range]:
+def _asked_margins(asked: Assess, steps: Sequence[Step]) -> tuple[tuple[str, ...], range]:
     """Return which margins are asked for, and the numbers of which steps."""
-    margins = find_margins(options.margins or ("all" if options.steps else ()))
-    if options.steps is None:
+    margins = find_margins(asked.margins or ("all" if asked.steps else ()))
+    if asked.steps is None:
         return margins, range(1, len(steps) + 1)
-    first, colon, last = options.steps.partition(":")
+    first, colon, last = asked.steps.partition(":")
     ends = (first or "1", (last or str(len(steps))) if colon else first)
     try:
         start, end = (count_word(end, "--steps", len(steps)) for end in ends)
     except ProblemError as error:
-        wrong = f"--steps {options.steps}: give numbers from 1 to {len(steps)}, as 3:7"
+        wrong = f"--steps {asked.steps}: give numbers from 1 to {len(steps)}, as 3:7"
         raise ProblemError(wrong) from error
     if end < start:
-        raise ProblemError(f"--steps {options.steps}: the first is after the last; exchange them")
+        raise ProblemError(f"--steps {asked.steps}: the first is after the last; exchange them")
     return margins, range(start, end + 1)

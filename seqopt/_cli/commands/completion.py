@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
@@ -16,40 +17,46 @@ import shtab
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.arguments import COMMANDS, parser
-from seqopt._cli.values import RULES
+from seqopt._cli.options import Asked, word
 from seqopt.graph.formulation import formulation_names
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.scene.scene import ORDERS
 from seqopt.scene.scene_file import KINDS, builtin_scenes
-from seqopt.sequence.rules import FREE
+from seqopt.sequence.rules import FREE, RULES
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import CRITERIA, PUBLISHED
 
 SHELLS = ("bash", "zsh", "fish")
-DESCRIPTION = (
-    "Print a script with which the shell completes commands, options, files, and the names of "
-    "scenes, formulations, criteria, engines, schedules and aims. Print it again once a "
-    "formulation of your own is installed."
-)
-EXAMPLES = (
-    'eval "$(seqopt completion bash)"      in ~/.bashrc, or for this shell alone',
-    'eval "$(seqopt completion zsh)"       in ~/.zshrc, after compinit',
-    "seqopt completion fish > ~/.config/fish/completions/seqopt.fish",
-)
 AIMS = ("minmax", "sum", "steps", "regrips", "travel", "bond", "friction", "tilt")
 SHORT = re.compile(r"[:;(]|, (?:as|if|or) ")  # where what matters of a help text ends
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``completion``."""
-    command.add_argument("shell", choices=SHELLS, help="for which shell")
+@dataclass(frozen=True, kw_only=True)
+class Completion(Asked):
+    """Print a script with which the shell completes words of seqopt.
+
+    It completes commands, options, files, and the names of scenes, formulations, criteria, engines,
+    schedules and aims. Print it again once a formulation of your own is installed.
+
+    For which shell?
+    shell : CHOICE
+        which shell reads it
+
+    Examples
+    --------
+    eval "$(seqopt completion bash)"      in ~/.bashrc, or for this shell alone
+    eval "$(seqopt completion zsh)"       in ~/.zshrc, after compinit
+    seqopt completion fish > ~/.config/fish/completions/seqopt.fish
+    """
+
+    shell: str = word(place=True, choices=("bash", "zsh", "fish"))
 
 
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Completion) -> Answer:
     """Return the script with which a shell completes words of seqopt."""
-    script = shtab.complete(_completed(parser()), options.shell)
-    return Answer(facts={"shell": options.shell, "script": script}, data=script + "\n")
+    script = shtab.complete(_completed(parser()), asked.shell)
+    return Answer(facts={"shell": asked.shell, "script": script}, data=script + "\n")
 
 
 def _completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
+from seqopt._cli import options
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import posture_trouble, scene_facts
-from seqopt._cli.options import POSTURES, WRITTEN, declare, form_options
-from seqopt._cli.screens import question
+from seqopt._cli.options import word
 from seqopt._cli.words.given import plan_folder
 from seqopt._files import require_apart, write_text
 from seqopt.arms._plan_postures import arm_faults
@@ -18,74 +20,75 @@ from seqopt.problem._limit_words import number_word
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
-DESCRIPTION = (
-    "Write the plan of a folder, as seqopt optimize --out makes it, in a format of others: which "
-    "block is absent, placed or held in which step, what each robot does and where, or the scene "
-    "with its plan."
-)
-EXAMPLES = (
-    "seqopt export best --format csv --out blocks.csv",
-    "seqopt export best --format tasks --distance 0.15 --out tasks.json",
-)
+
+@dataclass(frozen=True, kw_only=True)
+class Export(options.Postures):
+    """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
+
+    It says which block is absent, placed or held in which step, what each robot does and where, or
+    is the scene with its plan.
+
+    Which plan, and in which format?
+    folder : PLAN_DIR|SCENE
+        folder of a plan; of a scene, in its place, the usual steps are taken
+    format : NAME
+        what to write: {choices} (default: {default})
+    source : FILE
+        with a format of COMPAS: the file that was imported, to name its elements or to write the
+        plan into
+    distance : M
+        with tasks, tasks_csv or compas_fab: from a grip to where the tool comes from and goes to, m
+        (default: the longest side of each block)
+
+    What is written and printed?
+    out : FILE
+        file to write (default: standard output)
+
+    Examples
+    --------
+    seqopt export best --format csv --out blocks.csv
+    seqopt export best --format tasks --distance 0.15 --out tasks.json
+    """
+
+    folder: Any = word(place=True)
+    format: str = word("csv", choices=EXPORTS)
+    source: Path | None = None
+    distance: str | None = None
 
 
-DISTANCE = {
-    "--distance M": "with tasks, tasks_csv or compas_fab: from a grip to where the tool comes "
-    "from and goes to, m (default: the longest side of each block)"
-}
-SOURCE = {
-    "--source FILE": "with a format of COMPAS: the file that was imported, to name its elements or "
-    "to write the plan into"
-}
-
-
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``export``."""
-    basic = question(command, "Which plan, and in which format?")
-    about = "folder of a plan; of a scene, in its place, the usual steps are taken"
-    declare(basic, {"folder PLAN_DIR|SCENE": about})
-    said = f"what to write: {', '.join(EXPORTS)} (default: %(default)s)"
-    basic.add_argument("--format", choices=EXPORTS, default="csv", metavar="NAME", help=said)
-    declare(basic, SOURCE)
-    declare(basic, DISTANCE | POSTURES)
-    about = "file to write (default: standard output)"
-    declare(question(command, WRITTEN), {"--out FILE": about})
-    form_options(command)
-
-
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Export) -> Answer:
     """Write the plan of a folder in a format of others."""
-    folder = plan_folder(options, options.folder)
+    folder = plan_folder(asked, asked.folder)
     inputs = [folder / name for name in ("scene.json", "plan.csv")]
-    outputs = [*filter(None, [options.out])]
-    require_apart(outputs, [*inputs, *filter(None, [options.source])])
+    outputs = [*filter(None, [asked.out])]
+    require_apart(outputs, [*inputs, *filter(None, [asked.source])])
     scene, steps = read_folder(folder)
-    given = options.distance
+    given = asked.distance
     distance = None if given is None else number_word(given, f"--distance {given}")
-    notes, postures = _arms(options, scene, steps)
-    text = export_plan(scene, steps, options.format, options.source, distance, postures)
-    said, lost = f"{len(steps)} steps", LOST.get(options.format)
+    notes, postures = _arms(asked, scene, steps)
+    text = export_plan(scene, steps, asked.format, asked.source, distance, postures)
+    said, lost = f"{len(steps)} steps", LOST.get(asked.format)
     if lost:
         said = f"{len(scene.bricks)} blocks, without {', '.join(lost)},"
     elif lost is not None:
         said = f"the scene and its {len(steps)} steps"
-    facts = {"scene": scene_facts(scene), "steps": len(steps), "format": options.format}
-    if options.out is None:
+    facts = {"scene": scene_facts(scene), "steps": len(steps), "format": asked.format}
+    if asked.out is None:
         return Answer(facts=facts | {"text": text}, data=text, notes=notes)
-    write_text(options.out, text)
-    said = f"{said} written to {options.out}"
-    return Answer(facts=facts, text=said, written=(options.out,), notes=notes)
+    write_text(asked.out, text)
+    said = f"{said} written to {asked.out}"
+    return Answer(facts=facts, text=said, written=(asked.out,), notes=notes)
 
 
 def _arms(
-    options: argparse.Namespace, scene: Scene, steps: Sequence[Step]
+    asked: Export, scene: Scene, steps: Sequence[Step]
 ) -> tuple[tuple[str, ...], Postures | None]:
     """Return what there is to say of arms in a plan, and postures: none where they are not known.
 
     Other formats than those of tasks have none.
     """
-    if options.format not in TASKS or not scene.has_arms:
+    if asked.format not in TASKS or not scene.has_arms:
         return (), None
-    if trouble := posture_trouble(options, scene):
+    if trouble := posture_trouble(asked, scene):
         return (f"arms: grips are proposals without postures; {trouble}",), {}
     return tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps)), None

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
+from pathlib import Path
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.options import declare, form_options
-from seqopt._cli.screens import question
+from seqopt._cli.options import Asked, word
 from seqopt._cli.words.where import read_place
 from seqopt.errors import StepError
 from seqopt.plan._range import NONE_KEEPS
@@ -15,33 +15,38 @@ from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene_file import load_scene
 
-DESCRIPTION = (
-    "Print the best next move from a state of a build, whatever happened before, and what the rest "
-    "of the build then takes; looked up in the policy that optimize --policy writes."
-)
-EXAMPLES = ("seqopt next free:12 --policy free", "seqopt next state.json --policy free --json")
-PLACE = {
-    "state PLAN:STEP|STATE|N": "where the build stands: after a step of a plan, in a state of a "
-    "JSON file, or with so many bricks that nobody holds"
-}
-POLICY = {"--policy DIR": "folder that optimize --policy wrote"}
+
+@dataclass(frozen=True, kw_only=True)
+class Next(Asked):
+    """Print the best next move from a state of a build, whatever happened before.
+
+    Print also what the rest of the build then takes; looked up in the policy that optimize --policy
+    writes.
+
+    Where does the build stand?
+    state : PLAN:STEP|STATE|N
+        where the build stands: after a step of a plan, in a state of a JSON file, or with so many
+        bricks that nobody holds
+    policy : DIR
+        folder that optimize --policy wrote
+
+    Examples
+    --------
+    seqopt next free:12 --policy free
+    seqopt next state.json --policy free --json
+    """
+
+    state: str = word(place=True)
+    policy: Path = word()
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``next``."""
-    basic = question(command, "Where does the build stand?")
-    declare(basic, PLACE)
-    declare(basic, POLICY, required=True)
-    form_options(command)
-
-
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Next) -> Answer:
     """Print the best next move."""
-    scene = load_scene(options.policy / "scene.json")
-    policy = Policy.load(options.policy / FILE)
-    found, place = read_place(scene, options.state)
+    scene = load_scene(asked.policy / "scene.json")
+    policy = Policy.load(asked.policy / FILE)
+    found, place = read_place(scene, asked.state)
     if found != scene or place.site is None:
-        raise StepError(f"state {options.state}: the policy is of another order; plan from there")
+        raise StepError(f"state {asked.state}: the policy is of another order; plan from there")
     advice = policy.best(place.site)
     facts = {
         "move": str(advice),

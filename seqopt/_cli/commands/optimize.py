@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import pandas as pd
 
@@ -22,6 +21,7 @@ from seqopt._cli.asked import (
     exceeded,
     idle_notes,
     in_seconds,
+    kept_range,
     level_notes,
     refused,
     rule_notes,
@@ -29,29 +29,9 @@ from seqopt._cli.asked import (
     strictly,
     waits_said,
 )
-from seqopt._cli.options import (
-    BEST,
-    BUILT,
-    CURING,
-    DURATIONS,
-    HOLDS,
-    LIMIT,
-    MOVES,
-    PROVES,
-    RULE,
-    STANDING,
-    WHERE,
-    WRITTEN,
-    criterion_options,
-    declare,
-    engine_options,
-    form_options,
-    robots_option,
-    scene_options,
-)
+from seqopt._cli.options import Aimed, Cost, Cured, Posed, Strict, Timed, word
 from seqopt._cli.outputs import (
     ALWAYS,
-    TABLES,
     _bare_files,
     _plan_files,
     _steps_table,
@@ -59,30 +39,9 @@ from seqopt._cli.outputs import (
     write_outputs,
     written_to,
 )
-from seqopt._cli.posing import Asked, asked_problem
-from seqopt._cli.screens import question
+from seqopt._cli.posing import Change, PosedProblem, asked_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import parse_options, parse_size, parse_time_limit
-from seqopt._cli.words.optimizing import (
-    AIM,
-    BASES,
-    BUDGET,
-    FEWEST,
-    FORMULATION,
-    MEMORY,
-    OF_BEST,
-    OF_BUILT,
-    OF_HOLDS,
-    OF_MOVES,
-    OF_PROVING,
-    OF_SCENARIOS,
-    POLICY,
-    ROBUST,
-    SCHEDULE,
-    SEARCH,
-    TIME,
-    WORKERS,
-)
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, TimeUpError
@@ -95,7 +54,7 @@ from seqopt.plan._status import faults_in_words
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _solve_run, usual
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, OWN, overloads
+from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.schedule import Schedule
@@ -110,55 +69,137 @@ if TYPE_CHECKING:
     from seqopt.plan._studies.fewest_props import FoundProps
     from seqopt.plan.out_of_sample import Trial
 
-DESCRIPTION = (
-    "Choose where robots hold, over all steps of a sequence, by one formulation; or, with "
-    "--schedule free, choose every step. The answer is checked from the problem's own data, and "
-    "plan, selection, responses, summary and a page for the browser are written."
-)
-USAGE = (
-    "[SCENE] [--formulation NAME] [--out DIR] [other options]",
-    "[SCENE] --schedule free [--out DIR] [other options]",
-    "[SCENE] --robust AIM [--out DIR] [other options]",
-)
-EXAMPLES = (
-    "seqopt optimize arch25 --out best",
-    "seqopt optimize arch25 --schedule free --aim minmax,steps --out free",
-    "seqopt optimize wall:columns=4,courses=3 --schedule free --stands dry",
-    "seqopt optimize my.json --criteria worst-ratio --limit payload --out mine",
-)
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 VERDICTS, UNSEEN = "which steps stand", "its values in unseen scenarios"
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``optimize``, those of a first use before those of an expert."""
-    built, moves = question(command, BUILT, OF_BUILT), question(command, MOVES, OF_MOVES)
-    scene_options(built)
-    declare(moves, SCHEDULE)
-    robots_option(built, "a loop, or a schedule that is named")
-    declare(built, DURATIONS | BASES)
-    declare(moves, RULE | WHERE)
-    declare(question(command, BEST, OF_BEST), AIM | FEWEST)
-    criterion_options(command)
-    declare(question(command, HOLDS, OF_HOLDS), LIMIT | BUDGET | STANDING | CURING)
-    declare(question(command, "In which scenarios is it good?", OF_SCENARIOS), ROBUST)
-    proves = question(command, PROVES, OF_PROVING)
-    declare(proves, FORMULATION | SEARCH | TIME)
-    declare(proves, WORKERS, default="1")
-    declare(proves, MEMORY)
-    engine_options(command)
-    written = question(command, WRITTEN)
-    declare(written, {"--out DIR": "folder to write plan, tables, summary and page to"})
-    declare(written, TABLES, choices=("plan", "all"), default="plan")
-    declare(written, POLICY)
-    form_options(command, strict=True, builds=True)
+@dataclass(frozen=True, kw_only=True)
+class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
+    """Choose where robots hold, over all steps of a sequence, by one formulation.
+
+    With --schedule free, choose every step. The answer is checked from the problem's own data, and
+    plan, selection, responses, summary and a page for the browser are written.
+
+    Usage
+    [SCENE] [--formulation NAME] [--out DIR] [other options]
+    [SCENE] --schedule free [--out DIR] [other options]
+    [SCENE] --robust AIM [--out DIR] [other options]
+
+    What is built, and by whom?
+    --bases goes with --schedule free and not with --order.
+
+    bases : grid|FILE
+        with --schedule free: where the bases of arms stand is chosen too, by the best plan that
+        they allow: among places of a grid around the bricks (grid:METERS for its spacing), or those
+        of a CSV file with the columns robot, x, y, z, heading_deg
+
+    Which steps may a build have?
+    schedule : NAME|FILE
+        free: any robot may release, hold or place next, or a sequence with open grips: {schedules}
+        (of all robots), or a CSV file of steps; open grips are marked ? in it (default: the loop of
+        three robots, or of two where there is no third)
+
+    What counts as best?
+    With --aim, --stands, --order search or --schedule free states of the build are chosen:
+    --ranked, --among and criteria of ranks do not go with these. --props-among goes with --aim
+    props alone, and that with neither --bases nor --props.
+
+    props_among : NODES
+        with --aim props: at which nodes props may be, and what they bear, as --props; all of them
+        by default, as all:1e6,push
+
+    What must hold?
+    --friction, --tilt and --curing go with --stands. Budgets on steps, regrips, makespan and sums
+    go with --aim or --schedule free, those on steps_over and robot_use without.
+
+    budget : BUDGET
+        cap on a total over the build, with the formulations labels, lagrangian, overlap_mip and
+        overlap_lp: travel=0.8 (of what the optimum without budgets travels), travel=3.5m,
+        steps_over:F_largest=250:10 (at most 10 steps over 250 N), robot_use:rob1=100:5 (at most 5
+        in which rob1 carries over 100 N); with --aim or --schedule free: steps=N, regrips=N,
+        travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE
+
+    In which scenarios is it good?
+    --scenarios, --unseen, --seed and --vary go with --robust alone.
+
+    robust : AIM
+        what is to be as small as possible over all scenarios, in place of --formulation: worst-peak
+        (the largest cost of any step), worst-total (the largest total), or cvar=0.9 (the mean total
+        of the worst tenth)
+    scenarios : N
+        how many samples of the scene (default: 30)
+    unseen : N
+        how many other samples, of the next seed, judge the plan (default: none; as many as there
+        are scenarios double the time)
+    seed : N
+        which samples are drawn (default: 0)
+    vary : NAME=VALUE
+        how far samples are from the scene: stiffness=3 (of each joint, by a factor up to it, up or
+        down), density=0.1 (of each brick, up to this share), position=0.002 (of each brick and
+        joint, up to so many m); these are the defaults; grips=2 (of grips that are not rigid, by a
+        factor up to it)
+
+    Who chooses and proves, and how long?
+    --no-proof goes with cascade and rank_search, --lazy with exact formulations.
+
+    formulation : NAME
+        which mathematical program chooses: {formulations} (default: overlap_dp, which is exact and
+        the fastest, labels with --budget, minimax with --robust worst-peak, scenario_search with
+        other aims over scenarios; schedule_search with --aim, --stands or --schedule free,
+        makespan_labels where a makespan counts, order_search with --order search)
+    option : NAME=VALUE
+        option of the formulation, as horizon=2 or width=10
+    no_proof :
+        with cascade or rank_search: compute only the responses that the search meets, about a
+        fifth; how far the choice is from the optimum stays unknown
+    lazy :
+        with an exact formulation: compute only the responses that the proof needs; stopped before
+        it is done, it leaves its best choice and a bound; with --aim or --schedule free it is done
+        at any rate
+    candidates : RULE
+        look at fewer nodes per move: near:12 for those at most 12 joints from the newest bricks,
+        within:1.5 for those at most 1.5 m from them; makes any formulation a heuristic (free: of
+        grips on bricks that stand; what is proven holds among these)
+    workers : N
+        processes to share the work among; pays from about ten seconds (default: {default})
+    cache : DIR
+        keep answers there and use what is there: a run that was ended goes on
+    max_memory : SIZE
+        what responses and costs may take, as 500MB or 2GB (default: four fifths of what is free);
+        of a free schedule states and moves, with a bound where it ends
+
+    What is written and printed?
+    out : DIR
+        folder to write plan, tables, summary and page to
+    tables : plan|all
+        which tables are written: those of the plan, or all, with every choice of every open step
+        beside: megabytes (default: plan)
+    policy :
+        write policy.npz too: the best next move from every state that builds reach (needs --out;
+        seqopt next looks it up)
+
+    Examples
+    --------
+    seqopt optimize arch25 --out best
+    seqopt optimize arch25 --schedule free --aim minmax,steps --out free
+    seqopt optimize wall:columns=4,courses=3 --schedule free --stands dry
+    seqopt optimize my.json --criteria worst-ratio --limit payload --out mine
+    """
+
+    counts_props: ClassVar[bool] = True
+
+    option: tuple[str, ...] = ()
+    no_proof: bool = False
+    lazy: bool = False
+    tables: str = word("plan", choices=("plan", "all"))
+    policy: bool = False
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Found:
     """A plan, what was asked, and what there is time to say of it: from its responses to a page."""
 
-    asked: Asked
+    posed: PosedProblem
     plan: Plan
     assemble: float
     prover: BuildProver
@@ -170,7 +211,7 @@ class Found:
     @cached_property
     def trial(self) -> Trial | None:
         """Beside other plans, where candidates were chosen over scenarios."""
-        unseen = self.asked.unseen
+        unseen = self.posed.unseen
         if unseen is None or isinstance(self.plan.graph, States):
             return None
         from seqopt.plan.out_of_sample import judge_unseen  # noqa: PLC0415  # few plans are robust
@@ -223,10 +264,10 @@ class Found:
         }
         out |= {"left_out": dict(self.clock.left_out)} if self.clock.left_out else {}
         out |= {} if self.props is None else {"fewest_props": self.props.described()}
-        known, unseen = self.asked.known, self.asked.unseen
+        known, unseen = self.posed.known, self.posed.unseen
         if known is None:
             return out
-        out |= {"robust": str(self.asked.aim), "scenarios": known.settings}
+        out |= {"robust": str(self.posed.aim), "scenarios": known.settings}
         if unseen is None:
             return out
         if self.trial is not None:
@@ -239,29 +280,29 @@ class Found:
         return out | {"unseen": {**unseen.settings, "worst": worst}}
 
 
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Optimize) -> Answer:
     """Choose every open grip of a build, or every step, and write the plan."""
-    found = find(options)
+    found = find(asked)
     with found.proving():
-        return answered(options, found)
+        return answered(asked, found)
 
 
-def find(options: argparse.Namespace) -> Found:
-    """Choose every open grip of a build, or every step."""
-    clock = Clock(parse_time_limit(options.time_limit))
-    if getattr(options, "policy", False) and options.out is None:
+def find(asked: Optimize, change: Change | None = None) -> Found:
+    """Choose every open grip of a build, or every step; ``change``: what has changed before."""
+    clock = Clock(parse_time_limit(asked.time_limit))
+    if asked.policy and asked.out is None:
         raise ProblemError("--policy: it is written to a folder; give --out DIR")
-    require_out(options, *ALWAYS)
+    require_out(asked, *ALWAYS)
     start = time.perf_counter()
     with clock.needed("posing the problem"):
-        asked = asked_problem(options)
-        formulation = as_formulation(options.formulation or usual(asked.problem))
-    how = _how(options, formulation)
+        posed = asked_problem(asked, change)
+        formulation = as_formulation(asked.formulation or usual(posed.problem))
+    how = _how(asked, formulation)
     assemble = time.perf_counter() - start
     in_stages = formulation.on in (On.STATES, On.TIMES)
-    run = replace(how, progress=options.tell, clock=clock)
+    run = replace(how, progress=asked.tell, clock=clock)
     if not in_stages:
-        run = replace(run, progress=within(options.tell, clock.left))
+        run = replace(run, progress=within(asked.tell, clock.left))
 
     def choose(problem: Problem) -> Plan:
         if clock.interrupted:  # one that came between two plans ends the next
@@ -274,43 +315,42 @@ def find(options: argparse.Namespace) -> Found:
         clock.interrupted |= plan.ended is End.INTERRUPTED
         return plan
 
-    bases = None if options.bases is None else _bases(options, asked.problem, choose)
-    props = None if asked.fewest is None else _props(options, asked, choose)
+    bases = None if asked.bases is None else _bases(asked, asked.bases, posed.problem, choose)
+    props = None if posed.fewest is None else _props(asked, posed, choose)
     outer = bases or props
-    plan = choose(asked.problem) if outer is None else outer.plan
+    plan = choose(posed.problem) if outer is None else outer.plan
     plan = at_sufficient_level(plan, choose, clock)
-    prover = asked_prover(options, plan.engine.network)
-    whole = _from_empty(asked.whole, plan, choose)
-    return Found(asked, plan, assemble, prover, bases, whole, props, clock)
+    prover = asked_prover(asked, plan.engine.network)
+    whole = _from_empty(posed.whole, plan, choose)
+    return Found(posed, plan, assemble, prover, bases, whole, props, clock)
 
 
-def answered(options: argparse.Namespace, found: Found) -> Answer:
+def answered(asked: Optimize, found: Found) -> Answer:
     """Write a plan, and return what it is worth; what there is no time for is left out."""
     made: dict[str, bytes | str] = {}
-    if found.analyzed and found.summary and options.out is not None:  # what says most comes first
-        choices = getattr(options, "tables", None) == "all"
-        tables = partial(_plan_files, found.plan, choices=choices)
+    if found.analyzed and found.summary and asked.out is not None:  # what says most comes first
+        tables = partial(_plan_files, found.plan, choices=asked.tables == "all")
         made = found.clock.spare("its tables", tables, made)
     _ = found.verdicts, found.trial
-    return _answer(options, found, write_outputs(options, lambda: _files(options, found, made)))
+    return _answer(asked, found, write_outputs(asked, lambda: _files(asked, found, made)))
 
 
 def _files(
-    options: argparse.Namespace, found: Found, tables: Mapping[str, bytes | str]
+    asked: Optimize, found: Found, tables: Mapping[str, bytes | str]
 ) -> dict[str, bytes | str]:
     """Return the files of a plan by name, with its tables and tasks; at least what it is alone."""
     plan, outer, made = found.plan, found.bases or found.props, dict[str, bytes | str]()
     tasks = {kind: str(tables[f"tasks.{kind}"]) for kind in ("csv", "json") if tables}
-    asked: dict[str, Callable[[], str | bytes]] = {}
-    if getattr(options, "policy", False):
+    others: dict[str, Callable[[], str | bytes]] = {}
+    if asked.policy:
         from seqopt.plan.policy import FILE, find_policy  # noqa: PLC0415  # few ask for one
 
-        asked[FILE] = lambda: find_policy(found.asked.problem, options.tell).content()
+        others[FILE] = lambda: find_policy(found.posed.problem, asked.tell).content()
     if found.analyzed:
         from seqopt.report._pages import plan_page  # noqa: PLC0415  # only where files are written
 
-        asked[PAGE] = lambda: plan_page(plan, found.prover, tasks=tasks)
-    for name, make in asked.items():
+        others[PAGE] = lambda: plan_page(plan, found.prover, tasks=tasks)
+    for name, make in others.items():
         content = found.clock.spare(name, make, None)
         made |= {} if content is None else {name: content}
     if outer is not None:
@@ -349,54 +389,52 @@ def _values(plan: Plan) -> str:
     return f"{OUTSIDE}: " * plan.is_far + ", ".join([*values, *steps])
 
 
-def _props(
-    options: argparse.Namespace, asked: Asked, choose: Callable[[Problem], Plan]
-) -> FoundProps:
+def _props(asked: Optimize, posed: PosedProblem, choose: Callable[[Problem], Plan]) -> FoundProps:
     """Return the best plan of the fewest props."""
-    if options.no_proof:
+    if asked.no_proof:
         raise ProblemError("--no-proof: props are compared by proven plans; leave it out")
     from seqopt.plan._studies.fewest_props import fewest_props  # noqa: PLC0415  # few ask for it
 
-    assert asked.fewest is not None
-    return fewest_props(asked.problem, asked.fewest, choose, options.tell)
+    assert posed.fewest is not None
+    return fewest_props(posed.problem, posed.fewest, choose, asked.tell)
 
 
 def _bases(
-    options: argparse.Namespace, problem: Problem, choose: Callable[[Problem], Plan]
+    asked: Optimize, words: str, problem: Problem, choose: Callable[[Problem], Plan]
 ) -> FoundBases:
     """Return the best plan over the bases that are asked for."""
-    if options.no_proof:
+    if asked.no_proof:
         raise ProblemError("--no-proof: bases are compared by proven plans; leave it out")
-    from seqopt._cli.words.bases import asked_places  # noqa: PLC0415  # few ask for it
+    from seqopt.arms._base_words import asked_places  # noqa: PLC0415  # few ask for it
     from seqopt.arms._bases import choose_bases  # noqa: PLC0415
 
-    scene = in_seconds(options, asked_scene(options))
-    places = asked_places(scene, options.bases)
-    return choose_bases(problem, scene, places, choose, options.tell)
+    scene = in_seconds(asked, asked_scene(asked))
+    places = asked_places(scene, words)
+    return choose_bases(problem, scene, places, choose, asked.tell)
 
 
-def _how(options: argparse.Namespace, formulation: Formulation) -> Run:
+def _how(asked: Optimize, formulation: Formulation) -> Run:
     """Return how a formulation is to be run, its own options among it."""
-    how: dict[str, Any] = parse_options(formulation, options.option)
-    if options.max_memory is not None and formulation.on is On.ORDERS:
+    how: dict[str, Any] = parse_options(formulation, asked.option)
+    if asked.max_memory is not None and formulation.on is On.ORDERS:
         raise ProblemError(
             "--max-memory: the search of orders has none; leave it out, or give --option most=N"
         )
-    if options.max_memory is not None and "max_memory" in formulation.options:
-        how["max_memory"] = parse_size(options.max_memory)
-    return Run(proof=not options.no_proof, lazy=options.lazy, options=how)
+    if asked.max_memory is not None and "max_memory" in formulation.options:
+        how["max_memory"] = parse_size(asked.max_memory)
+    return Run(proof=not asked.no_proof, lazy=asked.lazy, options=how)
 
 
-def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...]) -> Answer:
+def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
     """Return what a plan is worth, once it is written."""
     plan, clock = found.plan, found.clock
     scene = plan.engine.network.scene
     early = plan.ended is End.INTERRUPTED
     over = exceeded(scene, plan._columns) if found.analyzed and not early else ()
     enough = _enough_payload(plan) if over else ()
-    page = found.analyzed and PAGE not in clock.left_out
     lines = [_value(found) if not found.analyzed else f"{_held(plan)}; {_value(found)}"]
-    lines += [f"{_search(plan)}; {written_to(options.out, page=page)}"]
+    page = found.analyzed and PAGE not in clock.left_out
+    lines += [f"{_search(plan)}; {written_to(asked.out, page=page)}"]
     lines += map(wrapped, waits_said(plan) if plan.certificate is not None else ())
     lines += [f"stability, {each}" for each in found.own]
     lines += [wrapped(each.said) for each in (found.bases, found.props) if each is not None]
@@ -406,13 +444,10 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
         "summary": lambda: found.report,
         "proof": _proof(plan),
     }
-    if found.bases is not None:
-        facts["bases"] = found.bases.tried
-    if found.props is not None:
-        facts["fewest_props"] = found.props.tried
+    outer = {"bases": found.bases, "fewest_props": found.props}
+    facts |= {name: each.tried for name, each in outer.items() if each is not None}
     if plan.order is not None:
-        order = plan.order.selection.order
-        facts["order"] = order
+        facts["order"] = order = plan.order.selection.order
         lines.append(wrapped(", ".join(map(str, order)), first="order: "))
     said = (*(plan.enough.lines if found.analyzed else ()), f"proof: {_proof(plan)}")
     answer = Answer(
@@ -420,9 +455,9 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
         text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over), *enough]),
         written=written,
         notes=(
-            *level_notes(options, plan.engine),
-            *_posed_notes(found.asked.problem),
-            *rule_notes(found.asked.problem.moves, scene),
+            *level_notes(asked, plan.engine),
+            *_posed_notes(found.posed.problem),
+            *rule_notes(found.posed.problem.moves, scene),
             *(() if plan.arms is None else (f"arms: {plan.arms}",)),
             *(() if early else said),
             *idle_notes(scene, plan.steps),
@@ -435,16 +470,9 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     )
     unreached = () if plan.arms is None else faults_in_words(plan.arms.postures)
     left = plan.departures if found.analyzed else ()
-    answer = strictly(answer, options, over, left, found.verdicts, unreached)
-    return answer if found.asked.problem.lifts_range else _in_range(answer, plan)
-
-
-def _in_range(answer: Answer, plan: Plan) -> Answer:
-    """Return an answer whose status says it if a plan leaves the limit of the linear range."""
-    if not plan.is_far or answer.status is not Status.DONE:
-        return answer
-    said = f"seqopt: {OUTSIDE}: {plan.beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
-    return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
+    answer = strictly(answer, asked, over, left, found.verdicts, unreached)
+    far = plan.is_far and not found.posed.problem.lifts_range
+    return kept_range(answer, plan.beyond if far else None)
 
 
 def _held(plan: Plan) -> str:
@@ -482,7 +510,7 @@ def _value(found: Found) -> str:
     if plan.order is not None:
         values = ", ".join(f"{name} {value_text(name, v)}" for name, v in plan.objective.items())
         return f"{values}, {plan.status}, {plan.order.bound_said}"
-    known = found.asked.known
+    known = found.posed.known
     if known is None or isinstance(plan.graph, States):
         return plan._value
     value = f"{plan._value} over {len(known.scenes)} scenarios ({plan.title})"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from math import inf
+from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -15,114 +17,101 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
     _not_done,
     asked_prover,
+    kept_range,
     level_notes,
     marked,
     refused,
     rule_notes,
     scene_facts,
 )
-from seqopt._cli.options import (
-    BEST,
-    BUILT,
-    HOLDS,
-    LIMIT,
-    MOVES,
-    PROVES,
-    RULE,
-    STANDING,
-    WHERE,
-    WRITTEN,
-    declare,
-    engine_options,
-    form_options,
-    robots_option,
-    scene_options,
-)
+from seqopt._cli.options import Posed
 from seqopt._cli.outputs import _picked_files, _steps_table, figure_notes, write_outputs, written_to
 from seqopt._cli.posing import asked_problem
-from seqopt._cli.screens import question
 from seqopt._cli.values import parse_numbers
 from seqopt._files import csv_text, write_folder
 from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, TimeUpError, did_you_mean
+from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem, judged_by
-from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _said_limits
+from seqopt.problem.requirements import _said_limits
 from seqopt.report._pages import front_page
 from seqopt.report.comparison import _worst_of, fixed_methods, shown_table
 from seqopt.responses._tolerance import value_text
-from seqopt.responses.table import OUTSIDE, Departure, LinearRange, _analyze_builds, builds_in_words
+from seqopt.responses.table import Departure, LinearRange, _analyze_builds, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
-from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.work._clock import INTERRUPT, Clock
 from seqopt.work.progress import within
 
-RANGE = "which points leave the linear range"
 DETAILS = "responses, verdicts and the page"
 INTERRUPTED = "seqopt: interrupted; the points are those that were found"
 MOST_ROWS = 30  # of a table on the terminal
 FOUR = "F_largest,M_sup,T_max,D_max"
-DESCRIPTION = (
-    "Find every plan of the free schedule, or of a sequence with open grips, that no other plan "
-    "beats in all aims at once (the Pareto set); check each, and write a table, the plans, a chart "
-    "and a page for the browser."
-)
-USAGE = ("[SCENE] [--out DIR] [--aim NAME,NAME] [other options]",)
-EXAMPLES = (
-    "seqopt pareto arch25 --out front",
-    "seqopt pareto arch25 --pick D_max --under F_largest=250 --out front",
-    "seqopt pareto arch25 --aim D_max,steps --seconds 60 --out front",
-    "seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front",
-)
-AIM = {
-    "--aim NAME,NAME": "what is to be small: responses and, of the free schedule, steps and "
-    "regrips (default: %(default)s)"
-}
-SCHEDULE = {
-    "--schedule NAME|FILE": f"{FREE} (default): any robot may place, hold or release next; or a "
-    f"sequence with open grips: {', '.join(SCHEDULES)}, or a CSV file"
-}
-CHOICE = {
-    "--pick NAME": "also write a folder, pick, of the plan with the least of a column",
-    "--round NAME=STEP ...": "round a number up to multiples of a step (SI units)",
-    "--under BOUND ...": "for --pick: only plans below it: NAME=VALUE (SI units), or a method that "
-    "is to be beaten in everything: sequential, cantilever, published",
-}
-OF_MOVES = (
-    f"--rule and --direction go with --schedule {FREE} alone, --keep with --direction take-down "
-    "and not with --to."
-)
-OF_HOLDS = "--friction and --tilt go with --stands."
-SECONDS = {
-    "--seconds S": "limit of the whole command, with its proof, verdicts and page: what it has no "
-    "time for is left out and named; the points that were found by then are there"
-}
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``pareto``."""
-    built, moves = question(command, BUILT), question(command, MOVES, OF_MOVES)
-    scene_options(built)
-    robots_option(built, "the build")
-    declare(moves, SCHEDULE, default=FREE)
-    declare(moves, RULE | WHERE)
-    best = question(command, BEST, "--under goes with --pick.")
-    declare(best, AIM, default=FOUR)
-    declare(best, CHOICE)
-    declare(question(command, HOLDS, OF_HOLDS), LIMIT | STANDING)
-    declare(question(command, PROVES), SECONDS, default="inf", type=float)
-    engine_options(command)
-    declare(question(command, WRITTEN), {"--out DIR": "folder to write"})
-    form_options(command, builds=True)
-    command.set_defaults(criteria=None, crown=None)
+@dataclass(frozen=True, kw_only=True)
+class Pareto(Posed):
+    """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
+
+    No other plan beats it in all aims at once (the Pareto set). Check each, and write a table, the
+    plans, a chart and a page for the browser.
+
+    Usage
+    [SCENE] [--out DIR] [--aim NAME,NAME] [other options]
+
+    Which steps may a build have?
+    schedule : NAME|FILE
+        free (default): any robot may place, hold or release next; or a sequence with open grips:
+        {schedules}, or a CSV file
+
+    What counts as best?
+    --under goes with --pick.
+
+    aim : NAME,NAME
+        what is to be small: responses and, of the free schedule, steps and regrips (default:
+        {default})
+    pick : NAME
+        also write a folder, pick, of the plan with the least of a column
+    round : NAME=STEP
+        round a number up to multiples of a step (SI units)
+    under : BOUND
+        for --pick: only plans below it: NAME=VALUE (SI units), or a method that is to be beaten in
+        everything: sequential, cantilever, published
+
+    What must hold?
+    --friction and --tilt go with --stands.
+
+    Who chooses and proves, and how long?
+    seconds : S
+        limit of the whole command, with its proof, verdicts and page: what it has no time for is
+        left out and named; the points that were found by then are there
+
+    What is written and printed?
+    out : DIR
+        folder to write
+
+    Examples
+    --------
+    seqopt pareto arch25 --out front
+    seqopt pareto arch25 --pick D_max --under F_largest=250 --out front
+    seqopt pareto arch25 --aim D_max,steps --seconds 60 --out front
+    seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front
+    """
+
+    schedule: Any = FREE
+    aim: str | None = FOUR
+    pick: str | None = None
+    round: tuple[str, ...] = ()
+    under: tuple[str, ...] = ()
+    seconds: float = inf
 
 
 @dataclass(frozen=True, repr=False)
@@ -132,187 +121,185 @@ class _Picked(GivenSequence):
     result: str = ""
 
 
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Pareto) -> Answer:
     """Find all plans that no other beats in every aim, and write them."""
-    return answered(options, *find(options))
+    return answered(asked, find(asked))
 
 
-def find(options: argparse.Namespace) -> tuple[Problem, Front]:
-    """Find all plans that no other beats in every aim; with the problem that they are plans of."""
-    seconds = float(options.seconds)
-    if not seconds >= 0:
-        raise ProblemError(f"--seconds {seconds:g}: give a number from 0")
-    clock = options.clock = Clock(seconds)
+@dataclass(frozen=True, eq=False, repr=False)
+class Found:
+    """A Pareto set, what was asked, and what there is time to say of it."""
+
+    problem: Problem
+    front: Front
+    clock: Clock
+    prover: Callable[[Network], BuildProver]
+
+    @cached_property
+    def provers(self) -> dict[Engine, BuildProver]:
+        """What says which steps stand, by the engine of a build order."""
+        return {own: self.prover(own.network) for own in {*self.front.engines}}
+
+    @cached_property
+    def methods(self) -> Mapping[str, pd.DataFrame]:
+        """Fixed methods beside, as far as there is time."""
+        return self.clock.spare(
+            "fixed methods beside", lambda: fixed_methods(self.problem.engine), {}
+        )
+
+    @cached_property
+    def departures(self) -> dict[str, tuple[Departure, ...]]:
+        """How plans leave the linear range, for those that do, by name."""
+
+        def departures() -> dict[str, tuple[Departure, ...]]:
+            left: dict[str, tuple[Departure, ...]] = {}
+            for own, builds in _by_engine(self.front).items():
+                left |= LinearRange(own).of_steps(builds)
+            return {name: left[name] for name in _names(self.front) if name in left}
+
+        return self.clock.spare("which points leave the linear range", departures, {})
+
+    @property
+    def counts(self) -> dict[str, object]:
+        """How many points there are, whether that is all, and how long it took."""
+        front = self.front
+        counts = {"points": len(front.steps), "complete": front.complete}
+        return {**counts, "seconds": dict(front.seconds)}
+
+
+def find(asked: Pareto) -> Found:
+    """Find all plans that no other beats in every aim."""
+    if not asked.seconds >= 0:
+        raise ProblemError(f"--seconds {asked.seconds:g}: give a number from 0")
+    clock = Clock(asked.seconds)
     with clock.needed("posing the problem"):
-        problem = asked_problem(options).problem
+        problem = asked_problem(asked).problem
         free = states_of(problem)
-    rounding = parse_numbers("--round", options.round, [str(goal) for goal in free.goals])
-    tell = within(options.tell, clock.left)
+    rounding = parse_numbers("--round", asked.round, [str(goal) for goal in free.goals])
+    tell = within(asked.tell, clock.left)
     front = find_front(problem, rounding=rounding, progress=tell, clock=clock)
     clock.interrupted |= front.stopped == INTERRUPT
-    return problem, front
+    return Found(problem, front, clock, partial(asked_prover, asked))
 
 
-def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Answer:
+def answered(asked: Pareto, found: Found) -> Answer:
     """Write a Pareto set, and return what is in it; what there is no time for is left out."""
-    free, clock = states_of(problem), options.clock
+    front, free, clock = found.front, states_of(found.problem), found.clock
     scene = free.engine.network.scene
-    provers = {own: asked_prover(options, own.network) for own in {*front.engines}}
-    methods, left, files = _content(options, problem, front, provers)
+    files: Mapping[str, bytes | str] = {}
+    if asked.out is not None or any("=" not in text for text in asked.under):
+        _ = found.methods
+    _ = found.departures
+    if asked.out is not None:
+        files = clock.spare(DETAILS, partial(_front_files, asked, found), _bare_files(found))
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
-    if options.out and not options.pick:
+    if asked.out and not asked.pick:
         said += "; --pick D_max also writes a folder of the plan with the least"
-    if options.pick:
-        chosen, picked, row = _chosen(options, front, methods)
+    if asked.pick:
+        chosen, picked, row = _chosen(asked, asked.pick, found)
         scene = front.engines[chosen].network.scene  # in the order of what is picked
         said += f"; picked row {chosen + 1}: {row}"
-    written = write_outputs(options, lambda: {**files, "scene.json": dump_scene(scene)})
+    written = write_outputs(asked, lambda: {**files, "scene.json": dump_scene(scene)})
     shown = "" if written else f"{_numbered(front).to_string(max_rows=MOST_ROWS)}\n"
-    missing = figure_notes() if written else ()
-    if written and picked is not None:
-        prover = provers[front.engines[chosen]]
-        write = partial(_write_picked, options, front, chosen, picked, prover)
+    if asked.out is not None and asked.pick and picked is not None:
+        write = partial(_write_picked, asked.out / "pick", asked.pick, found, chosen, picked)
         clock.spare("the folder of the plan that is picked", write, None)
+    points = {"points": shown_table(front.table), "picked": picked}
     answer = Answer(
-        facts={
-            "scene": scene_facts(scene),
-            "complete": front.complete,
-            "seconds": dict(front.seconds),
-            "points": shown_table(front.table),
-            "picked": picked,
-        },
-        text=f"{shown}{said}; {written_to(options.out, page=DETAILS not in clock.left_out)}",
+        facts={"scene": scene_facts(scene), **found.counts, **points},
+        text=f"{shown}{said}; {written_to(asked.out, page=DETAILS not in clock.left_out)}",
         written=written,
         notes=(
-            *level_notes(options, free.engine),
+            *level_notes(asked, free.engine),
             *rule_notes(free.rules, scene),
-            *refused(next(iter(provers.values()))),
-            *missing,
+            *refused(next(iter(found.provers.values()))),
+            *(figure_notes() if written else ()),
             *_not_done(clock),
         ),
         failures=(INTERRUPTED,) if clock.interrupted else (),
         status=Status.INTERRUPTED if clock.interrupted else Status.DONE,
     )
-    answer = marked(answer, left)
-    if not front.beyond or clock.interrupted:
-        return answer
-    said = f"seqopt: {OUTSIDE}: {front.beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
-    return replace(answer, failures=(said,), status=Status.DOES_NOT_HOLD)
+    return kept_range(marked(answer, builds_in_words(found.departures)), front.beyond or None)
 
 
-def _content(
-    options: argparse.Namespace,
-    problem: Problem,
-    front: Front,
-    provers: Mapping[Engine, BuildProver],
-) -> tuple[Mapping[str, pd.DataFrame], tuple[str, ...], Mapping[str, bytes | str]]:
-    """Return fixed methods, which points leave the linear range, and files, as far as needed."""
-    shows, clock = options.out is not None, options.clock
-    methods: Mapping[str, pd.DataFrame] = {}
-    if shows or any("=" not in text for text in options.under):
-        beside = partial(fixed_methods, problem.engine)
-        methods = clock.spare("fixed methods beside", beside, methods)
-    none: dict[str, tuple[Departure, ...]] = {}
-    departures = clock.spare(RANGE, partial(_departures, front), none)
-    files: Mapping[str, bytes | str] = _bare_files(front) if shows else {}
-    if shows:
-        found = partial(_front_files, front, problem, methods, provers, departures, options)
-        files = clock.spare(DETAILS, found, files)
-    return methods, builds_in_words(departures), files
-
-
-def _chosen(
-    options: argparse.Namespace, front: Front, methods: Mapping[str, pd.DataFrame]
-) -> tuple[int, dict[str, object], str]:
+def _chosen(asked: Pareto, name: str, found: Found) -> tuple[int, dict[str, object], str]:
     """Return which plan is picked, its point, and that in words."""
-    if options.under and not methods and options.clock.left_out:
-        raise TimeUpError(f"--pick {options.pick}: --under was not looked at; give more")
-    chosen = pick(front.table, options.pick, _under(options.under, methods))
-    values = shown_table(front.table).iloc[chosen]
+    if asked.under and not found.methods and found.clock.left_out:
+        raise TimeUpError(f"--pick {name}: --under was not looked at; give more")
+    chosen = pick(found.front.table, name, _under(asked.under, found))
+    values = shown_table(found.front.table).iloc[chosen]
     row = ", ".join(f"{name} {value_text(str(name), v)}" for name, v in values.items())
     return chosen, {"point": chosen + 1, **values}, row
 
 
-def _bare_files(front: Front) -> dict[str, bytes | str]:
+def _bare_files(found: Found) -> dict[str, bytes | str]:
     """Return a Pareto set without what takes time: its points, and the steps of their plans."""
-    pairs = zip(front.engines, front.steps, strict=True)
-    plans = [
-        _steps_table(_Picked(own, steps)).assign(point=number)
-        for number, (own, steps) in enumerate(pairs, start=1)
-    ]
-    summary = {"points": len(plans), "complete": front.complete, "seconds": dict(front.seconds)}
+    pairs = zip(found.front.engines, found.front.steps, strict=True)
+    return _files(found, [_steps_table(_Picked(own, steps)) for own, steps in pairs], {})
+
+
+def _files(
+    found: Found,
+    plans: Sequence[pd.DataFrame],
+    more: Mapping[str, object],
+    numbered: pd.DataFrame | None = None,
+) -> dict[str, bytes | str]:
+    """Return the tables and the summary of a Pareto set."""
+    points = _numbered(found.front).reset_index() if numbered is None else numbered
+    plans = [table.assign(point=number) for number, table in enumerate(plans, start=1)]
     return {
-        "pareto.csv": csv_text(_numbered(front).reset_index()),
+        "pareto.csv": csv_text(points),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
-        "summary.json": json.dumps(summary, indent=2) + "\n",
+        "summary.json": json.dumps({**found.counts, **more}, indent=2) + "\n",
     }
 
 
 def _write_picked(
-    options: argparse.Namespace,
-    front: Front,
-    chosen: int,
-    picked: Mapping[str, object],
-    prover: BuildProver,
+    folder: Path, name: str, found: Found, chosen: int, picked: Mapping[str, object]
 ) -> None:
     """Write the plan that is picked, a folder as of any plan."""
-    own = front.engines[chosen]
-    title = f"plan with the least {options.pick}"
-    plan = _Picked(own, front.steps[chosen], title, result=f"one of {len(front.steps)} plans")
+    own = found.front.engines[chosen]
+    result = f"one of {len(found.front.steps)} plans"
+    plan = _Picked(own, found.front.steps[chosen], f"plan with the least {name}", result=result)
     report = {"scene": own.network.scene.name, "picked": picked, **provenance(own)}
-    write_folder(options.out / "pick", _picked_files(plan, report, prover))
+    write_folder(folder, _picked_files(plan, report, found.provers[own]))
 
 
-def _front_files(
-    front: Front,
-    problem: Problem,
-    methods: Mapping[str, pd.DataFrame],
-    provers: Mapping[Engine, BuildProver],
-    departures: Mapping[str, Sequence[Departure]],
-    options: argparse.Namespace,
-) -> dict[str, bytes | str]:
+def _front_files(asked: Pareto, found: Found) -> dict[str, bytes | str]:
     """Return the files of a Pareto set by name."""
+    front, problem = found.front, found.problem
     engine, free = problem.engine, states_of(problem)
-    options.tell("analyzing plans")
-    found: dict[str, pd.DataFrame] = {}
+    asked.tell("analyzing plans")
+    each: dict[str, pd.DataFrame] = {}
     verdicts: dict[str, tuple[BuildVerdicts, ...]] = {}
     for own, builds in _by_engine(front).items():
-        found |= zip(builds, _analyze_builds(own, [*builds.values()]), strict=True)
-        verdicts |= provers[own].of_builds(builds)
-    options.tell("drawing and writing the page")
-    tables = {name: found[name] for name in _names(front)}
-    posed = {
+        each |= zip(builds, _analyze_builds(own, [*builds.values()]), strict=True)
+        verdicts |= found.provers[own].of_builds(builds)
+    asked.tell("drawing and writing the page")
+    tables = {name: each[name] for name in _names(front)}
+    left = found.departures
+    summary = {
+        "outside_linear_range": list(builds_in_words(left)),
         "scene": engine.network.scene.name,
-        "schedule": str(options.schedule),
+        "schedule": str(asked.schedule),
         "aims": [str(goal) for goal in free.goals],
         **judged_by(free.goals, free.criterion),
         "limits": _said_limits(problem.limits),
-    }
-    summary = {
-        "points": len(front.steps),
-        "complete": front.complete,
-        "seconds": dict(front.seconds),
-        "outside_linear_range": list(builds_in_words(departures)),
-        **posed,
         **provenance(engine),
     }
     numbered = _numbered(front).reset_index()
-    for each in [*zip(*(verdicts.get(name, ()) for name in tables), strict=True)]:
-        numbered[f"falls_{each[0].mortar}"] = [found.count(Verdict.FALLS) for found in each]
-    if departures:
-        numbered["outside_linear_range"] = ["yes" if name in departures else "" for name in tables]
+    for own_verdicts in [*zip(*(verdicts.get(name, ()) for name in tables), strict=True)]:
+        falls = [proven.count(Verdict.FALLS) for proven in own_verdicts]
+        numbered[f"falls_{own_verdicts[0].mortar}"] = falls
+    if left:
+        numbered["outside_linear_range"] = ["yes" if name in left else "" for name in tables]
     orders = [own.network.scene.build_order for own in front.engines]
     if {*orders} - {engine.network.scene.build_order}:
         numbered["order"] = [",".join(map(str, order)) for order in orders]
-    plans = [table.assign(point=number) for number, table in enumerate(tables.values(), start=1)]
-    return {
-        PAGE: front_page(engine, front, tables, departures, verdicts),
-        "pareto.csv": csv_text(numbered),
-        "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
-        **_picture(front, methods),
-        "summary.json": json.dumps(summary, indent=2) + "\n",
-    }
+    files = _files(found, [*tables.values()], summary, numbered)
+    page = front_page(engine, front, tables, left, verdicts)
+    return {PAGE: page, **files, **_picture(front, found.methods)}
 
 
 def _names(front: Front) -> list[str]:
@@ -326,14 +313,6 @@ def _by_engine(front: Front) -> dict[Engine, dict[str, Sequence[Step]]]:
     for name, own, steps in zip(_names(front), front.engines, front.steps, strict=True):
         found[own][name] = steps
     return found
-
-
-def _departures(front: Front) -> dict[str, tuple[Departure, ...]]:
-    """Return how plans leave the linear range, for those that do, by name."""
-    left: dict[str, tuple[Departure, ...]] = {}
-    for own, builds in _by_engine(front).items():
-        left |= LinearRange(own).of_steps(builds)
-    return {name: left[name] for name in _names(front) if name in left}
 
 
 def _numbered(front: Front) -> pd.DataFrame:
@@ -352,10 +331,11 @@ def _picture(front: Front, methods: Mapping[str, pd.DataFrame]) -> Mapping[str, 
     return picture_files("pareto", front_figure(front, methods))
 
 
-def _under(texts: Sequence[str], methods: Mapping[str, pd.DataFrame]) -> dict[str, float]:
+def _under(texts: Sequence[str], found: Found) -> dict[str, float]:
     """Return bounds from words: RESPONSE=VALUE, or the name of a method to beat."""
     out: dict[str, float] = {}
     for text in texts:
+        methods = {} if "=" in text else found.methods
         if "=" not in text and text not in methods:
             known = ", ".join(methods)
             why = f"no such method{did_you_mean(text, methods)}"

@@ -2,38 +2,20 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.arguments import parser
 from seqopt._cli.commands import optimize
-from seqopt._cli.options import (
-    BEST,
-    CURING,
-    DURATIONS,
-    HOLDS,
-    LIMIT,
-    MOVES,
-    POSTURES,
-    PROVES,
-    RULE,
-    STANDING,
-    WRITTEN,
-    criterion_options,
-    declare,
-    engine_options,
-    form_options,
-)
-from seqopt._cli.screens import question
+from seqopt._cli.options import Aimed, Cost, Cured, Judged, Postures, Rules, Strict, Timed, word
+from seqopt._cli.outputs import ALWAYS, require_out
+from seqopt._cli.posing import Change
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words.given import plan_folder
-from seqopt._cli.words.optimizing import AIM, TIME
 from seqopt._cli.words.where import Place
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
@@ -50,90 +32,114 @@ from seqopt.sequence.rules import FREE, _usual_grips, with_robots
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.study.published import CRITERIA
 
-DESCRIPTION = (
-    "Plan the rest of a build from one of its steps, after something has changed: a robot is lost, "
-    "carries less or is new, a brick is missing. Any robot may release, hold or place next; aims, "
-    "criterion and rules are those of the plan, if nothing else is said."
-)
-USAGE = ("PLAN_DIR [--at STEP] [changes] [--out DIR] [other options]",)
-EXAMPLES = (
-    "seqopt replan free --at 12 --lost rob3 --rule least_grips=1",
-    "seqopt replan free --at 12 --payload rob1=250 --out weaker",
-    "seqopt replan free --at 12 --robots 4 --missing 9",
-)
-PLACE = {
-    "plan PLAN_DIR|SCENE": "folder that optimize wrote: its plan, scene and summary; in "
-    "place of it a scene, for which the best free schedule is planned first"
-}
-CHANGES = {
-    "--lost ROBOT ...": "robot that lets go and takes no further part",
-    "--payload NEWTON ...": "what every robot may carry from now on, or as rob1=250 one",
-    "--grips STIFFNESS": "how stiff grips are, as of optimize",
-    "--robots N": "how many robots there are from now on; new ones reach every node",
-    "--missing BRICK ...": "brick that is not there: one that stood is placed again next, one that "
-    "was still to come waits until all are placed that do not hang on it",
-    "--measured FILE": "where bricks that stand were measured, m: a CSV file (brick, x, y, z), or "
-    "an assembly of COMPAS",
-    "--to PLAN:STEP|STATE|N": "where the build ends, as of optimize",
-}
-OF_HOLDS = "--friction, --tilt and --curing go with --stands."
-ASKED = ("aim", "criteria", "limit", "rule", "stands", "friction", "tilt")
+
+@dataclass(frozen=True, kw_only=True)
+class Replan(Strict, Postures, Judged, Timed, Cured, Cost, Aimed, Rules):
+    """Plan the rest of a build from one of its steps, after something has changed.
+
+    A robot is lost, carries less or is new, a brick is missing. Any robot may release, hold or
+    place next; aims, criterion and rules are those of the plan, if nothing else is said.
+
+    Usage
+    PLAN_DIR [--at STEP] [changes] [--out DIR] [other options]
+
+    Which plan, and where does it stand?
+    plan : PLAN_DIR|SCENE
+        folder that optimize wrote: its plan, scene and summary; in place of it a scene, for which
+        the best free schedule is planned first
+    at : STEP
+        number of the last step that was done (default: {default})
+
+    What has changed?
+    lost : ROBOT
+        robot that lets go and takes no further part
+    payload : NEWTON
+        what every robot may carry from now on, or as rob1=250 one
+    grips : STIFFNESS
+        how stiff grips are, as of optimize
+    robots : N
+        how many robots there are from now on; new ones reach every node
+    missing : BRICK
+        brick that is not there: one that stood is placed again next, one that was still to come
+        waits until all are placed that do not hang on it
+    measured : FILE
+        where bricks that stand were measured, m: a CSV file (brick, x, y, z), or an assembly of
+        COMPAS
+    to : PLAN:STEP|STATE|N
+        where the build ends, as of optimize
+
+    What counts as best?
+    As before, where nothing is said.
+
+    What must hold?
+    --friction, --tilt and --curing go with --stands.
+
+    What is written and printed?
+    out : DIR
+        folder to write the new plan to
+
+    Examples
+    --------
+    seqopt replan free --at 12 --lost rob3 --rule least_grips=1
+    seqopt replan free --at 12 --payload rob1=250 --out weaker
+    seqopt replan free --at 12 --robots 4 --missing 9
+    """
+
+    plan: Any = word(place=True)
+    at: str = "1"
+    lost: tuple[str, ...] = ()
+    payload: tuple[str, ...] = ()
+    grips: str | None = None
+    robots: str = ""
+    missing: tuple[str, ...] = ()
+    measured: Path | None = None
+    to: str | None = None
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``replan``."""
-    basic = question(command, "Which plan, and where does it stand?")
-    declare(basic, PLACE)
-    about = "number of the last step that was done (default: %(default)s)"
-    declare(basic, {"--at STEP": about}, default="1")
-    declare(question(command, "What has changed?"), CHANGES)
-    declare(question(command, MOVES), RULE | DURATIONS)
-    declare(question(command, BEST, "As before, where nothing is said."), AIM)
-    criterion_options(command)
-    declare(question(command, HOLDS, OF_HOLDS), LIMIT | STANDING | CURING)
-    declare(question(command, PROVES), TIME | POSTURES)
-    engine_options(command)
-    declare(question(command, WRITTEN), {"--out DIR": "folder to write the new plan to"})
-    form_options(command, strict=True, builds=True)
-
-
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Replan) -> Answer:
     """Plan the rest of a build, and say what changes."""
-    base, found = find(options)
-    with found.proving():
-        return answered(options, base, found)
+    found = find(asked)
+    with found.new.proving():
+        return answered(asked, found)
 
 
-def find(options: argparse.Namespace) -> tuple[argparse.Namespace, optimize.Found]:
-    """Plan the rest of a build; with what was asked, as words of ``optimize``."""
-    options.plan = plan_folder(options, options.plan, free=True)
-    scene_file = options.plan / "scene.json"
-    scene = load_scene(scene_file)
-    for name in ("at", "robots"):
-        if not (getattr(options, name) or "0").isdecimal():
-            raise StepError(f"--{name} {getattr(options, name)}: give a number")
-    base = _as_optimize(options, scene_file)
+class Found(NamedTuple):
+    """The folder of a plan, what is asked of ``optimize``, and the plan of the rest."""
+
+    folder: Path
+    base: optimize.Optimize
+    new: optimize.Found
+
+
+def find(asked: Replan) -> Found:
+    """Plan the rest of a build; with what was asked, as of ``optimize``."""
+    for name, text in (("at", asked.at), ("robots", asked.robots or "0")):
+        if not text.isdecimal():
+            raise StepError(f"--{name} {text}: give a number")
+    require_out(asked, *ALWAYS)
+    folder = plan_folder(asked, asked.plan, free=True)
+    base, change = _as_optimize(asked, folder), partial(_changed, asked)
     try:
-        return base, optimize.find(base)
+        return Found(folder, base, optimize.find(base, change))
     except InfeasibleError as error:
-        asked = int(options.robots or 0)
-        raise InfeasibleError(f"{error}{_with_another(base, scene, asked)}") from None
+        robots = load_scene(folder / "scene.json").robots
+        count = max(len(robots), int(asked.robots or 0)) + 1
+        raise InfeasibleError(f"{error}{_with_another(base, count, change)}") from None
 
 
-def answered(
-    options: argparse.Namespace, base: argparse.Namespace, found: optimize.Found
-) -> Answer:
+def answered(asked: Replan, found: Found) -> Answer:
     """Write the new plan, and say what it changes."""
-    scene = load_scene(options.plan / "scene.json")
-    steps = read_plan(scene, options.plan / "plan.csv")
-    old = [step for step in steps if step.number > int(options.at)]
+    folder, base, new = found
+    scene = load_scene(folder / "scene.json")
+    steps = read_plan(scene, folder / "plan.csv")
+    old = [step for step in steps if step.number > int(asked.at)]
 
     def differs() -> dict[str, object]:
-        off = {} if options.measured is None else _off(scene, found.plan)
-        return compared(found.plan, old) | off
+        off = {} if asked.measured is None else _off(scene, new.plan)
+        return compared(new.plan, old) | off
 
-    facts = found.clock.spare("what the new plan changes", differs, None)
-    answer = optimize.answered(base, found)
+    facts = new.clock.spare("what the new plan changes", differs, None)
+    answer = optimize.answered(base, new)
     if facts is None:
         return answer
     return replace(
@@ -152,23 +158,18 @@ def _off(scene: Scene, plan: Plan) -> dict[str, object]:
     return {"off_m": off, "off_brick": brick, "tolerance_left_m": float(left)}
 
 
-def _as_optimize(options: argparse.Namespace, scene_file: Path) -> argparse.Namespace:
-    """Return what is asked, as words of ``optimize`` that go on from the step."""
-    words = ["optimize", str(scene_file), "--schedule", FREE]
-    base = parser("optimize").parse_args(words)
-    told = _told(options.plan, lost=bool(options.lost))
-    for name, value in vars(options).items():
-        usual = told.get(name) if name in ASKED and not value else None
-        setattr(base, name, usual or value)
-    base.rule = [*told.get("rule", []), *options.rule] if options.rule else base.rule
-    base.command, base.scene, base.schedule = "optimize", str(scene_file), FREE
-    base.robots = options.robots or ""
-    setattr(base, "from", f"{options.plan}:{options.at}")
-    base.change = partial(_changed, options)
-    base.direction = told.get("direction")
-    if base.direction and options.missing:
+def _as_optimize(asked: Replan, folder: Path) -> optimize.Optimize:
+    """Return what is asked, as of ``optimize``, which goes on from the step."""
+    shared = {each.name for each in fields(asked)} & {e.name for e in fields(optimize.Optimize)}
+    given = {name: getattr(asked, name) for name in shared}
+    told = _told(folder, lost=bool(asked.lost))
+    given |= {name: told[name] for name in ("aim", "criteria", "limit") if not given[name] and told}
+    given |= {"scene": str(folder / "scene.json"), "schedule": FREE}
+    given |= {"begin": f"{folder}:{asked.at}", "direction": told.get("direction")}
+    given["rule"] = (*told.get("rule", ()), *asked.rule)
+    if given["direction"] and asked.missing:
         raise StepError("--missing: bricks are missing in a build; a take-down removes them anyway")
-    return base
+    return optimize.Optimize(**given)
 
 
 def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
@@ -191,12 +192,12 @@ def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
         "direction": rules.get("direction"),
         "aim": ",".join(map(str, aims if isinstance(aims, list) else ())),
         "criteria": criterion if isinstance(criterion, str) and criterion in CRITERIA else None,
-        "rule": [f"{name}={rules[name]}" for name in names if name in rules],
-        "limit": [
+        "rule": tuple(f"{name}={rules[name]}" for name in names if name in rules),
+        "limit": tuple(
             f"{TOLERANCE if is_tolerance(name) else name}={value}"  # beside which limits follows
             for name, value in limits.items()
             if name != PROP_EXCESS  # which the scene says
-        ],
+        ),
     }
 
 
@@ -212,15 +213,15 @@ def _texts(told: object) -> dict[str, str]:
     return {name: str(value) for name, value in pairs if isinstance(value, str | int | float)}
 
 
-def _changed(options: argparse.Namespace, scene: Scene, begin: Place) -> tuple[Scene, Place, str]:
+def _changed(asked: Replan, scene: Scene, begin: Place) -> tuple[Scene, Place, str]:
     """Return scene and place after what has changed, and the robots that take part, by name."""
     assert begin.site is not None
-    bricks = [_brick(text) for text in options.missing]
-    if options.measured is not None:
-        scene = _built(scene, begin.site.bricks, options.measured)
-    scene, site = without(scene, begin.site, options.lost, bricks)
-    left = [robot.name for robot in scene.robots if robot.name not in options.lost]
-    return scene, Place(site, None), ",".join(left) if options.lost else ""
+    bricks = [_brick(text) for text in asked.missing]
+    if asked.measured is not None:
+        scene = _built(scene, begin.site.bricks, asked.measured)
+    scene, site = without(scene, begin.site, asked.lost, bricks)
+    left = [robot.name for robot in scene.robots if robot.name not in asked.lost]
+    return scene, Place(site, None), ",".join(left) if asked.lost else ""
 
 
 def _built(scene: Scene, bricks: int, path: Path) -> Scene:
@@ -238,13 +239,11 @@ def _brick(text: str) -> int:
     return int(text)
 
 
-def _with_another(base: argparse.Namespace, scene: Scene, asked: int) -> str:
+def _with_another(base: optimize.Optimize, count: int, change: Change) -> str:
     """Return whether one more robot opens a way, as the end of a line."""
-    count = max(len(scene.robots), asked) + 1
     try:
-        with_robots(scene, count)
-        base.robots = str(count)
-        found = optimize.find(base)
+        with_robots(load_scene(str(base.scene)), count)
+        found = optimize.find(replace(base, robots=str(count)), change)
     except (InfeasibleError, NothingFoundError, StepError):
         return ""
     return f"; or with one more robot that reaches every node: {found.plan.result}"

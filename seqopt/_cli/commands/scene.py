@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_scene, posture_trouble, scene_facts, size_line
-from seqopt._cli.options import BUILT, POSTURES, declare, form_options, scene_options
+from seqopt._cli.options import Built, Postures
 from seqopt._cli.outputs import keep_apart
-from seqopt._cli.screens import question
 from seqopt._cli.words.given import file_name
 from seqopt._files import write_text
 from seqopt.network.build import build_network
@@ -24,53 +24,53 @@ from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
 from seqopt.work.progress import with_progress
 
-DESCRIPTION = (
-    "Check a scene, say what is in it, and write it as a JSON file if asked; or list all built-in "
-    "scenes and the words that make others."
-)
-EXAMPLES = (
-    "seqopt scene --list",
-    "seqopt scene arch:span=2,rise=0.8",
-    "seqopt scene arch25 --export my.json",
-    "seqopt scene my.json --view",
-)
+
+@dataclass(frozen=True, kw_only=True)
+class SceneAsked(Postures, Built):
+    """Check a scene, say what is in it, and write it as a JSON file if asked.
+
+    Or list all built-in scenes and the words that make others.
+
+    What is built, and by whom?
+    list :
+        name all built-in scenes, and the words that make others
+    export : FILE
+        JSON file to write
+    view :
+        write a page for the browser: bricks by name in their order, nodes at which robots can hold,
+        ground, bases and reaches
+
+    Examples
+    --------
+    seqopt scene --list
+    seqopt scene arch:span=2,rise=0.8
+    seqopt scene arch25 --export my.json
+    seqopt scene my.json --view
+    """
+
+    list: bool = False
+    export: Path | None = None
+    view: bool = False
 
 
-WHAT = {
-    "--list": "name all built-in scenes, and the words that make others",
-    "--export FILE": "JSON file to write",
-    "--view": "write a page for the browser: bricks by name in their order, nodes at which robots "
-    "can hold, ground, bases and reaches",
-}
-
-
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``scene``."""
-    basic = question(command, BUILT)
-    scene_options(basic)
-    declare(basic.add_mutually_exclusive_group(), WHAT)
-    declare(basic, POSTURES)
-    form_options(command)
-
-
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: SceneAsked) -> Answer:
     """Describe a scene and export it, or list all that there are."""
-    if options.list:
-        return _list(options)
-    keep_apart(options, options.export)
-    scene = asked_scene(options)
+    if asked.list:
+        return _list(asked)
+    keep_apart(asked, asked.export)
+    scene = asked_scene(asked)
     facts = {**scene_facts(scene), **_network_facts(build_network(scene))}
     lines = [*_described(scene, facts)]
-    if options.export is not None:
-        save_scene(scene, options.export)
-        lines.append(f"written to {options.export}")
-    written = () if options.export is None else (options.export,)
-    if options.view:
+    if asked.export is not None:
+        save_scene(scene, asked.export)
+        lines.append(f"written to {asked.export}")
+    written = () if asked.export is None else (asked.export,)
+    if asked.view:
         page = file_name(scene.name, ".html")
-        keep_apart(options, page)
-        trouble = posture_trouble(options, scene)
+        keep_apart(asked, page)
+        trouble = posture_trouble(asked, scene)
         lines += [f"arms: their reach is not known; {trouble}"] if trouble else []
-        options.tell("writing the page")
+        asked.tell("writing the page")
         write_text(page, scene_page(scene))
         lines.append(f"written to {page}; open it in a browser")
         written = (page,)
@@ -98,10 +98,10 @@ def _network_facts(network: Network) -> dict[str, object]:
     }
 
 
-def _list(options: argparse.Namespace) -> Answer:
+def _list(asked: SceneAsked) -> Answer:
     found = {
         name: load_scene(name)
-        for name in with_progress("reading built-in scenes", builtin_scenes(), options.tell)
+        for name in with_progress("reading built-in scenes", builtin_scenes(), asked.tell)
     }
     lines = [
         f"{name}: {len(scene.bricks)} bricks, {len(scene.joints)} joints; {ABOUT[name]}"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import pandas as pd
 
@@ -20,26 +20,10 @@ from seqopt._cli.asked import (
     scene_facts,
     waits_said,
 )
-from seqopt._cli.options import (
-    BUILT,
-    CURING,
-    DURATIONS,
-    HOLDS,
-    MOVES,
-    POSTURES,
-    STANDING,
-    STEPS_USAGE,
-    WRITTEN,
-    declare,
-    form_options,
-    scene_options,
-    steps_options,
-)
+from seqopt._cli.options import Cured, Fixed, Postures, Timed
 from seqopt._cli.outputs import figure_notes, require_out, time_files, write_outputs
-from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing
-from seqopt._cli.words.given import take
 from seqopt._files import csv_text
 from seqopt.contact.curing import _find_curing
 from seqopt.engines.registry import USUAL, make_engine
@@ -47,64 +31,67 @@ from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.plan.build import GivenSequence
 from seqopt.problem.standing import Standing
-from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence._durations import has_durations
 from seqopt.sequence.steps import Step
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
-from seqopt.times._tables import SHARE, aged_table, busy_table
+from seqopt.times._tables import aged_table, busy_table, softer_lines, spent_lines, total_lines
 
-DESCRIPTION = (
-    "Say how long a build takes and who does what when. A robot that holds nothing prepares what "
-    "it does next while others hold and act; actions come one after the other, in the order of "
-    "the steps."
-)
-USAGE = tuple(usage.replace("--out FILE", "--out DIR") for usage in STEPS_USAGE)
 USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
-EXAMPLES = (
-    "seqopt times timed.json --method cantilever --durations rob3:slower=2.5",
-    "seqopt times my.json --plan plan.csv --reassign --out faster",
-)
-REASSIGN = {
-    "--reassign": "give the same grips, in the same order, to the robots with which the build ends "
-    "first, within their reach and payload"
-}
 
 
-STIFFENS = {
-    "--stiffens WORDS ...": "which share of its stiffness a joint has at an age, in the words of "
-    "--curing, from 0 s on, as 0s=0.05,15min=1: responses of every step with joints as stiff as "
-    "they are when it begins, beside the payloads"
-}
+@dataclass(frozen=True, kw_only=True)
+class Times(Postures, Cured, Timed, Fixed):
+    """Say how long a build takes and who does what when.
+
+    A robot that holds nothing prepares what it does next while others hold and act; actions come
+    one after the other, in the order of the steps.
+
+    Usage
+    [SCENE] [--method NAME] [--out DIR] [other options]
+    [SCENE] --plan FILE [--out DIR] [other options]
+    PLAN_DIR [--out DIR] [other options]
+
+    Which steps may a build have?
+    reassign :
+        give the same grips, in the same order, to the robots with which the build ends first,
+        within their reach and payload
+
+    What must hold?
+    --stands, --friction and --tilt go with --curing alone.
+
+    stiffens : WORDS
+        which share of its stiffness a joint has at an age, in the words of --curing, from 0 s on,
+        as 0s=0.05,15min=1: responses of every step with joints as stiff as they are when it begins,
+        beside the payloads
+
+    What is written and printed?
+    out : DIR
+        folder to write plan.csv, times.csv and a chart to
+
+    Examples
+    --------
+    seqopt times timed.json --method cantilever --durations rob3:slower=2.5
+    seqopt times my.json --plan plan.csv --reassign --out faster
+    """
+
+    reassign: bool = False
+    stiffens: tuple[str, ...] = ()
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``times``."""
-    built = question(command, BUILT)
-    scene_options(built)
-    declare(built, DURATIONS)
-    moves = question(command, MOVES)
-    steps_options(moves)
-    declare(moves, REASSIGN | POSTURES)
-    cures = question(command, HOLDS, "--stands, --friction and --tilt go with --curing alone.")
-    declare(cures, STANDING | CURING | STIFFENS)
-    out = {"--out DIR": "folder to write plan.csv, times.csv and a chart to"}
-    declare(question(command, WRITTEN), out)
-    form_options(command)
-
-
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Times) -> Answer:
     """Say how long a build takes, and write its times if asked."""
-    require_out(options, "plan.csv", "times.csv")
-    scene = asked_scene(options)
-    if not (options.durations or has_durations(scene)):
-        options.durations = [USUAL_SECONDS]
-        take(options, f"durations: not known, taken as {USUAL_SECONDS}; --durations says others")
-    scene = in_seconds(options, scene)
+    require_out(asked, "plan.csv", "times.csv")
+    scene = asked_scene(asked)
+    if not (asked.durations or has_durations(scene)):
+        asked = replace(asked, durations=(USUAL_SECONDS,))
+        said = f"durations: not known, taken as {USUAL_SECONDS}; --durations says others"
+        asked.taken.append(said)
+    scene = in_seconds(asked, scene)
     network = build_network(scene)
-    steps = asked_steps(options, network)
-    standing = _standing(options)
+    steps = asked_steps(asked, network).steps
+    standing = _standing(asked)
     build = GivenSequence(make_engine(USUAL, network), steps, standing=standing)
     try:
         given = build.times()["end_s"].iloc[-1]
@@ -113,26 +100,25 @@ def run(options: argparse.Namespace) -> Answer:
             raise
         where = "--durations" if "durations" in str(error) else "--curing"
         raise ProblemError(f"{where}: {error}") from None
-    least = None
-    if options.reassign:
+    if asked.reassign:
         build = GivenSequence(build.engine, build.reassigned(), standing=standing)
-        least = build.times()["end_s"].iloc[-1]
-    aged = _aged(options, build)
+    least = build.times()["end_s"].iloc[-1] if asked.reassign else None
+    aged = _aged(asked, build)
     files = {} if aged is None else {"aged.csv": csv_text(aged)}
-    written = write_outputs(options, lambda: time_files(build) | files)
+    written = write_outputs(asked, lambda: time_files(build) | files)
     busy = busy_table(scene, build.steps, build._waits)
     if build.standing is not None:
         starts = build.times()["start_s"].tolist()
         check_cured(build.engine.network, build.steps, build.standing, starts)
-    said = _said(scene.name, len(steps), float(given), least)
-    lines = [*said, *waits_said(build), *_spent(busy)]
-    lines += [] if aged is None else _softer(scene, build.responses(), aged)
-    kept = f"written to {options.out}: {', '.join(('plan.csv', 'times.csv', *files))}"
+    total = total_lines(scene.name, len(steps), float(given), least)
+    lines = [*total, *waits_said(build), *spent_lines(busy)]
+    if aged is not None:
+        lines += softer_lines(scene, build.responses(), aged, exceeded(scene, aged))
+    kept = f"written to {asked.out}: {', '.join(('plan.csv', 'times.csv', *files))}"
     lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
+    cannot = _arms_cannot(asked, scene, build.steps)
     facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": build.times()}
-    cannot = _arms_cannot(options, scene, build.steps)
-    facts |= {} if aged is None else {"aged": aged}
-    facts |= {"arms_cannot": cannot} if cannot else {}
+    facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
         facts={"scene": scene_facts(scene), **facts},
         text="\n".join(map(wrapped, lines)),
@@ -146,66 +132,27 @@ def run(options: argparse.Namespace) -> Answer:
     )
 
 
-def _standing(options: argparse.Namespace) -> Standing | None:
+def _standing(asked: Times) -> Standing | None:
     """Return with what states must stand; mortar that does not cure says nothing of time."""
-    standing = asked_standing(options)
-    if standing is not None and not options.curing:
+    standing = asked_standing(asked)
+    if standing is not None and not asked.curing:
         raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
     return standing
 
 
-def _arms_cannot(
-    options: argparse.Namespace, scene: Scene, steps: Sequence[Step]
-) -> tuple[str, ...]:
+def _arms_cannot(asked: Times, scene: Scene, steps: Sequence[Step]) -> tuple[str, ...]:
     """Return which steps arms cannot be in, or why that is not known."""
-    trouble = posture_trouble(options, scene)
+    trouble = posture_trouble(asked, scene)
     return (f"not checked; {trouble}",) if trouble else arm_notes(scene, {"": steps})
 
 
-def _aged(options: argparse.Namespace, build: GivenSequence) -> pd.DataFrame | None:
+def _aged(asked: Times, build: GivenSequence) -> pd.DataFrame | None:
     """Return the responses of a build with joints as stiff as they are, where that is asked."""
-    if not options.stiffens:
+    if not asked.stiffens:
         return None
     network = build.engine.network
     times = step_times(network.scene, build.steps, build._waits)
     try:
-        return aged_table(network, build.steps, times, _find_curing(options.stiffens))
+        return aged_table(network, build.steps, times, _find_curing(asked.stiffens))
     except SceneError as error:
         raise SceneError(f"--stiffens: {error}") from None
-
-
-def _softer(scene: Scene, full: pd.DataFrame, aged: pd.DataFrame) -> Iterator[str]:
-    """Yield what a build comes to with joints as stiff as they are, beside full stiffness."""
-    softest = 100 * aged[SHARE].min()
-    yield (
-        f"with joints as stiff as they are when each step begins, from {softest:.3g} % on, beside "
-        "full stiffness:"
-    )
-    columns = {"D_max_1e-3mm": "displacements up to", "F_max_N": "tension up to"}
-    columns |= {force_column(robot): f"{robot.name} holds up to" for robot in scene.robots}
-    for column, what in columns.items():
-        was, now = (table.set_index("step")[column].abs() for table in (full, aged))
-        if now.notna().any():
-            unit = "µm" if column.startswith("D_") else "N"
-            most = f"{now.max():.4g} {unit} in step {now.idxmax()}"
-            yield f"  {what} {most}, not {was.max():.4g} {unit}"
-    over = exceeded(scene, aged)
-    yield from (f"  payload exceeded: {each}" for each in over)
-    if not over:
-        yield "  no payload is exceeded"
-
-
-def _spent(busy: pd.DataFrame) -> Iterator[str]:
-    """Yield how long each robot does what."""
-    for row in busy.to_dict("records"):
-        spent = (
-            f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
-        )
-        yield f"  {row['robot']}: {', '.join(spent)}"
-
-
-def _said(name: str, steps: int, given: float, least: float | None) -> Iterator[str]:
-    """Yield how long a build takes."""
-    yield f"{name}: {steps} steps take {given:.6g} s"
-    if least is not None:
-        yield f"the same grips by other robots: {least:.6g} s, the least"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import atexit
 import json
 import re
@@ -11,8 +10,9 @@ from contextlib import suppress
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
-from typing import TypeAlias
+from typing import NamedTuple
 
+from seqopt._cli.options import Asked, Built, Fixed
 from seqopt._files import csv_text, write_folder
 from seqopt.arms.reach import find_postures
 from seqopt.engines.registry import USUAL, make_engine
@@ -30,8 +30,12 @@ from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 from seqopt.workflow import optimize
 
-Steps: TypeAlias = tuple[Step, ...]
-STEPS = "--method, --plan or a plan's folder in place of SCENE names others"
+
+class NamedSteps(NamedTuple):
+    """A closed sequence, and what it is called: its method, its title, or the stem of its file."""
+
+    name: str
+    steps: tuple[Step, ...]
 
 
 def is_folder(path: Path) -> bool:
@@ -39,22 +43,22 @@ def is_folder(path: Path) -> bool:
     return (path / "scene.json").is_file() and (path / "plan.csv").is_file()
 
 
-def take(options: argparse.Namespace, note: str) -> None:
-    """Say in a line what is taken where nothing is asked for."""
-    options.taken = (*getattr(options, "taken", ()), note)
+def given_scene(asked: Built) -> Scene:
+    """Return the scene that is given, also as a plan or the folder of one."""
+    scene = asked.scene
+    if isinstance(scene, ShownBuild):
+        return scene.engine.network.scene
+    if isinstance(scene, Scene):
+        return scene
+    return load_scene(Path(scene) / "scene.json" if is_folder(Path(scene)) else scene)
 
 
-def given_scene(options: argparse.Namespace) -> Scene:
-    """Return the scene that is given; its steps too become options, where a plan is given."""
-    asked = options.scene
-    plan: ShownBuild | Path | None = None
-    if isinstance(asked, ShownBuild):
-        options.scene, plan = asked.engine.network.scene, asked
-    elif isinstance(asked, str | Path) and is_folder(folder := Path(asked)):
-        options.scene, plan = folder / "scene.json", folder
-    if not (getattr(options, "plan", None) or getattr(options, "method", None)):
-        options.plan = plan
-    return options.scene if isinstance(options.scene, Scene) else load_scene(options.scene)
+def given_plan(asked: Fixed) -> ShownBuild | Path | None:
+    """Return the plan whose steps are asked for, if one is named or stands for the scene."""
+    scene = asked.scene
+    if asked.plan is not None or asked.method is not None or isinstance(scene, ShownBuild):
+        return scene if asked.plan is None and isinstance(scene, ShownBuild) else asked.plan
+    return None if isinstance(scene, Scene) or not is_folder(Path(scene)) else Path(scene)
 
 
 def file_name(name: str | Path, end: str) -> Path:
@@ -62,79 +66,67 @@ def file_name(name: str | Path, end: str) -> Path:
     return Path(re.sub(r"\W+", "-", re.sub(r"\.json$", "", Path(name).name)).strip("-") + end)
 
 
-def plan_folder(options: argparse.Namespace, asked: object, *, free: bool = False) -> Path:
+def plan_folder(asked: Asked, given: object, *, free: bool = False) -> Path:
     """Return the folder of a plan, which is made where a plan, a scene or its name is given.
 
     The steps of a scene are usual ones, or the best ``free`` ones.
     """
-    if isinstance(asked, str | Path) and Path(asked).is_dir():
-        return Path(asked)
-    if not isinstance(asked, ShownBuild):
-        scene = asked if isinstance(asked, Scene) else load_scene(str(asked))
-        options.plan = options.method = None
-        find_postures(scene, getattr(options, "cache", None), options.tell)
-        engine = make_engine(USUAL, build_network(scene))
-        steps = _free(options, scene) if free else _usual(options, engine.network, ())
-        asked = options.plan or GivenSequence(engine, steps, options.method)
-    return _written(asked)
-
-
-def _written(plan: ShownBuild) -> Path:
-    """Return a folder with a plan, which is there as long as this process."""
-    told = plan.summary() if isinstance(plan, Plan) else {}
-    folder = Path(mkdtemp(prefix="seqopt-"))
+    if isinstance(given, str | Path) and Path(given).is_dir():
+        return Path(given)
+    if not isinstance(given, ShownBuild):
+        scene = given if isinstance(given, Scene) else load_scene(str(given))
+        find_postures(scene, asked.cache, asked.tell)
+        given = _free(asked, scene) if free else _usual(asked, build_network(scene), ())
+    folder = Path(mkdtemp(prefix="seqopt-"))  # there as long as this process
     atexit.register(rmtree, folder, ignore_errors=True)
     files: dict[str, bytes | str] = {
-        "scene.json": dump_scene(plan.engine.network.scene),
-        "plan.csv": csv_text(plan.responses()),
-        "summary.json": json.dumps(told),
+        "scene.json": dump_scene(given.engine.network.scene),
+        "plan.csv": csv_text(given.responses()),
+        "summary.json": json.dumps(given.summary() if isinstance(given, Plan) else {}),
     }
     write_folder(folder, files)
     return folder
 
 
-def given_steps(options: argparse.Namespace, network: Network, robots: Sequence[str]) -> Steps:
+def given_steps(asked: Fixed, network: Network, robots: Sequence[str]) -> NamedSteps:
     """Return the closed sequence that a command is asked for, or the usual one.
 
     Raises `SceneError` if the method is not for the scene.
     """
-    scene, plan = network.scene, options.plan
+    scene, plan, method = network.scene, given_plan(asked), asked.method
     if isinstance(plan, ShownBuild):
-        return plan.steps
+        return NamedSteps(plan.title, plan.steps)
     if plan is not None:
-        return read_plan(scene, plan / "plan.csv" if is_folder(plan) else plan)
-    find_postures(scene, getattr(options, "cache", None), options.tell)
-    if options.method is None:
-        return _usual(options, network, robots)
-    if options.method != PUBLISHED:
-        return METHODS[options.method](network, robots)
+        return NamedSteps(
+            plan.stem, read_plan(scene, plan / "plan.csv" if is_folder(plan) else plan)
+        )
+    find_postures(scene, asked.cache, asked.tell)
+    if method is None:
+        build = _usual(asked, network, robots)
+        return NamedSteps(build.title, build.steps)
+    if method != PUBLISHED:
+        return NamedSteps(method, METHODS[method](network, robots))
     if not is_reference_arch(scene):
         raise SceneError(
             f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "
             "give --plan FILE for another scene"
         )
-    return published_plan(scene)
+    return NamedSteps(method, published_plan(scene))
 
 
-def plan_name(options: argparse.Namespace) -> str:
-    """Return what a sequence is called: its method, its title, or the stem of its file."""
-    plan = options.plan
-    return options.method or (plan.title if isinstance(plan, ShownBuild) else plan.stem)
-
-
-def _usual(options: argparse.Namespace, network: Network, robots: Sequence[str]) -> Steps:
-    """Return the steps of the first fixed method that fits, else of a plan; the name is noted."""
+def _usual(asked: Asked, network: Network, robots: Sequence[str]) -> ShownBuild:
+    """Return the build by the first fixed method that fits, else a plan; which one is noted."""
     for name, method in METHODS.items():
         with suppress(StepError):
             steps = method(network, robots)
-            options.method = name
-            take(options, f"steps: of the {name} method; {STEPS}")
-            return steps
-    return _free(options, network.scene)
+            others = "--method, --plan or a plan's folder in place of SCENE names others"
+            asked.taken.append(f"steps: of the {name} method; {others}")
+            return GivenSequence(make_engine(USUAL, network), steps, name)
+    return _free(asked, network.scene)
 
 
-def _free(options: argparse.Namespace, scene: Scene) -> Steps:
-    """Return the steps of the best free schedule, which is noted."""
-    options.plan = plan = optimize(scene, FREE, progress=options.tell)
-    take(options, f"steps: of the best free schedule, {plan.result}")
-    return plan.steps
+def _free(asked: Asked, scene: Scene) -> Plan:
+    """Return the best free schedule, which is noted."""
+    plan = optimize(scene, FREE, progress=asked.tell)
+    asked.taken.append(f"steps: of the best free schedule, {plan.result}")
+    return plan

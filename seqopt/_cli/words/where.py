@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from seqopt._cli.options import Posed
 from seqopt._files import read_text
 from seqopt.errors import SeqoptError, StepError
 from seqopt.scene.scene import Scene, _parse_order
@@ -27,12 +27,11 @@ class Place:
     done: tuple[Step, ...] | None = ()
 
 
-def asked_place(options: argparse.Namespace, name: str, scene: Scene) -> tuple[Scene, Place]:
+def asked_place(text: str | None, name: str, scene: Scene) -> tuple[Scene, Place]:
     """Return where an option, ``from`` or ``to``, says that a build begins or ends.
 
     The scene is returned in an order that begins with the bricks that stand.
     """
-    text = getattr(options, name, None)
     if text is None:
         return scene, Place()
     try:
@@ -41,25 +40,23 @@ def asked_place(options: argparse.Namespace, name: str, scene: Scene) -> tuple[S
         raise StepError(f"--{name} {text}: {error}") from None
 
 
-def _kept_place(
-    options: argparse.Namespace, scene: Scene, begin: Place
-) -> tuple[Scene, Place, Place]:
-    """Return where a take-down begins, and where it ends: with the bricks that are to be kept.
+def kept_place(asked: Posed, keep: str, scene: Scene, begin: Place) -> tuple[Scene, Place]:
+    """Return where a take-down ends: with the bricks that are to be kept.
 
     The scene is returned in an order that begins with these.
     """
-    where = f"--keep {options.keep}"
-    if getattr(options, "to", None) is not None:
-        raise StepError(f"{where}: --to {options.to} says already what stays; leave one out")
+    where = f"--keep {keep}"
+    if asked.to is not None:
+        raise StepError(f"{where}: --to {asked.to} says already what stays; leave one out")
     try:
-        names = [*_parse_order(scene, options.keep)]
+        names = [*_parse_order(scene, keep)]
     except SeqoptError as error:
         raise StepError(f"{where}: {error}") from None
     found, count = _standing(scene, names, where)
     stands = len(scene.placed) if begin.site is None else begin.site.bricks
     if {*found.build_order[:stands]} != {*scene.build_order[:stands]}:
         raise StepError(f"{where}: not all of these stand where it begins; keep what stands")
-    return found, begin, Place(Site(count))
+    return found, Place(Site(count))
 
 
 def read_place(scene: Scene, text: str, *, bare: bool = True) -> tuple[Scene, Place]:

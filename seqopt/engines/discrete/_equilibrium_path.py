@@ -30,9 +30,9 @@ class Held(FrozenValue):
 
     system: System
     free: sparse.csr_array  # (6n, m); motions that the grips leave
-    pads: sparse.csr_array  # (6n, 6n); stiffness of grips that give way
+    pads: sparse.csr_array  # (6n, 6n); stiffness of soft grips
     far: Floats  # (6n,); how grips move the bodies that they hold, all the way
-    pull: Floats  # (6n,); how grips that give way pull at bodies that stay, all the way
+    pull: Floats  # (6n,); how soft grips pull at bodies that stay, all the way
 
     def moved(self, motion: Floats, share: float = 1.0) -> Floats:
         """Return how bodies move (6n,). ``motion`` (m,): in the free motions; ``share``: of it."""
@@ -84,7 +84,7 @@ class Held(FrozenValue):
 
     @cached_property
     def _unbroken(self) -> sparse.csr_array:
-        """What layers and grips that give way resist the free motions by, (m, m)."""
+        """Stiffness of layers and soft grips in the free motions, (m, m)."""
         return frozen(sparse.csr_array(self.free.T @ (self.system.layers + self.pads) @ self.free))
 
     def stiffness(self, slope: Floats) -> sparse.csr_array:

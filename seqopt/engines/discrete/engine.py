@@ -13,7 +13,6 @@ react. `seqopt.stability` asks less: that forces exist, whatever brings them abo
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,7 @@ from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._hands import Hands, invertible
+from seqopt.engines._grip_compliance import GripCompliance, invertible
 from seqopt.engines._kinds import OpeningEngine
 from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.engines.discrete._equilibrium_path import Held, Settled, settle
@@ -53,28 +52,27 @@ class DiscreteEngine(OpeningEngine):
         self._mortar, self._bed = mortar, bed
         self._systems: dict[int, System] = {}
 
-    def _answers(self, bricks: int, columns: Ints, hands: Hands | None) -> Iterable[Fields]:
-        every = [None if hands is None else hands.of(slice(i, i + 1)) for i in range(len(columns))]
-        for row, own in zip(columns, every, strict=True):
-            require_resistance(self.network, bricks, row, own)
-        if bricks not in self._systems:
-            self._systems[bricks] = build_system(self.network, bricks, self._mortar, self._bed)
-        each = zip(columns, every, strict=True)
-        return [self._solve_one(self._systems[bricks], *one) for one in each]
-
-    def _solve_one(self, system: System, columns: Ints, hands: Hands | None) -> Fields:
+    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance | None) -> Fields:
         network = self._network
-        springs = _springs(network, system, columns, hands)
-        held = self._hold(system, columns, hands, springs)
+        require_resistance(network, bricks, columns, compliance)
+        if bricks not in self._systems:
+            self._systems[bricks] = build_system(network, bricks, self._mortar, self._bed)
+        system = self._systems[bricks]
+        springs = _springs(network, system, columns, compliance)
+        held = self._hold(system, columns, compliance, springs)
         found = settle(held)
         if not found.rests:
             raise _not_at_rest(network, held, found, columns)
         return _fields(network, held, found, columns, springs)
 
     def _hold(
-        self, system: System, columns: Ints, hands: Hands | None, springs: list[_Spring]
+        self,
+        system: System,
+        columns: Ints,
+        compliance: GripCompliance | None,
+        springs: list[_Spring],
     ) -> Held:
-        return _held_nodes(self._network, system, columns, hands, springs)
+        return _held_nodes(self._network, system, columns, compliance, springs)
 
 
 def _not_at_rest(network: Network, held: Held, found: Settled, columns: Ints) -> SeqoptError:
@@ -93,11 +91,11 @@ def _not_at_rest(network: Network, held: Held, found: Settled, columns: Ints) ->
 
 
 class _Spring(NamedTuple):
-    """A hand that gives way."""
+    """A soft grip."""
 
     grip: int
     body: int
-    ways: list[int]  # in which of shifts and turns it gives way, w
+    ways: list[int]  # in which of shifts and turns it is compliant, w
     motion: Floats  # (w, 6); how its node shifts and turns with the body, scaled as the system is
     stiffness: Floats  # (w, w)
     far: Floats  # (w,); how far its end is moved
@@ -112,21 +110,25 @@ class _Spring(NamedTuple):
         return np.asarray(self.stiffness @ (self.far - self.motion @ twist))
 
 
-def _springs(network: Network, system: System, columns: Ints, hands: Hands | None) -> list[_Spring]:
+def _springs(
+    network: Network, system: System, columns: Ints, compliance: GripCompliance | None
+) -> list[_Spring]:
     """Return the soft grips of one set as springs."""
-    if hands is None or hands.give is None:
+    if compliance is None or compliance.matrix is None:
         return []
     grips, out = len(columns), []
     nodes = network.node_position[network.inner.ravel()[columns]]
-    soft, turns = hands.soft(1, grips)[0], hands.each_turns(1, grips)[0]
-    give, far = hands.each_give(1, grips)[0], hands.far(1, grips)[0]
-    scale = np.repeat([1.0, hands.lever], 3)
+    soft, turns = compliance.soft(1, grips)[0], compliance.transmit_moments(1, grips)[0]
+    flexibility, far = compliance.matrices(1, grips)[0], compliance.offsets(1, grips)[0]
+    scale = np.repeat([1.0, compliance.lever], 3)
     for grip, body in enumerate(columns // 2):
         ways = [way for way in range(6) if (soft[grip] if way < 3 else turns[grip])]
         if ways:
             shift = point_motion(nodes[grip] - network.centroid[body])
             every = np.vstack([shift, np.eye(6)[3:]]) * system.unit[:6]
-            own = invertible(give[grip][np.ix_(ways, ways)]) / np.outer(scale[ways], scale[ways])
+            own = invertible(flexibility[grip][np.ix_(ways, ways)]) / np.outer(
+                scale[ways], scale[ways]
+            )
             moved = np.append(far[grip], np.zeros(3))[ways]
             out.append(
                 _Spring(
@@ -137,13 +139,17 @@ def _springs(network: Network, system: System, columns: Ints, hands: Hands | Non
 
 
 def _held_nodes(
-    network: Network, system: System, columns: Ints, hands: Hands | None, springs: list[_Spring]
+    network: Network,
+    system: System,
+    columns: Ints,
+    compliance: GripCompliance | None,
+    springs: list[_Spring],
 ) -> Held:
     """Return a system whose nodes are held: rigidly, or by springs of soft grips."""
-    count, hands = len(system.load) // 6, hands or Hands()
+    count, compliance = len(system.load) // 6, compliance or GripCompliance()
     blocks, taken = [np.eye(6)] * count, np.zeros_like(system.load)
     pads, pull = [sparse.csr_array((6, 6))] * count, np.zeros_like(system.load)
-    rigid, far = ~hands.soft(1, len(columns))[0], hands.far(1, len(columns))[0]
+    rigid, far = ~compliance.soft(1, len(columns))[0], compliance.offsets(1, len(columns))[0]
     nodes = network.node_position[network.inner.ravel()[columns]]
     for body in np.unique(columns[rigid] // 2):
         mine = rigid & (columns // 2 == body)

@@ -1,7 +1,7 @@
 """The loops of `seqopt.engines.rigid._extremes`, compiled by numba where it is installed.
 
 Nothing else imports this file. Grip sets are solved a few at a time, side by side, so that a
-processor does the same with several at once; what loads mean is summed for one stretch of edges or
+processor works on several at once; what loads mean is summed for one stretch of edges or
 nodes at a time, over all sets, so that it stays in the processor's cache. The code is compiled when
 it is first called and kept in the folder that numba chooses: beside this file, or the user's own
 (``NUMBA_CACHE_DIR`` names another). No function touches what another call works on, and none holds

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from seqopt.arrays import Bools, Floats, Ints, frozen
-from seqopt.engines._hands import Hands
+from seqopt.engines._grip_compliance import GripCompliance
 from seqopt.engines.interface import _couples
 from seqopt.engines.rigid._operator import ComplianceOperator, Doubts
 
@@ -42,9 +42,9 @@ class Pairs(NamedTuple):
         sets, first, second, brick, axis = self
         return Pairs(sets[which], first[which], second[which], brick[which], axis[which])
 
-    def rigid(self, hands: Hands, sets: int, grips: int) -> Bools:
+    def rigid(self, compliance: GripCompliance, sets: int, grips: int) -> Bools:
         """Return which pairs (p,) have two rigid grips, in so many sets."""
-        soft = hands.soft(sets, grips)
+        soft = compliance.soft(sets, grips)
         return np.asarray(~soft[self.sets, self.first] & ~soft[self.sets, self.second])
 
 
@@ -72,7 +72,7 @@ def _count_grips(operator: ComplianceOperator, count: int) -> int:
 
 
 def _by_grip(operator: ComplianceOperator, force: Floats, grips: int) -> Floats:
-    """Return what hands bear, (S, r, w), of unknowns (S, k)."""
+    """Return forces and moments of grips, (S, r, w), of unknowns (S, k)."""
     width = operator.directions
     first, last = grips * width, grips * (width + operator.moments)
     shift = force[:, :first].reshape(len(force), grips, width)
@@ -145,7 +145,7 @@ def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tu
 
 
 def _solve_few(system: Floats) -> tuple[Floats, Floats] | None:
-    """Return the same of a few systems by LAPACK, one by one; None if one is not definite."""
+    """Solve a few systems by LAPACK, one by one; None if one is not definite."""
     size = system.shape[1]
     answer, pivot = np.empty(system.shape[1:]), np.empty(system.shape[1:])
     for s in range(system.shape[2]):
@@ -175,21 +175,25 @@ def grip_forces(
     columns: Ints,
     index: Ints,
     pairs: Pairs | None = None,
-    hands: Hands | None = None,
+    compliance: GripCompliance | None = None,
 ) -> _GripForces:
-    """Return the forces with which grips hold their nodes still, or where their hands let them be.
+    """Return the forces of grips, by which their nodes stay, or go as far as they are compliant.
 
     Two rigid grips on one rigid brick leave the force between them along the brick undetermined:
     `share_pairs` says how they share it.
 
     ``index`` (S, k): the loads at the grips, from `ComplianceOperator.load_index`; ``pairs``: of
-    the sets, if they are known; ``hands``: in the operator's directions.
+    the sets, if they are known; ``compliance``: in the operator's directions.
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
-    off = None if hands is None or hands.moved is None else _in_rows(operator, -hands.moved)
+    off = (
+        None
+        if compliance is None or compliance.moved is None
+        else _in_rows(operator, -compliance.moved)
+    )
     dead = operator.dead_displacement.take(rows)
-    force, pivot = _solved(operator, pairs, rows, dead, hands, off)
+    force, pivot = _solved(operator, pairs, rows, dead, compliance, off)
     return _GripForces(force.T, pivot)
 
 
@@ -198,25 +202,27 @@ def trusted(
     index: Ints,
     found: _GripForces,
     most: float,
-    hands: Hands | None = None,
+    compliance: GripCompliance | None = None,
 ) -> Bools:
     """Return which sets' forces (S,) rounding changes little enough.
 
-    ``operator``: or, without hands, its doubts alone; ``most``: largest of `_doubts` that is
-    accepted; ``hands``: as of `grip_forces`.
+    ``operator``: or, of rigid grips, its doubts alone; ``most``: largest of `_doubts` that is
+    accepted; ``compliance``: as of `grip_forces`.
     """
     doubts = operator.doubts if isinstance(operator, ComplianceOperator) else operator
     lowest, least = found.lowest, np.inf
-    if hands is None or hands.moved is None:  # else forces may undo what the weight does
-        own = 0.0 if hands is None else 2.0  # of what hands give, that forces undo as well
+    if compliance is None or compliance.moved is None:  # else forces may undo what the weight does
+        own = (
+            0.0 if compliance is None else 2.0
+        )  # of what soft grips yield, that forces undo as well
         least = len(found.pivot) * doubts.worst + own
     out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
         return out
     rest = slice(None) if len(out) <= _MANY else np.flatnonzero(~out & (lowest > 0))
     part = _GripForces(found.force[rest], found.pivot[:, rest])
-    own_hands = None if hands is None else hands.of(rest)
-    sure = _doubts(operator, index[rest], part, own_hands) <= most
+    own_compliance = None if compliance is None else compliance.select(rest)
+    sure = _doubts(operator, index[rest], part, own_compliance) <= most
     out[rest] |= sure & (lowest[rest] > 0)
     return out
 
@@ -225,7 +231,7 @@ def _doubts(
     operator: ComplianceOperator | Doubts,
     index: Ints,
     found: _GripForces,
-    hands: Hands | None = None,
+    compliance: GripCompliance | None = None,
 ) -> Floats:
     """Return the error (S,) of forces for rounding of one part in one, over the largest of each.
 
@@ -239,27 +245,31 @@ def _doubts(
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         own += (root * size).sum(axis=0)
         own *= scale
-        if isinstance(operator, ComplianceOperator) and hands is not None:
-            own = _with_hands(operator, own, size, root / scale, hands)
+        if isinstance(operator, ComplianceOperator) and compliance is not None:
+            own = _with_compliance(operator, own, size, root / scale, compliance)
         own /= found.pivot
         most = size.max(axis=0, initial=np.finfo(float).tiny)
         return np.asarray(own.max(axis=0, initial=0.0) / most)
 
 
-def _with_hands(
-    operator: ComplianceOperator, own: Floats, size: Floats, flexibility: Floats, hands: Hands
+def _with_compliance(
+    operator: ComplianceOperator,
+    own: Floats,
+    size: Floats,
+    flexibility: Floats,
+    compliance: GripCompliance,
 ) -> Floats:
-    """Return errors of forces (k, S), as of `_doubts`, that hands add to and give way to.
+    """Return errors of forces (k, S), as of `_doubts`, with soft and moved grips.
 
     ``size`` (k, S): of the forces, N; ``flexibility`` (k, S): the diagonal, m/N.
     """
     given, softer = np.zeros_like(own), np.zeros_like(own)
     nodes, grips = len(own) - operator.loose, _count_grips(operator, len(own))
-    if hands.moved is not None:
-        moved = _in_rows(operator, np.abs(hands.moved))
+    if compliance.moved is not None:
+        moved = _in_rows(operator, np.abs(compliance.moved))
         given[: len(moved)] += moved
-    if hands.give is not None:
-        parts = np.abs(hands.each_give(own.shape[1], grips))
+    if compliance.matrix is not None:
+        parts = np.abs(compliance.matrices(own.shape[1], grips))
         bears = _by_grip(operator, size.T, grips)
         given[:nodes] += _as_rows(operator, np.einsum("srij,srj->sri", parts, bears))
         softer[:nodes] = _as_rows(operator, np.diagonal(parts, axis1=2, axis2=3))
@@ -267,7 +277,7 @@ def _with_hands(
 
 
 def _in_rows(operator: ComplianceOperator, moved: Floats) -> Floats:
-    """Return what hands move (S, r, d) as rows of all unknowns (k, S), loose motions left out."""
+    """Return offsets of grips (S, r, d) as rows of all unknowns (k, S), loose motions left out."""
     rows = _as_rows(operator, moved)
     return np.pad(rows, ((0, moved.shape[1] * operator.moments), (0, 0)))
 
@@ -277,18 +287,18 @@ def still_forces(
     columns: Ints,
     index: Ints,
     moved: Floats,
-    hands: Hands | None = None,
+    compliance: GripCompliance | None = None,
     off: Floats | None = None,
 ) -> Floats:
     """Return the forces (S, k) with which grips undo given displacements of their nodes.
 
-    ``moved`` (S, k): m; of loose motions, the force that pulls at them, N; ``hands``: how they
-    give way; ``off`` (S, r, w): how far they are from where they should be, m, what they give
+    ``moved`` (S, k): m; of loose motions, the force that pulls at them, N; ``compliance``: of
+    grips; ``off`` (S, r, w): how far they are from where they should be, m, what they yield
     counted. Between two rigid grips on one brick there is no force.
     """
     pairs, rows = pairs_of(operator, columns), np.ascontiguousarray(index.T)
     apart = None if off is None else _as_rows(operator, off)
-    return _solved(operator, pairs, rows, np.ascontiguousarray(moved.T), hands, apart)[0].T
+    return _solved(operator, pairs, rows, np.ascontiguousarray(moved.T), compliance, apart)[0].T
 
 
 def share_pairs(
@@ -329,7 +339,7 @@ def _solved(
     pairs: Pairs,
     rows: Ints,
     dead: Floats,
-    hands: Hands | None,
+    compliance: GripCompliance | None,
     off: Floats | None,
 ) -> tuple[Floats, Floats]:
     """Return forces at loads (k, S) that undo displacements (k, S), and scaled pivots (k, S).
@@ -348,8 +358,8 @@ def _solved(
     np.negative(dead, out=system[-1])
     scale = 1 / operator.softness if operator.loose else 1.0
     apart = None
-    if hands is not None and hands.give is not None:
-        apart = _soften(system, operator, pairs, hands, off)
+    if compliance is not None and compliance.matrix is not None:
+        apart = _soften(system, operator, pairs, compliance, off)
     else:
         if off is not None:
             system[-1, : len(off)] -= off
@@ -361,22 +371,28 @@ def _solved(
 
 
 def _soften(
-    system: Floats, operator: ComplianceOperator, pairs: Pairs, hands: Hands, off: Floats | None
+    system: Floats,
+    operator: ComplianceOperator,
+    pairs: Pairs,
+    compliance: GripCompliance,
+    off: Floats | None,
 ) -> _Apart | None:
     """Add the compliance of grips to equations (k + 1, k, S), as of `_solve_positive`, in place.
 
     Two grips on one brick, of which one is soft, share what acts along it by their stiffness.
-    Where they are nearly rigid that is told apart from what both bear, so that it stays accurate.
+    Where they are nearly rigid, what one bears for the other is an unknown apart, to stay accurate.
 
-    ``off`` (n, S): by how much grips already let their nodes move. Result: the sets in which pairs
-    are told apart, if there are any.
+    ``off`` (n, S): by how much grips already let their nodes move. Result: the sets with such
+    unknowns, if there are any.
     """
     count, sets = system.shape[1:]
     grips = _count_grips(operator, count)
-    rigid = pairs.rigid(hands, sets, grips)
-    close = _nearly_rigid(system, operator, pairs, hands) & ~rigid
-    apart = _told_apart(system, operator, pairs.only(close), hands, off) if close.any() else None
-    _add_give(system, operator, hands)
+    rigid = pairs.rigid(compliance, sets, grips)
+    close = _nearly_rigid(system, operator, pairs, compliance) & ~rigid
+    apart = (
+        _split_pairs(system, operator, pairs.only(close), compliance, off) if close.any() else None
+    )
+    _add_compliance(system, operator, compliance)
     if off is not None:
         system[-1, : len(off)] -= off
     if apart is not None:
@@ -384,22 +400,22 @@ def _soften(
     if rigid.any():
         nodes = grips * operator.directions
         _brace(system[:nodes, :nodes], pairs.only(rigid))
-    _let_turn(system, operator, hands)
+    _release_moments(system, operator, compliance)
     return apart
 
 
-_CLOSE = 1e-4  # give of two hands on one brick, over its flexibility, below which digits are lost
+_CLOSE = 1e-4  # flexibility of two grips on one brick, over its own, below which digits are lost
 
 
 def _nearly_rigid(
-    system: Floats, operator: ComplianceOperator, pairs: Pairs, hands: Hands
+    system: Floats, operator: ComplianceOperator, pairs: Pairs, compliance: GripCompliance
 ) -> Bools:
-    """Return which pairs (p,) give so little along their bricks that digits would be lost."""
+    """Return which pairs (p,) are so stiff along their bricks that digits would be lost."""
     if not len(pairs.sets):
         return np.zeros(0, dtype=bool)
     width = operator.directions
-    give = hands.each_give(system.shape[2], _count_grips(operator, system.shape[1]))
-    own = give[pairs.sets, pairs.first] + give[pairs.sets, pairs.second]
+    flexibility = compliance.matrices(system.shape[2], _count_grips(operator, system.shape[1]))
+    own = flexibility[pairs.sets, pairs.first] + flexibility[pairs.sets, pairs.second]
     along = np.einsum("pi,pij,pj->p", pairs.axis, own[:, :width, :width], pairs.axis)
     rows = width * pairs.second[:, None] + np.arange(width)
     stands = system[rows, rows, pairs.sets[:, None]].mean(axis=1)
@@ -414,24 +430,28 @@ def _rows_of(operator: ComplianceOperator, grips: int, grip: int, ways: int) -> 
     return force + [grips * width + grip * rest + way for way in range(rest)]
 
 
-def _add_give(system: Floats, operator: ComplianceOperator, hands: Hands) -> None:
-    """Add to equations, in place, how every hand gives way."""
+def _add_compliance(
+    system: Floats, operator: ComplianceOperator, compliance: GripCompliance
+) -> None:
+    """Add to equations, in place, the compliance of every grip."""
     grips = _count_grips(operator, system.shape[1])
-    assert hands.give is not None
-    ways, used = hands.give.shape[2], np.asarray(hands.give.any(axis=0))
+    assert compliance.matrix is not None
+    ways, used = compliance.matrix.shape[2], np.asarray(compliance.matrix.any(axis=0))
     for grip in range(grips):
         rows = _rows_of(operator, grips, grip, ways)
         for a, b in zip(*np.tril_indices(ways), strict=True):
             if used[a, b]:
-                own = hands.kind[:, 0 if hands.alike else grip]
-                system[rows[a], rows[b]] += hands.give[own, a, b]
+                own = compliance.kind[:, 0 if compliance.alike else grip]
+                system[rows[a], rows[b]] += compliance.matrix[own, a, b]
 
 
-def _let_turn(system: Floats, operator: ComplianceOperator, hands: Hands) -> None:
-    """Let hands that bear no moment bear none, where others of the scene do, in place."""
+def _release_moments(
+    system: Floats, operator: ComplianceOperator, compliance: GripCompliance
+) -> None:
+    """Release the moments of grips that transmit none, where others of the scene do, in place."""
     count, sets = system.shape[1:]
     grips = _count_grips(operator, count)
-    free = ~hands.each_turns(sets, grips)
+    free = ~compliance.transmit_moments(sets, grips)
     if not operator.moments or not free.any():
         return
     for grip in range(grips):
@@ -445,9 +465,9 @@ def _let_turn(system: Floats, operator: ComplianceOperator, hands: Hands) -> Non
 
 
 class _Apart(NamedTuple):
-    """Equations of sets in which two hands share a brick and one gives way.
+    """Equations of sets in which two grips share a brick and one is soft.
 
-    What both bear along the brick, and what one bears for the other, are told apart.
+    What both bear along the brick, and what one bears for the other, are unknowns apart.
     """
 
     sets: Ints  # (n,)
@@ -462,26 +482,30 @@ class _Apart(NamedTuple):
         return force, pivot
 
 
-def _told_apart(
-    system: Floats, operator: ComplianceOperator, pairs: Pairs, hands: Hands, off: Floats | None
+def _split_pairs(
+    system: Floats,
+    operator: ComplianceOperator,
+    pairs: Pairs,
+    compliance: GripCompliance,
+    off: Floats | None,
 ) -> _Apart:
-    """Return the equations of the sets of pairs of which one hand gives way, changed."""
+    """Return the changed equations of the sets with pairs of which one grip is soft."""
     count = system.shape[1]
     sets = np.unique(pairs.sets)
     part = system[:, :, sets].transpose(2, 0, 1)
     whole = np.tril(part[:, :count])
     whole += np.tril(whole, -1).transpose(0, 2, 1)
-    give, grips = np.zeros((len(sets), count, count)), _count_grips(operator, count)
-    each = hands.of(sets).each_give(len(sets), grips)
+    flexibility, grips = np.zeros((len(sets), count, count)), _count_grips(operator, count)
+    each = compliance.select(sets).matrices(len(sets), grips)
     for grip in range(grips):
         rows = _rows_of(operator, grips, grip, each.shape[2])
-        give[:, np.array(rows)[:, None], rows] = each[:, grip]
+        flexibility[:, np.array(rows)[:, None], rows] = each[:, grip]
     forces, kept = np.tile(np.eye(count), (2, len(sets), 1, 1))
     factor, width = np.ones((count, len(sets))), operator.directions
     for at, first, second, _, axis in zip(*pairs, strict=True):
         n = int(np.searchsorted(sets, at))
         one, other = (slice(width * g, width * g + width) for g in (first, second))
-        own = give[n, one, one] + give[n, other, other]
+        own = flexibility[n, one, one] + flexibility[n, other, other]
         size = np.sqrt(np.trace(whole[n, other, other]) / width / (axis @ own @ axis))
         along = np.outer(axis, axis)
         kept[n, other, other] -= along
@@ -494,6 +518,6 @@ def _told_apart(
         load -= np.einsum("jn,nji->ni", own_off, forces)
     out = np.empty((len(sets), count + 1, count))
     out[:, :count] = kept.transpose(0, 2, 1) @ whole @ kept
-    out[:, :count] += forces.transpose(0, 2, 1) @ give @ forces
+    out[:, :count] += forces.transpose(0, 2, 1) @ flexibility @ forces
     out[:, count] = load
     return _Apart(sets, out.transpose(1, 2, 0), forces, factor)

@@ -126,7 +126,7 @@ def _motion_of(scene: SceneMaps) -> Motion:
 class GrownExtremes:
     """Answers grip sets of the brick count that a growth has reached.
 
-    ``builder``: in space, of a scene whose hands bear no moments and whose ground does not move.
+    ``builder``: in space, of a scene whose grips transmit no moments and whose ground stays.
     """
 
     def __init__(self, builder: OperatorBuilder) -> None:

@@ -1,4 +1,4 @@
-"""The stiffness of a partial structure, and whether it resists every motion."""
+"""The system of a partial structure without grips, and whether grips leave it a free motion."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, sparse
+from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines._hands import Hands
+from seqopt.engines._grip_compliance import GripCompliance
 from seqopt.errors import MechanismError
 from seqopt.network._mechanics import (
     Statics,
@@ -18,7 +18,6 @@ from seqopt.network._mechanics import (
     node_motion,
     point_motion,
     spread,
-    spring_maps,
 )
 from seqopt.network.network import Network
 from seqopt.work._threads import one_thread
@@ -146,57 +145,14 @@ def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csc_array:
     return sparse.csc_array(entries, shape=(joints + moves, joints + moves))
 
 
-_ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
 _UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class RigidStructure(FrozenValue):
-    """The parts of the stiffness of one partial structure."""
-
-    acting: Ints  # (s,); the springs that act
-    gap: Floats  # (s, 6, 6b); their deformations for unit twists of the bricks
-    stiffness: Floats  # (s, 6, 6); theirs, N/m and N m/rad
-    matrix: Floats  # (6b, 6b); stiffness of the structure without grips
-    motion: Floats  # (3n, 6b); displacements of the nodes for unit twists
-    inner_motion: Floats  # (6b, 6b); of these, the inner nodes in the order of ``network.inner``
-    statics: Statics  # of the network
-
-    def forbidden(self, grips: Ints) -> Floats:
-        """Return the motions (3r, 6b) that grips forbid."""
-        return np.asarray(self.inner_motion[(3 * grips[:, None] + np.arange(3)).ravel()])
-
-
-def rigid_structure(network: Network, bricks: int) -> RigidStructure:
-    """Return the parts of the stiffness of a partial structure."""
-    acting, gap, stiffness = spring_maps(network, bricks)
-    matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
-    motion = node_motion(network, bricks).toarray()
-    inner = motion[(3 * network.inner[:bricks].reshape(-1, 1) + np.arange(3)).ravel()]
-    return RigidStructure(acting, gap, stiffness, matrix, motion, inner, build_statics(network))
-
-
-def require_resistance(
-    network: Network, bricks: int, columns: Ints, hands: Hands | None = None
-) -> None:
-    """Raise `MechanismError` if one grip set leaves a motion that nothing resists.
-
-    The assembled stiffness settles most cases at once. It cannot tell a soft support from none;
-    `free_motion` can. A hand that gives way resists as one that does not. ``hands``: of this set.
-    """
-    parts = rigid_structure(network, bricks)
-    held = np.vstack([parts.forbidden(columns), _kept_from_turning(columns, bricks, hands)])
-    with one_thread():
-        values, vectors, motions = resisting_modes(parts.matrix, held)
-    if lost_to_rounding(values) and free_motion(network, bricks, columns, hands) is not None:
-        raise mechanism_error(network, motions @ vectors[:, 0])
-
-
-def _kept_from_turning(columns: Ints, bricks: int, hands: Hands | None) -> Floats:
-    """Return the turns (n, 6b) of bricks that hands of one set resist."""
+def _kept_from_turning(columns: Ints, bricks: int, compliance: GripCompliance | None) -> Floats:
+    """Return the turns (n, 6b) of bricks that grips of one set resist."""
     turns = np.zeros(len(columns), dtype=bool)
-    if hands is not None:
-        turns = hands.each_turns(1, len(columns))[0]
+    if compliance is not None:
+        turns = compliance.transmit_moments(1, len(columns))[0]
     out = np.zeros((3 * int(turns.sum()), 6 * bricks))
     for n, brick in enumerate(columns[turns] // 2):
         out[3 * n : 3 * n + 3, 6 * brick + 3 : 6 * brick + 6] = np.eye(3)
@@ -204,7 +160,7 @@ def _kept_from_turning(columns: Ints, bricks: int, hands: Hands | None) -> Float
 
 
 def free_motion(
-    network: Network, bricks: int, columns: Ints, hands: Hands | None = None
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
 ) -> Floats | None:
     """Return a motion that deforms no spring with any stiffness and moves no held node.
 
@@ -216,7 +172,7 @@ def free_motion(
     parts = ungripped_system(network, bricks)
     node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
     held = parts.motion[node.ravel()].toarray()
-    held = np.vstack([held, _kept_from_turning(columns, bricks, hands)]) * parts.twist_unit
+    held = np.vstack([held, _kept_from_turning(columns, bricks, compliance)]) * parts.twist_unit
     ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
     with one_thread():
         _, sizes, motions = np.linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
@@ -226,23 +182,18 @@ def free_motion(
     return np.asarray((motion / motion[np.abs(motion).argmax()]).reshape(-1, 6))
 
 
-def lost_to_rounding(values: Floats) -> bool:
-    """Return whether the least of ascending eigenvalues may be rounding alone."""
-    return len(values) > 0 and not values[0] > _ROUNDING * values[-1]  # all may be zero
+def require_resistance(
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
+) -> None:
+    """Raise `MechanismError` if one grip set leaves a motion that nothing resists.
 
-
-def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return how a structure of some stiffness resists the motions that its grips do not forbid.
-
-    Results: ``values`` (m,): eigenvalues of the scaled stiffness, ascending; ``vectors`` (m, m):
-    its modes; ``motions`` (6b, m): the motions that the modes combine.
+    A soft grip resists as a rigid one does. ``compliance``: of this set.
     """
-    free = linalg.null_space(forbidden) if len(forbidden) else np.eye(len(matrix))
-    diagonal = np.diag(free.T @ matrix @ free)
-    most = max(diagonal.max(initial=0.0), np.finfo(float).tiny / _ROUNDING)
-    motions = free / np.sqrt(np.maximum(diagonal, _ROUNDING * most))
-    values, vectors = np.linalg.eigh(motions.T @ matrix @ motions)
-    return values, vectors, motions
+    motion = free_motion(network, bricks, columns, compliance)
+    if motion is not None:
+        ends = network.node_position[network.inner[:bricks]]
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max()
+        raise mechanism_error(network, (motion / np.repeat([1.0, length], 3)).ravel())
 
 
 def mechanism_error(

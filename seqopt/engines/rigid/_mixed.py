@@ -22,7 +22,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.engines._hands import Hands
+from seqopt.engines._grip_compliance import GripCompliance
 from seqopt.engines._twice import add_products
 from seqopt.engines.interface import Fields, join_sets, no_sets
 from seqopt.engines.rigid._mechanism import Ungripped, require_resistance, ungripped_system
@@ -39,7 +39,7 @@ class Solution(FrozenValue):
     ``twist`` (S, 6b): of the bricks, m and rad. ``wrench`` (S, J, 6): of every spring of the
     network on its second body, N and N m; zero where it does not act. ``force`` (S, r, 3): of the
     grips, N; two rigid ones on one brick may share theirs in any way. ``moment`` (S, r, 3): of the
-    grips, N m. ``soft`` (S, r): which grips give way.
+    grips, N m. ``soft`` (S, r): which grips are.
     """
 
     twist: Floats
@@ -106,7 +106,7 @@ def split_pairs(
     """Let each of two rigid grips on one brick take what reaches its own node, in place.
 
     ``force`` (S, r, 3): of the grips; ``carried`` (S, E): by the edges; ``soft`` (S, r): which
-    grips give way.
+    grips are.
     """
     soft = np.zeros(columns.shape, dtype=bool) if soft is None else soft
     inner = np.flatnonzero(network.edge_spring < 0)
@@ -133,12 +133,15 @@ class MixedSystem(FrozenValue):
 
 
 def mixed_system(
-    parts: Ungripped, grips: Ints, shift: Floats | None = None, hands: Hands | None = None
+    parts: Ungripped,
+    grips: Ints,
+    shift: Floats | None = None,
+    compliance: GripCompliance | None = None,
 ) -> MixedSystem:
     """Return the system of one grip set.
 
     ``shift`` (6b,): added to the diagonal of the scaled stiffness, so that a mechanism can be
-    factored; ``hands``: of this set.
+    factored; ``compliance``: of this set.
     """
     network = parts.network
     motion = parts.motion[(3 * network.inner.ravel()[grips, None] + np.arange(3)).ravel()]
@@ -150,9 +153,9 @@ def mixed_system(
     force = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
     rows = sparse.csr_array(sparse.csr_array(force.T) @ motion)
     corner, weight = None, np.ones(force.shape[1])
-    if hands is not None and hands.give is not None:
-        rows, force, give = _given(parts, grips, rows, force, hands)
-        corner = parts.unit * give
+    if compliance is not None and compliance.matrix is not None:
+        rows, force, flexibility = _with_flexibility(parts, grips, rows, force, compliance)
+        corner = parts.unit * flexibility
         weight = 1 / np.maximum(1.0, np.diag(corner))
         corner *= weight[:, None]
     forbidden = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
@@ -163,18 +166,18 @@ def mixed_system(
     return MixedSystem(forbidden, bordered(matrix, forbidden, corner, weight), force, weight)
 
 
-def _given(
-    parts: Ungripped, grips: Ints, rows: sparse.csr_array, force: Floats, hands: Hands
+def _with_flexibility(
+    parts: Ungripped, grips: Ints, rows: sparse.csr_array, force: Floats, compliance: GripCompliance
 ) -> tuple[sparse.csr_array, Floats, Floats]:
-    """Return rows of motions, forces and flexibilities of a set whose hands give way.
+    """Return rows of motions, forces and flexibilities of a set with soft grips.
 
     After the multipliers of rigid grips, ``rows`` (c, 6b) and ``force`` (3r, c), there is one for
-    the force between two hands on one brick of which one gives way, which moves no brick, and those
+    the force between two grips on one brick of which one is soft, which moves no brick, and those
     of moments. Results: ``rows`` (n, 6b); ``force`` (wr, n): forces, then moments over the lever;
-    ``give`` (n, n): m/N.
+    ``flexibility`` (n, n): m/N.
     """
     network, count = parts.network, len(grips)
-    soft, turns = hands.soft(1, count)[0], hands.each_turns(1, count)[0]
+    soft, turns = compliance.soft(1, count)[0], compliance.transmit_moments(1, count)[0]
     between = []
     for i, j in permutations(range(count), 2):
         if i < j and grips[i] // 2 == grips[j] // 2 and (soft[i] or soft[j]):
@@ -187,19 +190,19 @@ def _given(
     bearing = np.zeros((3 * count, len(turned)))
     for n, grip in enumerate(np.flatnonzero(turns)):
         brick, own = grips[grip] // 2, slice(3 * n, 3 * n + 3)
-        turned[own, 6 * brick + 3 : 6 * brick + 6] = hands.lever * np.eye(3)
+        turned[own, 6 * brick + 3 : 6 * brick + 6] = compliance.lever * np.eye(3)
         bearing[3 * grip : 3 * grip + 3, own] = np.eye(3)
     still = np.zeros((len(between), 6 * parts.bricks))
     out = linalg.block_diag(shifts, bearing)
     if not turns.any():
         out = out[: 3 * count]
-    whole = hands.each_give(1, count)[0]
-    give = linalg.block_diag(*whole[:, :3, :3]) if count else np.zeros((0, 0))
+    whole = compliance.matrices(1, count)[0]
+    flexibility = linalg.block_diag(*whole[:, :3, :3]) if count else np.zeros((0, 0))
     if turns.any():
         corner = [linalg.block_diag(*whole[:, a, b]) for a, b in _QUARTERS]
-        give = np.block([corner[:2], corner[2:]])
+        flexibility = np.block([corner[:2], corner[2:]])
     every = sparse.csr_array(sparse.vstack([rows, sparse.csr_array(np.vstack([still, turned]))]))
-    return every, out, out.T @ give @ out
+    return every, out, out.T @ flexibility @ out
 
 
 _FORCE, _MOMENT = slice(3), slice(3, 6)
@@ -254,7 +257,9 @@ _EMPTY = 1e-6  # forces this small beside the moments over a brick's length are 
 _LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
 
 
-def solve_mixed(network: Network, bricks: int, columns: Ints, hands: Hands | None = None) -> Fields:
+def solve_mixed(
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
+) -> Fields:
     """Return the fields of grip sets, one factorization for each.
 
     A mechanism that no load excites passes: `seqopt.engines.rigid._mechanism.require_resistance`
@@ -263,7 +268,7 @@ def solve_mixed(network: Network, bricks: int, columns: Ints, hands: Hands | Non
     parts = ungripped_system(network, bricks)
     answers = [no_sets(network, bricks, columns.shape[1])]
     for i, grips in enumerate(columns):
-        own = None if hands is None else hands.of(slice(i, i + 1))
+        own = None if compliance is None else compliance.select(slice(i, i + 1))
         solution = solve_load(parts, grips, parts.load, parts.moved, own)
         answers.append(respond(network, parts.statics, parts.motion, grips[None], solution))
     return join_sets(answers)
@@ -274,37 +279,37 @@ def solve_load(
     grips: Ints,
     pull: Floats,
     moved: Floats | float = 0.0,
-    hands: Hands | None = None,
+    compliance: GripCompliance | None = None,
 ) -> Solution:
     """Return how a partial structure answers to a load while a grip set holds its nodes still.
 
-    ``pull`` (6b,), ``moved`` (6s,): as ``load`` and ``moved`` of the parts; ``hands``: of this set,
-    if they move. Raises `MechanismError` if a motion that the load excites meets no resistance;
+    ``pull`` (6b,), ``moved`` (6s,): as ``load`` and ``moved`` of the parts; ``compliance``: of this
+    set. Raises `MechanismError` if a motion that the load excites meets no resistance;
     `SolverError` if the last digits of the system decide more than `_SENSITIVE` of the answer. That
     is a matter of its condition, not of how a processor rounds.
     """
     network, bricks = parts.network, parts.bricks
-    system = mixed_system(parts, grips, hands=hands)
+    system = mixed_system(parts, grips, compliance=compliance)
     joints, last = len(parts.wrench_unit), len(parts.wrench_unit) + len(parts.twist_unit)
     load = np.zeros(system.matrix.shape[0])
     load[:joints], load[joints:last] = moved, pull
-    if hands is not None and hands.moved is not None:
-        load[last:] = system.weight * (system.force[: 3 * len(grips)].T @ hands.moved.ravel())
+    if compliance is not None and compliance.moved is not None:
+        load[last:] = system.weight * (system.force[: 3 * len(grips)].T @ compliance.moved.ravel())
     try:
         factors = splu(system.matrix)
     except RuntimeError as error:
-        require_resistance(network, bricks, grips, hands)
+        require_resistance(network, bricks, grips, compliance)
         raise SolverError(f"{bricks} bricks: exactly singular in double precision") from error
     result, settled = _corrected(parts, factors, system.matrix.tocsr(), load)
     if not settled:
-        require_resistance(network, bricks, grips, hands)
+        require_resistance(network, bricks, grips, compliance)
         raise SolverError(
             f"{bricks} bricks: too close to a mechanism for double precision; "
             "add a grip or stiffness"
         )
     wrench, twist = unscaled(parts, result[None, :last])
     force = system.force @ (result[last:] * parts.unit)
-    return Solution(twist, wrench, *borne(force[None], len(grips), hands))
+    return Solution(twist, wrench, *borne(force[None], len(grips), compliance))
 
 
 def _corrected(
@@ -331,16 +336,18 @@ def _corrected(
     return result, bool(unchanged(parts, state, changes, _SENSITIVE).all())
 
 
-def borne(force: Floats, grips: int, hands: Hands | None) -> tuple[Floats, Floats, Bools | None]:
-    """Return forces, N, and moments, N m, of grips (S, r, 3), and which hands are soft.
+def borne(
+    force: Floats, grips: int, compliance: GripCompliance | None
+) -> tuple[Floats, Floats, Bools | None]:
+    """Return forces, N, and moments, N m, of grips (S, r, 3), and which are soft.
 
-    ``force`` (S, wr): forces, then moments over the lever if hands bear any.
+    ``force`` (S, wr): forces, then moments over the lever if grips transmit any.
     """
     sets = len(force)
     moment = np.zeros((sets, grips, 3))
-    if hands is not None and force.shape[1] > 3 * grips:
-        moment = hands.lever * force[:, 3 * grips :].reshape(sets, grips, 3)
-    soft = None if hands is None else hands.soft(sets, grips)
+    if compliance is not None and force.shape[1] > 3 * grips:
+        moment = compliance.lever * force[:, 3 * grips :].reshape(sets, grips, 3)
+    soft = None if compliance is None else compliance.soft(sets, grips)
     return force[:, : 3 * grips].reshape(sets, grips, 3), moment, soft
 
 

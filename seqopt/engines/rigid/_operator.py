@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines._hands import _lever_of
+from seqopt.engines._grip_compliance import _lever_of
 from seqopt.engines.interface import SPACE, Basis
 from seqopt.engines.rigid._growth import Growth, SpanningTree
 from seqopt.engines.rigid._response_maps import (
@@ -71,10 +71,10 @@ class ComplianceOperator(FrozenValue):
 
     Row ``dm + i`` is a unit force in direction ``i`` of d at the ``m``-th inner node
     (`Network.inner`) of the h bricks that are loaded, l = 2dh loads in all: d = 3 in space, 2 in a
-    plane. Where hands bear moments, those on a brick, over a lever, follow the forces at its nodes,
-    and what they move are rotations times the lever: see `load_rows`. One more row at the end of
-    all but the first two arrays is the weight of the b bricks, with what else loads them and how
-    the ground moves.
+    plane. Where grips transmit moments, those on a brick, over a lever, follow the forces at its
+    nodes, and what they move are rotations times the lever: see `load_rows`. One more row at the
+    end of all but the first two arrays is the weight of the b bricks, with what else loads them and
+    how the ground moves.
 
     ``held`` (h,): the bricks that are loaded, ascending. ``flexibility`` (l, l): displacements of
     their inner nodes, m/N. ``dead_displacement`` (l,): displacements of these under the weight with

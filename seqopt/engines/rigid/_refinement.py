@@ -30,7 +30,7 @@ from scipy.sparse import csgraph
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._hands import Hands, _lever_of
+from seqopt.engines._grip_compliance import GripCompliance, _lever_of
 from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import _by_grip, grip_forces, still_forces
 from seqopt.engines.rigid._hanging import Hanging, HangingSystem
@@ -265,20 +265,20 @@ class Refinement:
         operator: ComplianceOperator | None = None,
         largest: float = LAST_CORRECTION,
         basis: Basis = SPACE,
-        hands: Hands | None = None,
+        compliance: GripCompliance | None = None,
     ) -> Fields:
         """Return all fields of grip sets.
 
         ``operator``: with wrenches and twists, if there is one for these grips; it serves if
         nothing is loose. ``largest``: correction of a set after which it needs no other, over the
         largest of each kind. ``basis``: the directions that the operator knows; in the others
-        nothing may move. ``hands``: of the sets, in all of space.
+        nothing may move. ``compliance``: of the sets, in all of space.
         """
         every = [slice(i, i + _TOGETHER) for i in range(0, len(columns), _TOGETHER)]
         if operator is None or self.held.loose:
             operator, basis = self.own, SPACE
         corrector = _Corrector(self, operator, largest, basis)
-        own = [None if hands is None else hands.of(part) for part in every]
+        own = [None if compliance is None else compliance.select(part) for part in every]
         parts = (corrector.together(columns[p], h) for p, h in zip(every, own, strict=True))
         return join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
 
@@ -318,7 +318,7 @@ class _Asked(NamedTuple):
 
     columns: Ints  # (S, r)
     loads: Ints  # (S, k); rows of the operator's loads at the grips
-    hands: Hands | None  # in the operator's directions
+    compliance: GripCompliance | None  # in the operator's directions
 
     @property
     def grips(self) -> int:
@@ -327,8 +327,8 @@ class _Asked(NamedTuple):
 
     def of(self, which: Ints) -> _Asked:
         """Return some of the sets."""
-        hands = None if self.hands is None else self.hands.of(which)
-        return _Asked(self.columns[which], self.loads[which], hands)
+        compliance = None if self.compliance is None else self.compliance.select(which)
+        return _Asked(self.columns[which], self.loads[which], compliance)
 
 
 class _Corrector:
@@ -345,27 +345,27 @@ class _Corrector:
         self.held, self.inner = system.held, system.inner
         self.operator, self.largest, self.basis = operator, largest, basis
 
-    def together(self, columns: Ints, hands: Hands | None = None) -> Fields:
+    def together(self, columns: Ints, compliance: GripCompliance | None = None) -> Fields:
         """Return the fields of a few sets."""
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)
-        own = None if hands is None else hands.within(self.basis.force, self.basis.wrench)
-        found = grip_forces(operator, columns, index, hands=own)
+        own = None if compliance is None else compliance.within(self.basis.force, self.basis.wrench)
+        found = grip_forces(operator, columns, index, compliance=own)
         if operator.loose:
             for at in np.flatnonzero(~(found.lowest >= _HARDLY_HELD)):
-                mine = None if hands is None else hands.of(slice(at, at + 1))
+                mine = None if compliance is None else compliance.select(slice(at, at + 1))
                 require_resistance(self.network, bricks, columns[at], mine)
         states = self._states(index, found.force)
         force = self._in_space(found.force, columns.shape[1])
         done = self._correct(_Asked(columns, index, own), states, force)
         wrench, twist = unscaled(parts, states[done])
-        mine = None if hands is None else hands.of(done)
+        mine = None if compliance is None else compliance.select(done)
         solution = Solution(twist, wrench, *borne(force[done], columns.shape[1], mine))
         motion = operator.maps.motion if self.basis is SPACE else parts.motion
         fields = respond(self.network, parts.statics, motion, columns[done], solution)
         if done.all():
             return fields
-        rest = None if hands is None else hands.of(~done)
+        rest = None if compliance is None else compliance.select(~done)
         return merge_sets(done, fields, solve_mixed(self.network, bricks, columns[~done], rest))
 
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
@@ -425,7 +425,7 @@ class _Corrector:
             moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
         at_grips = self._at_grips(np.take_along_axis(moved, at, axis=1), grips)
         moved, off = np.hstack([at_grips, -pull]), self._off(asked, force)
-        change = still_forces(operator, columns, asked.loads, moved, asked.hands, off)
+        change = still_forces(operator, columns, asked.loads, moved, asked.compliance, off)
         more = self._in_space(change, grips)
         change[:, change.shape[1] - operator.loose :] += loose
         return answer + self._states(asked.loads, change, 0.0), more
@@ -440,15 +440,15 @@ class _Corrector:
         return np.hstack([shift.reshape(sets, -1), turn.reshape(sets, -1)])
 
     def _off(self, asked: _Asked, force: Floats) -> Floats | None:
-        """Return how far hands let their nodes be, (S, r, w); None if they are rigid and still."""
-        hands, grips = asked.hands, asked.grips
-        if hands is None:
+        """Return how far grips let their nodes be, (S, r, w); None if rigid and in place."""
+        compliance, grips = asked.compliance, asked.grips
+        if compliance is None:
             return None
         width, moments = self.operator.directions, self.operator.moments
         out = np.zeros((len(force), grips, width + moments))
-        if hands.give is not None:
+        if compliance.matrix is not None:
             bears = _by_grip(self.operator, self._at_grips(force, grips), grips)
-            out += np.einsum("srij,srj->sri", hands.each_give(len(force), grips), bears)
-        if hands.moved is not None:
-            out[..., :width] -= hands.moved
+            out += np.einsum("srij,srj->sri", compliance.matrices(len(force), grips), bears)
+        if compliance.moved is not None:
+            out[..., :width] -= compliance.moved
         return out

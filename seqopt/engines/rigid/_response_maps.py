@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines.interface import SHAPES, SPACE, Basis, counts_of_fields
+from seqopt.engines.interface import SHAPES, SPACE, Basis, _counts_of_fields
 from seqopt.network._mechanics import build_statics, node_motion
 from seqopt.network.network import Network
 
@@ -94,7 +94,7 @@ class ResponseMaps(FrozenValue):
 
     @cached_property
     def _counts(self) -> dict[str, int]:
-        return counts_of_fields(self.scene.network, self.bricks)
+        return _counts_of_fields(self.scene.network, self.bricks)
 
     def apply(self, name: str, states: Floats, out: Floats | None = None) -> Floats:
         """Return a field of states, edge forces without what loads add to the inner edges.

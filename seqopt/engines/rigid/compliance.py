@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._hands import Hands, read_hands
+from seqopt.engines._grip_compliance import GripCompliance, read_compliance
 from seqopt.engines.interface import (
     SHAPES,
     SPACE,
@@ -29,7 +29,7 @@ from seqopt.engines.interface import (
     Fields,
     NamedEngine,
     Want,
-    failing_in_a_line,
+    _failing_in_a_line,
     grip_columns,
     keep_wanted,
     names_wanted,
@@ -111,33 +111,33 @@ class _Tried:
 def _try_forces(
     operator: ComplianceOperator,
     columns: Ints,
-    hands: Hands | None = None,
+    compliance: GripCompliance | None = None,
     *,
     even: bool,
     accuracy: float,
 ) -> _Tried:
     """Return what an operator alone says about grip sets, and which of them it answers well enough.
 
-    ``hands``: in the operator's directions; ``even``: whether the joints are about equally stiff:
-    where not, pivots do not tell the whole error; ``accuracy``: largest error of fields, over the
-    largest entry of each, that is accepted.
+    ``compliance``: in the operator's directions; ``even``: whether the joints are about equally
+    stiff: where not, pivots do not tell the whole error; ``accuracy``: largest error of fields,
+    over the largest entry of each, that is accepted.
     """
     sets, index, pairs = len(columns), operator.load_index(columns), pairs_of(operator, columns)
     force, good = np.empty(index.shape), np.empty(sets, dtype=bool)
     for start in range(0, sets, _CHUNK):
         part = slice(start, start + _CHUNK)
         mine = pairs if sets <= _CHUNK else pairs.within(start, start + _CHUNK)
-        own = None if hands is None else hands.of(part)
+        own = None if compliance is None else compliance.select(part)
         found = grip_forces(operator, columns[part], index[part], mine, own)
         force[part] = found.force
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
     if np.count_nonzero(good) < sets:
         force[~good] = 0.0
-    if hands is not None and len(pairs.sets):
-        pairs = pairs.only(pairs.rigid(hands, *columns.shape))
+    if compliance is not None and len(pairs.sets):
+        pairs = pairs.only(pairs.rigid(compliance, *columns.shape))
     if not even:
         good &= ~_cancels(operator, index, force)
-    lever = 1.0 if hands is None else hands.lever
+    lever = 1.0 if compliance is None else compliance.lever
     return _Tried(operator, columns, index, force, pairs, lever, good)
 
 
@@ -215,7 +215,7 @@ class ComplianceEngine(NamedEngine):
         self._bytes: dict[int, int] = {}  # of them, when they were counted last
         self._asked: set[int] = set()  # brick counts since then
 
-    @failing_in_a_line
+    @_failing_in_a_line
     def solve(
         self,
         bricks: int,
@@ -225,25 +225,31 @@ class ComplianceEngine(NamedEngine):
     ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self._network, bricks, grips)
-        hands = read_hands(self._network, columns, grips, moved)
-        self._require_known(columns, hands)
-        found = self._found(bricks, columns, hands, want)
+        compliance = read_compliance(self._network, columns, grips, moved)
+        self._require_known(columns, compliance)
+        found = self._found(bricks, columns, compliance, want)
         return require_finite(found, bricks, grips)
 
-    def _require_known(self, columns: Ints, hands: Hands | None) -> None:
+    def _require_known(self, columns: Ints, compliance: GripCompliance | None) -> None:
         """Raise `GripError` where a grip set is none that the directions of bricks can answer."""
 
-    def _found(self, bricks: int, columns: Ints, hands: Hands | None, want: Want) -> Fields:
+    def _found(
+        self, bricks: int, columns: Ints, compliance: GripCompliance | None, want: Want
+    ) -> Fields:
         """Return what is wanted of grip sets, corrected where the operator is not enough."""
         tried: _Tried | None = None
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._even
             accuracy = self._accepted(want)
-            own = None if hands is None else hands.within(self._basis.force, self._basis.wrench)
+            own = (
+                None
+                if compliance is None
+                else compliance.within(self._basis.force, self._basis.wrench)
+            )
             tried = _try_forces(operator, columns, own, even=even, accuracy=accuracy)
         sure = 0 if tried is None else np.count_nonzero(tried.trusted)
         if tried is None or (len(columns) and not sure):
-            return self._refined(bricks, columns, hands, want)
+            return self._refined(bricks, columns, compliance, want)
         found = tried.fields(want)
         if self._basis is not SPACE:
             found["grip_force"] = found["grip_force"] @ self._basis.force
@@ -251,13 +257,13 @@ class ComplianceEngine(NamedEngine):
                 found["grip_moment"] = found["grip_moment"] @ self._basis.moment
         if sure < len(columns):
             wrong = ~tried.trusted
-            rest = None if hands is None else hands.of(wrong)
+            rest = None if compliance is None else compliance.select(wrong)
             better = self._refined(bricks, columns[wrong], rest, want)
             for name, values in found.items():
                 values[wrong] = getattr(better, name)
         return Fields(**found)
 
-    @failing_in_a_line
+    @_failing_in_a_line
     def _extremes(
         self, bricks: int, grips: ArrayLike, want: Want, *, compiled: bool = False
     ) -> Extremes:
@@ -267,10 +273,10 @@ class ComplianceEngine(NamedEngine):
         made; else they are taken from the fields.
         """
         columns, numbers = grip_columns(self._network, bricks, grips), np.asarray(grips)
-        hands = read_hands(self._network, columns, numbers, None)
-        self._require_known(columns, hands)
-        if not compiled or hands is not None or not can_compile():
-            fields = self._found(bricks, columns, hands, want)
+        compliance = read_compliance(self._network, columns, numbers, None)
+        self._require_known(columns, compliance)
+        if not compiled or compliance is not None or not can_compile():
+            fields = self._found(bricks, columns, compliance, want)
             return extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
@@ -346,14 +352,16 @@ class ComplianceEngine(NamedEngine):
 
         return GrownExtremes(self._builder)
 
-    def _refined(self, bricks: int, columns: Ints, hands: Hands | None, want: Want) -> Fields:
+    def _refined(
+        self, bricks: int, columns: Ints, compliance: GripCompliance | None, want: Want
+    ) -> Fields:
         """Return what is wanted of grip sets that the operator alone answers not well enough."""
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             tied = operator is not None  # the tree that it grew on reaches them all
             refinement = self._refinements.of(bricks, tied=tied)
             largest = _SCREEN if _is_screen(want) else self._refinements.largest
-            answer = refinement.solve(columns, operator, largest, self._basis, hands)
+            answer = refinement.solve(columns, operator, largest, self._basis, compliance)
         return keep_wanted(answer, want)
 
 

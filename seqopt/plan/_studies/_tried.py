@@ -73,7 +73,7 @@ class Tried:
 
 
 def bound_of(plan: Plan) -> tuple[float, ...]:
-    """Return what no plan stays below: of arms with any posture of the table."""
+    """Return the lower bounds of a plan's goals; of arms those with any posture of the table."""
     if plan.arms is not None and plan.arms.bounds:
         return plan.arms.bounds
     return () if plan.certificate is None else plan.certificate.bounds

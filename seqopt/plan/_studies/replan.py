@@ -8,13 +8,13 @@ from dataclasses import replace
 from seqopt._registry import offered
 from seqopt.errors import SeqoptError, StepError
 from seqopt.graph.states.states import States
+from seqopt.judge._rule_moves import check_free
 from seqopt.judge.schedules import plan_values
 from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.responses.table import analyze
 from seqopt.scene._armed import check_postures
 from seqopt.scene.scene import Scene, in_order
-from seqopt.sequence._rule_check import check_free
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.site import Site, _begin_step
 from seqopt.sequence.steps import Step

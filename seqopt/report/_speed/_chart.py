@@ -14,8 +14,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
-from matplotlib.text import Annotation
-from matplotlib.transforms import Bbox
 
 from seqopt.arrays import Floats
 from seqopt.report._speed._table import CUT, DONE, FAILED, SpeedTable, error_text, seconds_text
@@ -35,9 +33,14 @@ from seqopt.report._style import (
 from seqopt.report.text import in_words
 
 RADII = (7, 12, 20, 30, 42, 56, 72, 90)  # points, from a point to its words
+DEGREES = (0, 45, 90, 315, 135, 270, 180, 225, 20, 70, 340, 290, 110, 160, 250, 200)
+SPOTS = np.array(
+    [(r * np.cos(angle), r * np.sin(angle)) for r in RADII for angle in np.radians(DEGREES)]
+)  # the nearest and those beside first
 FAR = 16  # from where on a line leads to them
 ROOM = 4.0  # half of the size of a point, in points
 AIR = 1.5  # points between two texts
+SIDES: tuple[Any, ...] = (("left", "center", "right"), ("bottom", "center", "top"))
 
 
 @dataclass(frozen=True)
@@ -53,102 +56,48 @@ class Label:
 def place(
     figure: Figure, labels: Sequence[Label], taken: Sequence[tuple[Axes, float, float]]
 ) -> None:
-    """Write labels where there is room, the needed ones first, around points that are taken."""
+    """Write labels around points that are taken, the needed ones first.
+
+    Each stands at the first spot that is free; where none is, needed words go where they cover
+    least, others nowhere.
+    """
     FigureCanvasAgg(figure).draw()  # type: ignore[no-untyped-call]  # which settles where everything is
     scale = figure.dpi / 72
-    boxes = [_around(axes, x, y, ROOM * scale) for axes, x, y in taken]
-    boxes += [text.get_window_extent() for axes in figure.axes for text in axes.texts]
+    points = np.array([axes.transData.transform((x, y)) for axes, x, y in taken]).reshape(-1, 2)
+    texts = [text.get_window_extent().extents for axes in figure.axes for text in axes.texts]
+    boxes = np.vstack([np.hstack([points - ROOM * scale, points + ROOM * scale]), *texts])
     for label in sorted(labels, key=lambda each: not each.needed):
-        text = _written(label)
-        found = _spot(text, label, boxes, scale)
-        if found is None:
+        beside: Any = {"textcoords": "offset points", "fontsize": SMALL, "linespacing": 1.0}
+        color = INK if label.needed else GRAY
+        text = label.axes.annotate(label.words, label.at, (0, 0), color=color, **beside)
+        text.set_in_layout(False)
+        size = np.array(text.get_window_extent().size)
+        before = np.select([SPOTS > 1, SPOTS < -1], [0.0, 1.0], 0.5)  # share before the anchor
+        low = label.axes.transData.transform(label.at) + SPOTS * scale - size * before
+        spots, air = np.hstack([low, low + size]), AIR * scale * np.array([-1, -1, 1, 1])
+        inside = np.array([label.axes.get_window_extent().extents])
+        outside = (spots[:, 2:] - spots[:, :2]).prod(axis=1) - _shared(spots, inside)
+        covered = outside + _shared(spots + air, boxes)
+        best = int(covered.argmin())
+        if covered[best] > 0 and not label.needed:
             text.remove()
-        else:
-            boxes.append(found)
+            continue
+        dx, dy = SPOTS[best].tolist()
+        text.set_position((dx, dy))
+        ha, va = (names[int(2 * share)] for names, share in zip(SIDES, before[best], strict=True))
+        text.set(ha=ha, va=va)
+        if float(np.hypot(dx, dy)) > FAR:
+            line = {"arrowstyle": "-", "lw": 0.5, "color": GRAY, "shrinkA": 0, "shrinkB": 4}
+            how: Any = {"textcoords": "offset points", "arrowprops": line}
+            label.axes.annotate("", label.at, (dx, dy), **how).set_in_layout(False)
+        boxes = np.vstack([boxes, spots[best]])
 
 
-def _around(axes: Axes, x: float, y: float, half: float) -> Bbox:
-    across, up = axes.transData.transform((x, y))
-    return Bbox.from_extents(across - half, up - half, across + half, up + half)
-
-
-def _written(label: Label) -> Annotation:
-    text = label.axes.annotate(
-        label.words,
-        label.at,
-        (0, 0),
-        textcoords="offset points",
-        fontsize=SMALL,
-        color=INK if label.needed else GRAY,
-        linespacing=1.0,
-    )
-    text.set_in_layout(False)
-    return text
-
-
-def _lead(label: Label, shift: tuple[float, float]) -> None:
-    """Draw a line from a point to its words."""
-    line = {"arrowstyle": "-", "lw": 0.5, "color": GRAY, "shrinkA": 0, "shrinkB": 4}
-    found = label.axes.annotate("", label.at, shift, textcoords="offset points", arrowprops=line)
-    found.set_in_layout(False)
-
-
-def _spots() -> Iterator[tuple[float, float]]:
-    """Yield directions with their distances, points: the nearest and those beside first."""
-    for radius in RADII:
-        for degrees in (0, 45, 90, 315, 135, 270, 180, 225, 20, 70, 340, 290, 110, 160, 250, 200):
-            angle = np.radians(degrees)
-            yield radius * float(np.cos(angle)), radius * float(np.sin(angle))
-
-
-def _spot(text: Annotation, label: Label, boxes: Sequence[Bbox], scale: float) -> Bbox | None:
-    """Move a text to the first spot that is free, and return what it takes up there.
-
-    Where none is, needed words go where they cover least, others nowhere.
-    """
-    inside = label.axes.get_window_extent()
-    own = text.get_window_extent()
-    wide, high = own.width, own.height
-    x, y = label.axes.transData.transform(label.at)
-    others = np.array([other.extents for other in boxes]).reshape(-1, 4)
-    best, least = None, np.inf
-    for dx, dy in _spots():
-        left = x + dx * scale - wide * _share(dx)
-        low = y + dy * scale - high * _share(dy)
-        box = Bbox.from_bounds(left, low, wide, high)
-        covered = _outside(box, inside) + _shared(box.padded(AIR * scale), others)
-        if covered < least:
-            best, least = (dx, dy, box), covered
-        if not covered:
-            break
-    if best is None or (least > 0 and not label.needed):
-        return None
-    dx, dy, box = best
-    text.set_position((dx, dy))
-    across: dict[float, Any] = {0.0: "left", 0.5: "center", 1.0: "right"}
-    up: dict[float, Any] = {0.0: "bottom", 0.5: "center", 1.0: "top"}
-    text.set(ha=across[_share(dx)], va=up[_share(dy)])
-    if float(np.hypot(dx, dy)) > FAR:
-        _lead(label, (dx, dy))
-    return box
-
-
-def _share(shift: float) -> float:
-    """Return which share of a text lies before its anchor."""
-    return 0.0 if shift > 1 else 1.0 if shift < -1 else 0.5
-
-
-def _outside(box: Bbox, room: Bbox) -> float:
-    """Return how much of a box lies outside of another, pixels squared."""
-    shared = Bbox.intersection(box, room)
-    area = box.width * box.height
-    return area - (shared.width * shared.height if shared is not None else 0.0)
-
-
-def _shared(box: Bbox, others: Floats) -> float:
-    """Return how much of a box others cover, each by itself, pixels squared."""
-    low, high = np.maximum(others[:, :2], box.min), np.minimum(others[:, 2:], box.max)
-    return float((high - low).clip(min=0.0).prod(axis=1).sum())
+def _shared(boxes: Floats, others: Floats) -> Floats:
+    """Return how much of boxes (n, 4) others (m, 4) cover, each by itself, pixels squared, (n,)."""
+    low = np.maximum(boxes[:, None, :2], others[:, :2])
+    high = np.minimum(boxes[:, None, 2:], others[:, 2:])
+    return np.asarray((high - low).clip(min=0.0).prod(axis=2).sum(axis=1))
 
 
 ENGINES = ("compliance", "frame", "auto", "discrete", "planar")  # in the order of their looks
@@ -164,38 +113,34 @@ CORNER = 0.16  # share of a panel
 @styled
 def speed_chart(*speeds: SpeedTable, width: float = WIDTH) -> Figure:
     """Return the chart of one problem or of several, side by side: above gaps, below errors."""
-    narrow = int((width - 0.7) / len(speeds) / LETTER)
-    titles = [_title(speed, narrow, full=len(speeds) == 1) for speed in speeds]
-    lines = max(title.count("\n") for title in titles)
-    figure = new_figure(4.6 + 0.15 * lines + 0.7 * (width < WIDTH), width)
+    narrow, alone = int((width - 0.7) / len(speeds) / LETTER), len(speeds) == 1
+    titles = []
+    for speed in speeds:
+        took = speed.take
+        words = f"take {took['engine']} with {_words(took)}: {seconds_text(took['seconds'])}"
+        lines = textwrap.wrap(speed.sentence if alone else words, narrow, break_on_hyphens=False)
+        titles.append("\n".join([f"{speed.scene}, {speed.bricks} bricks", *lines]))
+    most = max(title.count("\n") for title in titles)
+    figure = new_figure(4.6 + 0.15 * most + 0.7 * (width < WIDTH), width)
     panels = figure.subplots(
         2, len(speeds), sharex="col", sharey="row", squeeze=False, height_ratios=[3, 2]
     )
     labels, taken = list[Label](), list[tuple[Axes, float, float]]()
     for speed, title, (gaps, errors) in zip(speeds, titles, panels.T, strict=True):
-        gaps.set_title(title, fontsize=SMALL if len(speeds) > 1 else None)
+        gaps.set_title(title, fontsize=None if alone else SMALL)
         errors.set_xlabel("time from scene to plan [s]")
         for axes, name in ((gaps, "gap"), (errors, "error")):
-            taken += _points(axes, speed, name)
-            labels += _named(axes, speed, name)
+            seen = _seen(speed, name)
+            taken += _points(axes, speed, seen)
+            labels += _named(axes, seen, speed.take.name, engines=name == "error")
         _limits(speed, gaps, errors)
     _scales(panels, speeds)
     dress(*panels.ravel())
-    if len(speeds) > 1:
+    if not alone:
         name_panels(*panels[0])
     _legend(figure, speeds, across=2 if width < WIDTH else 6)
     place(figure, labels, taken)
     return figure
-
-
-def _title(speed: SpeedTable, width: int, *, full: bool) -> str:
-    """Return what is built, and what to take, as lines."""
-    took = speed.take
-    what = f"{speed.scene}, {speed.bricks} bricks"
-    if full:
-        return "\n".join([what, *textwrap.wrap(speed.sentence, width, break_on_hyphens=False)])
-    words = f"take {took['engine']} with {_words(took)}: {seconds_text(took['seconds'])}"
-    return "\n".join([what, *textwrap.wrap(words, width, break_on_hyphens=False)])
 
 
 def _words(row: pd.Series[float]) -> str:
@@ -208,85 +153,63 @@ def _look(engine: str, *, filled: bool = True) -> dict[str, Any]:
     return look(known).mark(filled=filled)
 
 
-def _height(name: str, values: pd.Series[float]) -> pd.Series[float]:
-    """Return where gaps or errors are drawn: gaps in percent, no error at the foot of the axis."""
-    return 100 * values if name == "gap" else values.clip(lower=NONE)
-
-
 def _seen(speed: SpeedTable, name: str) -> pd.DataFrame:
-    """Return the rows with a point, where it is, and whether another one beats it."""
-    every: pd.DataFrame = speed.table.assign(kept=speed.kept)
-    table = every[np.isfinite(every[name].to_numpy(float))]
-    found: pd.DataFrame = table.assign(height=_height(name, table[name]))
+    """Return the rows with a point, how high it is, and whether it is kept: not dominated.
+
+    Gaps are in percent; an error of none is at the foot of the axis.
+    """
+    table: pd.DataFrame = speed.table.assign(kept=speed.kept)
+    height = 100 * table[name] if name == "gap" else table[name].clip(lower=NONE)
+    found: pd.DataFrame = table.assign(height=height)[np.isfinite(table[name].to_numpy(float))]
     return found
 
 
-def _points(axes: Axes, speed: SpeedTable, name: str) -> Iterator[tuple[Axes, float, float]]:
-    """Draw a point for every plan, those that another one beats pale; yield where they are."""
-    seen = _seen(speed, name).sort_values("kept")
-    spots = pd.DataFrame({"x": np.log10(seen["seconds"]).round(2), "y": seen["height"]})
-    spots = spots.join(seen[["engine", "exact", "kept"]])  # one pale point on another is not pale
-    for _, row in seen[~spots.duplicated()].iterrows():
-        alpha, size = (1.0, 6.5) if row["kept"] else (PALE, 5.5)
+def _points(
+    axes: Axes, speed: SpeedTable, seen: pd.DataFrame
+) -> Iterator[tuple[Axes, float, float]]:
+    """Draw a point for every plan, those that are dominated pale; yield where they are."""
+    ranked = seen.sort_values("kept")
+    spots = pd.DataFrame({"x": np.log10(ranked["seconds"]).round(2), "y": ranked["height"]})
+    spots = spots.join(ranked[["engine", "exact", "kept"]])  # one pale point on another is not pale
+    for _, row in ranked[~spots.duplicated()].iterrows():
         mark = _look(str(row["engine"]), filled=bool(row["exact"]))
+        how: Any = {"ms": 5.5, "alpha": PALE, "zorder": 2, "clip_on": False, **mark}
+        how |= {"ms": 6.5, "alpha": 1.0, "zorder": 3} if row["kept"] else {}
         at = float(row["seconds"]), float(row["height"])
-        axes.plot(*at, **mark, ms=size, alpha=alpha, zorder=3 if row["kept"] else 2, clip_on=False)
+        axes.plot(*at, **how)
         yield axes, *at
-    took = speed.take
-    at = float(took["seconds"]), float(_height(name, pd.Series([took[name]]))[0])
+    name: Any = speed.take.name  # of the row to take
+    took: pd.Series[float] = seen.loc[name]
+    at = float(took["seconds"]), float(took["height"])
     axes.plot(*at, "o", ms=14, mfc="none", mec=INK, mew=1.1, zorder=4, clip_on=False)
 
 
-def _named(axes: Axes, speed: SpeedTable, name: str) -> Iterator[Label]:
-    """Yield words for points: above for formulations, each once a level; below for engines."""
-    seen, took, named = _seen(speed, name).sort_values("seconds"), _index(speed), set[str]()
-    for height, level in seen.groupby("height"):
-        level = level.sort_values("kept", ascending=False, kind="stable")  # noqa: PLW2901
-        if name == "error":
-            first: pd.Series[float] = level.loc[took] if took in level.index else level.iloc[0]
-            engines = _engines(level, str(first["engine"]))
-            if engines not in named:
-                yield Label(axes, _at(first, height), engines, bool(first["kept"]))
-            named.add(engines)
-        else:
-            yield from _named_once(axes, level, height, took)
-
-
-def _index(speed: SpeedTable) -> Any:
-    """Return where in the table the row to take is."""
-    return speed.take.name
-
-
-def _at(row: pd.Series[float], height: object) -> tuple[float, float]:
-    return float(row["seconds"]), float(str(height))
-
-
-def _named_once(axes: Axes, level: pd.DataFrame, height: object, took: Any) -> Iterator[Label]:
-    """Yield words for the formulations of one height, none of which is named twice."""
-    said = set[str]()
-    for own in _neighbors(level):
-        first: pd.Series[float] = own.loc[took] if took in own.index else own.iloc[0]
-        words = dict.fromkeys([_words(first), *(_words(row) for _, row in own.iterrows())])
-        new = [each for each in words if each not in said]
-        said |= {*words}
-        if new:
-            more = f"\nand {len(new) - 1} more" if len(new) > 1 else ""
-            yield Label(axes, _at(first, height), new[0] + more, bool(first["kept"]))
-
-
-def _engines(level: pd.DataFrame, first: str) -> str:
-    worst = float(level["error"].max())
-    names = dict.fromkeys([first, *level["engine"]])
-    said = ", ".join(names) + (f": {error_text(worst)}" if worst else "")
-    return textwrap.fill(said, LINE)
-
-
-def _neighbors(level: pd.DataFrame) -> Iterator[pd.DataFrame]:
-    """Yield rows in groups: those close in time, of which another one beats all or none."""
-    times, kept = level["seconds"].to_numpy(float), level["kept"].to_numpy(bool)
-    apart = (times[1:] > NEAR * times[:-1]) | (kept[1:] != kept[:-1])
-    for at in np.split(np.arange(len(times)), np.flatnonzero(apart) + 1):
-        yield level.iloc[at]
+def _named(axes: Axes, seen: pd.DataFrame, took: Any, *, engines: bool) -> Iterator[Label]:
+    """Yield words for points: formulations, each once a level, or engines; ``took`` is first."""
+    named = set[str]()
+    for height, rows in seen.sort_values("seconds").groupby("height"):
+        level = rows.sort_values("kept", ascending=False, kind="stable")
+        times, kept = level["seconds"].to_numpy(float), level["kept"].to_numpy(bool)
+        apart = (times[1:] > NEAR * times[:-1]) | (kept[1:] != kept[:-1])
+        ends = np.flatnonzero(apart & (not engines)) + 1  # of those close in time and alike
+        said = set[str]()
+        for places in np.split(np.arange(len(times)), ends):
+            own = level.iloc[places]
+            first: pd.Series[float] = own.loc[took] if took in own.index else own.iloc[0]
+            if engines:
+                worst = float(own["error"].max())
+                names = ", ".join(dict.fromkeys([str(first["engine"]), *own["engine"]]))
+                words = textwrap.fill(names + (f": {error_text(worst)}" if worst else ""), LINE)
+                new = [] if words in named else [words]
+                named.add(words)
+            else:
+                every = dict.fromkeys([_words(first), *(_words(row) for _, row in own.iterrows())])
+                new = [each for each in every if each not in said]
+                said |= {*every}
+            if new:
+                more = f"\nand {len(new) - 1} more" if len(new) > 1 else ""
+                at = float(first["seconds"]), float(str(height))
+                yield Label(axes, at, new[0] + more, bool(first["kept"]))
 
 
 def _limits(speed: SpeedTable, gaps: Axes, errors: Axes) -> None:
@@ -320,11 +243,8 @@ def _scales(panels: np.ndarray, speeds: Sequence[SpeedTable]) -> None:
     panels[1, 0].set_yticks([NONE, *ticks], ["none", *(error_text(tick) for tick in ticks)])
     panels[1, 0].set_yticks([], minor=True)
     for axes in panels.ravel():
-        size: dict[str, Any] = {
-            "width": 2 * CORNER,
-            "height": 2 * 1.4 * CORNER,
-            "transform": axes.transAxes,
-        }
+        size: dict[str, Any] = {"width": 2 * CORNER, "height": 2 * 1.4 * CORNER}
+        size["transform"] = axes.transAxes
         axes.add_patch(Ellipse((0, 0), **size, fc=GREEN, alpha=0.16, lw=0, zorder=0))
 
 

@@ -26,18 +26,20 @@ from seqopt.scene._checks import (
     whole_between,
 )
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.boxes import as_vector, require_apart
+from seqopt.scene.boxes import require_apart
 from seqopt.scene.library.common import (
     MASONRY,
     JointLaw,
+    _bond_pairs,
     _ground_under,
     _joints_between,
+    _running_bond,
     a_law,
     few_enough,
     joint_width,
     mobile_robots,
 )
-from seqopt.scene.parts import THICKEST, Brick, Robot
+from seqopt.scene.parts import THICKEST, Robot
 from seqopt.scene.scene import Scene
 
 _Line = Callable[[float], Floats]
@@ -179,13 +181,18 @@ def arch(form: ArchForm, name: str = "", *, robots: Sequence[Robot] | None = Non
     >>> arch(ArchForm(span=2.0, rise=0.7, bricks=12))
     <Scene circular arch 2 x 0.7: 12 bricks, 11 joints, 2 ground ends, 3 robots>
     """
+    return _first_that_fits("arch", form, lambda count: _arch(form, count, name, robots))
+
+
+def _first_that_fits(what: str, form: ArchForm, make: Callable[[int], Scene]) -> Scene:
+    """Return the scene of the first number of bricks that can be built, the best ones first."""
     refused: SceneError | None = None
     for count in [form.bricks] if form.bricks else _counts(form)[:_TRIED]:
         try:
-            return _arch(form, count, name, robots)
+            return make(count)
         except SceneError as error:
             refused = refused or error
-    raise refused or SceneError("arch: no number of bricks fills its curve; give one")
+    raise refused or SceneError(f"{what}: no number of bricks fills its curve; give one")
 
 
 def _arch(form: ArchForm, count: int, name: str, robots: Sequence[Robot] | None) -> Scene:
@@ -323,7 +330,11 @@ def barrel_vault(
     >>> barrel_vault(2)
     <Scene barrel vault 2: 31 bricks, 30 joints, 2 ground ends, 3 robots>
     """
-    row = _tested(test)
+    source = resources.files("seqopt").joinpath("data/paper/arch_tests.csv")
+    rows = {row["test"]: row for row in csv.DictReader(source.read_text("utf-8").splitlines())}
+    if isinstance(test, bool) or not isinstance(test, int) or str(test) not in rows:
+        raise SceneError(f"barrel vault: test is {short(test)}; give 1 to {len(rows)}")
+    row = rows[str(test)]
     scene = arch_scene(
         _vault_shape(row, law),
         name or f"barrel vault {test}",
@@ -356,18 +367,6 @@ def _vault_shape(row: dict[str, str], law: JointLaw) -> ArchShape:
         dimensions=(chord - gap, width, thickness),
         density=float(row["gamma_m_kg_m3"]),
     )
-
-
-def _tested(test: int) -> dict[str, str]:
-    source = resources.files("seqopt").joinpath("data/paper/arch_tests.csv")
-    rows = {row["test"]: row for row in csv.DictReader(source.read_text("utf-8").splitlines())}
-    if isinstance(test, bool) or not isinstance(test, int) or str(test) not in rows:
-        raise SceneError(f"barrel vault: test is {short(test)}; give 1 to {len(rows)}")
-    return rows[str(test)]
-
-
-_TRIED_VAULTS = 8  # numbers of courses, where none is given
-Laid = tuple[float, Floats]  # the width of joints between courses, and the points between them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -418,70 +417,35 @@ def _barrel(shape: _BarrelShape, name: str = "") -> Scene:
     It spans along x from z = 0 and runs towards +y. Raises `SceneError` if courses do not fill the
     curve, or bricks interpenetrate.
     """
-    form = shape.form
-    refused: SceneError | None = None
-    for courses in [form.bricks] if form.bricks else _counts(form)[:_TRIED_VAULTS]:
-        few_enough("vault", shape.columns * courses)
-        try:
-            return _vault(shape, _laid(form, form.line, courses), name)
-        except SceneError as error:
-            refused = refused or error
-    raise refused or SceneError("vault: no number of courses fills its curve; give one")
+    return _first_that_fits("vault", shape.form, lambda courses: _vault(shape, courses, name))
 
 
-def _vault(shape: _BarrelShape, laid: Laid, name: str) -> Scene:
-    _, points = laid
-    courses = len(points) - 1
-    bricks = [
-        _brick(shape, course, column, laid)
-        for course in range(courses)
-        for column in range(shape.columns)
-    ]
-    require_apart("vault", bricks, "give another number of courses, or thinner bricks")
-    tangents = np.diff(points, axis=0) / np.linalg.norm(np.diff(points, axis=0), axis=1)[:, None]
-    ends = [(0, -tangents[0]), (courses - 1, tangents[-1])]
-    grounds = tuple(
-        _ground_under(bricks[course * shape.columns + column], np.array([x, 0.0, z]), shape.law)
-        for column in range(shape.columns)
-        for course, (x, z) in ends
+def _vault(shape: _BarrelShape, courses: int, name: str) -> Scene:
+    few_enough("vault", shape.columns * courses)
+    _, points = _laid(shape.form, shape.form.line, courses)
+    step = np.diff(points, axis=0)
+    tangents = np.insert(step / np.linalg.norm(step, axis=1)[:, None], 1, 0.0, axis=1)
+    ends = np.insert(points, 1, 0.0, axis=1)  # in space
+    lines = zip(0.5 * (ends[:-1] + ends[1:]), tangents, strict=True)
+    bricks = _running_bond(
+        ((middle, np.eye(3)[1], tangent) for middle, tangent in lines),
+        shape.columns,
+        shape.dimensions,
+        shape.gap,
+        shape.density,
     )
+    require_apart("vault", bricks, "give another number of courses, or thinner bricks")
+    feet = (0, -tangents[0]), (len(bricks) - shape.columns, tangents[-1])
     return Scene(
         name=name or f"vault {shape.columns} x {courses}",
         provenance="Generated by seqopt.scene.library.",
         bricks=tuple(bricks),
-        joints=_joints_between(bricks, _touching(shape.columns, courses), shape.law),
-        grounds=grounds,
+        joints=_joints_between(bricks, _bond_pairs(shape.columns, len(bricks)), shape.law),
+        grounds=tuple(
+            _ground_under(bricks[first + column], down, shape.law)
+            for column in range(shape.columns)
+            for first, down in feet
+        ),
         build_order=tuple(brick.name for brick in bricks),
         robots=mobile_robots(bricks),
     )
-
-
-def _brick(shape: _BarrelShape, course: int, column: int, laid: Laid) -> Brick:
-    """Return a brick whose length lies along the vault."""
-    _, points = laid
-    start, end = points[course], points[course + 1]
-    x, z = 0.5 * (start + end)
-    tangent = (end - start) / np.linalg.norm(end - start)
-    name = course * shape.columns + column + 1
-    along = (shape.dimensions[0] + shape.gap) * (column + 0.5 * (course % 2))
-    return Brick(
-        name=name,
-        position=as_vector(np.array([x, along, z])),
-        length_axis=(0.0, 1.0, 0.0),
-        width_axis=as_vector(np.array([tangent[0], 0.0, tangent[1]])),
-        dimensions=shape.dimensions,
-        density=shape.density,
-        nodes=(2 * name, 2 * name + 1),
-        placing_node=2 * name,
-    )
-
-
-def _touching(columns: int, courses: int) -> Sequence[tuple[int, int]]:
-    """Return which bricks share a joint: those beside each other, and those of the next course."""
-    out = []
-    for i in range(columns * courses):
-        course, column = divmod(i, columns)
-        before = (column, column + 1) if course % 2 else (column - 1, column)
-        out += [(i - column - columns + c, i) for c in before if course and 0 <= c < columns]
-        out += [(i - 1, i)] if column else []
-    return out

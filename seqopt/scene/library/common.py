@@ -116,6 +116,48 @@ def joint_width(where: str, value: float) -> float:
     return 0.0 if as_float(value) == 0 else positive(where, value, "m, or 0")
 
 
+def _running_bond(
+    courses: Iterable[tuple[Floats, Floats, Floats]],
+    columns: int,
+    dimensions: Vector,
+    gap: float,
+    density: float,
+) -> list[Brick]:
+    """Return the bricks of courses, every second one shifted by half a brick, course by course.
+
+    ``courses``: where each starts, m, and unit vectors along it and across its bricks.
+    """
+    out = list[Brick]()
+    for course, (start, along, across) in enumerate(courses):
+        for column in range(columns):
+            node = 2 * len(out) + 2
+            brick = Brick(
+                name=len(out) + 1,
+                position=as_vector(
+                    start + (dimensions[0] + gap) * (column + 0.5 * (course % 2)) * along
+                ),
+                length_axis=as_vector(along),
+                width_axis=as_vector(across),
+                dimensions=dimensions,
+                density=density,
+                nodes=(node, node + 1),
+                placing_node=node,
+            )
+            out.append(brick)
+    return out
+
+
+def _bond_pairs(columns: int, bricks: int) -> list[tuple[int, int]]:
+    """Return which bricks of a running bond share a joint: with those below, and beside it."""
+    out = []
+    for i in range(bricks):
+        course, column = divmod(i, columns)
+        below = (column, column + 1) if course % 2 else (column - 1, column)
+        out += [(i - column - columns + c, i) for c in below if course and 0 <= c < columns]
+        out += [(i - 1, i)] if column else []
+    return out
+
+
 REPEAT = 4  # rows and columns after which a herringbone repeats
 
 

@@ -259,6 +259,6 @@ def approach_all(sought: Sequence[Sought], done: Bools) -> Iterator[list[tuple[i
 
 
 def approach(sought: Sought) -> Iterator[Answer]:
-    """Yield the same of one assembly."""
+    """Yield forces and motions of one assembly, as `approach_all`."""
     for answers in approach_all([sought], np.zeros(1, dtype=bool)):
         yield from (answer for _, answer in answers)

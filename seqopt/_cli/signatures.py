@@ -1,0 +1,165 @@
+"""Parsers and values of commands, made of the classes that say what these are asked."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, Field, dataclass, field, fields
+from inspect import cleandoc
+from pathlib import Path
+from typing import Any, TypeVar
+
+from seqopt._cli.options import NAMES, Asked
+from seqopt._cli.terminal import columns, wrapped
+from seqopt.errors import ProblemError, did_you_mean
+
+QUESTIONS = (
+    "What is built, and by whom?",
+    "Which steps may a build have?",
+    "What counts as best?",
+    "What must hold?",
+    "What is asked beside verdicts?",
+    "In which scenarios is it good?",
+    "Who chooses and proves, and how long?",
+    "How are responses computed?",
+    "What is written and printed?",
+)  # in the order in which help asks them, after those of one command
+TOGETHER = ({"quiet", "json"}, {"method", "plan"}, {"list", "export", "view"})  # one of each
+PATHS = ("FILE", "DIR", "FOLDER", "PLAN_DIR", "INSTANCE", "SOLUTION")
+OPTION = re.compile(r"(\w+) :(?: (\S.*))?")
+PLAIN = ("Usage", "Examples")
+_Asked = TypeVar("_Asked", bound=Asked)
+
+
+@dataclass
+class Page:
+    """What docstrings of a command say: lines by heading, the first without one, and options."""
+
+    lines: dict[str, list[str]] = field(default_factory=dict)
+    options: dict[str, tuple[str, str, str]] = field(default_factory=dict)  # question, value, help
+
+    def read(self, docstring: str) -> None:
+        """Add a docstring."""
+        title = name = ""
+        for line in cleandoc(docstring).splitlines():
+            if not line or line.startswith("---"):
+                continue
+            if line.endswith("?") or line in PLAIN:
+                title = line
+                self.lines.setdefault(title, [])
+            elif title not in PLAIN and (found := OPTION.fullmatch(line)):
+                name = found[1]
+                self.options[name] = title, found[2] or "", ""
+            elif line.startswith("    "):
+                question, value, text = self.options[name]
+                self.options[name] = question, value, f"{text} {line.strip()}".lstrip()
+            else:
+                self.lines.setdefault(title, []).append(line)
+
+
+def page_of(kind: type[Asked]) -> Page:
+    """Return what docstrings say of a command: first of what it shares with others."""
+    own, *shared, root, _ = kind.__mro__
+    page, known = Page(), {each.name: each for each in fields(kind)}
+    for part in (*reversed(shared), own, root):
+        page.read(part.__doc__ or "")
+        if part in shared:  # a command may build on another one
+            page.lines = {title: each for title, each in page.lines.items() if title[-1:] == "?"}
+    names = {name: ", ".join(NAMES[name]()) for name in NAMES}
+    for name, (question, value, text) in page.options.items():
+        choices = ", ".join(known[name].metadata.get("choices", ()))
+        more = names | {"choices": choices, "default": known[name].default}
+        page.options[name] = question, value, text.format(**more)
+    return page
+
+
+def fill(command: argparse.ArgumentParser, kind: type[Asked]) -> None:
+    """Give a parser the options of a command, by question, and what its help says."""
+    page = page_of(kind)
+    command.description = wrapped(" ".join(page.lines.get("", ())))
+    if usages := page.lines.get("Usage"):
+        command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
+    examples = page.lines.get("Examples", [])
+    listed = "\n".join(f"  {example}" for example in examples)
+    command.epilog = f"example{'s' * (len(examples) > 1)}:\n{listed}"
+    known = {each.name: each for each in fields(kind)}
+    asked = dict.fromkeys(question for question, *_ in page.options.values())
+    for title in sorted(asked, key=lambda each: QUESTIONS.index(each) if each in QUESTIONS else -1):
+        about = wrapped(" ".join(page.lines.get(title, ())), columns() - 2)
+        group = command.add_argument_group(title, about or None)
+        own = {name: said for name, said in page.options.items() if said[0] == title}
+        one = [names for names in TOGETHER if names <= {*own}]
+        takes: dict[str, Any] = {}
+        for names in one:
+            takes |= dict.fromkeys(names, group.add_mutually_exclusive_group())
+        for name, (_, value, text) in own.items():
+            _add(takes.get(name, group), known[name], value, text)
+
+
+def _add(takes: Any, known: Field[Any], value: str, text: str) -> None:
+    """Add an option: a switch, if it has no value; repeated, if its default is a tuple."""
+    more, default = known.metadata, known.default
+    how: dict[str, Any] = {"help": text, "default": None if default is MISSING else default}
+    if not value:
+        how["action"] = "store_true"
+    else:
+        how["metavar"] = None if value == "CHOICE" else value
+        how |= {"choices": more["choices"]} if "choices" in more else {}
+        how |= {"type": Path} if value in PATHS else {}
+        how |= {"type": float} if isinstance(default, float) else {}
+    if isinstance(default, tuple):
+        how |= {"action": "append", "default": [], "help": f"{text}; may be repeated"}
+    if "const" in more:
+        how |= {"nargs": "?", "const": more["const"]}
+    if "place" in more:
+        how |= {} if default is MISSING else {"nargs": "?"}
+        takes.add_argument(known.name, **how)
+        return
+    flag = more.get("flag", f"--{known.name.replace('_', '-')}")
+    takes.add_argument(flag, dest=known.name, required=default is MISSING, **how)
+
+
+def parsed(kind: type[_Asked], options: Mapping[str, Any], **more: Any) -> _Asked:
+    """Return what a command is asked, from what a parser found."""
+    told: dict[str, Any] = {n: tuple(v) if isinstance(v, list) else v for n, v in options.items()}
+    return kind(**told, **more)
+
+
+def given(kind: type[_Asked], values: Mapping[str, Any], **more: Any) -> _Asked:
+    """Return what a command is asked, from values of Python; numbers and lists become words.
+
+    What is None is left to the command, and so is what ``more`` says that it has no field for.
+    Raises `ProblemError` if a word is none of a choice.
+    """
+    known = {each.name: each for each in fields(kind)}
+    told = {name: _value(known[name], v) for name, v in values.items() if v is not None}
+    return kind(**told, **{name: each for name, each in more.items() if name in known})
+
+
+def _value(known: Field[Any], value: Any) -> Any:
+    """Return the value of an option as the command line would read it; values stay values."""
+    if isinstance(value, bool):
+        return value
+    if isinstance(known.default, tuple):
+        if isinstance(value, Mapping):
+            value = [f"{name}={_text(each)}" for name, each in value.items()]
+        several = value if isinstance(value, Sequence) and not isinstance(value, str) else [value]
+        return tuple(map(_text, several))
+    if isinstance(known.default, float):
+        return float(value)
+    text, choices = _text(value), known.metadata.get("choices")
+    if choices is not None and text not in choices:
+        hint = did_you_mean(text, choices)
+        raise ProblemError(f"{known.name} {text!r} does not exist{hint}; give {', '.join(choices)}")
+    return Path(text) if str(known.type).startswith("Path") and isinstance(text, str) else text
+
+
+def _text(value: Any) -> Any:
+    """Return numbers, paths and lists as words; what is none of these stays."""
+    if isinstance(value, int | float | os.PathLike):
+        return os.fspath(value) if isinstance(value, os.PathLike) else f"{value!r}"
+    if isinstance(value, list | tuple | range):
+        return ",".join(str(_text(each)) for each in value)
+    return value

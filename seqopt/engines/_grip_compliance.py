@@ -1,0 +1,239 @@
+"""The compliance of grips, and how far they are from where they should be.
+
+A soft grip is held at its far end: it lets its node shift and turn by a compliance for every force
+and moment that it transmits. Its far end may be moved. Moments and rotations are measured by a
+lever, so that they are forces and lengths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.errors import GripError
+from seqopt.network.network import Network
+from seqopt.scene._armed import held_postures
+from seqopt.scene.scene import Scene
+
+_Number = TypeVar("_Number", np.float64, np.bool_)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GripCompliance(FrozenValue):
+    """The compliance of the grips of S grip sets, and their offsets.
+
+    ``moved`` (S, r, d): how far each is from where it should be, m; None if none is. ``matrix``
+    (K, w, w): compliance of each kind of grip, m/N, first of forces in d directions, then of
+    moments over the lever if any grip of the scene transmits any; None if all are rigid and
+    transmit none. ``transmits_moment`` (K,): which kinds do; None if none of the scene does.
+    ``kind`` (S, r): of every grip; (1, 1) if all are of one: that of its robot, or of its robot at
+    its node where it has an arm with compliant joints. ``lever``: m. ``directions``: of forces, d.
+    """
+
+    moved: Floats | None = None
+    matrix: Floats | None = None
+    transmits_moment: Bools | None = None
+    kind: Ints = field(default_factory=lambda: np.zeros((1, 1), dtype=np.int64))
+    lever: float = 1.0
+    directions: int = 3
+
+    def select(self, which: Bools | Ints | slice) -> GripCompliance:
+        """Select grip sets."""
+        moved = None if self.moved is None else self.moved[which]
+        kind = self.kind if self.alike else self.kind[which]
+        return replace(self, moved=moved, kind=kind)
+
+    @property
+    def alike(self) -> bool:
+        """Whether all grips are of one kind."""
+        return self.matrix is None or len(self.matrix) == 1
+
+    def within(self, force: Floats, wrench: Floats) -> GripCompliance:
+        """Return it in the directions of a `Basis`: a plane's, or all."""
+        matrix, count = self.matrix, len(force)
+        if count == self.directions:
+            return self
+        if matrix is not None:
+            ways = force if self.transmits_moment is None else wrench
+            matrix = ways @ matrix @ ways.T
+        moved = None if self.moved is None else self.moved @ force.T
+        return replace(self, moved=moved, matrix=matrix, directions=count)
+
+    def offsets(self, sets: int, grips: int) -> Floats:
+        """Return how far the grips are moved (S, r, 3), in space."""
+        return np.zeros((sets, grips, 3)) if self.moved is None else self.moved
+
+    def soft(self, sets: int, grips: int) -> Bools:
+        """Return which grips (S, r) are compliant to forces."""
+        if self.matrix is None:
+            return np.zeros((sets, grips), dtype=bool)
+        d = self.directions
+        return self._each(np.asarray(self.matrix[:, :d, :d].any(axis=(1, 2))), sets, grips)
+
+    def matrices(self, sets: int, grips: int) -> Floats:
+        """Return the compliance of every grip, (S, r, w, w); they must not all be rigid."""
+        assert self.matrix is not None
+        return self._each(self.matrix, sets, grips)
+
+    def transmit_moments(self, sets: int, grips: int) -> Bools:
+        """Return which grips (S, r) transmit moments."""
+        if self.transmits_moment is None:
+            return np.zeros((sets, grips), dtype=bool)
+        return self._each(self.transmits_moment, sets, grips)
+
+    def _each(self, of_kind: NDArray[_Number], sets: int, grips: int) -> NDArray[_Number]:
+        """Return what kinds have (K, ...) for every grip, (S, r, ...)."""
+        return np.broadcast_to(of_kind[self.kind], (sets, grips, *of_kind.shape[1:]))
+
+
+def _lever_of(network: Network) -> float:
+    """Return the length of the longest inner edge, by which moments are measured, m."""
+    ends = network.node_position[network.inner]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
+
+
+def read_compliance(
+    network: Network, columns: Ints, grips: ArrayLike, moved: ArrayLike | None
+) -> GripCompliance | None:
+    """Return the compliance of grip sets (S, r), as `grip_columns` gives them.
+
+    ``grips``, ``moved``: as `seqopt.engines.interface.Engine.solve` takes them. None if all grips
+    are rigid, in their places and transmit no moment. Raises `GripError` if ``moved`` is not as
+    many lengths.
+    """
+    kinds = network.scene.grip_kinds
+    if moved is None and kinds.rigid:
+        return None
+    found = GripCompliance() if kinds.rigid else _of_scene(network, grips)
+    if moved is None:
+        return found
+    offsets = _lengths(columns, moved)
+    _follow_bricks(network, columns, offsets, found)
+    return replace(found, moved=offsets)
+
+
+def _of_scene(network: Network, grips: ArrayLike) -> GripCompliance:
+    """Return the compliance of grips in their places, by their kinds and arms."""
+    kinds, lever = network.scene.grip_kinds, _lever_of(network)
+    scale = np.repeat([1.0, lever], 3)
+    kind, compliance, bears = np.zeros((1, 1), dtype=np.int64), kinds.compliance, kinds.turns
+    if kinds.arms.any():
+        kind, found = _of_arms(network.scene, np.asarray(grips))
+        compliance, bears = found.compliance, found.transmits_moment
+    elif len(compliance) > 1:
+        _, kind = kinds.split(np.asarray(grips))
+    matrix = compliance * np.outer(scale, scale)
+    if not bears.any():
+        return GripCompliance(None, matrix[:, :3, :3], None, kind, lever)
+    return GripCompliance(None, matrix, bears, kind, lever)
+
+
+class _ArmGrips(NamedTuple):
+    """The M compliances of the grips of a scene whose arms have compliant joints.
+
+    ``compliance`` (M, 6, 6); ``transmits_moment`` (M,); ``kind`` (K, N): which of these each kind
+    of the scene's has at each node, -1 where an arm has no posture; ``nodes`` (N,): ascending.
+    """
+
+    compliance: Floats
+    transmits_moment: Bools
+    kind: Ints
+    nodes: Ints
+
+
+_KEY = "_arm_grips"  # of what is kept with a scene
+
+
+def _arm_grips(scene: Scene) -> _ArmGrips:
+    """Return the compliance of grips, with that of the joints of arms behind them."""
+    held, (of, known) = held_postures(scene), vars(scene).get(_KEY, (None, None))
+    assert held is not None
+    if of is held and isinstance(known, _ArmGrips):
+        return known
+    kinds = scene.grip_kinds
+    compliance, bears = [kinds.compliance], [kinds.turns]
+    kind = np.repeat(np.arange(len(kinds.turns))[:, None], len(held.nodes), axis=1)
+    count = len(kinds.turns)
+    for robot, rows, joints in zip(held.robots, held.rows, held.compliance(scene), strict=True):
+        own, there = kinds.of_robot[robot], rows >= 0
+        kind[own] = -1
+        kind[own, there] = count + np.arange(there.sum())
+        compliance.append(kinds.compliance[own] + joints[there])
+        bears.append(np.repeat(kinds.turns[own], there.sum()))
+        count += int(there.sum())
+    found = _ArmGrips(np.concatenate(compliance), np.concatenate(bears), kind, held.nodes)
+    vars(scene)[_KEY] = held, found
+    return found
+
+
+def _of_arms(scene: Scene, grips: Ints) -> tuple[Ints, _ArmGrips]:
+    """Return the kind (S, r) of each grip of a scene with such arms.
+
+    Raises `GripError` if an arm has no posture at a node.
+    """
+    found, (node, kind) = _arm_grips(scene), scene.grip_kinds.split(grips)
+    own = found.kind[kind, np.searchsorted(found.nodes, node)]
+    if (own < 0).any():
+        at = tuple(np.argwhere(own < 0)[0])
+        name = scene.robots[[*scene.grip_kinds.of_robot].index(kind[at])].name
+        raise GripError(
+            f"robot {name} has no posture at node {node[at]}, so nobody knows how its grip gives "
+            "way; move its base, or leave out joint_stiffness"
+        )
+    return own, found
+
+
+_RIGID = 1e-9  # compliance in a direction, over the largest, that stands for none
+
+
+def invertible(matrix: Floats) -> Floats:
+    """Return a compliance (w, w) with an inverse, also where too few joints of an arm give any.
+
+    Grips that are compliant along each axis by itself stay as they are.
+    """
+    values, axes = np.linalg.eigh(matrix)
+    least = _RIGID * values[-1]
+    if values[0] >= least or (values[0] > 0 and not (matrix - np.diag(np.diag(matrix))).any()):
+        return matrix
+    return np.asarray(axes * np.maximum(values, least) @ axes.T)
+
+
+def _lengths(columns: Ints, moved: ArrayLike) -> Floats:
+    """Return offsets (S, r, 3) of grips, if that is what they are."""
+    try:
+        far = np.array(moved, dtype=float)
+    except (TypeError, ValueError):
+        raise GripError("moved: give lengths in meters, (sets, grips, 3)") from None
+    if far.shape != (*columns.shape, 3):
+        raise GripError(
+            f"moved has shape {far.shape}; give lengths in meters, (sets, grips, 3), here "
+            f"{(*columns.shape, 3)}"
+        )
+    if not np.isfinite(far).all():
+        raise GripError("moved: a length is not finite; give meters")
+    return far
+
+
+def _follow_bricks(
+    network: Network, columns: Ints, offsets: Floats, compliance: GripCompliance
+) -> None:
+    """Restrict the offsets of two rigid grips on one brick to what it can follow, in place.
+
+    It cannot become longer: along it, both nodes go halfway between.
+    """
+    ends = network.node_position[network.inner]
+    steps = ends[:, 1] - ends[:, 0]
+    axes = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+    soft = compliance.soft(*columns.shape)
+    for i, j in combinations(range(columns.shape[1]), 2):
+        one = columns[:, i] // 2 == columns[:, j] // 2
+        both = np.flatnonzero(one & ~soft[:, i] & ~soft[:, j])
+        axis = axes[columns[both, i] // 2]
+        stretch = np.einsum("si,si->s", offsets[both, j] - offsets[both, i], axis)
+        offsets[both, i] += 0.5 * stretch[:, None] * axis
+        offsets[both, j] -= 0.5 * stretch[:, None] * axis

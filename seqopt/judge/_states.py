@@ -1,0 +1,340 @@
+"""States that a better plan could pass: responses, limits and stability, computed anew.
+
+Nothing that a search keeps is believed; what this judge computed once for a grip set it keeps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph.paths import strictly_below, tied
+from seqopt.graph.states._visits import move_amounts
+from seqopt.graph.states.states import States
+from seqopt.judge._rule_moves import RuleTables, ScheduleTables, Transitions
+from seqopt.judge._step_checks import props_that_hold
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.problem import LARGEST, Goal, Measure
+from seqopt.problem.requirements import LIMIT_TOLERANCE, state_costs
+from seqopt.problem.standing import Standing, StandingSets
+from seqopt.responses._blocks import Block
+from seqopt.responses._grip_sets import KnownRows, solve_sets
+from seqopt.sequence._rule_check import RuleBook
+from seqopt.sequence.rules import Payload
+from seqopt.sequence.schedule import Schedule
+
+FEW = 500  # grip sets of which all digits take no longer than to ask some of them twice
+BAND = 1e-3  # share of a value within which six digits do not decide, far more than they err
+
+Tables: TypeAlias = RuleTables | ScheduleTables
+"""What rules or a schedule allow, level by level."""
+
+
+class Answers(NamedTuple):
+    """What the engine answers of grip sets.
+
+    ``values`` (S, g): of every goal; zero of one that is about moves or margins; ``forces`` (S, r):
+    of the grips, N; ``fit`` (S,): which hang together and are within all limits.
+    """
+
+    values: Floats
+    forces: Floats
+    fit: Bools
+
+
+def ask(
+    problem: States, bricks: int, grips: Ints, most: float = np.inf, *, rough: bool = False
+) -> Answers:
+    """Return what the engine answers of grip sets (S, r), nodes held.
+
+    ``most``: over scenarios, what the first goal takes more of in one is not asked of the next;
+    ``rough``: whether six digits are enough.
+    """
+    if not problem.each:
+        return _ask_engine(problem, bricks, grips, rough=rough)
+    out = np.zeros((len(grips), len(problem.goals)))
+    forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
+    for number, each in enumerate(problem.each):
+        rows = np.flatnonzero(fit & (out[:, 0] <= most))
+        found = ask(each, bricks, grips[rows], rough=rough)
+        out[rows] = problem.joined(out[rows], found.values, number)
+        forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
+    return Answers(out, forces, fit)
+
+
+def _ask_engine(problem: States, bricks: int, grips: Ints, *, rough: bool) -> Answers:
+    names = tuple(name for name in problem.named if name != LARGEST)
+    held = props_that_hold(problem.network.scene, bricks, grips.shape[1])
+    block = Block(bricks, grips, names, rough, tuple(number for number, _ in held))
+    rows = solve_sets(problem.engine, block, problem.resources)
+    found, forces = dict(zip(names, rows.T, strict=False)), rows[:, len(names) :]
+    found[LARGEST] = forces.max(axis=1, initial=0.0)
+    fit = np.asarray(np.isfinite(rows).all(axis=1))
+    for limit in problem.limits:
+        fit &= ~limit.exceeded(found.get(limit.response, np.zeros(len(grips))))
+    values = np.column_stack([goal_values(problem, g, found, bricks, fit) for g in problem.goals])
+    if problem.spares and bricks == len(problem.network.inner) and not grips.shape[1]:
+        values[:] = 0.0  # the whole that nobody holds, where a take-down begins
+    return Answers(values, forces, fit & np.isfinite(values).all(axis=1))
+
+
+def goal_values(
+    problem: States, goal: Goal, responses: Mapping[str, Floats], bricks: int, fit: Bools
+) -> Floats:
+    """Return the values (n,) of a goal in states with so many bricks; zero if not about states."""
+    if goal.of_margins or not goal.of_states:
+        return np.zeros(len(fit))
+    if goal.response:
+        return responses[goal.response]
+    return state_costs(problem.criterion, responses, bricks, fit)
+
+
+class Filter(NamedTuple):
+    """What states must keep to.
+
+    ``values``: of goals; the first that is about no margin bounds states, if it is about a worst
+    step; ``margins``: of first goals, with which states must stand, as demanded; None does not
+    ask; ``exact``: whether all values have all digits, or those that decide about these;
+    ``strict``: whether states must be below that value, not at most at it.
+    """
+
+    values: Sequence[float] = ()
+    margins: Sequence[float] | None = None
+    exact: bool = False
+    strict: bool = False
+
+
+class Reachable(NamedTuple):
+    """States of a part that pass a filter.
+
+    ``codes`` (n,); ``states`` (n, c); ``values`` (n, g): of goals; ``onward``: transitions from
+    them, by their rows.
+    """
+
+    codes: Ints
+    states: Ints
+    values: Floats
+    onward: list[Transitions]
+
+
+class StateEvaluator:
+    """The states of one schedule: which may be passed, and what goals take of them.
+
+    ``tables``: what rules allow; ``margins``: how many goals are about margins; they come first.
+    """
+
+    def __init__(self, problem: States) -> None:
+        self.problem = problem
+        robots = range(len(problem.network.scene.robots))
+        most, own = ([_load(problem, r, stand=stand) for r in robots] for stand in (False, True))
+        self.tables = _tables(problem, most)
+        self.margins = sum(goal.of_margins for goal in problem.goals)
+        self._most = np.array([most[r] for r in self.tables.team])
+        self._payload, self._loads = np.array([own[r] for r in self.tables.team]), np.array(own)
+        kinds, nodes = problem.network.scene.grip_kinds, self.tables.nodes
+        more = [kind * kinds.span for kind in range(len(kinds.turns))]
+        self._numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
+        self._beyond = len(nodes) * kinds.of_robot[list(self.tables.team)]
+        self._known, self._standing = KnownRows(), dict[Standing, tuple[StandingSets, ...]]()
+        self._exact = not _six_digits_do(problem)
+
+    def least(self) -> tuple[float, ...]:
+        """Return lower bounds of goals, from the one end that builds have and from counted steps.
+
+        Every move to that end is a cut. Minus infinity where nothing is known.
+        """
+        goals, tables = self.problem.goals, self.tables
+        end, counted = dict(tables.certain()).get(tables.last), float(tables.least_steps())
+        last = np.full(len(goals), -np.inf if end is None else 0.0)
+        if end is not None and tables.bricks_at(tables.last):
+            last = self.valued(tables.last, end, Filter(exact=True))[0][0]
+        known = {Measure.PEAK: last, Measure.STEPS: np.full(len(goals), counted)}
+        none = np.full(len(goals), -np.inf)
+        return tuple(float(known.get(goal.measure, none)[k]) for k, goal in enumerate(goals))
+
+    def bars(self, margins: Sequence[float]) -> bool:
+        """Return whether a state that every plan passes is not allowed, or lacks such margins."""
+        asked = Filter((), margins, exact=True)
+        return any(not self.valued(*state, asked)[1].all() for state in self.tables.certain())
+
+    def reachable(self, level: int, entries: Ints, asked: Filter) -> Reachable:
+        """Return the states that pass and are reached from entries (n, c) on the same level."""
+        seen, count, fresh = np.zeros(0, dtype=np.int64), 0, entries
+        parts = [Reachable(seen, entries[:0], np.zeros((0, len(self.problem.goals))), [])]
+        while len(fresh):
+            own, at = np.unique(self.tables.codes(fresh), return_index=True)
+            new = ~np.isin(own, seen, assume_unique=True)
+            seen, rows = np.concatenate([seen, own[new]]), fresh[at[new]]
+            values, ok = self.valued(level, rows, asked)
+            onward = [
+                move._replace(source=move.source + count)
+                for move in self.tables.successors(level, rows[ok])
+            ]
+            parts.append(Reachable(own[new][ok], rows[ok], values[ok], onward))
+            count += int(ok.sum())
+            fresh = np.concatenate([entries[:0], *(m.states for m in onward if m.level == level)])
+        return Reachable(
+            np.concatenate([part.codes for part in parts]),
+            np.concatenate([part.states for part in parts]),
+            np.concatenate([part.values for part in parts]),
+            [move for part in parts for move in part.onward],
+        )
+
+    def valued(self, level: int, states: Ints, asked: Filter) -> tuple[Floats, Bools]:
+        """Return values of goals in states (n, g), and which states pass a filter (n,)."""
+        goals, bricks, k = self.problem.goals, self.tables.bricks_at(level), self.margins
+        if not bricks:
+            return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
+        below = np.inf
+        if len(asked.values) > k and goals[k].measure is Measure.PEAK:
+            below = (strictly_below if asked.strict else tied)(asked.values[k])
+        held, payload = self._held(states, self._most, self._beyond)
+        values, forces, ok = self._answers(bricks, held, asked, np.inf if k else below)
+        ok &= (forces <= payload).all(axis=1) & (values[:, k : k + 1] <= below).all(axis=1)
+        if asked.margins is not None:
+            ok[ok] = self.may_stand(level, states[ok], asked.margins)
+        return values, ok
+
+    def demands(self, margins: Sequence[float]) -> tuple[Standing, ...]:
+        """Return what is demanded of states where the first goals, margins, have values."""
+        base = self.problem.standing or Standing()
+        pairs = zip(self.problem.goals, margins, strict=False)
+        own = (base.demanding(goal.response, max(value, 0.0)) for goal, value in pairs)
+        return (*self.problem.demands, *own)
+
+    def may_stand(self, level: int, states: Ints, margins: Sequence[float]) -> Bools:
+        """Return which states (n, c) are not proven to fall, or to lack margins of first goals."""
+        (held, payload), out = self.held_to_stand(states), np.ones(len(states), dtype=bool)
+        bricks = self.tables.bricks_at(level)
+        for known in self._stability(margins) if bricks else ():  # an empty site stands
+            out[out] = known.may_stand(bricks, held[out], payload[out])
+        return out
+
+    def known_to_stand(self, level: int, states: Ints, margins: Sequence[float]) -> Ints:
+        """Return 1 for states that are known to stand, -1 for those that fall, 0 for others."""
+        (held, payload), bricks = self.held_to_stand(states), self.tables.bricks_at(level)
+        if not bricks:
+            return np.ones(len(held), dtype=np.int64)
+        known = [each.recalled(bricks, held, payload) for each in self._stability(margins)]
+        return np.asarray(np.min(known, axis=0))
+
+    def _stability(self, margins: Sequence[float]) -> Iterator[StandingSets]:
+        """Yield what is known of every demand in every scenario."""
+        for demand in self.demands(margins):
+            if demand not in self._standing:
+                networks = [p.network for p in self.problem.each or (self.problem,)]
+                sets = (StandingSets(network, demand, self._loads) for network in networks)
+                self._standing[demand] = tuple(sets)
+            yield from self._standing[demand]
+
+    def held_to_stand(self, states: Ints) -> tuple[Ints, Floats]:
+        """Return places held, ascending, and the largest forces there, where states must stand."""
+        return self._held(states, self._payload)
+
+    def _held(self, states: Ints, most: Floats, beyond: Ints | int = 0) -> tuple[Ints, Floats]:
+        """Return places held, ascending, and the most that those may carry who hold them, (n, r).
+
+        ``beyond`` (r,): how far places of robots' grips come after those of the nodes.
+        """
+        grips = states[:, : self.tables.robots].clip(min=0)
+        grips = np.where(grips > 0, grips + beyond, 0)
+        order = np.argsort(grips, axis=1, kind="stable")
+        return np.take_along_axis(grips, order, axis=1), most[order]
+
+    def _answers(
+        self, bricks: int, held: Ints, asked: Filter, below: float
+    ) -> tuple[Floats, Floats, Bools]:
+        """Return values (n, g), forces (n, r) and what is within limits (n,) of places held.
+
+        Over scenarios they are those of the first that exceeds a value of the first goal.
+        """
+        goals, robots = len(self.problem.goals), held.shape[1]
+        out = np.zeros((len(held), goals + robots + 1))
+        count = np.count_nonzero(held, axis=1)
+        for grips in np.unique(count).tolist():
+            rows = np.flatnonzero(count == grips)
+            places = held[rows, robots - grips :]
+            codes = places @ len(self._numbers) ** np.arange(grips)
+
+            def compute(new: Ints, places: Ints = places) -> Floats:
+                return self._computed(bricks, self._numbers[places[new]], asked, below)
+
+            key = (bricks, grips, below, asked.exact, *asked.values)
+            found = self._known.of(key, codes, compute)
+            out[rows, :goals] = found[:, :goals]
+            out[rows, goals + robots - grips :] = found[:, goals:]
+        return out[:, :goals], out[:, goals:-1], out[:, -1] > 0
+
+    def _computed(self, bricks: int, grips: Ints, asked: Filter, below: float) -> Floats:
+        """Return values, forces and what is within limits of grip sets, side by side.
+
+        Six digits are enough where no value or payload that decides is close.
+        """
+        exact = asked.exact or self._exact or len(grips) <= FEW
+        found: Floats = np.column_stack(ask(self.problem, bricks, grips, below, rough=not exact))
+        if not exact:
+            goals = len(self.problem.goals)
+            close = _near(found[:, goals:-1], self._most)
+            for k, value in enumerate(asked.values):
+                if self.problem.goals[k].measure is Measure.PEAK:
+                    close |= _near(found[:, [k]], np.array([value]))
+            found[close] = np.column_stack(ask(self.problem, bricks, grips[close], below))
+        return found
+
+    def amounts(self, values: Floats, found: Transitions) -> Floats:
+        """Return what goals take of moves to states with such values, (m, g)."""
+        taken = np.column_stack([np.full(len(found.distance), float(found.regrip)), found.distance])
+        return move_amounts(self.problem, values, taken)
+
+
+def _load(problem: States, robot: int, *, stand: bool) -> float:
+    """Return the most that a robot of the scene may carry, or has to hold with, N."""
+    rules, own = problem.rules, problem.network.scene.robots[robot]
+    kept = stand if isinstance(rules, Schedule) else rules.payload is Payload.KEPT
+    most = min(own.payload if kept else np.inf, problem.caps.get(own.name, np.inf))
+    return float(most * (1 + LIMIT_TOLERANCE))
+
+
+def _tables(problem: States, most: Sequence[float]) -> Tables:
+    """Return what rules or a schedule allow; ``most``: that robots may carry, N."""
+    if isinstance(problem.rules, Schedule):
+        own = problem.rules, problem.network
+        return ScheduleTables(*own, parks=problem.parks, worlds=problem.worlds)
+    book = RuleBook(problem.network, problem.rules, problem.worlds)
+    groups = interchangeable(book, most, timed=problem.is_timed)
+    return RuleTables(book, groups, parks=problem.parks)
+
+
+def interchangeable(
+    book: RuleBook, most: Sequence[float], *, timed: bool = False
+) -> list[tuple[int, ...]]:
+    """Return the robots that could change places, group by group; ``timed``: also in time."""
+    scene, last = book.network.scene, len(book.network.inner)
+    groups: dict[object, list[int]] = {}
+    for r in book.team:
+        may = tuple(book.places(r, b) for b in range(1, last + 1))
+        nodes = tuple(book.newest_nodes[r, b] for b in range(1, last + 1))
+        own = scene.robots[r]
+        grip = (own.stiffness, own.rotational_stiffness, own.payload)  # tolerances are of these
+        arm = own.arm and r  # no other robot is where it is
+        takes = own.durations if timed else None
+        key = (book.reached[r, last], nodes, may, most[r], grip, arm, takes)
+        groups.setdefault(key, []).append(r)
+    return [tuple(group) for group in groups.values() if len(group) > 1]
+
+
+def _six_digits_do(problem: States) -> bool:
+    """Return whether six digits of responses say nearly as much of what goals take of states."""
+    ratios = isinstance(problem.criterion, WorstRatio)
+    of_states = [goal for goal in problem.goals if goal.of_states and not goal.of_margins]
+    peaks = all(g.measure is Measure.PEAK and (g.response or ratios) for g in of_states)
+    return peaks and not problem.limits
+
+
+def _near(values: Floats, bounds: Floats) -> Bools:
+    """Return the rows (n,) of which a value (n, k) is so close to a bound that digits decide."""
+    finite = bounds[np.isfinite(bounds)]
+    return np.asarray((np.abs(values[:, :, None] - finite) <= BAND * np.abs(finite)).any((1, 2)))

@@ -1,0 +1,203 @@
+"""Grips of a build over its steps, or over seconds: a lane per robot, a bar per grip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from seqopt.errors import StepError
+from seqopt.report._style import SMALL, new_picture, styled
+from seqopt.responses.table import force_column
+from seqopt.scene.scene import Scene
+from seqopt.sequence.schedule import Hold, holds
+from seqopt.sequence.site import Site
+from seqopt.sequence.steps import AnyStep, Step
+from seqopt.times._curing import Waits
+from seqopt.times._steps import step_times
+
+SHADES = "YlGnBu"
+PALE = "#f2efe9"  # of a grip whose force is not known
+DARK, PREPARES, CURES = "#222222", "#e8e8e8", "#f3dcc0"
+LANE = 0.74  # height of a bar, of a lane's
+SIZES = {"steps": (0.13, 6.0, 1.6, 1.2), "seconds": (0.15, 7.0, 1.8, 1.3)}
+"""Inches: of a step, of a chart at least, beside the bars, above and below them."""
+WIDEST, LETTER = 30.0, 0.06  # inches: of a chart, of a letter
+Stops = Callable[[Hold], list[tuple[float, float]]]  # from when to when a grip has each step
+
+
+@styled
+def gantt_picture(
+    scene: Scene,
+    steps: Sequence[AnyStep],
+    responses: pd.DataFrame | None = None,
+    shown: tuple[int | None, int | None] = (None, None),
+) -> Figure:
+    """Return the grips of a build over its steps, shaded by their forces, where these are given."""
+    first, last = shown = _numbers(steps, shown)
+
+    def stops(hold: Hold) -> list[tuple[float, float]]:
+        return [(number - 0.5, number + 0.5) for number in range(hold.first, hold.last + 1)]
+
+    drawn = (scene, steps, responses, shown)
+    figure, axes, shade = _lanes(*drawn, "steps", stops, (first - 0.5, last + 0.5))
+    whole = (first, last) == (1, steps[-1].number)
+    said = "step" if whole else f"step, {first} to {last} of {steps[-1].number}"
+    axes.set(xlabel=said, xlim=(first - 0.7, last + 0.7))
+    open_ = Patch(fc=PALE, ec=DARK, hatch="//", label="still to be chosen")
+    more = [open_] if any(getattr(step, "moves", ()) for step in steps) else []
+    _explain(figure, axes, [*_marks(), *more], shade)
+    return figure
+
+
+@styled
+def seconds_picture(
+    scene: Scene,
+    steps: Sequence[Step],
+    responses: pd.DataFrame,
+    shown: tuple[int | None, int | None] = (None, None),
+    waits: Waits | None = None,
+    begin: Site | None = None,
+) -> Figure:
+    """Return the grips of a build over seconds, with what robots prepare.
+
+    ``waits``: as of `step_times`, where mortar cures: such waits are marked behind all lanes;
+    ``begin``: where a part of a build begins.
+    """
+    first, last = shown = _numbers(steps, shown)
+    begins, times = steps[0].number, step_times(scene, steps, waits, begin)
+    ends = [0.0, *(time.end for time in times)]  # before and after every step
+
+    def stops(hold: Hold) -> list[tuple[float, float]]:
+        at, end = hold.first - begins, hold.last - begins
+        start = times[at].start if hold.robot in times[at].robots else 0.0  # who held at first
+        out = [(start, ends[at + 1]), *zip(ends[at + 1 : end + 1], ends[at + 2 :], strict=False)]
+        return [*out[:-1], (out[-1][0], ends[min(end + 2, len(times))])]  # up to letting go
+
+    start, end = span = ends[first - begins], ends[last - begins + 1]
+    figure, axes, shade = _lanes(scene, steps, responses, shown, "seconds", stops, span)
+    room = 0.01 * (end - start)
+    axes.set(xlabel="seconds", xlim=(start - room, end + room))
+    look: Any = {"fc": PREPARES, "ec": DARK, "hatch": "///"}
+    cures = False
+    for before, time in [*zip(ends, times, strict=False)][first - begins : last - begins + 1]:
+        if time.prepares is not None and time.ready is not None:
+            low, wide = time.robots[0] - LANE / 4, time.ready - time.prepares
+            named: Any = {"gid": f"prepares {time.step}", "lw": 0.4, **look}
+            axes.add_patch(Rectangle((time.prepares, low), wide, LANE / 2, **named))
+        ready = max(before, time.ready or 0.0)
+        if time.joint and time.start > ready:  # it waits for mortar alone
+            axes.axvspan(ready, time.start, fc=CURES, lw=0, zorder=0, gid="cures")
+            cures = True
+    marks = [Patch(lw=0.5, label="prepares", **look), *_marks()]
+    marks += [Patch(fc=CURES, label="waits for mortar")] if cures else []
+    _explain(figure, axes, marks, shade)
+    return figure
+
+
+def _numbers(steps: Sequence[AnyStep], shown: tuple[int | None, int | None]) -> tuple[int, int]:
+    """Return the first and the last number of the steps that are shown, all by default."""
+    begins, ends = steps[0].number, steps[-1].number
+    first = begins if shown[0] is None else shown[0]
+    last = ends if shown[1] is None else shown[1]
+    if not begins <= first <= last <= ends:
+        raise StepError(f"steps {first} to {last}: the build has steps {begins} to {ends}")
+    return first, last
+
+
+def _lanes(
+    scene: Scene,
+    steps: Sequence[AnyStep],
+    responses: pd.DataFrame | None,
+    shown: tuple[int, int],
+    along: str,
+    stops: Stops,
+    span: tuple[float, float],
+) -> tuple[Figure, Axes, ScalarMappable | None]:
+    """Draw a lane per robot and a bar per grip; return what shades them, too, if forces are known.
+
+    ``along``: what the axis is, a name of `SIZES`; ``stops``: of a grip there; ``span``: shown.
+    """
+    first, last = shown
+    per_step, least, beside, above = SIZES[along]
+    width = float(np.clip(per_step * (last - first + 1) + beside, least, WIDEST))
+    count = len(scene.robots)
+    figure = new_picture(width, 0.62 * count + above)
+    axes = figure.add_subplot()
+    inch = (width - beside) / (span[1] - span[0] or 1.0)
+    shade, colors = None, None
+    if responses is not None:  # N, by step and robot
+        forces = responses[[force_column(robot) for robot in scene.robots]].to_numpy(float)
+        most = np.nanmax(forces, initial=0.0) or 1.0
+        shade = ScalarMappable(Normalize(0.0, most), colormaps[SHADES])
+        colors = shade.to_rgba(forces)
+    for hold in holds(scene, steps):
+        if hold.last >= first and hold.first <= last:
+            parts = slice(hold.first - steps[0].number, hold.last - steps[0].number + 1)
+            _bar(axes, hold, stops(hold), None if colors is None else colors[parts, hold.robot])
+            _label(axes, scene, hold, stops(hold), inch)
+    axes.set(ylim=(count - 0.5, -0.5), axisbelow=True)
+    axes.set_yticks(range(count), [robot.name for robot in scene.robots])
+    axes.tick_params(left=False)
+    axes.grid(visible=True, axis="x", lw=0.3)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    return figure, axes, shade
+
+
+def _bar(
+    axes: Axes, hold: Hold, stops: Sequence[tuple[float, float]], colors: np.ndarray | None
+) -> None:
+    """Draw a grip: shaded step by step, framed as a whole, marked where it places a brick."""
+    low, begin, end = hold.robot - LANE / 2, stops[0][0], stops[-1][1]
+    for (start, stop), color in zip(stops, () if colors is None else colors, strict=False):
+        axes.add_patch(Rectangle((start, low), stop - start, LANE, fc=color, lw=0))
+    look: Any = {"fc": PALE if colors is None else "none", "ec": DARK, "lw": 0.9}
+    look |= {"hatch": "//"} if hold.node is None else {}
+    name = f"hold {hold.robot} {hold.first} {hold.last}"
+    axes.add_patch(Rectangle((begin, low), end - begin, LANE, gid=name, **look))
+    if hold.places is not None:
+        axes.plot([begin] * 2, [low, low + LANE], color=DARK, lw=3.2)
+
+
+def _label(
+    axes: Axes, scene: Scene, hold: Hold, stops: Sequence[tuple[float, float]], inch: float
+) -> None:
+    """Write brick and node, or the number of an open grip, into a bar as far as they fit."""
+    begin, end = stops[0][0], stops[-1][1]
+    room = inch * (end - begin)
+    if room < 0.12:
+        return
+    words = f"?{(hold.move or 0) + 1}"
+    if hold.node is not None:
+        words = f"{scene.brick_of_node[hold.node].name} · {hold.node}"
+    flat = room >= LETTER * len(words) + 0.06
+    look: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
+    look["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
+    axes.annotate(words, ((begin + end) / 2, hold.robot), rotation=0 if flat else 90, **look)
+
+
+def _marks() -> list[Line2D | Patch]:
+    """Return what explains marks and words of bars, in a legend."""
+    return [
+        Line2D([], [], color=DARK, marker="|", ms=11, mew=3.2, lw=0, label="places the brick"),
+        Patch(fc="white", ec=DARK, label="holds it (brick · node)"),
+    ]
+
+
+def _explain(
+    figure: Figure, axes: Axes, marks: list[Line2D | Patch], shade: ScalarMappable | None
+) -> None:
+    """Explain marks and shades."""
+    place: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
+    axes.legend(handles=marks, ncols=len(marks), frameon=False, **place)
+    if shade is not None:
+        figure.colorbar(shade, ax=axes, label="grip force, N", pad=0.01)

@@ -1,1 +1,0 @@
-"""Charts of builds in time: who prepares, acts and holds when."""
