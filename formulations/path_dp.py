@@ -21,7 +21,7 @@ free schedule a path through its states (``path_dp``). With moves :math:`a = (u,
 A sum is found by Dijkstra's algorithm from both sides, and only moves with :math:`d(u) + c_a +
 d'(v)` at its least are left for the next goal, :math:`d'` being what is left to an end. Of a peak
 the least value below which moves connect the start to an end is found by bisection. Among paths of
-the same largest cost ``minimax`` takes one of least sum.
+the same largest cost ``minimax`` takes one of least sum of the :math:`c` and :math:`d`.
 """
 
 from __future__ import annotations
@@ -46,15 +46,16 @@ def shortest(graph: Graph, watch: Watch) -> Choice:
 
 
 def _least_peak(graph: Graph, watch: Watch) -> Choice:
-    """Return the path of least peak, among these that of the least sum of the same amounts."""
+    """Return the path of least peak, among these that of the least sum of its parts."""
     if not graph.peaks[0]:
         raise ProblemError(
             "minimax: a sum comes first, and no largest cost; use scenario_search over scenarios, "
             "path_dp or overlap_dp elsewhere"
         )
-    twice = np.column_stack([graph.amounts, graph.amounts[:, :1]])
-    peaks = (True, *graph.peaks[1:], False)
-    found = shortest(Graph(graph.source, graph.target, twice, peaks, graph.ends), watch)
+    parts = graph.amounts[:, 0] if graph.alone is None else graph.alone.sum(axis=1)
+    added = parts - min(0.0, float(parts.min()))  # of candidates, all paths have as many moves
+    peaks, amounts = (True, *graph.peaks[1:], False), np.column_stack([graph.amounts, added])
+    found = shortest(Graph(graph.source, graph.target, amounts, peaks, graph.ends), watch)
     return found._replace(bounds=found.bounds[:-1])
 
 
@@ -65,7 +66,12 @@ OVERLAP_DP = on_graph(
     "overlap_dp", "full overlap, dynamic programming", shortest, on=On.LAYERS, aim=Aim.SUM
 )
 MINIMAX = on_graph(
-    "minimax", "smallest worst cost over the build", _least_peak, on=On.LAYERS, aim=Aim.PEAK
+    "minimax",
+    "smallest worst cost over the build",
+    _least_peak,
+    on=On.LAYERS,
+    aim=Aim.PEAK,
+    alone=True,
 )
 SCENARIO_SEARCH = on_graph(
     "scenario_search",

@@ -85,7 +85,7 @@ def solve_layers(graph: Choices, formulation: Formulation, run: Run) -> Plan:
 def compiled(graph: Choices, aim: Aim | None, name: str = "", *, alone: bool = False) -> Compiled:
     """Return the graph of choices, of one scene or over scenarios, whose sums or peaks count.
 
-    ``alone``: whether with what a search of one move alone is charged.
+    ``alone``: whether with what a search of one move alone is charged; of peaks, with their parts.
     """
     nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
     name, nodes = name or nominal.schedule.scene.name, nominal.candidates
@@ -94,8 +94,10 @@ def compiled(graph: Choices, aim: Aim | None, name: str = "", *, alone: bool = F
         largest_of(layers)  # says if no choice is allowed in all scenarios
         return compile_totals(name, layers, graph.aim, nodes)
     aim = aim or Aim.SUM
-    charged = graph.alone if alone and isinstance(graph, Layers) else None
-    found = compile_costs(name, aim.costs(graph), aim, graph.budgets, charged, nodes)
+    costs = charged = aim.costs(graph)
+    if aim is Aim.SUM and alone and isinstance(graph, Layers):
+        charged = graph.alone
+    found = compile_costs(name, costs, aim, graph.budgets, charged if alone else None, nodes)
     if isinstance(graph, Layers):
         return found
     (goal,) = found.instance.goals

@@ -252,10 +252,10 @@ def test_the_judge_sees_a_worse_plan_and_one_of_another_schedule():
         judge_schedule(problem, found.selection, other)
 
 
-def test_what_does_not_go_together_is_said_in_a_line():
+def test_many_open_grips_at_once_are_solved_as_states():
     engine, schedule = built("four")
-    assert seqopt.solve(seqopt.pose(engine, schedule, ONES)).goals == ("minmax",)
-    with pytest.raises(StepError, match=r"open at once; .* give an aim"):
-        seqopt.solve(seqopt.pose(engine, schedule, ONES), "minimax")
+    plans = [seqopt.solve(seqopt.pose(engine, schedule, ONES), n) for n in (None, "minimax")]
+    assert [plan.goals for plan in plans] == [("minmax",)] * 2
+    assert plans[1].objective["minmax"] == pytest.approx(plans[0].objective["minmax"])
     with pytest.raises(ProblemError, match="ranks the choices of a move"):
         build_states(engine, schedule, seqopt.CRITERIA["equations-2-3"], "sum")

@@ -11,6 +11,8 @@ from hypothesis import given
 
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.problem.problem import Aim
+from tests.layered import answer
 from tests.strategies import problems
 
 INF = np.inf
@@ -196,3 +198,10 @@ def test_nothing_taken_of_nothing_leaves_nothing():
 def test_a_budget_that_is_no_budget_is_named(change, named):
     with pytest.raises(ProblemError, match=named):
         replace(use(1.0), **change)
+
+
+@given(problem=problems())
+def test_of_choices_with_one_worst_cost_minimax_takes_the_least_sum(problem):
+    worths = {c: (worst, problem.worth(c)) for c, worst in problem.within(Aim.PEAK).items()}
+    if worths:
+        assert worths[answer(problem, "minimax").choice] == min(worths.values())
