@@ -33,8 +33,8 @@ from seqopt._cli.options import Asked
 from seqopt._cli.signatures import given, page_of
 from seqopt._cli.watcher import Watcher
 from seqopt.contact.mortar import Mortar
-from seqopt.graph.instances.instance import Instance
-from seqopt.judge._arithmetic import judge_instance as judge
+from seqopt.graph.instance import Instance
+from seqopt.instances.answers import judge_instance as judge
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
 from seqopt.plan.plan import Plan

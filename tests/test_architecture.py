@@ -51,6 +51,7 @@ SHARED = {  # what formulations may import
     "formulations.on_graph",
     "formulations.cascade",
     "formulations.labels",
+    "formulations.path_dp",
     "formulations.overlap_flow",
     "formulations._weights",
     "formulations.states._search",

@@ -215,9 +215,18 @@ def _instance(document: dict[str, Any], arrays: dict[str, np.ndarray]) -> Instan
         ]
         graph = Graph(*rows, amounts, (False,) * len(names), ends)
         timed = TimedGraph(_by_goal(graph, (goals, caps)), states[:, 0], *whole)
-    asked: Any = (names, amounts, goals, caps)
-    facts = document["facts"]
-    return Instance(document["name"], *rows, ends, *asked, states=states, timed=timed, facts=facts)
+    return Instance(
+        document["name"],
+        *rows,
+        ends,
+        tuple(names),
+        amounts,
+        tuple(goals),
+        tuple(caps),
+        states=states,
+        timed=timed,
+        facts=document["facts"],
+    )
 
 
 def _require_columns(goals: Sequence[_Target], caps: Sequence[_Cap], count: int) -> None:

@@ -182,7 +182,9 @@ CHECKS = {
         *("status", "feasible", {"build": "vault"}),
     ),
     "composing": Check(
-        composing.holds, ("composing",), *("value", np.nan, {"schedule": "free", "with": "overlap_dp"})
+        composing.holds,
+        ("composing",),
+        *("value", np.nan, {"schedule": "free", "with": "overlap_dp"}),
     ),
     "free_formulations": Check(
         free_formulations.holds,
