@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from seqopt.errors import StepError, did_you_mean
+from seqopt.errors import StepError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene._armed import reachable
@@ -112,7 +112,11 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
             f"scene {scene.name}: {len(scene.robots)} robots and {len(scene.placed)} bricks; "
             f"this method needs {in_words(count)} robots and {in_words(count + 1)} bricks"
         )
-    turns = _rotation(count, len(scene.placed) - count)
+    longest = [*range(1, count - 1), 0, count - 1]  # who has held longest, again and again
+    turns = [
+        _Turn(*(longest[(k - ago) % count] for ago in (1, 2, 0)))
+        for k in range(len(scene.placed) - count)
+    ]
     chosen = find_robots(scene, names, f"the loop of {count}", count)
     roles = [{role} for role in range(count)]
     for brick, turn in enumerate(turns, start=count):
@@ -122,20 +126,14 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
 
 
 class _Turn(NamedTuple):
-    """The roles of one turn of the loop: who moves, who places next, who releases after that."""
+    """The roles of one turn of the loop, each named by the first brick that it places.
+
+    Who has held longest moves in the next turn, and places in the one after.
+    """
 
     mover: int
     placer: int
     oldest: int
-
-
-def _rotation(count: int, turns: int) -> list[_Turn]:
-    """Return who does what, turn by turn; a role is named by the first brick that it places.
-
-    Who has held longest moves in the next turn, and places in the one after.
-    """
-    oldest = [*range(1, count - 1), 0, count - 1]  # again and again
-    return [_Turn(*(oldest[(k - ago) % count] for ago in (1, 2, 0))) for k in range(turns)]
 
 
 def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> list[OpenStep]:
@@ -290,11 +288,3 @@ SCHEDULES: dict[str, Method[Schedule]] = {
     "two-robot": _two_robot_loop,
     "loop": robot_loop,
 }
-
-
-def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
-    """Return a schedule of `SCHEDULES` by name, with robots in the order of their roles."""
-    if name not in SCHEDULES:
-        why = f"does not exist{did_you_mean(name, SCHEDULES)}; give one of {', '.join(SCHEDULES)}"
-        raise StepError(f"schedule {name!r} {why}")
-    return SCHEDULES[name](network, robots)

@@ -42,17 +42,14 @@ def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str
     for some in ([robot] for robot in limited):
         if more := _least(scene, some, exists):
             alone += 1
-            yield _said(some[0], more)
+            robot, reach = some[0], some[0].reach
+            if isinstance(reach, Sphere):
+                radius = math.ceil(_MM * (reach.radius + more) - 1e-6) / _MM
+                yield f"a reach of {radius:.6g} m of {robot.name} ({reach.radius:.6g} m now)"
+            else:
+                yield f"a reach of {robot.name} that is {more:.6g} m longer"
     if not alone and len(limited) > 1 and (more := _least(scene, limited, exists)):
         yield f"a reach that is {more:.6g} m longer of every robot that does not reach everything"
-
-
-def _said(robot: Robot, more: float) -> str:
-    """Return the reach of a robot that is enough, in words."""
-    if isinstance(robot.reach, Sphere):
-        radius = math.ceil(_MM * (robot.reach.radius + more) - 1e-6) / _MM
-        return f"a reach of {radius:.6g} m of {robot.name} ({robot.reach.radius:.6g} m now)"
-    return f"a reach of {robot.name} that is {more:.6g} m longer"
 
 
 def _least(scene: Scene, some: Sequence[Robot], exists: Callable[[Scene], bool]) -> float:
@@ -230,17 +227,12 @@ def _first_match(fits: Sequence[Sequence[int]]) -> list[int]:
     """Return the first way to give every role a robot of its own; none if there is no way."""
     for robot in fits[0] if fits else ():
         rest = [[other for other in fit if other != robot] for fit in fits[1:]]
-        if _matched(rest):
+        if not all(rest):
+            continue
+        able = np.array([np.isin(np.arange(1 + max(map(max, rest))), fit) for fit in rest] or [[1]])
+        if (maximum_bipartite_matching(csr_array(able), perm_type="column") >= 0).all():
             return [robot, *_first_match(rest)]
     return []
-
-
-def _matched(fits: Sequence[Sequence[int]]) -> bool:
-    """Return whether every role can have a robot that no other has."""
-    if not fits or not all(fits):
-        return not fits
-    able = np.array([np.isin(np.arange(1 + max(map(max, fits))), fit) for fit in fits])
-    return bool((maximum_bipartite_matching(csr_array(able), perm_type="column") >= 0).all())
 
 
 def in_words(number: int) -> str:
