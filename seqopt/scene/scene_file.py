@@ -181,7 +181,7 @@ KINDS = {
 def _maker(kind: str) -> tuple[Callable[..., Scene], type | None]:
     """Return what makes a kind of scene, and the shape that this takes, if it takes one."""
     from seqopt.scene import library as of  # noqa: PLC0415  # a scene from a file needs none
-    from seqopt.scene.library.arch_form import _barrel, _BarrelShape  # noqa: PLC0415
+    from seqopt.scene.library.arch_form import _barrel  # noqa: PLC0415
 
     makers: dict[str, tuple[Callable[..., Scene], type | None]] = {
         "arch": (of.arch, of.ArchForm),
@@ -192,7 +192,7 @@ def _maker(kind: str) -> tuple[Callable[..., Scene], type | None]:
             lambda shape: of.herringbone_vault(_load_stored("arch25"), shape),
             of.VaultShape,
         ),
-        "vault": (_barrel, _BarrelShape),
+        "vault": (_barrel, None),
         "wall": (of.wall, of.WallShape),
     }
     return makers[kind]
