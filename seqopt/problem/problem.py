@@ -34,7 +34,7 @@ from seqopt.problem.standing import MARGINS, Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import NO_TOLERANCE, PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
-from seqopt.scene._checks import short
+from seqopt.scene._checks import settle, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
@@ -403,10 +403,10 @@ class Problem(Shown):
         if isinstance(network, Network):  # another engine is refused later
             kept = (each for each in limits if each.response != PROP_EXCESS)
             limits = (*kept, *_prop_limits(network.scene))
-        for name, parts in (("limits", limits), ("goals", self.goals)):
-            named = _with_other_limits([part.response for part in parts], limits)
-            pairs = zip(parts, named, strict=True)
-            object.__setattr__(self, name, tuple(replace(p, response=word) for p, word in pairs))
+        parts: tuple[Limit | Goal, ...] = (*limits, *self.goals)
+        names = _with_other_limits([part.response for part in parts], limits)
+        named = [replace(p, response=name) for p, name in zip(parts, names, strict=True)]
+        settle(self, limits=tuple(named[: len(limits)]), goals=tuple(named[len(limits) :]))
 
     def __repr__(self) -> str:
         parts = [f"{self.scene.name!r}, {self.method!r}, criterion {self.criterion.name!r}"]

@@ -38,7 +38,7 @@ def block_brick(
     own = replace(shape, vertices=as_vectors(shape.points - shape.centroid))
     x, y, z = own.extents(own.axes).tolist()
     at, first, second = as_vectors(np.vstack([shape.centroid, own.axes[:2]]))
-    held = own.nodes()
+    held: tuple[Vector, ...] = own.nodes()
     if grips is not None:
         where = f"brick {name}: grips"
         found = [vector(where, row) for row in rows(where, grips)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from seqopt._files import parse_json, read_text
 from seqopt.errors import SceneError, StepError, did_you_mean
@@ -50,7 +51,7 @@ def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
 
 def _measured(scene: Scene, told: object, where: str) -> Scene:
     """Return a scene whose bricks are where they were measured."""
-    points = told if isinstance(told, Mapping) else {"": told}
+    points: Mapping[str, Any] = told if isinstance(told, Mapping) else {"": told}
     for name, point in points.items():
         right = isinstance(point, list) and len(point) == 3 and _are_near(point)
         if not (name.isdecimal() and right):

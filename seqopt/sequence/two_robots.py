@@ -229,7 +229,8 @@ def _first_match(fits: Sequence[Sequence[int]]) -> list[int]:
         rest = [[other for other in fit if other != robot] for fit in fits[1:]]
         if not all(rest):
             continue
-        able = np.array([np.isin(np.arange(1 + max(map(max, rest))), fit) for fit in rest] or [[1]])
+        count = 1 + max(map(max, rest), default=0)
+        able = np.array([np.isin(np.arange(count), fit) for fit in rest], bool).reshape(-1, count)
         if (maximum_bipartite_matching(csr_array(able), perm_type="column") >= 0).all():
             return [robot, *_first_match(rest)]
     return []
