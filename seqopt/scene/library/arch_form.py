@@ -30,6 +30,7 @@ from seqopt.scene.boxes import require_apart
 from seqopt.scene.library.common import (
     MASONRY,
     JointLaw,
+    _bond_pairs,
     _masonry,
     _running_bond,
     a_law,

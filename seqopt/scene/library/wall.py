@@ -16,6 +16,7 @@ from seqopt.scene.library.common import (
     DOWN,
     MASONRY,
     JointLaw,
+    _bond_pairs,
     _masonry,
     _running_bond,
     a_law,
