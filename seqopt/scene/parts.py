@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Real
 
@@ -159,6 +159,15 @@ class Side:
         """Return whether a point is within reach."""
         return _dot(self.toward, point) >= _dot(self.toward, self.point)
 
+    def lack(self, point: Vector) -> float:
+        """Return how far a point is out of reach, m."""
+        return float(np.dot(self.toward, np.subtract(self.point, point)))
+
+    def longer(self, more: float) -> Side:
+        """Return a reach that is longer, m."""
+        x, y, z = (p - more * t for p, t in zip(self.point, self.toward, strict=True))
+        return replace(self, point=(x, y, z))
+
     def __str__(self) -> str:
         return "the side toward ({:g}, {:g}, {:g})".format(*self.toward)
 
@@ -193,6 +202,14 @@ class Sphere:
     def covers(self, point: Vector) -> bool:
         """Return whether a point is within reach."""
         return math.dist(self.center, point) <= self.radius
+
+    def lack(self, point: Vector) -> float:
+        """Return how far a point is out of reach, m."""
+        return math.dist(self.center, point) - self.radius
+
+    def longer(self, more: float) -> Sphere:
+        """Return a reach that is longer, m."""
+        return replace(self, radius=self.radius + more)
 
     def __str__(self) -> str:
         return "{:g} m around ({:g}, {:g}, {:g})".format(self.radius, *self.center)

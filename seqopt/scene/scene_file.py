@@ -377,7 +377,7 @@ def _scene_from_document(document: object, source: str) -> Scene:
 def _scene_from_dict(document: dict[str, Any]) -> Scene:
     """Return the scene of a document that obeys the schema."""
     content = {key: value for key, value in document.items() if key not in ("format", "version")}
-    content["bricks"] = [Brick(**_with_shape(brick)) for brick in content["bricks"]]
+    content["bricks"] = [_brick(**brick) for brick in content["bricks"]]
     content["joints"] = [Joint(**joint) for joint in content["joints"]]
     content["grounds"] = [Ground(**ground) for ground in content["grounds"]]
     content["loads"] = [Load(**load) for load in content.get("loads", ())]
@@ -394,14 +394,12 @@ def _scene_from_dict(document: dict[str, Any]) -> Scene:
     return Scene(**content)
 
 
-def _with_shape(entry: dict[str, Any]) -> dict[str, Any]:
-    """Return the entry of a brick with its shape, if it has one, as a value."""
-    if entry.get("shape") is None:
-        return entry
+def _brick(shape: dict[str, Any] | None = None, **entry: Any) -> Brick:
     try:
-        return {**entry, "shape": Polyhedron(**entry["shape"])}
+        solid = None if shape is None else Polyhedron(**shape)
     except SceneError as error:
         raise SceneError(f"brick {short(entry['name'])}: {error}") from error
+    return Brick(**entry, shape=solid)
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:

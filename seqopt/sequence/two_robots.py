@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 import typing
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from contextlib import suppress
 from dataclasses import replace
 from functools import wraps
 from itertools import permutations
@@ -22,7 +24,7 @@ from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network, PartKind
 from seqopt.scene._armed import within_reach
-from seqopt.scene.parts import Brick, Reach, Robot, Side, Sphere
+from seqopt.scene.parts import Anywhere, Brick, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import acting_bodies, check_support
 from seqopt.sequence.steps import Step, StepKind, check_sequence
@@ -37,65 +39,47 @@ def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str
 
     ``exists``: whether it does in a scene, which is the same save for what robots reach.
     """
-    limited = [r for r in scene.robots if r.arm is None and isinstance(r.reach, Side | Sphere)]
+    limited = {
+        robot.name: robot.reach
+        for robot in scene.robots
+        if robot.arm is None and not isinstance(robot.reach, Anywhere)
+    }
     alone = 0
-    for some in ([robot] for robot in limited):
-        if more := _least(scene, some, exists):
+    for name, reach in limited.items():
+        if more := _least(scene, {name: reach}, exists):
             alone += 1
-            robot, reach = some[0], some[0].reach
             if isinstance(reach, Sphere):
                 radius = math.ceil(_MM * (reach.radius + more) - 1e-6) / _MM
-                yield f"a reach of {radius:.6g} m of {robot.name} ({reach.radius:.6g} m now)"
+                yield f"a reach of {radius:.6g} m of {name} ({reach.radius:.6g} m now)"
             else:
-                yield f"a reach of {robot.name} that is {more:.6g} m longer"
+                yield f"a reach of {name} that is {more:.6g} m longer"
     if not alone and len(limited) > 1 and (more := _least(scene, limited, exists)):
         yield f"a reach that is {more:.6g} m longer of every robot that does not reach everything"
 
 
-def _least(scene: Scene, some: Sequence[Robot], exists: Callable[[Scene], bool]) -> float:
-    """Return how much longer some robots have to reach at least, in whole mm; zero if it is vain.
+def _least(
+    scene: Scene, reaches: Mapping[str, Side | Sphere], exists: Callable[[Scene], bool]
+) -> float:
+    """Return how much longer some reaches have to be at least, in whole mm; zero if it is vain.
 
-    Only lengths at which one more node is reached make a difference.
+    Only lengths at which one more node is reached make a difference. ``reaches``: by robot.
     """
-    lacks = {
-        math.ceil(_MM * lack - 1e-6) / _MM
-        for robot in some
-        for brick in scene.placed
-        for node in brick.nodes
-        if (lack := _lack(robot.reach, brick.node_position(node))) > 0
-    }
-    steps = sorted(lacks)
-    if not steps or not exists(_longer(scene, some, steps[-1])):
+    points = [brick.node_position(node) for brick in scene.placed for node in brick.nodes]
+    lacks = (reach.lack(point) for reach in reaches.values() for point in points)
+    steps = sorted({math.ceil(_MM * lack - 1e-6) / _MM for lack in lacks if lack > 0})
+
+    def is_enough(more: float) -> bool:
+        robots = (
+            replace(robot, reach=reaches[robot.name].longer(more))
+            if robot.name in reaches
+            else robot
+            for robot in scene.robots
+        )
+        return exists(scene.with_robots(*robots))
+
+    if not steps or not is_enough(steps[-1]):
         return 0.0
-    low, high = -1, len(steps) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if exists(_longer(scene, some, steps[middle])) else (middle, high)
-    return steps[high]
-
-
-def _lack(reach: Reach, point: Sequence[float]) -> float:
-    """Return how far a point is out of reach, m."""
-    if isinstance(reach, Sphere):
-        return math.dist(reach.center, point) - reach.radius
-    if isinstance(reach, Side):
-        return float(np.dot(reach.toward, np.subtract(reach.point, point)))
-    return 0.0
-
-
-def _longer(scene: Scene, some: Sequence[Robot], more: float) -> Scene:
-
-    def changed(robot: Robot) -> Robot:
-        reach = robot.reach
-        if robot not in some:
-            return robot
-        if isinstance(reach, Sphere):
-            return replace(robot, reach=replace(reach, radius=reach.radius + more))
-        assert isinstance(reach, Side)
-        x, y, z = (p - more * t for p, t in zip(reach.point, reach.toward, strict=True))
-        return replace(robot, reach=replace(reach, point=(x, y, z)))
-
-    return scene.with_robots(*map(changed, scene.robots))
+    return steps[bisect_left(steps, 1, hi=len(steps) - 1, key=is_enough)]
 
 
 def _says_reach(make: _Make) -> _Make:
@@ -109,15 +93,14 @@ def _says_reach(make: _Make) -> _Make:
             said = str(error)
             if ASKS not in said:
                 raise
-            scene = network if isinstance(network, Scene) else network.scene
 
         def exists(other: Scene) -> bool:
-            try:
+            with suppress(StepError):
                 make(build_network(other), robots)
-            except StepError:
-                return False
-            return True
+                return True
+            return False
 
+        scene = network if isinstance(network, Scene) else network.scene
         ways = " or ".join(_enough_reach(scene, exists))
         raise StepError(said.replace(ASKS, f"give {ways}") if ways else said)
 

@@ -84,10 +84,9 @@ def _masonry(
     pairs: _Pairs,
     law: JointLaw,
     feet: Iterable[tuple[Brick, Floats]],
-    robots: Sequence[Robot] | None = None,
     normals: Floats | None = None,
 ) -> Scene:
-    """Return the scene of generated bricks, built in their order by mobile robots by default.
+    """Return the scene of generated bricks, built in their order by mobile robots.
 
     ``source``: the module that generates it; ``pairs``: which bricks share a joint, and
     ``normals`` across it, as of `_joints_between`; ``feet``: bricks that stand on the ground, and
@@ -100,7 +99,7 @@ def _masonry(
         joints=_joints_between(bricks, pairs, law, normals),
         grounds=tuple(_ground_under(brick, down, law) for brick, down in feet),
         build_order=tuple(brick.name for brick in bricks),
-        robots=mobile_robots(bricks) if robots is None else tuple(robots),
+        robots=mobile_robots(bricks),
     )
 
 

@@ -27,7 +27,7 @@ from seqopt.scene.library.common import (
     tiles,
     touching_order,
 )
-from seqopt.scene.parts import Brick, Robot
+from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 
 _BONDS = ("running", "herringbone")
@@ -108,15 +108,15 @@ class _Place(NamedTuple):
     half: float  # rad
 
 
-def dome(shape: DomeShape, name: str = "", *, robots: Sequence[Robot] | None = None) -> Scene:
+def dome(shape: DomeShape) -> Scene:
     """Return the scene of a dome that is built from the ground up, course by course.
 
     Its axis is z, and the surface through the middles of its bricks starts at z = 0. Bricks are
     boxes cut to the room that their place in the dome leaves: shorter the higher they are, unless a
     course has fewer of them.
 
-    ``name``: by default the kind and the number of bricks; ``robots``: three that reach everything
-    by default. Raises `SceneError` if a place leaves no room for a brick, or bricks interpenetrate.
+    Three robots reach everything. Raises `SceneError` if a place leaves no room for a brick, or
+    bricks interpenetrate.
 
     Examples
     --------
@@ -127,8 +127,8 @@ def dome(shape: DomeShape, name: str = "", *, robots: Sequence[Robot] | None = N
     bricks = [_brick(shape, place, b) for b, place in enumerate(places, start=1)]
     require_apart("dome", bricks, "give more around, a wider gap or thinner bricks")
     feet = [(brick, DOWN) for brick, p in zip(bricks, places, strict=True) if not p.low]
-    name = name or f"dome {len(bricks)}"
-    return _masonry(name, ".dome.", bricks, ends, shape.law, feet, robots, normals)
+    name = f"dome {len(bricks)}"
+    return _masonry(name, ".dome.", bricks, ends, shape.law, feet, normals)
 
 
 def _laid(shape: DomeShape) -> tuple[list[_Place], list[tuple[int, int]], Floats]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -23,7 +22,6 @@ from seqopt.scene.library.common import (
     few_enough,
     joint_width,
 )
-from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 
 WHOLE = 1e-3  # of a brick: lengths in mm come to whole bricks
@@ -97,14 +95,13 @@ class WallShape:
         object.__setattr__(self, name, round(count))
 
 
-def wall(shape: WallShape, name: str = "", *, robots: Sequence[Robot] | None = None) -> Scene:
+def wall(shape: WallShape) -> Scene:
     """Return the scene of a wall that is built course by course, from left to right.
 
     It runs towards +x from y = 0 and stands on z = 0. A brick has joints with those beside
     it and those that it lies on: nearly every one closes a loop.
 
-    ``name``: by default the kind and the size; ``robots``: three that reach everything by default.
-    Raises `SceneError` if the numbers make no scene.
+    Three robots reach everything. Raises `SceneError` if the numbers make no scene.
 
     Examples
     --------
@@ -118,7 +115,7 @@ def wall(shape: WallShape, name: str = "", *, robots: Sequence[Robot] | None = N
     )
     courses = ((start, np.eye(3)[0], np.eye(3)[1]) for start in starts)
     bricks = _running_bond(courses, shape.columns, shape.dimensions, shape.gap, shape.density)
-    name = name or f"wall {shape.columns} x {shape.courses}"
+    name = f"wall {shape.columns} x {shape.courses}"
     feet = [(brick, DOWN) for brick in bricks[: shape.columns]]
     pairs = _bond_pairs(shape.columns, len(bricks))
-    return _masonry(name, ".wall.", bricks, pairs, shape.law, feet, robots)
+    return _masonry(name, ".wall.", bricks, pairs, shape.law, feet)
