@@ -83,19 +83,6 @@ class Load(Terse):
         return self.brick if self.since is None else self.since
 
 
-def _from_both_sides(names: Sequence[int], places: Sequence[Vector], up: Vector) -> tuple[int, ...]:
-    """Return names of bricks, at some places, in that order."""
-    where, high = np.array(places), np.array(up)
-    level = where - np.outer(where @ high, high)
-    axis = np.linalg.svd(level - level.mean(axis=0))[2][0]  # along which it is longest
-    along = np.round(level @ axis * np.sign(axis[np.abs(axis).argmax()]), 6)
-    courses, course = np.unique(np.round(where @ high, 6), return_inverse=True)
-    ends = [along[course == k] for k in range(len(courses))]
-    middle = np.array([0.5 * (each.min() + each.max()) for each in ends])[course]
-    rank = np.lexsort((along, np.round(-np.abs(along - middle), 6), course))
-    return tuple(names[k] for k in rank)
-
-
 _UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
 _STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
 _SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block

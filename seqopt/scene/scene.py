@@ -18,17 +18,7 @@ from seqopt.errors import SceneError, did_you_mean
 from seqopt.scene._checks import check, not_negative, printable, settle, short, vector, wholes
 from seqopt.scene._durations import _durations_in_words
 from seqopt.scene._props import Prop, settled_props
-from seqopt.scene.parts import (
-    Brick,
-    Ground,
-    Joint,
-    Load,
-    Reach,
-    Robot,
-    _from_both_sides,
-    _grip_kinds,
-    _GripKinds,
-)
+from seqopt.scene.parts import Brick, Ground, Joint, Load, Reach, Robot, _grip_kinds, _GripKinds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -476,10 +466,23 @@ def _from_all_ends(scene: Scene) -> Order:
     return tuple(sorted(scene.build_order, key=lambda name: far.get(name, last)))
 
 
+def _from_both_sides(scene: Scene) -> Order:
+    """Return the order that builds course by course, from both ends of each to its middle."""
+    where, high = np.array([brick.position for brick in scene.placed]), np.array(scene.up)
+    level = where - np.outer(where @ high, high)
+    axis = np.linalg.svd(level - level.mean(axis=0))[2][0]  # along which it is longest
+    along = np.round(level @ axis * np.sign(axis[np.abs(axis).argmax()]), 6)
+    courses, course = np.unique(np.round(where @ high, 6), return_inverse=True)
+    ends = [along[course == k] for k in range(len(courses))]
+    middle = np.array([0.5 * (each.min() + each.max()) for each in ends])[course]
+    rank = np.lexsort((along, np.round(-np.abs(along - middle), 6), course))
+    return tuple(scene.build_order[k] for k in rank)
+
+
 ORDERS: dict[str, Callable[[Scene], Order]] = {
     "reversed": lambda scene: scene.build_order[::-1],
     "ends": _from_all_ends,
-    "sides": lambda s: _from_both_sides(s.build_order, [b.position for b in s.placed], s.up),
+    "sides": _from_both_sides,
 }
 """Orders by name.
 
