@@ -89,21 +89,17 @@ def _durations_in_words(
         if colon and name not in names:
             hint = did_you_mean(name, names)
             raise SceneError(f"durations {text}: no robot {name!r}{hint}; give {', '.join(names)}")
-        for index, robot in enumerate(names):
-            if robot == name or not colon:
-                out[index] = _changed(text, words, out[index])
+        known = dict.fromkeys((*_NAMES, SLOWER), (float, "5"))
+        said = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
+        factor = said.pop(SLOWER, None)
+        for index in (i for i, robot in enumerate(names) if robot == name or not colon):
+            before = out[index]
+            lacking = [each for each in _NAMES if each not in said and each != "speed"]
+            if before is None and lacking:
+                raise SceneError(
+                    f"durations {text}: {', '.join(lacking)} not given, nor in the scene; give "
+                    f"all, as {EXAMPLE}"
+                )
+            found = Durations(**said) if before is None else replace(before, **said)
+            out[index] = found if factor is None else found.slower(factor)
     return tuple(out)
-
-
-def _changed(text: str, words: str, before: Durations | None) -> Durations:
-    """Return durations with what words say in place of what they were."""
-    where, known = f"durations {text}", dict.fromkeys((*_NAMES, SLOWER), (float, "5"))
-    said = in_words(where, words.split(","), known, f", as {EXAMPLE}")
-    factor = said.pop(SLOWER, None)
-    if before is None and (lacking := [n for n in _NAMES if n not in said and n != "speed"]):
-        raise SceneError(
-            f"durations {text}: {', '.join(lacking)} not given, nor in the scene; give all, as "
-            f"{EXAMPLE}"
-        )
-    found = Durations(**said) if before is None else replace(before, **said)
-    return found if factor is None else found.slower(factor)

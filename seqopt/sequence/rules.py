@@ -297,20 +297,18 @@ def parse_rules(
         raise StepError(f"{where} {short(given)}: give a seqopt.FreeRules, or as least_grips=1")
     found = FreeRules()
     for each in several:
-        found = each if isinstance(each, FreeRules) else _with_rule(found, each, where)
+        if isinstance(each, FreeRules):
+            found = each
+            continue
+        name, _, text = each.partition("=")
+        if name not in RULES:
+            hint, known = did_you_mean(name, RULES), ", ".join(RULES)
+            raise StepError(f"{where} {each} does not exist{hint}; give one of {known}")
+        value: object = int(text) if name in _COUNTS and text.isdecimal() else text
+        if name == "placers":
+            value = tuple(part.strip() for part in text.split(","))
+        found = replace(found, **{name: _UNBOUND.get((name, text), value)})  # type: ignore[arg-type]
     return replace(found, robots=robots) if robots else found
-
-
-def _with_rule(rules: FreeRules, words: str, where: str) -> FreeRules:
-    """Return rules with one from ``NAME=VALUE``."""
-    name, _, text = words.partition("=")
-    if name not in RULES:
-        hint, known = did_you_mean(name, RULES), ", ".join(RULES)
-        raise StepError(f"{where} {words} does not exist{hint}; give one of {known}")
-    value: object = int(text) if name in _COUNTS and text.isdecimal() else text
-    if name == "placers":
-        value = tuple(part.strip() for part in text.split(","))
-    return replace(rules, **{name: _UNBOUND.get((name, text), value)})  # type: ignore[arg-type]
 
 
 def with_robots(scene: Scene, count: int) -> Scene:

@@ -26,7 +26,6 @@ from seqopt._showing import Shown, display
 from seqopt.arrays import Ints, Terse
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.network import Network
-from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 from seqopt.sequence.site import Site, _begin_step
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
@@ -63,25 +62,21 @@ class Near:
             return ()
         name, _, most = self.rule.partition(":")
         placed = scene.placed[:bricks]
-        if name == "near":
-            away = _joints_away(scene, placed)
+        if name == "near":  # counted in joints
+            import networkx as nx  # noqa: PLC0415  # slow to import, for this only
+
+            names = [brick.name for brick in placed]
+            graph: nx.Graph[int] = nx.Graph(joint.bricks for joint in scene.joints)
+            graph = graph.subgraph(names).copy()
+            graph.add_nodes_from(names)
+            joints = nx.multi_source_dijkstra_path_length(graph, {*names[-_NEWEST:]})
+            away = {n: float(joints.get(b.name, math.inf)) for b in placed for n in b.nodes}
         else:
             ends = [brick.position for brick in placed[-_NEWEST:]]
             points = {n: b.node_position(n) for b in placed for n in b.nodes}
             away = {n: min(math.dist(at, end) for end in ends) for n, at in points.items()}
         limit = max(float(most), min(away.get(n, math.inf) for n in nodes))
         return tuple(node for node in nodes if away.get(node, math.inf) <= limit)
-
-
-def _joints_away(scene: Scene, placed: Sequence[Brick]) -> dict[int, float]:
-    """Return how many joints part the nodes of placed bricks from the newest."""
-    import networkx as nx  # noqa: PLC0415  # slow to import, for this only
-
-    names = [brick.name for brick in placed]
-    graph: nx.Graph[int] = nx.Graph(joint.bricks for joint in scene.joints).subgraph(names).copy()
-    graph.add_nodes_from(names)
-    away = nx.multi_source_dijkstra_path_length(graph, {*names[-_NEWEST:]})
-    return {n: float(away.get(b.name, math.inf)) for b in placed for n in b.nodes}
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import wraps
 from itertools import permutations
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -108,7 +108,7 @@ def _says_reach(make: _Make) -> _Make:
 
 
 _Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
-_Ways = dict[_Pair, tuple[int, tuple[_Pair, ...]]]  # by pair: changes so far, pairs so far
+_Way = tuple[int, tuple[_Pair, ...]]  # changes so far, pairs so far
 
 
 def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> list[int]:
@@ -148,7 +148,7 @@ def _take_turns(
     """
     scene = network.scene
     rank = {robot: i for i, robot in enumerate(robots)}
-    ways: _Ways = {
+    ways: dict[_Pair, _Way] = {  # the best one to every pair that can be at work
         (placer, holder): (0, ((rank[placer], rank[holder]),))
         for placer, holder in starts or permutations(robots, 2)
     }
@@ -157,21 +157,15 @@ def _take_turns(
         possible = {pair: way for pair, way in ways.items() if pair[0] in able}
         if not possible:
             raise _nobody(scene, [pair[0] for pair in ways], able, k)
-        ways = _go_on(possible, rank, swapped=k == 0 or brick.name in swap_after)
+        ways = {}
+        for (placer, holder), (changes, path) in possible.items():
+            stays = k == 0 or brick.name in swap_after
+            free, held = (holder, placer) if stays else (placer, holder)
+            for after in (robot for robot in rank if robot != held):
+                way = (changes + (after != free), (*path, (rank[after], rank[held])))
+                ways[after, held] = min(way, ways.get((after, held), way))
     path = min(possible.values())[1]
     return [(robots[placer], robots[holder]) for placer, holder in path]
-
-
-def _go_on(ways: _Ways, rank: Mapping[int, int], *, swapped: bool) -> _Ways:
-    """Return the best way to every pair that can be at work at the next brick."""
-    out: _Ways = {}
-    for (placer, holder), (changes, path) in ways.items():
-        free, held = (holder, placer) if swapped else (placer, holder)
-        for after in rank:
-            if after != held:
-                way = (changes + (after != free), (*path, (rank[after], rank[held])))
-                out[after, held] = min(way, out.get((after, held), way))
-    return out
 
 
 def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepError:
@@ -288,14 +282,6 @@ def degeneration(network: Network, method: str) -> str:
 
 
 _Grip = TypeVar("_Grip")
-_Made_co = TypeVar("_Made_co", covariant=True)
-
-
-class Method(Protocol[_Made_co]):
-    """A rule that makes a sequence of steps, or a schedule."""
-
-    def __call__(self, network: Network | Scene, robots: Sequence[str] = ()) -> _Made_co:
-        """Return what builds a scene, by robots in the order of their roles, or found by reach."""
 
 
 def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
@@ -378,11 +364,6 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     tuple of Step
         Checked; every grip is given.
 
-    Raises
-    ------
-    StepError
-        As in `sequential`.
-
     Examples
     --------
     >>> import seqopt
@@ -395,7 +376,10 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     return _two_robots(network, "cantilever", swaps, robots)
 
 
-METHODS: dict[str, Method[tuple[Step, ...]]] = {"sequential": sequential, "cantilever": cantilever}
+METHODS: dict[str, Callable[..., tuple[Step, ...]]] = {
+    "sequential": sequential,
+    "cantilever": cantilever,
+}
 
 
 def alternate(

@@ -123,30 +123,13 @@ def dome(shape: DomeShape) -> Scene:
     >>> dome(DomeShape(courses=4, around=12, bond="herringbone"))
     <Scene dome 42: 42 bricks, 90 joints, 12 ground ends, 3 robots>
     """
-    places, ends, normals = _laid(shape)
-    bricks = [_brick(shape, place, b) for b, place in enumerate(places, start=1)]
-    require_apart("dome", bricks, "give more around, a wider gap or thinner bricks")
-    feet = [(brick, DOWN) for brick, p in zip(bricks, places, strict=True) if not p.low]
-    name = f"dome {len(bricks)}"
-    return _masonry(name, ".dome.", bricks, ends, shape.law, feet, normals)
-
-
-def _laid(shape: DomeShape) -> tuple[list[_Place], list[tuple[int, int]], Floats]:
-    """Return all places in the order of building, which have a joint, and directions across it."""
-    places = _running(shape)
-    if shape.bond == "herringbone":  # tiles that close around the dome, from the ground up
-        cell, places = 0.5 * _TURN / shape.around, []
-        for tile in tiles(shape.courses, range(2 * shape.around)):
-            rows, half = (2, 0.5 * cell) if tile.along else (1, cell)
-            places.append(_Place(tile.row, tile.row + rows, cell * tile.middle[1], half))
-        places.sort(key=lambda place: (place.low, place.azimuth))
+    places = _places(shape)
     loose = [_brick(shape, place, i) for i, place in enumerate(places)]
     pairs, normals = _beside(shape, places)
     kept = np.flatnonzero(_shares(loose, pairs, normals) >= _LEAST_SHARE)
     pairs, normals = [pairs[k] for k in kept], normals[kept]
-    order = touching_order(
-        range(len(places)), pairs, [i for i, p in enumerate(places) if not p.low]
-    )
+    grounded = [i for i, place in enumerate(places) if not place.low]
+    order = touching_order(range(len(places)), pairs, grounded)
     if len(order) < len(places):
         raise SceneError(
             f"dome: {len(places) - len(order)} of {len(places)} bricks lie on no other; "
@@ -155,12 +138,27 @@ def _laid(shape: DomeShape) -> tuple[list[_Place], list[tuple[int, int]], Floats
     rank = {old: new for new, old in enumerate(order)}
     ends = [(min(rank[a], rank[b]), max(rank[a], rank[b])) for a, b in pairs]
     turn = sorted(range(len(ends)), key=lambda k: ends[k][::-1])
-    return [places[old] for old in order], [ends[k] for k in turn], normals[turn]
+    places, ends = [places[old] for old in order], [ends[k] for k in turn]
+    bricks = [_brick(shape, place, b) for b, place in enumerate(places, start=1)]
+    require_apart("dome", bricks, "give more around, a wider gap or thinner bricks")
+    feet = [(brick, DOWN) for brick, p in zip(bricks, places, strict=True) if not p.low]
+    name = f"dome {len(bricks)}"
+    return _masonry(name, ".dome.", bricks, ends, shape.law, feet, normals[turn])
 
 
-def _running(shape: DomeShape) -> list[_Place]:
-    """Return courses of bricks as long as the lowest ones, each shifted by half a brick."""
+def _places(shape: DomeShape) -> list[_Place]:
+    """Return the places of bricks, from the ground up.
+
+    Bricks of courses are as long as the lowest ones, and shifted by half a brick; the tiles of a
+    herringbone close around the dome.
+    """
     out = []
+    if shape.bond == "herringbone":
+        cell = 0.5 * _TURN / shape.around
+        for tile in tiles(shape.courses, range(2 * shape.around)):
+            rows, half = (2, 0.5 * cell) if tile.along else (1, cell)
+            out.append(_Place(tile.row, tile.row + rows, cell * tile.middle[1], half))
+        return sorted(out, key=lambda place: (place.low, place.azimuth))
     for row in range(shape.courses):
         size = math.cos(shape.latitude(row)) / math.cos(shape.latitude(0))
         count = max(3, round(shape.around * size))
