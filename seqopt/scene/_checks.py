@@ -86,7 +86,7 @@ def _rounded(value: float) -> float:
     return float(f"{value:.{DIGITS}g}")
 
 
-Reader = tuple[Callable[[str], Any], str]  # how text is read, raising ValueError, and an example
+Reader = tuple[Callable[[str], Any], str]  # how text is read, or ValueError; what is wanted
 
 
 def in_words(
@@ -103,11 +103,11 @@ def in_words(
             why = f"is none of its numbers{did_you_mean(key, known)}"
             what = "is given twice" if key in found else why
             raise SceneError(f"{where}: {key!r} {what}; give {', '.join(known)}{example}")
-        read, sample = known[key]
+        read, wanted = known[key]
         try:
             found[key] = read(text)
         except ValueError:
-            raise SceneError(f"{where}: {key} is {short(text)}; give it as {sample}") from None
+            raise SceneError(f"{where}: {key} is {short(text)}; give {wanted}") from None
     return found
 
 

@@ -89,7 +89,7 @@ def _durations_in_words(
         if colon and name not in names:
             hint = did_you_mean(name, names)
             raise SceneError(f"durations {text}: no robot {name!r}{hint}; give {', '.join(names)}")
-        known = dict.fromkeys((*_NAMES, SLOWER), (float, "5"))
+        known = dict.fromkeys((*_NAMES, SLOWER), (float, f"a number, as {EXAMPLE}"))
         said = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
         factor = said.pop(SLOWER, None)
         for index in (i for i, robot in enumerate(names) if robot == name or not colon):

@@ -204,14 +204,14 @@ def _vector(text: str) -> Vector:
 
 
 ORDER = "order"  # of any kind: in which bricks are placed
-_WHOLE, _NUMBER = (int, "12"), (float, "0.5")
+_WHOLE, _NUMBER = (int, "it as 12"), (float, "it as 0.5")
 _READ: dict[Any, Reader] = {
     int: _WHOLE,
     int | None: _WHOLE,
     float: _NUMBER,
     float | None: _NUMBER,
     str: (str, "a word"),
-    Vector: (_vector, "0.2x0.1x0.06"),
+    Vector: (_vector, "it as 0.2x0.1x0.06"),
 }  # by what a number is
 
 
