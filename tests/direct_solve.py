@@ -8,7 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines._grip_compliance import GripCompliance
+from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import Fields, join_sets, no_sets
 from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond
@@ -21,7 +21,7 @@ _BACKWARD = 1e-10  # largest backward error of an accepted solution
 
 
 def solve_dense(
-    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance = RIGID
 ) -> Fields:
     """Return the fields of grip sets from the stiffness matrix of each.
 
@@ -29,9 +29,9 @@ def solve_dense(
     little for the assembled stiffness to tell, or the backward error is larger than `_BACKWARD`.
     """
     parts = rigid_structure(network, bricks)
-    if compliance is not None and compliance.matrix is not None:
+    if compliance.matrix is not None:
         raise SolverError("direct solve: it holds rigidly; take another engine for soft grips")
-    far = (compliance or GripCompliance()).offsets(*columns.shape)
+    far = compliance.offsets(*columns.shape)
     each = zip(columns, far, strict=True)
     answers = [_solve_one_dense(network, parts, *one) for one in each]
     return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])

@@ -14,7 +14,7 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
-from seqopt.engines._grip_compliance import read_compliance
+from seqopt.engines._grip_compliance import RIGID, read_compliance
 from seqopt.engines._planar import _Plane
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete._equilibrium_path import settle
@@ -54,7 +54,7 @@ def values(arch25):
     grips = np.array([2])
     assembly = step_assembly(network, 2, (2, None, None))
     system = build_system(network, 2, EPOXY, None)
-    held = _held_nodes(network, system, grips, None, [])
+    held = _held_nodes(network, system, grips, RIGID, [])
     parts = ungripped_system(network, 2)
     proven = Prover(assembly, _compiled())(bonded(assembly, EPOXY))
     plane = _Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])

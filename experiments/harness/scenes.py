@@ -41,7 +41,7 @@ def method_steps(engine: ComplianceEngine, names: Iterable[str]) -> dict[str, tu
 
 def half_circle(count: int) -> Network:
     """Return the network of an arch that turns from upright to upright."""
-    return build_network(chain(count, robots=ROBOTS))
+    return build_network(chain(count).with_robots(*ROBOTS))
 
 
 def longer(scene: Scene, times: float) -> Scene:
@@ -79,7 +79,7 @@ def running_bond(columns: int, courses: int) -> Scene:
     Joints have one stiffness each, whatever their area: three different ones along their axes.
     """
     robots = tuple(Robot(name=f"rob{i}", payload=400.0) for i in (1, 2, 3))
-    scene = wall(WallShape(columns=columns, courses=courses), robots=robots)
+    scene = wall(WallShape(columns=columns, courses=courses)).with_robots(*robots)
     beds = (joint for joint in scene.joints if abs(joint.along[2]) > 0.5)
     return replace(
         scene,

@@ -186,8 +186,10 @@ def _searched(
                 continue
             plan = _plan(problem, visited, stages, found, waits)
             best += [] if plan is None else [plan]
-            if plan is not None and (found.late or _is_known(stages, found, plan, waits)):
-                return _least_of(best, plan.bound, plan.stopped)
+            if plan is not None:
+                known = found.late or waits.cuts is None
+                if known or plan.ends <= stages.least(found.path) * (1 + ALMOST):
+                    return _least_of(best, plan.bound, plan.stopped)
             if not waits.learn():
                 break
         if best:
@@ -197,14 +199,9 @@ def _searched(
             ended = "interrupt" if isinstance(stop, KeyboardInterrupt) else str(stop)
             return _least_of(best, best[-1].bound, ended)
         return _by_then(problem, first, stop, waits)
-    raise _none(wide)
-
-
-def _none(wide: Explorer) -> InfeasibleError | NothingFoundError:
-    """Return the error that says why no plan was found among states that were looked at."""
     if wide.whole:
-        return NothingFoundError("no wait for mortar is enough for the plans that were looked at")
-    return wide.without_plan("no plan is allowed")
+        raise NothingFoundError("no wait for mortar is enough for the plans that were looked at")
+    raise wide.without_plan("no plan is allowed")
 
 
 def _ceiling(problem: States, first: StatePath | None, waits: Waits) -> float:
@@ -240,11 +237,6 @@ def _fell(problem: States, wide: Explorer, visited: Visited, path: Sequence[int]
             wide.close((level, part), state[None])
             fell = True
     return fell
-
-
-def _is_known(stages: Stages, found: StageFound, plan: StatePath, waits: Waits) -> bool:
-    """Return whether a plan takes no longer than is known of its path."""
-    return waits.cuts is None or plan.ends <= stages.least(found.path) * (1 + ALMOST)
 
 
 def _least_of(plans: Sequence[StatePath], bound: tuple[float, ...], stopped: str = "") -> StatePath:

@@ -136,7 +136,7 @@ def _files(scene: Scene, builds: Builds, found: FailureMap) -> dict[str, bytes |
     }
     if figure_notes():
         return files
-    from seqopt.report._failure_chart import failure_figure  # noqa: PLC0415
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.charts import failure_figure  # noqa: PLC0415
 
     return files | picture_files("map", failure_figure(found))

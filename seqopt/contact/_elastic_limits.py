@@ -31,15 +31,15 @@ class Quadrature(FrozenValue):
     area: Floats  # (P,); share of its face that a point stands for, m²
 
 
-def face_quadrature(assembly: Assembly, cuts: int = _CUTS) -> Quadrature:
+def face_quadrature(assembly: Assembly) -> Quadrature:
     """Return the bed of all contacts, in their order.
 
-    The middles of edges of triangles, each cut into four ``cuts`` times, integrate squares exactly.
+    The middles of edges of triangles, each cut into four twice, integrate squares exactly.
     """
     faces = [np.flatnonzero(assembly.contact == c) for c in range(len(assembly.bodies))]
     parts = fans([face.tolist() for face in faces])
     corners, face = assembly.corner[parts].reshape(-1, 3, 3), assembly.contact[parts[:, 0]]
-    for _ in range(cuts):
+    for _ in range(_CUTS):
         a, b, c = corners.transpose(1, 0, 2)
         ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
         quarters = np.array([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)])

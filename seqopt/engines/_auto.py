@@ -53,12 +53,14 @@ def find_level(network: Network) -> LevelChoice:
     kinds = network.scene.grip_kinds
     if kinds.rigid:
         return _IN_PLANE
+    if kinds.arms.any():
+        return _GIVING
     columns = np.arange(2 * len(network.inner))[:, None]
     nodes = np.array([network.node_name[i] for i in network.inner.ravel()], dtype=np.int64)
     for holder in [*{kind: i for i, kind in enumerate(kinds.of_robot)}.values()]:
         grips = kinds.numbers(nodes, [holder] * len(nodes))[:, None]
-        compliance = None if kinds.arms.any() else read_compliance(network, columns, grips, None)
-        if compliance is None or _leaves_plane(plane, compliance, columns).any():
+        compliance = read_compliance(network, columns, grips, None)
+        if _leaves_plane(plane, compliance, columns).any():
             return _GIVING
     return _IN_PLANE
 
@@ -111,9 +113,7 @@ class _RigidBricks(NamedEngine):
         columns = grip_columns(self.network, bricks, grips)
         flat = np.asarray(self._flat[columns].all(axis=1))
         compliance = read_compliance(self.network, columns, grips, moved)
-        return (
-            flat if compliance is None else flat & ~_leaves_plane(self._mirror, compliance, columns)
-        )
+        return flat & ~_leaves_plane(self._mirror, compliance, columns)
 
 
 def _of(moved: ArrayLike | None, which: Bools) -> Floats | None:

@@ -42,8 +42,15 @@ class GripCompliance(FrozenValue):
     lever: float = 1.0
     directions: int = 3
 
+    @property
+    def rigid(self) -> bool:
+        """Whether all grips are rigid, in their places, and transmit no moment."""
+        return self.matrix is None and self.moved is None
+
     def select(self, which: Bools | Ints | slice) -> GripCompliance:
         """Select grip sets."""
+        if self.rigid:
+            return self
         moved = None if self.moved is None else self.moved[which]
         kind = self.kind if self.alike else self.kind[which]
         return replace(self, moved=moved, kind=kind)
@@ -56,7 +63,7 @@ class GripCompliance(FrozenValue):
     def within(self, force: Floats, wrench: Floats) -> GripCompliance:
         """Return it in the directions of a `Basis`: a plane's, or all."""
         matrix, count = self.matrix, len(force)
-        if count == self.directions:
+        if count == self.directions or self.rigid:
             return self
         if matrix is not None:
             ways = force if self.transmits_moment is None else wrench
@@ -91,6 +98,10 @@ class GripCompliance(FrozenValue):
         return np.broadcast_to(of_kind[self.kind], (sets, grips, *of_kind.shape[1:]))
 
 
+RIGID = GripCompliance()
+"""Of rigid grips in their places."""
+
+
 def _lever_of(network: Network) -> float:
     """Return the length of the longest inner edge, by which moments are measured, m."""
     ends = network.node_position[network.inner]
@@ -99,17 +110,13 @@ def _lever_of(network: Network) -> float:
 
 def read_compliance(
     network: Network, columns: Ints, grips: ArrayLike, moved: ArrayLike | None
-) -> GripCompliance | None:
+) -> GripCompliance:
     """Return the compliance of grip sets (S, r), as `grip_columns` gives them.
 
-    ``grips``, ``moved``: as `seqopt.engines.interface.Engine.solve` takes them. None if all grips
-    are rigid, in their places and transmit no moment. Raises `GripError` if ``moved`` is not as
-    many lengths.
+    ``grips``, ``moved``: as `seqopt.engines.interface.Engine.solve` takes them. Raises `GripError`
+    if ``moved`` is not as many lengths.
     """
-    kinds = network.scene.grip_kinds
-    if moved is None and kinds.rigid:
-        return None
-    found = GripCompliance() if kinds.rigid else _of_scene(network, grips)
+    found = RIGID if network.scene.grip_kinds.rigid else _of_scene(network, grips)
     if moved is None:
         return found
     offsets = _lengths(columns, moved)

@@ -176,9 +176,9 @@ class PlanarEngine(FlatEngine, ComplianceEngine):
         """The same bricks and joints, free to leave the plane."""
         return ComplianceEngine(self.network)
 
-    def _require_known(self, columns: Ints, compliance: GripCompliance | None) -> None:
+    def _require_known(self, columns: Ints, compliance: GripCompliance) -> None:
         """Raise `GripError` if a grip lies, is moved or is compliant out of the plane."""
-        if compliance is not None and _leaves_plane(self._plane, compliance, columns).any():
+        if _leaves_plane(self._plane, compliance, columns).any():
             raise GripError(f"a grip is moved, or gives way, out of the scene's plane; {_ELSE}")
         if self._away is None:
             return

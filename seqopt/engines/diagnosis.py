@@ -21,7 +21,7 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.engines._grip_compliance import GripCompliance, read_compliance
+from seqopt.engines._grip_compliance import RIGID, GripCompliance, read_compliance
 from seqopt.engines.interface import Engine, Fields, Want, grip_columns
 from seqopt.engines.rigid._mechanism import free_motion, ungripped_system
 from seqopt.engines.rigid._mixed import MixedSystem, mixed_system, solve_mixed
@@ -35,7 +35,7 @@ _EIGENVALUE_TOLERANCE = 1e-6  # relative
 
 
 def _spectrum(
-    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance = RIGID
 ) -> tuple[float, float, Floats]:
     """Return how the constrained stiffness, scaled by its diagonal, resists motions.
 
@@ -111,11 +111,7 @@ class _Residuals:
 
 
 def residual(
-    network: Network,
-    bricks: int,
-    columns: Ints,
-    fields: Fields,
-    compliance: GripCompliance | None = None,
+    network: Network, bricks: int, columns: Ints, fields: Fields, compliance: GripCompliance = RIGID
 ) -> _Residuals:
     """Return the residuals of the first grip set's fields, from the network alone."""
     springs, center = network.springs, network.centroid[:bricks]
@@ -163,12 +159,12 @@ def residual(
     )
 
 
-def _off_grips(moved: Floats, borne: Floats, compliance: GripCompliance | None) -> Floats:
+def _off_grips(moved: Floats, borne: Floats, compliance: GripCompliance) -> Floats:
     """Return how far nodes are from where their grips let them be (r, n), m, turns over a lever.
 
     ``moved``, ``borne`` (r, 6): how nodes shift and turn, what grips exert on them.
     """
-    if compliance is None:
+    if compliance.rigid:
         return moved[:, :3]
     out = moved * np.repeat([1.0, compliance.lever], 3)
     bears = borne / np.repeat([1.0, compliance.lever], 3)

@@ -47,12 +47,12 @@ class FrameEngine(SerialEngine):
         super().__init__(network)
         self._contrast = contrast
 
-    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance | None) -> Fields:
+    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance) -> Fields:
         return _solve_one(self.network, bricks, columns, compliance, self._contrast)
 
 
 def _solve_one(
-    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None, contrast: float
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance, contrast: float
 ) -> Fields:
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     split, deformation, stiffness = _frame(network, bricks, contrast)
@@ -113,9 +113,9 @@ class _Holds(NamedTuple):
     turns: Bools  # (r,); which bear moments
 
 
-def _hold(network: Network, columns: Ints, compliance: GripCompliance | None, size: int) -> _Holds:
+def _hold(network: Network, columns: Ints, compliance: GripCompliance, size: int) -> _Holds:
     """Return how the grips of one set hold a frame with as many motions."""
-    compliance, grips = compliance or GripCompliance(), len(columns)
+    grips = len(columns)
     soft, turns = compliance.soft(1, grips)[0], compliance.transmit_moments(1, grips)[0]
     far, at = (
         compliance.offsets(1, grips)[0],

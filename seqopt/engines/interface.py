@@ -357,10 +357,10 @@ class SerialEngine(NamedEngine, ABC):
         compliance = read_compliance(self.network, columns, grips, moved)
         answers = [no_sets(self.network, bricks, columns.shape[1])]
         for i, held in enumerate(columns):
-            own = None if compliance is None else compliance.select(slice(i, i + 1))
+            own = compliance.select(slice(i, i + 1))
             answers.append(self._answer(bricks, held, own))
         return require_finite(join_sets(answers), bricks, grips)
 
     @abstractmethod
-    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance | None) -> Fields:
+    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance) -> Fields:
         """Return the fields of one grip set, whose columns are (r,)."""

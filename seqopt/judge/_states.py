@@ -46,29 +46,29 @@ class Answers(NamedTuple):
 
 
 def ask(
-    problem: States, bricks: int, grips: Ints, most: float = np.inf, *, rough: bool = False
+    problem: States, bricks: int, grips: Ints, most: float = np.inf, *, low_precision: bool = False
 ) -> Answers:
     """Return what the engine answers of grip sets (S, r), nodes held.
 
     ``most``: over scenarios, what the first goal takes more of in one is not asked of the next;
-    ``rough``: whether six digits are enough.
+    ``low_precision``: whether six digits are enough.
     """
     if not problem.each:
-        return _ask_engine(problem, bricks, grips, rough=rough)
+        return _ask_engine(problem, bricks, grips, low_precision=low_precision)
     out = np.zeros((len(grips), len(problem.goals)))
     forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
     for number, each in enumerate(problem.each):
         rows = np.flatnonzero(fit & (out[:, 0] <= most))
-        found = ask(each, bricks, grips[rows], rough=rough)
+        found = ask(each, bricks, grips[rows], low_precision=low_precision)
         out[rows] = problem.joined(out[rows], found.values, number)
         forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
     return Answers(out, forces, fit)
 
 
-def _ask_engine(problem: States, bricks: int, grips: Ints, *, rough: bool) -> Answers:
+def _ask_engine(problem: States, bricks: int, grips: Ints, *, low_precision: bool) -> Answers:
     names = tuple(name for name in problem.named if name != LARGEST)
     held = props_that_hold(problem.network.scene, bricks, grips.shape[1])
-    block = Block(bricks, grips, names, rough, tuple(number for number, _ in held))
+    block = Block(bricks, grips, names, low_precision, tuple(number for number, _ in held))
     rows = solve_sets(problem.engine, block, problem.resources)
     found, forces = dict(zip(names, rows.T, strict=False)), rows[:, len(names) :]
     found[LARGEST] = forces.max(axis=1, initial=0.0)
@@ -274,7 +274,9 @@ class StateEvaluator:
         Six digits are enough where no value or payload that decides is close.
         """
         exact = asked.exact or self._exact or len(grips) <= FEW
-        found: Floats = np.column_stack(ask(self.problem, bricks, grips, below, rough=not exact))
+        found: Floats = np.column_stack(
+            ask(self.problem, bricks, grips, below, low_precision=not exact)
+        )
         if not exact:
             goals = len(self.problem.goals)
             close = _near(found[:, goals:-1], self._most)

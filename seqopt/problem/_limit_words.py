@@ -68,17 +68,16 @@ def _limit_of(text: str, where: str) -> Limit:
     (name, value), said = split_word(text), f"{where} {text}"
     if name == "payload":
         raise ProblemError(f"{said}: give payload alone, and values with --payload")
+    if name == LINEAR_RANGE and value == LIFTED:
+        return Limit(name, math.inf)
     if name == LINEAR_RANGE:
-        return Limit(name, math.inf if value == LIFTED else _share(value, said))
+        try:
+            return Limit(name, number_word(value, said))
+        except ProblemError as error:
+            hint = f"give a share of it, as 0.5, or {LIFTED} to lift it"
+            raise ProblemError(f"{error}; {hint}") from None
     if name not in (*NAMES, "F_each") and not name.startswith("F_"):
         names = ("payload", *NAMES, LINEAR_RANGE)
         hint = did_you_mean(name, names)
         raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
     return Limit(name, (length_word if name == TOLERANCE else number_word)(value, said))
-
-
-def _share(text: str, said: str) -> float:
-    try:
-        return number_word(text, said)
-    except ProblemError as error:
-        raise ProblemError(f"{error}; give a share of it, as 0.5, or {LIFTED} to lift it") from None

@@ -34,7 +34,7 @@ from seqopt.problem.standing import MARGINS, Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import NO_TOLERANCE, PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
-from seqopt.scene._checks import short
+from seqopt.scene._checks import settle, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
@@ -43,11 +43,8 @@ from seqopt.sequence.schedule import Schedule
 class _Costs(Protocol):
     """Costs of choices, of which an aim takes the sum or the largest."""
 
-    def cost(self, choice: Sequence[int]) -> float:
-        """Return the sum of the costs that a choice, a candidate for every move, meets."""
-
-    def worst(self, choice: Sequence[int]) -> float:
-        """Return the largest cost that a choice meets."""
+    def cost(self, choice: Sequence[int]) -> float: ...
+    def worst(self, choice: Sequence[int]) -> float: ...
 
 
 Found_co = TypeVar("Found_co", bound=_Costs, covariant=True)
@@ -57,12 +54,9 @@ class _Costed(Protocol[Found_co]):
     """What has costs to be summed up, and costs whose largest counts."""
 
     @property
-    def sums(self) -> Found_co:
-        """The costs whose sum over the build is minimized."""
-
+    def sums(self) -> Found_co: ...
     @property
-    def peaks(self) -> Found_co:
-        """The costs whose largest over the build is minimized."""
+    def peaks(self) -> Found_co: ...
 
 
 class Aim(Enum):
@@ -171,16 +165,13 @@ def parse_robust(text: str) -> RobustAim:
     if text in known:
         return known[text]
     name, _, number = text.partition("=")
-    level = math.nan
-    if name == RobustKind.CVAR.value:
-        with suppress(ValueError):
-            level = float(number)
-    if math.isnan(level):
-        hint = did_you_mean(name, (*known, RobustKind.CVAR.value))
-        raise ProblemError(
-            f"robust aim {text} does not exist{hint}; give worst-peak, worst-total or cvar=0.9, say"
-        )
-    return cvar(level)
+    with suppress(ValueError):
+        if name == RobustKind.CVAR.value and not math.isnan(level := float(number)):
+            return cvar(level)
+    hint = did_you_mean(name, (*known, RobustKind.CVAR.value))
+    raise ProblemError(
+        f"robust aim {text} does not exist{hint}; give worst-peak, worst-total or cvar=0.9, say"
+    )
 
 
 LARGEST = "F_largest"
@@ -342,7 +333,7 @@ class Orders(Enum):
 
     @classmethod
     def of(cls, given: Orders | str) -> Orders:
-        """Return orders that are given as such, or by name; a `ProblemError` names those known."""
+        """Return orders that are given as such, or by name; raises `ProblemError`."""
         try:
             return cls(given)
         except ValueError:
@@ -408,12 +399,14 @@ class Problem(Shown):
 
     def __post_init__(self) -> None:
         """Let a tolerance keep to other limits, and props to what they may bear."""
-        object.__setattr__(self, "limits", _with_prop_limits(self.limits, self.engine))
-        said = [(each, _with_other_limits([each.response], self.limits)[0]) for each in self.limits]
-        goals = [(each, _with_other_limits([each.response], self.limits)[0]) for each in self.goals]
-        limits = tuple(replace(each, response=name) for each, name in said)
-        object.__setattr__(self, "limits", limits)
-        object.__setattr__(self, "goals", tuple(replace(e, response=name) for e, name in goals))
+        network, limits = getattr(self.engine, "network", None), self.limits
+        if isinstance(network, Network):  # another engine is refused later
+            kept = (each for each in limits if each.response != PROP_EXCESS)
+            limits = (*kept, *_prop_limits(network.scene))
+        parts: tuple[Limit | Goal, ...] = (*limits, *self.goals)
+        names = _with_other_limits([part.response for part in parts], limits)
+        named = [replace(p, response=name) for p, name in zip(parts, names, strict=True)]
+        settle(self, limits=tuple(named[: len(limits)]), goals=tuple(named[len(limits) :]))
 
     def __repr__(self) -> str:
         parts = [f"{self.scene.name!r}, {self.method!r}, criterion {self.criterion.name!r}"]
@@ -479,15 +472,6 @@ class Problem(Shown):
     def graphs(self) -> dict[str, Any]:
         """The graphs of choices that were made for it, which keep what was computed."""
         return {}
-
-
-def _with_prop_limits(limits: tuple[Limit, ...], engine: Engine) -> tuple[Limit, ...]:
-    """Return limits, with that on what the props of an engine's scene bear."""
-    network = getattr(engine, "network", None)
-    if not isinstance(network, Network):  # it is refused later
-        return limits
-    kept = tuple(each for each in limits if each.response != PROP_EXCESS)
-    return (*kept, *_prop_limits(network.scene))
 
 
 def _in_values(words: Mapping[str, Any], engine: Engine) -> dict[str, Any]:

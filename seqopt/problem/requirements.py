@@ -68,33 +68,6 @@ class Units:
         return {"M": self.moment, "D": self.displacement}.get(response[0], self.force)
 
 
-def _scene_units(network: Network) -> Units:
-    """Return the units of a scene, each 1 where it has no weight or no stiffness."""
-    weight = float(np.linalg.norm(network.weight, axis=1).mean()) or 1.0
-    length = float(np.mean([max(brick.dimensions) for brick in network.scene.bricks]))
-    stiffness = network.springs.translational_stiffness
-    middle = float(np.median(stiffness[stiffness > 0])) if stiffness.any() else 1.0
-    return Units(weight, weight * length, weight / middle)
-
-
-def _own_scales(network: Network) -> Mapping[str, float]:
-    """Return scales that every scene has, SI units, for one that no fixed method builds.
-
-    Of grip forces it is the smallest payload; of ``T_max`` the weight of the structure, of
-    ``M_sup`` this at its size, of ``D_max`` what it moves a chain of a joint for every brick.
-    """
-    scene, units, count = network.scene, _scene_units(network), len(network.scene.bricks)
-    size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()
-    size += max(max(brick.dimensions) for brick in scene.bricks)
-    weight = count * units.force
-    names = [*(robot_response(robot.name) for robot in scene.robots), "F_largest"]
-    return dict.fromkeys(names, min(robot.payload for robot in scene.robots)) | {
-        "T_max": weight,
-        "M_sup": weight * float(size),
-        "D_max": count**2 * units.displacement,
-    }
-
-
 def crown(scene: Scene) -> float:
     """Return how many bricks are placed when a build reaches its crown.
 
@@ -126,18 +99,41 @@ class SceneFacts:
 
     @cached_property
     def units(self) -> Units:
-        """See `_scene_units`."""
-        return _scene_units(self.engine.network)
+        """The units of the scene, each 1 where it has no weight or no stiffness."""
+        network = self.engine.network
+        weight = float(np.linalg.norm(network.weight, axis=1).mean()) or 1.0
+        length = float(np.mean([max(brick.dimensions) for brick in network.scene.bricks]))
+        stiffness = network.springs.translational_stiffness
+        middle = float(np.median(stiffness[stiffness > 0])) if stiffness.any() else 1.0
+        return Units(weight, weight * length, weight / middle)
 
     @property
     def reference(self) -> Mapping[str, float]:
         """The least that any fixed method reaches of each response's largest value, SI units.
 
-        Where no fixed method can build the scene, or none stands on the way: see `_own_scales`.
+        Where no fixed method can build the scene, or none stands on the way: `own_scales`.
         """
         if not self._reached:
-            return _own_scales(self.engine.network)
-        return {name: min(values[name] for values in self._reached) for name in self._reached[0]}
+            return self.own_scales
+        return {name: min(values[name] for values in self._reached) for name in SCALED}
+
+    @property
+    def own_scales(self) -> Mapping[str, float]:
+        """Scales that every scene has, SI units, for one that no fixed method builds.
+
+        Of grip forces it is the smallest payload; of ``T_max`` the weight of the structure, of
+        ``M_sup`` this at its size, of ``D_max`` what it moves a chain of a joint for every brick.
+        """
+        scene = self.engine.network.scene
+        size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()
+        size += max(max(brick.dimensions) for brick in scene.bricks)
+        weight = len(scene.bricks) * self.units.force
+        names = [*map(robot_response, self.robots), "F_largest"]
+        return dict.fromkeys(names, min(robot.payload for robot in scene.robots)) | {
+            "T_max": weight,
+            "M_sup": weight * float(size),
+            "D_max": len(scene.bricks) ** 2 * self.units.displacement,
+        }
 
     @property
     def basis(self) -> str:
@@ -147,7 +143,9 @@ class SceneFacts:
     @cached_property
     def _reached(self) -> list[dict[str, float]]:
         """The largest responses of every fixed method that can build the scene without props."""
-        engine, found = _bare(self.engine), []
+        engine, found, recipe = self.engine, [], recipe_of(self.engine)
+        if recipe is not None and engine.network.scene.props:
+            engine = recipe.make(engine.network.scene.with_props())
         network = engine.network
         for method in METHODS.values():
             with suppress(StepError, MechanismError):
@@ -155,14 +153,6 @@ class SceneFacts:
                 along = ((name, _response_along(network.scene, table, name)) for name in SCALED)
                 found.append({name: float(np.nanmax(values)) for name, values in along})
         return found
-
-
-def _bare(engine: Engine) -> Engine:
-    """Return an engine of the same kind for its scene without props, if it is one by name."""
-    recipe, scene = recipe_of(engine), engine.network.scene
-    if recipe is None or not scene.props:
-        return engine
-    return recipe.make(scene.with_props())
 
 
 ChoiceResponses = Mapping[str, Floats]
@@ -462,7 +452,7 @@ def overloads(scene: Scene, table: _Columns) -> tuple[Excess, ...]:
     """
     names = {robot_response(robot.name): robot.name for robot in scene.robots}
     found = _excesses(scene, table, payload_limits(scene))
-    held = tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
+    held = (replace(excess, robot=names[excess.limit.response]) for excess in found)
     return (*held, *_carrying_excesses(scene, _steps_in_table(scene, table)))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from math import degrees, pi
 from operator import le
@@ -15,7 +15,7 @@ from seqopt.contact.mortar import DRY, Mortar, _mortar_name, _with_mortar, bond_
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._grip_sets import KnownRows
-from seqopt.scene._checks import short
+from seqopt.scene._checks import settle, short
 from seqopt.stability._margins import Margins
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Proofs, Screen
 
@@ -47,21 +47,16 @@ class Standing:
     curing: Curing | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mortar", find_mortar(self.mortar))
-        if self.curing is not None:
-            self._settle(_find_curing(self.curing))
-        if not (isinstance(self.tilt, int | float) and 0 <= self.tilt < pi / 2):
-            raise ProblemError(f"tilt {short(self.tilt)}: give an angle from 0 to below pi/2, rad")
-
-    def _settle(self, curing: Curing) -> None:
-        """Keep how mortar cures, unless it never does or at once: that is another mortar."""
-        bare = not curing.points
-        mortar = Mortar(friction=self.mortar.friction) if bare else self.mortar
-        bonded = mortar.tensile_strength or mortar.cohesion
-        object.__setattr__(self, "mortar", mortar)
-        object.__setattr__(self, "curing", None if curing.is_instant or not bonded else curing)
+        settle(self, mortar=find_mortar(self.mortar))
+        if self.curing is not None:  # mortar that never cures, or at once, is another mortar
+            curing, mortar = _find_curing(self.curing), self.mortar
+            mortar = mortar if curing.points else Mortar(friction=mortar.friction)
+            bonded = mortar.tensile_strength or mortar.cohesion
+            settle(self, mortar=mortar, curing=curing if bonded and not curing.is_instant else None)
         if self.curing is not None and self.tilt:
             raise ProblemError("tilt: it is not modeled while mortar cures; leave one of them out")
+        if not (isinstance(self.tilt, int | float) and 0 <= self.tilt < pi / 2):
+            raise ProblemError(f"tilt {short(self.tilt)}: give an angle from 0 to below pi/2, rad")
 
     def demanding(self, name: str, value: float) -> Standing:
         """Return the demand that a margin, as goals count it, is no worse than a value alone."""
@@ -200,12 +195,9 @@ class StandingSets:
         for other in self._others:
             found = other._known[""].known(bricks, codes)
             for one, weaker, verdict in ((other, self, STANDS), (self, other, FALLS)):
-                if one._demands_all_of(weaker):
+                if all(any(d._implies(w) for d in one._demands) for w in weaker._demands):
                     out[found == verdict] = verdict
         return out
-
-    def _demands_all_of(self, other: StandingSets) -> bool:
-        return all(any(mine._implies(each) for mine in self._demands) for each in other._demands)
 
     def margins(self, name: str, bricks: int, held: Ints, payload: Floats) -> Floats:
         """Return (S, 2) between which values, as goals count them, margins of grip sets lie."""
@@ -214,7 +206,7 @@ class StandingSets:
             margin = self._tilts if name == "tilt" else getattr(self._margins, name)
             return np.asarray(margin(bricks, held[rows], payload[rows]))
 
-        return self._ask(name, bricks, (held, payload), brackets)
+        return self._known[name].of(bricks, self._codes(held, payload), brackets)
 
     def _tilts(self, bricks: int, held: Ints, payload: Floats) -> Floats:
         """Return between which angles from a right one tilts lie, by halving intervals."""
@@ -226,25 +218,17 @@ class StandingSets:
                 middle = np.where(low < 0, 0, (low + high) // 2)
                 for step in np.unique(middle[left]).tolist():
                     rows = np.flatnonzero(left & (middle == step))
-                    found = self._tilted(step).stands(bricks, held[rows], payload[rows])
+                    if step not in self._tilts_known:
+                        self._tilts_known[step] = Screen(
+                            self._network, self._mortar, step * STEP, proofs=self._proofs
+                        )
+                    found = self._tilts_known[step].stands(bricks, held[rows], payload[rows])
                     low[rows[found >= least]] = step
                     high[rows[found < least]] = step
                     fallen[rows[found == FALLS]] = step
             ends.append(low.copy())
         survived = np.where(ends[0] < 0, -np.inf, ends[0] * STEP)
         return np.stack([pi / 2 - fallen * STEP, pi / 2 - survived], axis=1)
-
-    def _tilted(self, step: int) -> Screen:
-        if step not in self._tilts_known:
-            self._tilts_known[step] = Screen(
-                self._network, self._mortar, step * STEP, proofs=self._proofs
-            )
-        return self._tilts_known[step]
-
-    def _ask(
-        self, name: str, bricks: int, grips: tuple[Ints, Floats], compute: Callable[[Ints], Floats]
-    ) -> Floats:
-        return self._known[name].of(bricks, self._codes(*grips), compute)
 
     def _codes(self, held: Ints, payload: Floats) -> Ints:
         kinds = np.where(held > 0, np.searchsorted(self._payloads, payload), 0)

@@ -14,7 +14,6 @@ from seqopt.problem.requirements import Criterion
 from seqopt.report.comparison import CLOSED, Comparison
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
-from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.study.published import PUBLISHED
 
@@ -125,16 +124,14 @@ def _stands(comparison: Comparison) -> Iterator[str]:
         for name, *more in (sorted(names, key=_plainness) for names in same.values()):
             label = f"  {name}{f' +{len(more)}' if more else ''}"
             shown, *_ = found = comparison.verdicts[name]
-            counts = "".join(map(_falling, found))
+            open_ = (each.count(Verdict.UNDECIDED) for each in found)
+            counts = "".join(
+                f"{each.count(Verdict.FALLS)}{f' ({n}?)' if n else ''}".rjust(9)
+                for each, n in zip(found, open_, strict=True)
+            )
             where = f"step {shown.first}: brick {shown.brick}" if shown.first else ""
             where += f", joint {shown.joint}" if shown.joint else ""
             yield f"{label:{NAME}}{len(shown.verdicts):5}{counts}   {where}".rstrip()
-
-
-def _falling(found: BuildVerdicts) -> str:
-    """Return how many steps fall, and how many are undecided, in nine columns."""
-    undecided = found.count(Verdict.UNDECIDED)
-    return f"{found.count(Verdict.FALLS)}{f' ({undecided}?)' if undecided else ''}".rjust(9)
 
 
 def _plainness(name: str) -> tuple[bool, bool, str]:
@@ -195,54 +192,42 @@ def _choices(comparison: Comparison) -> Iterator[str]:
         yield _title_of(str(problem))
         for name, row in rows.iterrows():
             steps = len(comparison.tables[str(name)])
+            models, seconds = (
+                format(row[column], form) if np.isfinite(row[column]) else "-"
+                for column, form in (("models", ",.0f"), ("seconds", ".3f"))
+            )
             yield (
                 f"{f'  {name}':{NAME}}{row['objective']:10.2f}{100 * row['gap']:7.2f} %{steps:7}"
-                + _known(row["models"], 9, ",.0f")
-                + _known(row["seconds"], 9, ".3f")
-                + f"  {kinds.get(str(name), 'in print')}"
+                f"{models:>9}{seconds:>9}  {kinds.get(str(name), 'in print')}"
             )
 
 
-def _known(value: float, width: int, form: str) -> str:
-    return f"{format(value, form) if np.isfinite(value) else '-':>{width}}"
-
-
 def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
-    said = (
-        f"Objective: what the criterion {criterion.name} adds up to over all steps; "
-        f"{_of_steps(comparison, criterion)}. Compare objectives only within a heading and an "
-        "aim: others add up other steps. Gap: how far the objective is above its optimum. Models: "
-        f"how many partial structures with different grips it looks at{_counted(comparison)}. "
-        "Seconds: to choose and to check"
-    )
-    if comparison.loop is not None:
-        seconds = comparison.loop.seconds
-        said += (
-            f"; the responses of all choices, which all rows of the loop share, took "
-            f"{seconds['respond']:.2f} s more and their ranks {seconds['rank']:.2f} s"
-        )
-    return f"{said}."
-
-
-def _of_steps(comparison: Comparison, criterion: Criterion) -> str:
-    """Return what the objective is of aims that are about the worst step, in words."""
-    if not isinstance(criterion, RankSum):
-        return "of minimax and the free schedule its largest step"
-    if comparison.maxima.empty:
-        return "of the free schedule, which has no ranks, its worst response over what it may be"
+    """Return what columns of the table of choices are."""
     known = "the fixed sequences" + (" and the published plan" * (PUBLISHED in comparison.tables))
-    return (
+    worst = (
         "of minimax its largest step, of the free schedule, which has no ranks, its worst response "
         f"over the least that {known} reach"
     )
-
-
-def _counted(comparison: Comparison) -> str:
-    """Return how many models the paper counts, in words; nothing where it counts none."""
-    if comparison.loop is None or comparison.loop.paper_models is None:
-        return ""
-    cascading, overlap = comparison.loop.paper_models
-    return f" (the paper counts {cascading:,} for its cascade and {overlap:,} with full overlap)"
+    if not isinstance(criterion, RankSum):
+        worst = "of minimax and the free schedule its largest step"
+    elif comparison.maxima.empty:
+        worst = "of the free schedule, which has no ranks, its worst response over what it may be"
+    loop, paper, shared = comparison.loop, "", ""
+    if loop is not None:
+        shared = (
+            "; the responses of all choices, which all rows of the loop share, took "
+            f"{loop.seconds['respond']:.2f} s more and their ranks {loop.seconds['rank']:.2f} s"
+        )
+        if loop.paper_models is not None:
+            few, many = loop.paper_models
+            paper = f" (the paper counts {few:,} for its cascade and {many:,} with full overlap)"
+    return (
+        f"Objective: what the criterion {criterion.name} adds up to over all steps; {worst}. "
+        "Compare objectives only within a heading and an aim: others add up other steps. Gap: how "
+        "far the objective is above its optimum. Models: how many partial structures with "
+        f"different grips it looks at{paper}. Seconds: to choose and to check{shared}."
+    )
 
 
 def _notes(comparison: Comparison) -> Iterator[list[str]]:
@@ -262,3 +247,61 @@ def _title_of(problem: str) -> str:
         FREE: "free schedule: any robot may place, hold or release next",
     }
     return titles.get(problem, f"{problem} loop, grips chosen by a formulation")
+
+
+def format_details(comparison: Comparison, scene: Scene) -> str:
+    """Return forces of robots, plans under both objectives of ranks, and published ranks."""
+    blocks = [_methods(comparison, scene)]
+    if comparison.table["conditional"].notna().any():
+        blocks.append(_objectives(comparison.table))
+    if comparison.loop is not None and (ranks := comparison.loop.ranks) is not None:
+        blocks.append("Where the published plan's nodes rank, optimization by optimization")
+        ways = {"rank_in_window": "cascade", "rank_overlap": "overlap", "rank_peak": "minimax"}
+        for column, label in ways.items():
+            own = ranks[column]
+            first, three = (own == 1).sum(), (own <= 3).sum()
+            text = f"  {label:21}first in {first} of {len(own)}, among three in {three}: "
+            text += " ".join(map(str, own))
+            blocks[-1] += "\n" + textwrap.fill(text, 80, subsequent_indent=" " * 23)
+    return "\n\n".join(blocks)
+
+
+def _methods(comparison: Comparison, scene: Scene) -> str:
+    """Return the largest responses of methods: under each our value and, if any, the paper's."""
+    maxima, paper = comparison.maxima, comparison.printed
+    width = 12 if paper is None else 21
+    lines = [f"{scene.name}: {len(scene.bricks)} bricks; largest response of any step", ""]
+    lines.append(f"{'':16}" + "".join(f"{name:>{width}}" for name in maxima))
+    if paper is not None:
+        lines.append(f"{'':16}" + f"{'seqopt':>13}{'paper':>8}" * maxima.shape[1])
+    for row, quantity in enumerate(maxima.index):
+        cells = [f"{_number(own):>{width}}" for own in maxima.iloc[row]]
+        if paper is not None:
+            pairs = zip(maxima.iloc[row], paper.iloc[row], strict=True)
+            cells = [f"{_number(own):>13}{_number(beside):>8}" for own, beside in pairs]
+        lines.append(f"{str(quantity).replace('1e-3 mm', 'µm'):16}{''.join(cells)}")
+    return "\n".join(lines)
+
+
+def _number(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
+
+
+def _objectives(table: pd.DataFrame) -> str:
+    """Return the value of every plan under both objectives, and the parts of heuristics' gaps."""
+    lines = [
+        "Ranks over all pairs, and given the choice before; a heuristic's gap in two",
+        "parts: what it loses by not looking ahead, and what the change of objective",
+        "costs",
+        f"{'':22}{'pairs':>11}{'given':>11}{'gap':>8}{'sight':>9}{'change':>9}",
+    ]
+    for problem, rows in table[table["conditional"].notna()].groupby("problem", sort=False):
+        lines.append(f"{problem}:")
+        for name, row in rows.iterrows():
+            line = f"{f'  {name}':22}{row['pairs']:11.2f}{row['conditional']:11.2f}"
+            if np.isfinite(row["short_sight"]):
+                line += f"{100 * row['gap']:7.2f}%"
+                parts = (100 * row[part] for part in ("short_sight", "change_of_objective"))
+                line += "".join(f"{round(part, 2) + 0.0:8.2f}%" for part in parts)
+            lines.append(line)
+    return "\n".join(lines)

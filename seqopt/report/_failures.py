@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -157,45 +157,22 @@ _NAME = 26  # columns of a build with what holds it
 
 
 def failure_blocks(scene: Scene, found: FailureMap, wrapped: Callable[[str], str]) -> list[str]:
-    """Return how many steps fall, then what would cure it: lines under a heading."""
-    return ["\n".join(block) for block in (_table(scene, found), _cures(found, wrapped)) if block]
-
-
-def _table(scene: Scene, found: FailureMap) -> Iterator[str]:
-    """Yield how many steps fall, a line for every build and what holds it."""
-    cases = found.cases
-    axis = AXIS_WORDS[str(cases["axis"].iloc[0])]
-    yield f"{scene.name}: steps that fall, by {axis}"
-    values = sorted(cases["value"].unique())
-    yield f"{'':{_NAME}}{'steps':>5}" + "".join(f"{value:8.3g}" for value in values)
-    for (build, holds), rows in cases.groupby(["build", "holds"], sort=False):
-        steps = rows["steps"].unique()
-        counts = {
-            case["value"]: _count(case, differ=len(steps) > 1) for case in rows.to_dict("records")
-        }
-        cells = "".join(f"{counts.get(value, ''):>8}" for value in values)
-        yield f"{f'{build}, {holds}':{_NAME}}{steps[0] if len(steps) == 1 else '':5}{cells}"
-
-
-def _count(case: Mapping[Any, Any], *, differ: bool) -> str:
-    """Return how many steps of a case fall, and of how many where numbers of steps differ."""
-    of = f"/{case['steps']}" if differ else ""
-    open_ = f" ({case['undecided']}?)" if case["undecided"] else ""
-    return f"{case['fall']}{of}{open_}"
-
-
-def _cures(found: FailureMap, wrapped: Callable[[str], str]) -> Sequence[str]:
-    """Return what fails first in every build, and what would cure it."""
-    value = found.usual
-    axis = AXIS_WORDS[str(found.cases["axis"].iloc[0])]
-    here = found.cases[(found.cases["value"] == value) & (found.cases["fall"] > 0)]
-    lines = [wrapped(_first_words(case)) for case in here.to_dict(orient="records")]
-    title = f"What falls first, {axis} {value:.3g}, and what would cure it"
-    return [title, *lines] if lines else []
-
-
-def _first_words(case: Mapping[Any, Any]) -> str:
-    """Return what falls first in a case, and what would cure it."""
-    joint = f", joint {case['joint']} {case['motion']}" if case["joint"] else ""
-    where = f"step {case['first_step']}, brick {case['brick']}{joint}"
-    return f"{case['build']}, {case['holds']}: {where}; {cure_words(case)}"
+    """Return how many steps fall, then what falls first and would cure it, under headings."""
+    axis, values = AXIS_WORDS[str(found.cases["axis"].iloc[0])], sorted({*found.cases["value"]})
+    heads = "".join(f"{value:8.3g}" for value in values)
+    lines = [f"{scene.name}: steps that fall, by {axis}", f"{'':{_NAME}}{'steps':>5}{heads}"]
+    for (build, holds), rows in found.cases.groupby(["build", "holds"], sort=False):
+        steps, counts = rows["steps"].unique(), dict.fromkeys(values, "")
+        for case in rows.to_dict("records"):
+            of = f"/{case['steps']}" if len(steps) > 1 else ""  # where numbers of steps differ
+            open_ = f" ({case['undecided']}?)" if case["undecided"] else ""
+            counts[case["value"]] = f"{case['fall']}{of}{open_}"
+        cells = "".join(f"{count:>8}" for count in counts.values())
+        lines.append(f"{f'{build}, {holds}':{_NAME}}{steps[0] if len(steps) == 1 else '':5}{cells}")
+    cures = [f"What falls first, {axis} {found.usual:.3g}, and what would cure it"]
+    at = (found.cases["value"] == found.usual) & (found.cases["fall"] > 0)
+    for case in found.cases[at].to_dict(orient="records"):
+        joint = f", joint {case['joint']} {case['motion']}" if case["joint"] else ""
+        where = f"step {case['first_step']}, brick {case['brick']}{joint}"
+        cures.append(wrapped(f"{case['build']}, {case['holds']}: {where}; {cure_words(case)}"))
+    return ["\n".join(block) for block in (lines, cures if len(cures) > 1 else []) if block]

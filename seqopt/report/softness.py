@@ -68,7 +68,6 @@ def held_softly(
     [380.6, 15.7]
     """
     scene, rows = engine.network.scene, []
-    states = _states(scene, tables)
     for size in with_progress("grips", stiffness, progress):
         robots = [
             replace(
@@ -79,7 +78,9 @@ def held_softly(
             for robot in scene.robots
         ]
         largest = {name: dict.fromkeys([*LARGEST, SHARE], 0.0) for name in tables}
-        for builds, found in _responses(engine_for(engine, scene.with_robots(*robots)), states):
+        softer = scene.with_robots(*robots)
+        states = _states(softer, tables)  # numbers of grips are those of its kinds
+        for builds, found in _responses(engine_for(engine, softer), states):
             for build in builds:
                 largest[build] = {key: max(v, found[key]) for key, v in largest[build].items()}
         rows += [{"build": name, "stiffness": size, **each} for name, each in largest.items()]

@@ -1,12 +1,10 @@
-"""Comparisons as text, methods in the words of the field, and a build in one sentence."""
+"""Methods and responses in the words of the field, and a build in one sentence."""
 
 from __future__ import annotations
 
 import re
-import textwrap
 from collections.abc import Iterator, Sequence
 from operator import itemgetter
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +12,6 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import Criterion, _prop_faults, _response_along, overloads
-from seqopt.report.comparison import Comparison
 from seqopt.responses.quantities import RESPONSES, _plain, length_text, robot_response
 from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
 from seqopt.scene.scene import Scene
@@ -186,7 +183,6 @@ def _far_off(length: float) -> str:
     return "may not even be 0.001 mm off" if length > 0 else "may not be off at all"
 
 
-WIDTH = 80  # columns
 QUANTITIES = {
     "F_rob": "grip force",
     "M_sup": "support moment",
@@ -221,65 +217,6 @@ WORDS = {
     "minimax_arc": "epigraph per pair",
     "minimax_big_m": "large constant (big-M)",
 }
-
-
-def format_details(comparison: Comparison, scene: Scene) -> str:
-    """Return forces of robots, plans under both objectives of ranks, and published ranks."""
-    blocks = [_methods(comparison, scene)]
-    if comparison.table["conditional"].notna().any():
-        blocks.append(_objectives(comparison.table))
-    if comparison.loop is not None and (ranks := comparison.loop.ranks) is not None:
-        blocks.append("Where the published plan's nodes rank, optimization by optimization")
-        ways = {"rank_in_window": "cascade", "rank_overlap": "overlap", "rank_peak": "minimax"}
-        for column, label in ways.items():
-            own = ranks[column]
-            first, three = (own == 1).sum(), (own <= 3).sum()
-            text = f"  {label:21}first in {first} of {len(own)}, among three in {three}: "
-            text += " ".join(map(str, own))
-            how: Any = {"subsequent_indent": " " * 23, "break_on_hyphens": False}
-            blocks[-1] += "\n" + textwrap.fill(text, WIDTH, **how)
-    return "\n\n".join(blocks)
-
-
-def _methods(comparison: Comparison, scene: Scene) -> str:
-    """Return the largest responses of methods: under each our value and, if any, the paper's."""
-    maxima, paper = comparison.maxima, comparison.printed
-    width = 12 if paper is None else 21
-    lines = [f"{scene.name}: {len(scene.bricks)} bricks; largest response of any step", ""]
-    lines.append(f"{'':16}" + "".join(f"{name:>{width}}" for name in maxima))
-    if paper is not None:
-        lines.append(f"{'':16}" + f"{'seqopt':>13}{'paper':>8}" * maxima.shape[1])
-    for row, quantity in enumerate(maxima.index):
-        cells = [f"{_number(own):>{width}}" for own in maxima.iloc[row]]
-        if paper is not None:
-            pairs = zip(maxima.iloc[row], paper.iloc[row], strict=True)
-            cells = [f"{_number(own):>13}{_number(beside):>8}" for own, beside in pairs]
-        lines.append(f"{str(quantity).replace('1e-3 mm', 'µm'):16}{''.join(cells)}")
-    return "\n".join(lines)
-
-
-def _number(value: float) -> str:
-    return "-" if np.isnan(value) else f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
-
-
-def _objectives(table: pd.DataFrame) -> str:
-    """Return the value of every plan under both objectives, and the parts of heuristics' gaps."""
-    lines = [
-        "Ranks over all pairs, and given the choice before; a heuristic's gap in two",
-        "parts: what it loses by not looking ahead, and what the change of objective",
-        "costs",
-        f"{'':22}{'pairs':>11}{'given':>11}{'gap':>8}{'sight':>9}{'change':>9}",
-    ]
-    for problem, rows in table[table["conditional"].notna()].groupby("problem", sort=False):
-        lines.append(f"{problem}:")
-        for name, row in rows.iterrows():
-            line = f"{f'  {name}':22}{row['pairs']:11.2f}{row['conditional']:11.2f}"
-            if np.isfinite(row["short_sight"]):
-                line += f"{100 * row['gap']:7.2f}%"
-                parts = (100 * row[part] for part in ("short_sight", "change_of_objective"))
-                line += "".join(f"{round(part, 2) + 0.0:8.2f}%" for part in parts)
-            lines.append(line)
-    return "\n".join(lines)
 
 
 def in_words(name: str) -> str:

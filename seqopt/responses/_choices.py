@@ -58,7 +58,7 @@ from seqopt.work.progress import Progress
 
 CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot
 
-__all__ = ["CHOICE_RESPONSES", "Evaluation", "StepChoices", "Wanted", "evaluate_choices"]
+__all__ = ["CHOICE_RESPONSES", "Evaluation", "StepChoices", "Wanted"]
 
 _SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
 _PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
@@ -273,14 +273,6 @@ class _Found(Terse):
     steps: tuple[StepChoices, ...]
     models: int
     seconds: float
-
-
-def evaluate_choices(
-    engine: Engine, schedule: Schedule, wanted: Wanted, resources: Resources = HERE
-) -> tuple[tuple[StepChoices, ...], int]:
-    """Return the steps and the number of models of an `Evaluation`."""
-    evaluation = Evaluation(engine, schedule, wanted, resources)
-    return evaluation.steps, evaluation.models
 
 
 def _by_level(evaluation: Evaluation) -> Generator[tuple[list[StepChoices], int], None, None]:

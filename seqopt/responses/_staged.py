@@ -172,7 +172,7 @@ def _loaded(
     state: StagedState,
     pulls: tuple[Floats, Floats],
     before: int,
-    compliance: GripCompliance | None,
+    compliance: GripCompliance,
 ) -> StagedState:
     """Return a state with further forces (2b, 3) at inner nodes and moments (b, 3) on bricks.
 

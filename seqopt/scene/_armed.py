@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +100,7 @@ def within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
     own = scene.within_reach(robot)
     if robot.arm is None:
         return own
-    until = _until(scene, robot)
+    until = _asked("permits")(scene).until[scene.robots.index(robot)]
     return tuple(
         tuple(n for i, n in enumerate(b.nodes) if n in nodes and until[2 * k + i + 1] > k + 1)
         for k, (b, nodes) in enumerate(zip(scene.placed, own, strict=True))
@@ -112,15 +112,11 @@ def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     nodes = [node for brick in within_reach(scene, robot)[:bricks] for node in brick]
     if robot.arm is None:
         return tuple(nodes)
-    until = _until(scene, robot)
+    until = _asked("permits")(scene).until[
+        scene.robots.index(robot)
+    ]  # by place: which count ends it
     place = {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
     return tuple(node for node in nodes if until[place[node]] > bricks)
-
-
-def _until(scene: Scene, robot: Robot) -> Floats:
-    """Return from which brick count on a robot cannot hold each place, (2B + 1,)."""
-    until: Floats = _asked("permits")(scene).until[scene.robots.index(robot)]
-    return until
 
 
 def go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
@@ -138,9 +134,8 @@ def held_postures(scene: Scene) -> HeldPostures | None:
 
     They are computed once, and go along with a scene to other processes.
     """
-    found: HeldPostures | None = None
-    if scene.grip_kinds.arms.any():
-        found = _asked("held_postures")(scene)
+    arms = scene.grip_kinds.arms.any()
+    found: HeldPostures | None = _asked("held_postures")(scene) if arms else None
     return found
 
 
@@ -157,9 +152,8 @@ def hold_alike(nominal: Scene, scene: Scene) -> Scene:
 
     It is as it was where it has other arms: joints may have other stiffnesses.
     """
-    alike: Scene = scene
-    if nominal.grip_kinds.arms.any():
-        alike = _asked("hold_alike")(nominal, scene)
+    arms = nominal.grip_kinds.arms.any()
+    alike: Scene = _asked("hold_alike")(nominal, scene) if arms else scene
     return alike
 
 
@@ -169,24 +163,17 @@ def plan_postures(scene: Scene, steps: Sequence[object]) -> PlanPostures | None:
     return found
 
 
-class _Rules(Protocol):
-    """Which states arms can be in, by a second way for the judge."""
+class _NoRules:
+    """Which states arms can be in, by a second way for the judge: all, of robots without any."""
 
     def allow(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) of places have postures that go together, (n,)."""
-
-
-class _NoRules:
-    """What robots without arms ask of a state."""
-
-    def allow(self, bricks: int, states: Ints) -> Bools:
-        """Return that all states will do."""
         return np.ones(len(states), dtype=bool)
 
 
-def posture_rules(scene: Scene, team: Sequence[int]) -> _Rules:
+def posture_rules(scene: Scene, team: Sequence[int]) -> _NoRules:
     """Return the judge's rules of arms; ``team``: robots of the columns of states, by index."""
-    rules: _Rules = _asked("PostureRules")(scene, team) if scene.has_arms else _NoRules()
+    rules: _NoRules = _asked("PostureRules")(scene, team) if scene.has_arms else _NoRules()
     return rules
 
 

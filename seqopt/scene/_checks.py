@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from seqopt.arrays import Floats, Vector
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, did_you_mean
 
 
 def units(vectors: Floats) -> Floats:
@@ -53,7 +53,9 @@ def which_fit(make: Callable[[Mapping[str, Any]], object], given: Mapping[str, A
             if time.perf_counter() > end:
                 break
             if fits(name, other):
-                found.append(f"{name}={_said(_nearest(name, value, other, fits))}")
+                near = _nearest(name, value, other, fits)
+                parts = near if isinstance(near, tuple) else (near,)
+                found.append(f"{name}={'x'.join(f'{each:g}' for each in parts)}")
                 break
     return f"; it fits with {' or '.join(found)}" if found else ""
 
@@ -84,8 +86,29 @@ def _rounded(value: float) -> float:
     return float(f"{value:.{DIGITS}g}")
 
 
-def _said(value: Any) -> str:
-    return "x".join(f"{each:g}" for each in value) if isinstance(value, tuple) else f"{value:g}"
+Reader = tuple[Callable[[str], Any], str]  # how text is read, or ValueError; what is wanted
+
+
+def in_words(
+    where: str, parts: Iterable[str], known: Mapping[str, Reader], example: str = ""
+) -> dict[str, Any]:
+    """Return values by name from parts ``name=value``, each name once.
+
+    ``known``: how the value of each name is read; ``example``: ends messages about names.
+    """
+    found: dict[str, Any] = {}
+    for part in parts:
+        key, _, text = part.strip().partition("=")
+        if key not in known or key in found:
+            why = f"is none of its numbers{did_you_mean(key, known)}"
+            what = "is given twice" if key in found else why
+            raise SceneError(f"{where}: {key!r} {what}; give {', '.join(known)}{example}")
+        read, wanted = known[key]
+        try:
+            found[key] = read(text)
+        except ValueError:
+            raise SceneError(f"{where}: {key} is {short(text)}; give {wanted}") from None
+    return found
 
 
 _Part = TypeVar("_Part")

@@ -47,10 +47,6 @@ def _arch(given: _Given, now: int, bricks: int) -> _Given:
     return {**given, "bricks": bricks, "dimensions": (share * long, across * width, thick)}
 
 
-def _chain(given: _Given, _: int, bricks: int) -> _Given:
-    return {**given, "bricks": bricks}
-
-
 def _wall(given: _Given, now: int, bricks: int) -> _Given:
     """Return what makes a wall as long and as high, and as far out, of smaller bricks."""
     shape = WallShape(**given)
@@ -77,7 +73,7 @@ def _grown(count: int, now: int, bricks: int) -> int:
 
 _COUNTED: Mapping[str, Callable[[_Given, int, int], _Given]] = {
     "arch": _arch,
-    "chain": _chain,
+    "chain": lambda given, _, bricks: {**given, "bricks": bricks},
     "wall": _wall,
     "dome": _dome,
 }

@@ -8,14 +8,12 @@ from functools import partial
 
 from seqopt.arrays import Terse
 from seqopt.errors import SceneError, did_you_mean
-from seqopt.scene._checks import check, finite, short, unless_none
+from seqopt.scene._checks import check, finite, in_words, unless_none
 
 _seconds = partial(finite, least=0.0, wanted="seconds, zero or more")
+_METERS = "a positive number of m/s, or none if ways take no time"
+_speed = partial(finite, least=1e-12, wanted=_METERS)
 SLOWER = "slower"  # the word for a factor on all durations
-
-
-def _speed(where: str, value: float) -> float:
-    return finite(where, value, 1e-12, "a positive number of m/s, or none if ways take no time")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -38,11 +36,6 @@ class Durations(Terse):
     speed : float, optional
         At which it goes from the node that it held last to the next one, in a straight line, before
         it places or grips, m/s; by default such ways take no time of their own.
-
-    Raises
-    ------
-    SceneError
-        If seconds are negative or not finite, or the speed is not positive.
 
     Examples
     --------
@@ -96,32 +89,17 @@ def _durations_in_words(
         if colon and name not in names:
             hint = did_you_mean(name, names)
             raise SceneError(f"durations {text}: no robot {name!r}{hint}; give {', '.join(names)}")
-        for index, robot in enumerate(names):
-            if robot == name or not colon:
-                out[index] = _changed(text, words, out[index])
+        known = dict.fromkeys((*_NAMES, SLOWER), (float, f"a number, as {EXAMPLE}"))
+        said = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
+        factor = said.pop(SLOWER, None)
+        for index in (i for i, robot in enumerate(names) if robot == name or not colon):
+            before = out[index]
+            lacking = [each for each in _NAMES if each not in said and each != "speed"]
+            if before is None and lacking:
+                raise SceneError(
+                    f"durations {text}: {', '.join(lacking)} not given, nor in the scene; give "
+                    f"all, as {EXAMPLE}"
+                )
+            found = Durations(**said) if before is None else replace(before, **said)
+            out[index] = found if factor is None else found.slower(factor)
     return tuple(out)
-
-
-def _changed(text: str, words: str, before: Durations | None) -> Durations:
-    """Return durations with what words say in place of what they were."""
-    said: dict[str, float] = {}
-    for word in words.split(","):
-        key, _, number = word.strip().partition("=")
-        if key not in (*_NAMES, SLOWER) or key in said:
-            what = "stands there twice" if key in said else f"is none{did_you_mean(key, _NAMES)}"
-            known = ", ".join((*_NAMES, SLOWER))
-            raise SceneError(f"durations {text}: {key!r} {what}; give {known}, as {EXAMPLE}")
-        try:
-            said[key] = float(number)
-        except ValueError:
-            raise SceneError(
-                f"durations {text}: {key} is {short(number)}; give a number, as {EXAMPLE}"
-            ) from None
-    factor = said.pop(SLOWER, None)
-    if before is None and (lacking := [n for n in _NAMES if n not in said and n != "speed"]):
-        raise SceneError(
-            f"durations {text}: {', '.join(lacking)} not given, nor in the scene; give all, as "
-            f"{EXAMPLE}"
-        )
-    found = Durations(**said) if before is None else replace(before, **said)
-    return found if factor is None else found.slower(factor)

@@ -160,7 +160,12 @@ def _where_both(pair: Sequence[Polyhedron], deepest: float) -> Floats:
         rims = [moved[mine][list(face)] for face in pair[mine].faces]
         start = np.vstack(rims)
         step = np.vstack([np.roll(rim, -1, axis=0) - rim for rim in rims])
-        found += [_passed(face, start, step) for face in faces[other]]
+        for face in faces[other]:  # where edges pass it
+            slope = step @ face.axes[0]
+            share = ((face.origin - start) @ face.axes[0]) / np.where(slope == 0, np.inf, slope)
+            met = start + share[:, None] * step
+            inside = _within(face, (met - face.origin) @ face.axes[1:].T)
+            found.append(met[(share > 0) & (share < 1) & inside])
     points = np.vstack(found)
     return points[:: max(1, len(points) // _STARTS)][:_STARTS]
 
@@ -177,15 +182,6 @@ def _eroded(solid: Polyhedron, by: float) -> Floats:
         for own in normals
     ]
     return np.asarray(solid.points - by * np.array(shift))
-
-
-def _passed(face: _Face, start: Floats, step: Floats) -> Floats:
-    """Return where lines, from points to others (k, 3), pass a face."""
-    slope = step @ face.axes[0]
-    share = ((face.origin - start) @ face.axes[0]) / np.where(slope == 0, np.inf, slope)
-    met = start + share[:, None] * step
-    inside = (share > 0) & (share < 1) & _within(face, (met - face.origin) @ face.axes[1:].T)
-    return np.asarray(met[inside])
 
 
 def _foot(face: _Face, points: Floats) -> Floats:

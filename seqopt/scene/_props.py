@@ -37,11 +37,6 @@ class Prop(Terse):
     capacity : float, optional
         Largest force that it bears, N; by default any.
 
-    Raises
-    ------
-    SceneError
-        If neither a node nor a position is given, or both, or a value is no such number.
-
     Examples
     --------
     >>> Prop(node=13, direction=(0, 0, 2))
@@ -84,34 +79,22 @@ def _unit(where: str, values: Iterable[float]) -> Vector:
 
 def settled_props(props: Sequence[Prop], bricks: Mapping[int, Brick]) -> tuple[Prop, ...]:
     """Return props, those given by a position at the nearest nodes of bricks."""
-    out = tuple(p if p.position is None else _at_node(p, p.position, bricks) for p in props)
-    for i, prop in enumerate(out):
+    out = dict[int, Prop]()
+    for given in props:
+        prop = given
+        if (at := prop.position) is not None:
+            away, node = min((math.dist(b.node_position(n), at), n) for n, b in bricks.items())
+            most = _NEAR * min(bricks[node].dimensions)
+            if away > most:
+                raise SceneError(
+                    f"{prop.label}: the nearest node, {node}, is {away:.3g} m away; give a point "
+                    f"at most {most:.3g} m from one"
+                )
+            prop = replace(prop, node=node, position=None)
         if prop.node not in bricks:
             known = f"{min(bricks)} to {max(bricks)}"
             raise SceneError(f"{prop.label}: there is no such node; give one of {known}")
-        if prop.node in [other.node for other in out[:i]]:
+        if prop.node in out:
             raise SceneError(f"{prop.label}: another one holds it; give each its own node")
-    return out
-
-
-def _at_node(prop: Prop, position: Vector, bricks: Mapping[int, Brick]) -> Prop:
-    away, node = min((math.dist(b.node_position(n), position), n) for n, b in bricks.items())
-    most = _NEAR * min(bricks[node].dimensions)
-    if away > most:
-        raise SceneError(
-            f"{prop.label}: the nearest node, {node}, is {away:.3g} m away; give a point at most "
-            f"{most:.3g} m from one"
-        )
-    return replace(prop, node=node, position=None)
-
-
-def centered(
-    bricks: Iterable[Brick], blocked: Sequence[int], stiffness: float | Vector | None
-) -> tuple[Prop, ...]:
-    """Return a prop for every brick, at a node that leaves the one at which it is placed free.
-
-    A brick of which no other node is free has none.
-    """
-    taken = {*blocked}
-    free = [[n for n in b.nodes if n not in taken and n != b.placing_node] for b in bricks]
-    return tuple(Prop(node=nodes[0], stiffness=stiffness) for nodes in free if nodes)
+        out[prop.node] = prop
+    return tuple(out.values())

@@ -64,11 +64,6 @@ class ArchShape(Terse):
     closed : bool
         Whether the last brick stands on a second ground end.
 
-    Raises
-    ------
-    SceneError
-        If there are no bricks, the lists differ in length or the pattern has other letters.
-
     Examples
     --------
     >>> ArchShape(pitch=(1.2, 0.6, 0.0, -0.6, -1.2), pattern="V").dimensions
@@ -155,7 +150,10 @@ def arch_scene(
     axes = tangent, _, ends = _axes(shape)
     bricks = _bricks(shape, axes, line_nodes or {})
     bisector = tangent[:-1] + tangent[1:]
-    joints = [_joint(shape, b, ends[b], bisector[b - 1]) for b in range(1, len(bricks))]
+    joints = []
+    for b, way in enumerate(bisector, start=1):
+        spring = _spring(shape, ends[b], way, way / np.linalg.norm(way))
+        joints.append(Joint(bricks=(b, b + 1), **spring))
     grounds = [_ground(shape, 1, ends[0], tangent[0], -1.0)]
     if shape.closed:
         grounds.append(_ground(shape, len(bricks), ends[-1], tangent[-1], 1.0))
@@ -224,40 +222,33 @@ def _bricks(
     shape: ArchShape, axes: tuple[Floats, Floats, Floats], line_nodes: Mapping[int, int]
 ) -> tuple[Brick, ...]:
     """Return all bricks, each in the middle between its ends and moved outward by its offset."""
-    tangent, left, ends = axes
-    offset = np.zeros(len(tangent)) if shape.offset is None else np.asarray(shape.offset, float)
-    middle = 0.5 * (ends[:-1] + ends[1:]) + offset[:, None] * np.cross(tangent, left)
-    poses = zip(tangent, left, middle, strict=True)
-    return tuple(
-        _brick(shape, b, pose, line_nodes.get(b, 2 * b - 2)) for b, pose in enumerate(poses, 1)
-    )
-
-
-def _brick(shape: ArchShape, b: int, pose: tuple[Floats, Floats, Floats], line_node: int) -> Brick:
-    """Return brick ``b`` from its direction along the arch, its left, and its middle."""
-    tangent, left, position = pose
-    letter = _pattern(shape)[b - 1]
-    nodes = (2 * b - 2, 2 * b - 1)
-    if letter == "V":
-        length_axis, width_axis, placing = tangent, left, nodes[1]
-    else:
-        length_axis = left if letter == "L" else -left
-        width_axis = np.cross(np.cross(length_axis, tangent), length_axis)
-        width_axis /= np.linalg.norm(width_axis)
-        position = position + shape.overhang * length_axis
-        if line_node == nodes[1]:
-            nodes = nodes[::-1]
-        placing = nodes[int((letter == "L") == (b % 2 == 1))]  # robots on either side take turns
-    return Brick(
-        name=b,
-        position=as_vector(position),
-        length_axis=as_vector(length_axis),
-        width_axis=as_vector(width_axis),
-        dimensions=shape.dimensions,
-        density=shape.density,
-        nodes=nodes,
-        placing_node=placing,
-    )
+    tangents, lefts, ends = axes
+    offset = np.zeros(len(tangents)) if shape.offset is None else np.asarray(shape.offset, float)
+    middle = 0.5 * (ends[:-1] + ends[1:]) + offset[:, None] * np.cross(tangents, lefts)
+    poses, out = zip(tangents, lefts, middle, _pattern(shape), strict=True), list[Brick]()
+    for b, (tangent, left, position, letter) in enumerate(poses, start=1):
+        nodes, length_axis, width_axis = (2 * b - 2, 2 * b - 1), tangent, left
+        placing = nodes[1]
+        if letter != "V":
+            length_axis = left if letter == "L" else -left
+            width_axis = np.cross(np.cross(length_axis, tangent), length_axis)
+            width_axis /= np.linalg.norm(width_axis)
+            if line_nodes.get(b) == nodes[1]:
+                nodes = nodes[::-1]
+            placing = nodes[int((letter == "L") == (b % 2 == 1))]  # both sides take turns
+        aside = 0.0 if letter == "V" else shape.overhang
+        brick = Brick(
+            name=b,
+            position=as_vector(position + aside * length_axis),
+            length_axis=as_vector(length_axis),
+            width_axis=as_vector(width_axis),
+            dimensions=shape.dimensions,
+            density=shape.density,
+            nodes=nodes,
+            placing_node=placing,
+        )
+        out.append(brick)
+    return tuple(out)
 
 
 def _spring(shape: ArchShape, position: Floats, direction: Floats, along: Floats) -> dict[str, Any]:
@@ -266,11 +257,6 @@ def _spring(shape: ArchShape, position: Floats, direction: Floats, along: Floats
     rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
     fields = spring_fields(position, along, np.asarray(rest / np.linalg.norm(rest)), stiffness)
     return {**fields, "thickness": shape.thickness}
-
-
-def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) -> Joint:
-    along = direction / np.linalg.norm(direction)
-    return Joint(bricks=(brick, brick + 1), **_spring(shape, position, direction, along))
 
 
 def _ground(shape: ArchShape, brick: int, end: Floats, tangent: Floats, sign: float) -> Ground:

@@ -6,8 +6,8 @@ Lengths are in m, joint stiffnesses in N m/rad. What an arm reaches is worked ou
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from seqopt.arrays import Terse, Vector
@@ -31,26 +31,6 @@ MOST = 8  # postures of a robot at a node that are kept of those that are found
 SIDES = ("length", "width", "thickness")
 """The pairs of faces of a brick, by the axis that they are across."""
 _FACES = (*SIDES, *(sign + side for side in SIDES for sign in "+-"))
-
-
-def _model(where: str, given: str | Path) -> str:
-    """Return where a URDF is, if that is text."""
-    if not isinstance(given, str | Path) or not str(given):
-        raise SceneError(f"{where} is {short(given)}; give the path of a URDF, or package:path")
-    return printable(where, os.fspath(given))
-
-
-def _faces(where: str, given: Iterable[str]) -> tuple[str, ...]:
-    """Return faces of a brick, each of them known."""
-    found = rows(where, given, f"some of {', '.join(_FACES)}")
-    if not found or any(face not in _FACES for face in found):
-        raise SceneError(f"{where} are {short(given)}; give some of {', '.join(_FACES)}")
-    return found
-
-
-def _stiffnesses(where: str, given: Iterable[float]) -> tuple[float, ...]:
-    """Return positive stiffnesses, one a joint."""
-    return tuple(positive(where, each, "N m/rad") for each in rows(where, given, "numbers"))
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -90,11 +70,6 @@ class Arm(Terse):
         Of every joint, N m/rad; N/m if it slides; empty for joints that do not give way. Where it
         is given, an arm holds each node in one posture, which makes its grip as stiff as it is.
 
-    Raises
-    ------
-    SceneError
-        If a value is not finite, not positive where it must be, or not consistent.
-
     Examples
     --------
     >>> Arm(urdf="ur10.urdf", position=(0.0, 1.5, 0.0), tool_length=0.3, tool_radius=0.05).faces
@@ -117,17 +92,24 @@ class Arm(Terse):
     joint_stiffness: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        check(self, "arm", urdf=_model, position=vector, faces=_faces, flange=printable)
+        if not isinstance(self.urdf, str | Path) or not str(self.urdf):
+            wanted = "give the path of a URDF, or package:path"
+            raise SceneError(f"arm: urdf is {short(self.urdf)}; {wanted}")
+        settle(self, urdf=printable("arm: urdf", os.fspath(self.urdf)))
+        wanted = f"some of {', '.join(_FACES)}"
+        faces = rows("arm: faces", self.faces, wanted)
+        if not faces or any(face not in _FACES for face in faces):
+            raise SceneError(f"arm: faces are {short(self.faces)}; give {wanted}")
+        settle(self, faces=faces)
+        check(self, "arm", position=vector, flange=printable)
         unit_axes(self, "arm", "x_axis", "y_axis")
-        lengths = {
-            "tool_length": length,
-            "tool_radius": length,
-            "fingers": not_negative,
-            "approach": not_negative,
-        }
-        check(self, "arm", **lengths, tool_mass=not_negative, joint_stiffness=_stiffnesses)
-        settle(self, keeps_apart=kind_of("arm: keeps_apart", self.keeps_apart, bool))
-        settle(self, postures=whole_between("arm: postures", self.postures, 1, MOST))
+        check(self, "arm", tool_length=length, tool_radius=length, fingers=not_negative)
+        check(self, "arm", approach=not_negative, tool_mass=not_negative)
+        where = "arm: joint_stiffness"
+        joints = rows(where, self.joint_stiffness, "numbers")
+        settle(self, joint_stiffness=tuple(positive(where, each, "N m/rad") for each in joints))
+        check(self, "arm", keeps_apart=partial(kind_of, kind=bool))
+        check(self, "arm", postures=partial(whole_between, least=1, most=MOST))
         if not self.fingers < self.tool_length:
             raise SceneError(
                 f"arm: fingers stand out {self.fingers:g} m from a brick, and the whole tool is "

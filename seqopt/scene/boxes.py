@@ -19,12 +19,14 @@ from seqopt.scene._checks import frames, rows, short, vector, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 
-_Numbers = tuple[int, int] | None
-_Places = tuple[Vector, Vector] | None
-
 
 def block_brick(
-    name: int, shape: Polyhedron, density: float, *, nodes: _Numbers = None, grips: _Places = None
+    name: int,
+    shape: Polyhedron,
+    density: float,
+    *,
+    nodes: tuple[int, int] | None = None,
+    grips: tuple[Vector, Vector] | None = None,
 ) -> Brick:
     """Return a brick of any shape, placed by its second node.
 
@@ -36,7 +38,13 @@ def block_brick(
     own = replace(shape, vertices=as_vectors(shape.points - shape.centroid))
     x, y, z = own.extents(own.axes).tolist()
     at, first, second = as_vectors(np.vstack([shape.centroid, own.axes[:2]]))
-    held = own.nodes() if grips is None else _from(shape.centroid, name, grips)
+    held: tuple[Vector, ...] = own.nodes()
+    if grips is not None:
+        where = f"brick {name}: grips"
+        found = [vector(where, row) for row in rows(where, grips)]
+        if len(found) != 2:
+            raise SceneError(f"{where} are {short(grips)}; give two points")
+        held = as_vectors(np.array(found) - shape.centroid)
     numbers = nodes or (2 * whole("brick: its name", name), 2 * name + 1)
     return Brick(
         name=name,
@@ -48,17 +56,8 @@ def block_brick(
         nodes=numbers,
         placing_node=numbers[-1],
         shape=own,
-        node_offsets=held,
+        node_offsets=(held[0], held[1]),
     )
-
-
-def _from(center: Floats, name: int, grips: _Places) -> tuple[Vector, Vector]:
-    where = f"brick {name}: grips"
-    found = [vector(where, row) for row in rows(where, grips or ())]
-    if len(found) != 2:
-        raise SceneError(f"{where} are {short(grips)}; give two points")
-    first, second = as_vectors(np.array(found) - center)
-    return first, second
 
 
 def spring_fields(
@@ -134,7 +133,10 @@ def _separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
     pairs = near[np.lexsort(near.T[::-1])].astype(np.int64)
     a, b = pairs.T
     first, second = shapes.frame[a], shapes.frame[b]
-    axes = np.concatenate([first, second, _edge_normals(first, second)], axis=1)
+    normal = np.cross(first[:, :, None], second[:, None, :]).reshape(len(first), 9, 3)
+    size = np.linalg.norm(normal, axis=2, keepdims=True)
+    normal = np.where(size > _PARALLEL, normal / np.maximum(size, _PARALLEL), 0.0)
+    axes = np.concatenate([first, second, normal], axis=1)
     step = shapes.place[b] - shapes.place[a]
     apart = np.abs(axes @ step[:, :, None])[:, :, 0]
     for which in (a, b):
@@ -156,10 +158,3 @@ def require_apart(
             f"{where}: bricks {bricks[i].name} and {bricks[j].name} interpenetrate by "
             f"{-1e3 * distance.min():.3g} mm; {remedy}"
         )
-
-
-def _edge_normals(first: Floats, second: Floats) -> Floats:
-    """Return unit vectors across an edge of each of two boxes, (P, 9, 3); zero if they agree."""
-    normal = np.cross(first[:, :, None], second[:, None, :]).reshape(len(first), 9, 3)
-    size = np.linalg.norm(normal, axis=2, keepdims=True)
-    return np.asarray(np.where(size > _PARALLEL, normal / np.maximum(size, _PARALLEL), 0.0))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Real
 
@@ -56,11 +56,6 @@ class Load(Terse):
         Name of the brick with whose placing it begins to act, if that is placed later than
         ``brick``; by default it acts as soon as its own brick is placed.
 
-    Raises
-    ------
-    SceneError
-        If a value is not finite.
-
     Examples
     --------
     >>> Load(brick=13, force=(0.0, 0.0, -800.0), since=25)
@@ -88,19 +83,6 @@ class Load(Terse):
         return self.brick if self.since is None else self.since
 
 
-def _from_both_sides(names: Sequence[int], places: Sequence[Vector], up: Vector) -> tuple[int, ...]:
-    """Return names of bricks, at some places, in that order."""
-    where, high = np.array(places), np.array(up)
-    level = where - np.outer(where @ high, high)
-    axis = np.linalg.svd(level - level.mean(axis=0))[2][0]  # along which it is longest
-    along = np.round(level @ axis * np.sign(axis[np.abs(axis).argmax()]), 6)
-    courses, course = np.unique(np.round(where @ high, 6), return_inverse=True)
-    ends = [along[course == k] for k in range(len(courses))]
-    middle = np.array([0.5 * (each.min() + each.max()) for each in ends])[course]
-    rank = np.lexsort((along, np.round(-np.abs(along - middle), 6), course))
-    return tuple(names[k] for k in rank)
-
-
 _UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
 _STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
 _SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
@@ -108,22 +90,6 @@ _SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
 
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _six(where: str, given: Iterable[float]) -> tuple[float, ...]:
-    """Return a translation and a rotation; three numbers are a translation."""
-    numbers = rows(where, given, "three or six numbers")
-    if len(numbers) not in (3, 6):
-        raise SceneError(f"{where} is {short(given)}; give three or six numbers")
-    return (*vector(where, numbers[:3]), *vector(where, numbers[3:] or (0.0, 0.0, 0.0)))
-
-
-def _two_points(where: str, given: Iterable[Iterable[float]]) -> tuple[Vector, Vector]:
-    """Return where the nodes of a block are if they are two places."""
-    found = [vector(where, row) for row in rows(where, given)]
-    if len(found) != 2 or found[0] == found[1]:
-        raise SceneError(f"{where} are {short(given)}; give two different points")
-    return found[0], found[1]
 
 
 def _convex_polygon(
@@ -180,6 +146,15 @@ class Side:
         """Return whether a point is within reach."""
         return _dot(self.toward, point) >= _dot(self.toward, self.point)
 
+    def lack(self, point: Vector) -> float:
+        """Return how far a point is out of reach, m."""
+        return float(np.dot(self.toward, np.subtract(self.point, point)))
+
+    def longer(self, more: float) -> Side:
+        """Return a reach that is longer, m."""
+        x, y, z = (p - more * t for p, t in zip(self.point, self.toward, strict=True))
+        return replace(self, point=(x, y, z))
+
     def __str__(self) -> str:
         return "the side toward ({:g}, {:g}, {:g})".format(*self.toward)
 
@@ -194,11 +169,6 @@ class Sphere:
         m.
     radius : float
         m.
-
-    Raises
-    ------
-    SceneError
-        If the radius is not a positive number or the center is not finite.
 
     Examples
     --------
@@ -220,20 +190,19 @@ class Sphere:
         """Return whether a point is within reach."""
         return math.dist(self.center, point) <= self.radius
 
+    def lack(self, point: Vector) -> float:
+        """Return how far a point is out of reach, m."""
+        return math.dist(self.center, point) - self.radius
+
+    def longer(self, more: float) -> Sphere:
+        """Return a reach that is longer, m."""
+        return replace(self, radius=self.radius + more)
+
     def __str__(self) -> str:
         return "{:g} m around ({:g}, {:g}, {:g})".format(self.radius, *self.center)
 
 
 Reach = Anywhere | Side | Sphere
-
-
-def _as_reach(where: str, given: Reach | str) -> Reach:
-    """Return a reach; ``"anywhere"`` is one too."""
-    if isinstance(given, str) and given == "anywhere":
-        return Anywhere()
-    if not isinstance(given, Anywhere | Side | Sphere):
-        raise SceneError(f"{where} is {short(given)}; give Anywhere(), Side(...) or Sphere(...)")
-    return given
 
 
 THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of its bricks
@@ -263,11 +232,6 @@ class Brick(Terse):
         The shape of a block that is not a box; see `seqopt.scene.boxes.block_brick`.
     node_offsets : tuple of 2 Vector, optional
         Where the inner nodes are if they are elsewhere, from the centroid, m.
-
-    Raises
-    ------
-    SceneError
-        If a value is not finite, not positive where it must be, or not consistent.
     """
 
     name: int
@@ -294,7 +258,13 @@ class Brick(Terse):
                 f"{where}: placing_node is {self.placing_node}; "
                 f"give one of its nodes {list(self.nodes)}"
             )
-        check(self, where, node_offsets=unless_none(_two_points))
+        if self.node_offsets is not None:
+            what = f"{where}: node_offsets"
+            points = tuple(vector(what, row) for row in rows(what, self.node_offsets))
+            if len(points) != 2 or points[0] == points[1]:
+                given = short(self.node_offsets)
+                raise SceneError(f"{what} are {given}; give two different points")
+            settle(self, node_offsets=points)
         if self.shape is not None:
             self._check_shape(where, kind_of(f"{where}: shape", self.shape, Polyhedron))
 
@@ -383,11 +353,6 @@ class Joint(Spring):
     ----------
     bricks : tuple of 2 int
         Names of the two bricks, in any order; the others as of `Spring`.
-
-    Raises
-    ------
-    SceneError
-        If it joins a brick to itself, or a value is not finite or not consistent.
     """
 
     bricks: tuple[int, int]
@@ -424,11 +389,6 @@ class Ground(Spring):
     movement : tuple of 6 float, optional
         How the fixed point and its stub move while this end acts: translation, m, and rotation,
         rad, in the scene's axes; three numbers are a translation.
-
-    Raises
-    ------
-    SceneError
-        If the stub has no length, or a value is not finite or not consistent.
     """
 
     brick: int
@@ -439,7 +399,14 @@ class Ground(Spring):
     def __post_init__(self) -> None:
         check(self, "ground end", brick=whole)
         where = self.label
-        check(self, where, closes_with=unless_none(whole), movement=unless_none(_six))
+        check(self, where, closes_with=unless_none(whole))
+        if self.movement is not None:
+            what, wanted = f"{where}: movement", "three or six numbers"
+            numbers = rows(what, self.movement, wanted)
+            if len(numbers) not in (3, 6):
+                raise SceneError(f"{what} is {short(self.movement)}; give {wanted}")
+            turn = vector(what, numbers[3:] or (0.0, 0.0, 0.0))
+            settle(self, movement=(*vector(what, numbers[:3]), *turn))
         self._check(where)
         check(self, where, anchor=vector)
         if self.anchor == self.position:
@@ -499,12 +466,6 @@ class Robot(Terse):
     durations : Durations, optional
         How long it takes for what it does; by default that is not known.
 
-    Raises
-    ------
-    SceneError
-        If the name cannot be printed, the payload is not a positive number, or a stiffness is not
-        one or three numbers from 1e-3 to 1e15.
-
     Examples
     --------
     >>> import seqopt
@@ -525,8 +486,13 @@ class Robot(Terse):
 
     def __post_init__(self) -> None:
         printable("robot", self.name)
-        newtons, where = partial(positive, unit="N"), f"robot {self.name}"
-        check(self, where, reach=_as_reach, payload=newtons)
+        where, reach = f"robot {self.name}", self.reach
+        if isinstance(reach, str) and reach == "anywhere":
+            settle(self, reach=Anywhere())
+        elif not isinstance(reach, Anywhere | Side | Sphere):
+            wanted = "Anywhere(), Side(...) or Sphere(...)"
+            raise SceneError(f"{where}: reach is {short(reach)}; give {wanted}")
+        check(self, where, payload=partial(positive, unit="N"))
         check(self, where, stiffness=unless_none(partial(_each_way, unit="N/m, or none if rigid")))
         turning = partial(_each_way, unit="N m/rad, or none if its node may turn")
         check(self, where, rotational_stiffness=unless_none(turning))
@@ -586,7 +552,11 @@ class _GripKinds(FrozenValue):
 
 def _grip_kinds(robots: Sequence[Robot], nodes: Sequence[int]) -> _GripKinds:
     """Return the kinds of robots; one that is rigid where there is none. ``nodes``: all numbers."""
-    ways = [(r.stiffness, r.rotational_stiffness, r.payload, _soft_arm(r)) for r in robots]
+    soft = [r.name if r.arm is not None and r.arm.joint_stiffness else "" for r in robots]
+    ways = [
+        (r.stiffness, r.rotational_stiffness, r.payload, arm)
+        for r, arm in zip(robots, soft, strict=True)
+    ]
     kinds = list(dict.fromkeys(ways)) or [(None, None, np.inf, "")]
     compliance = np.zeros((len(kinds), 6, 6))
     for own, (shift, turn, *_) in zip(compliance, kinds, strict=True):
@@ -599,8 +569,3 @@ def _grip_kinds(robots: Sequence[Robot], nodes: Sequence[int]) -> _GripKinds:
     of_robot = np.array([kinds.index(way) for way in ways], dtype=np.int64)
     first, span = min(nodes), max(nodes) - min(nodes) + 1
     return _GripKinds(compliance, arms, turns, payload, of_robot, first, span)
-
-
-def _soft_arm(robot: Robot) -> str:
-    """Return the name of a robot with an arm whose joints give way; empty for others."""
-    return robot.name if robot.arm is not None and robot.arm.joint_stiffness else ""

@@ -51,10 +51,8 @@ def _gripped(scene: Scene, factors: Floats) -> Scene:
             None if each is None else as_vector(factor * np.array(each))
             for each in (robot.stiffness, robot.rotational_stiffness)
         )
-        arm = robot.arm
-        if arm is not None:
-            joints = tuple(factor * each for each in arm.joint_stiffness)
-            arm = replace(arm, joint_stiffness=joints)
+        joints = () if robot.arm is None else (factor * k for k in robot.arm.joint_stiffness)
+        arm = robot.arm and replace(robot.arm, joint_stiffness=tuple(joints))
         return replace(robot, stiffness=shift, rotational_stiffness=turn, arm=arm)
 
     own = factors[scene.grip_kinds.of_robot].tolist()
@@ -190,8 +188,12 @@ class Scenarios:
         held = _factors("grips", factors)
         if self.grips != _ALIKE:
             raise SceneError("grips of these scenarios vary already; give factors once")
-        scenes = tuple(_held(s, held, (self.seed, i)) for i, s in enumerate(self.scenes))
-        return replace(self, scenes=scenes, grips=held)
+        scenes, (low, high) = [], map(math.log, held)
+        for i, scene in enumerate(self.scenes):  # with random numbers of their own
+            kinds = len(scene.grip_kinds.turns)
+            logs = np.random.default_rng([self.seed, i, 3]).uniform(low, high, kinds)
+            scenes.append(_gripped(scene, np.exp(logs)))
+        return replace(self, scenes=tuple(scenes), grips=held)
 
 
 def scenarios(
@@ -225,11 +227,6 @@ def scenarios(
     Returns
     -------
     Scenarios
-
-    Raises
-    ------
-    SceneError
-        If a number is none that can be meant, or a sample is no valid scene.
 
     Examples
     --------
@@ -266,13 +263,6 @@ def _sample(
             f"scenario {stream[1] + 1} of {scene.name} is not a valid scene ({error}); let "
             "positions, densities and stiffnesses vary less"
         ) from error
-
-
-def _held(scene: Scene, factors: tuple[float, float], stream: tuple[int, int]) -> Scene:
-    """Return a scenario whose grips vary as well, with random numbers of their own."""
-    low, high = map(math.log, factors)
-    logs = np.random.default_rng([*stream, 3]).uniform(low, high, len(scene.grip_kinds.turns))
-    return _gripped(scene, np.exp(logs))
 
 
 def _factors(name: str, given: Sequence[float]) -> tuple[float, float]:

@@ -3,38 +3,25 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, TypeVar
 
+import numpy as np
+
 from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
-from seqopt.errors import SceneError
-from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
+from seqopt.errors import SceneError, did_you_mean
+from seqopt.scene._checks import check, not_negative, printable, settle, short, vector, wholes
 from seqopt.scene._durations import _durations_in_words
-from seqopt.scene._props import Prop, centered, settled_props
-from seqopt.scene.parts import (
-    Brick,
-    Ground,
-    Joint,
-    Load,
-    Reach,
-    Robot,
-    _from_both_sides,
-    _grip_kinds,
-    _GripKinds,
-)
+from seqopt.scene._props import Prop, settled_props
+from seqopt.scene.parts import Brick, Ground, Joint, Load, Reach, Robot, _grip_kinds, _GripKinds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-import re
-from collections.abc import Callable
-
-import numpy as np
-
-from seqopt.errors import did_you_mean
 
 _Part = TypeVar("_Part")
 _AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
@@ -103,17 +90,6 @@ def _check_edges(spring: Joint | Ground, brick: Brick) -> None:
         )
 
 
-def _check_loads(loads: Sequence[Load], bricks: Mapping[int, Brick]) -> None:
-    """Require forces that can be computed with. ``bricks``: by name."""
-    for load in loads:
-        if math.hypot(*load.force) > _HEAVY:
-            raise SceneError(f"{load.label}: force is {list(load.force)}; give N, to {_HEAVY:g}")
-        brick = bricks[load.brick]
-        if load.position and max(map(abs, load.position)) > _FAR * max(brick.dimensions):
-            where = list(load.position)
-            raise SceneError(f"{load.label}: position is {where}; move it to its brick")
-
-
 _PARTS = (Brick, Joint, Ground, Robot, Load, Prop)
 _KINDS = {f"{part.__name__.lower()}s": part for part in _PARTS}
 
@@ -147,11 +123,6 @@ class Scene(Shown):
     props : tuple of Prop
         What holds nodes beside the robots, from when their bricks stand until the finished
         structure is let go.
-
-    Raises
-    ------
-    SceneError
-        If the scene is empty or its parts do not fit together.
 
     Examples
     --------
@@ -193,8 +164,17 @@ class Scene(Shown):
         _check_bricks(self.bricks, self.gravity, self.weight_factor)
         by_name = {brick.name: brick for brick in self.bricks}
         _check_springs((*self.joints, *self.grounds), by_name)
-        _check_loads(self.loads, by_name)
-        object.__setattr__(self, "props", settled_props(self.props, self._free_bricks))
+        for load in self.loads:
+            if math.hypot(*load.force) > _HEAVY:
+                found = list(load.force)
+                raise SceneError(f"{load.label}: force is {found}; give N, to {_HEAVY:g}")
+            far = _FAR * max(by_name[load.brick].dimensions)
+            if load.position and max(map(abs, load.position)) > far:
+                found = list(load.position)
+                raise SceneError(f"{load.label}: position is {found}; move it to its brick")
+        blocked, of_node = {*self.blocked_nodes}, self.brick_of_node
+        free = {node: brick for node, brick in of_node.items() if node not in blocked}
+        settle(self, props=settled_props(self.props, free))
         if math.hypot(*self.wind) > _STORM:
             raise SceneError(f"{where}: wind is {list(self.wind)}; give shares of the weight")
 
@@ -214,10 +194,13 @@ class Scene(Shown):
             _known(ground.label, "brick", (ground.brick, closes), names)
         for load in self.loads:
             _known(load.label, "brick", (load.brick, load.starts_with), names)
-        if Counter(self.build_order) != Counter(names):
+        for name in Counter(self.build_order) - Counter(names):
+            why = "occurs twice" if name in names else "is no brick"
+            raise SceneError(f"{where}: build_order: {name} {why}; name every brick once")
+        if left := names - {*self.build_order}:
             raise SceneError(
-                f"{where}: build_order is {list(self.build_order)}; "
-                f"name each of the {len(names)} bricks once"
+                f"{where}: build_order: {len(left)} bricks are missing, {min(left)} among them; "
+                "name every brick once"
             )
         _known(f"{where}: blocked_nodes", "node", self.blocked_nodes, {*self.brick_of_node})
         for brick in self.bricks:
@@ -231,12 +214,6 @@ class Scene(Shown):
     def brick_of_node(self) -> dict[int, Brick]:
         """The brick that each inner node belongs to."""
         return {node: brick for brick in self.bricks for node in brick.nodes}
-
-    @property
-    def _free_bricks(self) -> dict[int, Brick]:
-        """The brick of each node that is not blocked."""
-        blocked = {*self.blocked_nodes}
-        return {n: brick for n, brick in self.brick_of_node.items() if n not in blocked}
 
     def node_position(self, node: int) -> Vector:
         """Return where an inner node lies."""
@@ -328,11 +305,11 @@ class Scene(Shown):
         >>> scene.with_grips(None) == seqopt.load_scene("arch25")
         True
         """
-        ways = {"stiffness": stiffness, "rotational_stiffness": rotational_stiffness}
-        arms = (r.arm and replace(r.arm, joint_stiffness=()) for r in self.robots)
-        pairs = zip(self.robots, arms, strict=True)
-        robots = (replace(robot, arm=arm, **ways) for robot, arm in pairs)  # type: ignore[arg-type]
-        return replace(self, robots=tuple(robots))
+        bare = [(r, r.arm and replace(r.arm, joint_stiffness=())) for r in self.robots]
+        turn = rotational_stiffness
+        return self.with_robots(
+            *(replace(r, arm=a, stiffness=stiffness, rotational_stiffness=turn) for r, a in bare)
+        )
 
     def with_props(self, *props: Prop) -> Scene:
         """Return the same scene with other props, ``*props``: all of the new scene.
@@ -358,7 +335,9 @@ class Scene(Shown):
         >>> len(props), props[0].node
         (24, 3)
         """
-        return self.with_props(*centered(self.placed, self.blocked_nodes, stiffness))
+        taken = {*self.blocked_nodes, *(brick.placing_node for brick in self.bricks)}
+        free = ([node for node in brick.nodes if node not in taken] for brick in self.placed)
+        return self.with_props(*(Prop(node=n[0], stiffness=stiffness) for n in free if n))
 
     def standing_props(self, bricks: int, *, held: bool) -> tuple[Prop, ...]:
         """Return the props that hold while so many bricks stand, in the scene's order.
@@ -386,7 +365,7 @@ class Scene(Shown):
         names, own = [r.name for r in self.robots], [r.durations for r in self.robots]
         found = _durations_in_words(names, own, words)
         pairs = zip(self.robots, found, strict=True)
-        return replace(self, robots=tuple(replace(r, durations=each) for r, each in pairs))
+        return self.with_robots(*(replace(robot, durations=each) for robot, each in pairs))
 
     @cached_property
     def grip_kinds(self) -> _GripKinds:
@@ -487,10 +466,23 @@ def _from_all_ends(scene: Scene) -> Order:
     return tuple(sorted(scene.build_order, key=lambda name: far.get(name, last)))
 
 
+def _from_both_sides(scene: Scene) -> Order:
+    """Return the order that builds course by course, from both ends of each to its middle."""
+    where, high = np.array([brick.position for brick in scene.placed]), np.array(scene.up)
+    level = where - np.outer(where @ high, high)
+    axis = np.linalg.svd(level - level.mean(axis=0))[2][0]  # along which it is longest
+    along = np.round(level @ axis * np.sign(axis[np.abs(axis).argmax()]), 6)
+    courses, course = np.unique(np.round(where @ high, 6), return_inverse=True)
+    ends = [along[course == k] for k in range(len(courses))]
+    middle = np.array([0.5 * (each.min() + each.max()) for each in ends])[course]
+    rank = np.lexsort((along, np.round(-np.abs(along - middle), 6), course))
+    return tuple(scene.build_order[k] for k in rank)
+
+
 ORDERS: dict[str, Callable[[Scene], Order]] = {
     "reversed": lambda scene: scene.build_order[::-1],
     "ends": _from_all_ends,
-    "sides": lambda s: _from_both_sides(s.build_order, [b.position for b in s.placed], s.up),
+    "sides": _from_both_sides,
 }
 """Orders by name.
 
@@ -526,20 +518,4 @@ def in_order(scene: Scene, order: Sequence[int] | str | None) -> Scene:
         return scene
     where = f"scene {scene.name}: order"
     given = _parse_order(scene, order) if isinstance(order, str) else wholes(where, order)
-    _require_all(scene, given)
     return replace(scene, build_order=given)
-
-
-def _require_all(scene: Scene, order: Iterable[int]) -> None:
-    """Raise an error unless an order names every brick once."""
-    left = {*scene.build_order}
-    for name in order:
-        if name not in left:
-            why = "occurs twice" if name in scene.build_order else "is no brick"
-            raise SceneError(f"scene {scene.name}: order: {name} {why}; name every brick once")
-        left.remove(name)
-    if left:
-        raise SceneError(
-            f"scene {scene.name}: order: {len(left)} bricks are missing, {min(left)} among them; "
-            "name every brick once"
-        )

@@ -123,12 +123,11 @@ class Polyhedron:
         """
         reach = 0.25 * self.extents(self.axes)
         steps = [share * reach[i] * self.axes[i] for i in range(3) for share in _NEAR]
-        found = next((step for step in steps if self._holds(step)), steps[0])
+        center = self.centroid
+        inside = (s for s in steps if self.contains(center + s) and self.contains(center - s))
+        found = next(inside, steps[0])
         x, y, z = (found + 0.0).tolist()
         return (0.0 - x, 0.0 - y, 0.0 - z), (x, y, z)
-
-    def _holds(self, step: Floats) -> bool:
-        return self.contains(self.centroid + step) and self.contains(self.centroid - step)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from seqopt._files import parse_json, read_text
 from seqopt.errors import SceneError, StepError, did_you_mean
 from seqopt.scene._checks import LARGEST_NUMBER, as_float, short
 from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene, in_order
-from seqopt.sequence.schedule import Move, OpenGrip, Schedule
+from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step
 
@@ -36,33 +37,26 @@ def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
     more = {key: told[key] for key in ("regrips", "step") if key in told}
     if any(not isinstance(value, int) or value < 0 for value in more.values()):
         raise StepError(f"{where}: {short(more)}; give whole numbers from 0")
+    ages, names = told.get("ages", {}), [str(brick.name) for brick in scene.placed[:count]]
     try:
-        site = Site(count, grips, last, **more, ages=_ages(scene, count, told.get("ages", {})))
+        if not isinstance(ages, Mapping) or any(name not in names for name in ages):
+            raise StepError(f"ages {short(ages)}; give seconds by brick, of those that stand")
+        seconds = tuple(ages.get(name, 0.0) for name in names) if ages else ()
+        site = Site(count, grips, last, **more, ages=seconds)
         site.holds(scene)
     except (SceneError, StepError) as error:
         raise StepError(f"{where}: {error}") from None
     return scene, site
 
 
-def _ages(scene: Scene, count: int, told: object) -> tuple[float, ...]:
-    """Return for how long bricks that stand have been there, s; by default just placed."""
-    names = [brick.name for brick in scene.placed[:count]]
-    if not isinstance(told, Mapping) or any(name not in map(str, names) for name in told):
-        raise StepError(f"ages {short(told)}; give seconds by brick, of those that stand")
-    return tuple(told.get(str(name), 0.0) for name in names) if told else ()
-
-
 def _measured(scene: Scene, told: object, where: str) -> Scene:
     """Return a scene whose bricks are where they were measured."""
-    points = {} if not isinstance(told, Mapping) else {**told}
-    right = all(
-        name.isdecimal() and isinstance(point, list) and len(point) == 3 and _are_near(point)
-        for name, point in points.items()
-    )
-    if not isinstance(told, Mapping) or not right:
-        raise StepError(f"{where}: measured {short(told)}; give x, y, z by brick, m")
-    found = {int(name): tuple(map(as_float, point)) for name, point in points.items()}
-    return as_built(scene, found)
+    points: Mapping[str, Any] = told if isinstance(told, Mapping) else {"": told}
+    for name, point in points.items():
+        right = isinstance(point, list) and len(point) == 3 and _are_near(point)
+        if not (name.isdecimal() and right):
+            raise StepError(f"{where}: measured {short(told)}; give x, y, z by brick, m")
+    return as_built(scene, {int(n): tuple(map(as_float, at)) for n, at in points.items()})
 
 
 def _are_near(values: Sequence[object]) -> bool:
@@ -107,9 +101,7 @@ def what_is_left(schedule: Schedule, done: Sequence[Step], to: Site | None = Non
             f"step {len(done)} to {last}"
         )
     _require_done(schedule, done)
-    given = {}
-    if done:
-        given = _held(schedule, len(done), done[-1].grips)
+    given = _held(schedule, len(done), done[-1].grips) if done else {}
     if to is not None and to.grips is not None:
         given |= _held(schedule, last, to.grips)
     rest = schedule.steps[len(done) : last]
@@ -123,9 +115,14 @@ def what_is_left(schedule: Schedule, done: Sequence[Step], to: Site | None = Non
 
     steps = tuple(replace(step, grips=tuple(map(known, step.grips))) for step in rest)
     held = [{g for s in steps if k in s.moves for g in s.grips} for k in range(len(left))]
-    moves = tuple(_apart(schedule.moves[move], held[k]) for k, move in enumerate(left))
+    moves = []
+    for k, move in enumerate(schedule.moves[move] for move in left):
+        free = tuple(node for node in move.candidates if node not in held[k])
+        if not free:
+            raise StepError(f"step {move.step}: others hold every node that {move.robot} may hold")
+        moves.append(replace(move, candidates=free))
     begin = Site.after(done, done[-1].number) if done else None
-    return replace(schedule, steps=steps, moves=moves, begin=begin)
+    return replace(schedule, steps=steps, moves=tuple(moves), begin=begin)
 
 
 def _held(schedule: Schedule, count: int, grips: Sequence[int | None]) -> dict[int, int | None]:
@@ -135,21 +132,9 @@ def _held(schedule: Schedule, count: int, grips: Sequence[int | None]) -> dict[i
     return {grip.move: node for grip, node in pairs if isinstance(grip, OpenGrip)}
 
 
-def _apart(move: Move, held: Collection[object]) -> Move:
-    """Return a move with the candidates that no given grip holds while it lasts."""
-    found = tuple(node for node in move.candidates if node not in held)
-    if not found:
-        raise StepError(f"step {move.step}: others hold every node that {move.robot} may hold")
-    return replace(move, candidates=found)
-
-
 def _require_done(schedule: Schedule, done: Sequence[Step]) -> None:
     for step, planned in zip(done, schedule.steps, strict=False):
-        same = (step.number, step.kind, step.bricks) == (
-            planned.number,
-            planned.kind,
-            planned.bricks,
-        )
+        same = replace(planned, grips=()) == OpenStep(step.number, step.kind, step.bricks, ())
         for node, grip in zip(step.grips, planned.grips, strict=True):
             open_ = isinstance(grip, OpenGrip) and node in schedule.moves[grip.move].candidates
             same &= open_ or node == grip

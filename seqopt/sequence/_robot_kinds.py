@@ -64,7 +64,7 @@ def sort_robots(
 
 def node_numbers(network: Network) -> list[int]:
     """Return the scene's numbers of all inner nodes (2B,), brick by brick in build order."""
-    return [node for brick in network.scene.placed for node in brick.nodes]
+    return [*network.scene.placed_nodes]
 
 
 def _placing(network: Network, robot: Robot, reach: Bools) -> Bools:

@@ -69,6 +69,29 @@ class StateRows(Terse):
         """First column of every kind, and the one after its last."""
         return tuple(pairwise(np.cumsum([0, *(len(kind.robots) for kind in self.kinds)]).tolist()))
 
+    @cached_property
+    def _place(self) -> dict[int | None, int]:
+        """The places of nodes in build order, from 1."""
+        return {node: i for i, node in enumerate(node_numbers(self.network), start=1)}
+
+    @cached_property
+    def _distance(self) -> Floats:
+        """Distances of nodes, (2B + 1, 2B + 1), m; none from or to node 0."""
+        at = self.network.node_position[self.network.inner.ravel()]
+        out = np.zeros((len(at) + 1,) * 2)
+        out[1:, 1:] = np.linalg.norm(at[:, None] - at[None], axis=2)
+        return frozen(out)
+
+    def require_codes(self, regrips: int = 0) -> None:
+        """Raise a `StepError` if states of a level are more than can be numbered."""
+        base = 1 + (2 if self.parks else 1) * 2 * len(self.network.inner)
+        if base**self.robots * (1 + regrips) >= 2**62:
+            raise StepError(
+                f"scene {self.network.scene.name}: {len(self.network.inner)} bricks and "
+                f"{self.robots} robots have more states than can be numbered; let fewer robots "
+                "take part"
+            )
+
     def for_arms(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) arms can be in while so many bricks stand, (n,)."""
         scene = self.network.scene
@@ -159,14 +182,6 @@ class FreeSpace(StateRows):
         """Return the moves that place the next brick: none of them is a regrip."""
         return ((self.places(level, states), False),)
 
-    @cached_property
-    def _distance(self) -> Floats:
-        """Distances of nodes, (2B + 1, 2B + 1), m; none from or to node 0."""
-        at = self.network.node_position[self.network.inner.ravel()]
-        out = np.zeros((len(at) + 1,) * 2)
-        out[1:, 1:] = np.linalg.norm(at[:, None] - at[None], axis=2)
-        return frozen(out)
-
     def start(self) -> Ints:
         """Return the one state in which the build begins, (1, c).
 
@@ -183,15 +198,14 @@ class FreeSpace(StateRows):
 
     def _row(self, site: Site) -> Ints:
         """Return the entries (robots,) of robots in a site."""
-        place = {node: i for i, node in enumerate(node_numbers(self.network), start=1)}
         held, out = site.holds(self.network.scene), np.zeros((1, self.robots), dtype=np.int64)
         for kind, (first, end) in zip(self.kinds, self.slots, strict=True):
             for column, robot in enumerate(kind.robots, start=first):
                 node, stay = held[robot], site.stays[robot] if site.stays else None
                 if node is not None:
-                    out[0, column] = place[node]
+                    out[0, column] = self._place[node]
                 elif stay is not None and self.parks:
-                    out[0, column] = -place[stay]
+                    out[0, column] = -self._place[stay]
             sort_entries(out, first, end)
         return np.asarray(out[0])
 
@@ -223,21 +237,29 @@ class FreeSpace(StateRows):
 
     def releases(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which one robot lets go, or at the end all do, as rules allow."""
+        moves = self._lets_go(states, states[:, : self.robots] > 0)
+        if not self.rules.lets_go_one_by_one(bricks, self._span):
+            moves = self._lawful_only(bricks, moves)
+        if bricks != self._span[1] or self.rules.how_it_ends is Ending.HELD:
+            return moves
+        if self.rules.how_it_ends is Ending.RELEASED:
+            rows = np.flatnonzero(self.grips(states))
+            moves = _join_moves([moves, Moves(rows, states[rows], np.zeros(len(rows)))], states)
+            moves.states[len(moves.source) - len(rows) :, : self.robots] = 0
+        moves.states[self.grips(moves.states) == 0, : self.robots] = 0  # it forgets where they were
+        return moves
+
+    def _lets_go(self, states: Ints, may: Bools) -> Moves:
+        """Return the moves in which one robot lets go that may, (n, robots) by column."""
         parts = []
         for first, end in self.slots:
             for slot in range(first, end):
-                rows = np.flatnonzero(states[:, slot] > 0)
+                rows = np.flatnonzero(may[:, slot])
                 new = states[rows]
                 new[:, slot] = -new[:, slot] if self.parks else 0
                 sort_entries(new, first, end)
                 parts.append(Moves(rows, new, np.zeros(len(rows))))
-        moves = _join_moves(parts, states)
-        ending = self.rules.how_it_ends
-        if not self.rules.lets_go_one_by_one(bricks, self._span):
-            moves = self._lawful_only(bricks, moves)
-        if bricks != self._span[1] or ending is Ending.HELD:
-            return moves
-        return self._let_go(states, moves)
+        return _join_moves(parts, states)
 
     def lawful(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, (n,)."""
@@ -262,10 +284,9 @@ class FreeSpace(StateRows):
                 for node in nodes[kind.newest[nodes - 1]]:
                     newest |= (held[:, first:end] == node).any(axis=1)
             ok &= newest
-        for bricks_of in self._loose[bricks]:
-            if not {*bricks_of}.isdisjoint(propped):
-                continue
-            ok &= np.isin((held - 1) // 2, bricks_of).any(axis=1)
+        for part in self._loose[bricks]:
+            if {*part}.isdisjoint(propped):
+                ok &= np.isin((held - 1) // 2, part).any(axis=1)
         return ok
 
     def ended(self, states: Ints) -> Bools:
@@ -278,15 +299,6 @@ class FreeSpace(StateRows):
         for first, end in self.slots if self.parks else ():
             sort_entries(held, first, end)
         return np.asarray((held == self._row(self.rules.finish).clip(min=0)).all(axis=1))
-
-    def _let_go(self, states: Ints, moves: Moves) -> Moves:
-        """Return the moves and those in which all let go; who lets go forgets where it was."""
-        if self.rules.how_it_ends is Ending.RELEASED:
-            rows = np.flatnonzero(self.grips(states))
-            moves = _join_moves([moves, Moves(rows, states[rows], np.zeros(len(rows)))], states)
-            moves.states[len(moves.source) - len(rows) :, : self.robots] = 0
-        moves.states[self.grips(moves.states) == 0, : self.robots] = 0
-        return moves
 
     def _near(self, bricks: int) -> Ints:
         """Return the nodes of bricks that stand that may be taken hold of, from 0."""
@@ -383,18 +395,14 @@ class _TakeDownSpace(FreeSpace):
 
     def removes(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which the one robot that holds the newest brick takes it away."""
-        on = (states[:, : self.robots].astype(np.int64) + 1) // 2 == bricks
-        alone, parts = on.sum(axis=1) == 1, [Moves(np.zeros(0, np.int64), states[:0], np.zeros(0))]
+        held = states[:, : self.robots].astype(np.int64)
+        may = (held + 1) // 2 == bricks
+        may[may.sum(axis=1) != 1] = False
         for kind, (first, end) in zip(self.kinds, self.slots, strict=True):
-            for slot in range(first, end) if kind.places[bricks - 1] else ():
-                rows = np.flatnonzero(alone & on[:, slot])
-                rows = rows[kind.newest[states[rows, slot].astype(np.int64) - 1]]
-                new = states[rows]
-                new[:, slot] = -new[:, slot] if self.parks else 0
-                new[:, self.robots :] = 0
-                sort_entries(new, first, end)
-                parts.append(Moves(rows, new, np.zeros(len(rows))))
-        moves = _join_moves(parts, states)
+            own = slice(first, end)
+            may[:, own] &= kind.places[bricks - 1] & kind.newest[held[:, own].clip(min=1) - 1]
+        moves = self._lets_go(states, may)
+        moves.states[:, self.robots :] = 0
         return self._lawful_only(bricks - 1, moves) if bricks > 1 else moves
 
 
@@ -422,10 +430,5 @@ def free_space(
     kinds = sort_robots(network, rules, caps, timed=timed, worlds=worlds)
     rules = rules.begun(network.scene)
     space = (_TakeDownSpace if rules.takes_down else FreeSpace)(network, rules, kinds, parks)
-    base = 1 + (2 if parks else 1) * 2 * len(network.inner)
-    if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
-        raise StepError(
-            f"scene {network.scene.name}: {len(network.inner)} bricks and {space.robots} robots "
-            "have more states than can be numbered; let fewer robots take part"
-        )
+    space.require_codes(rules.regrips or 0)
     return space

@@ -14,8 +14,7 @@ from math import prod
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import StepError
+from seqopt.arrays import Bools, Ints
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence._carrying import can_carry, carried
@@ -37,12 +36,7 @@ class ScheduleSpace(StateRows):
     worlds: tuple[Scene, ...] = ()  # of scenarios, in which robots must carry their bricks as well
 
     def __post_init__(self) -> None:
-        base = 1 + (2 if self.parks else 1) * 2 * len(self.network.inner)
-        if base**self.robots >= 2**62:
-            raise StepError(
-                f"scene {self.network.scene.name}: so many nodes and robots have more states than "
-                "can be numbered; let fewer robots take part"
-            )
+        self.require_codes()
 
     first = 0  # the level before the first step
 
@@ -115,7 +109,8 @@ class ScheduleSpace(StateRows):
             elif not isinstance(grip, OpenGrip):
                 after[:, robot] = self._place[grip]
             elif before[robot] != grip:
-                fresh.append((robot, self._places[grip.move]))
+                open_to = self.schedule.moves[grip.move].candidates
+                fresh.append((robot, [self._place[node] for node in open_to]))
         grids = np.meshgrid(*(places for _, places in fresh), indexing="ij")
         count = prod(len(places) for _, places in fresh)
         source, after = (np.repeat(rows, count, axis=0) for rows in (np.arange(len(states)), after))
@@ -125,27 +120,11 @@ class ScheduleSpace(StateRows):
         kept = ~((held[:, 1:] == held[:, :-1]) & (held[:, 1:] > 0)).any(axis=1)  # a node each
         kept &= self.for_arms(step.bricks, after) & (step.number not in self._too_heavy)
         source, after = source[kept], after[kept]
-        way = self._ways(states[source], after) if self.parks else np.zeros(len(source))
+        way, came = np.zeros(len(source)), states[source]
+        if self.parks:
+            gone = (after > 0) & (after != came) & (came != 0)
+            way = (self._distance[np.abs(after), np.abs(came)] * gone).sum(axis=1)
         return ((Moves(source, after, way), step.kind is StepKind.REPOSITION),)
-
-    def _ways(self, before: Ints, after: Ints) -> Floats:
-        """Return how far robots go that take grips, m."""
-        gone = (after > 0) & (after != before) & (before != 0)
-        at = self._at[np.abs(after)] - self._at[np.abs(before)]
-        return np.asarray((np.linalg.norm(at, axis=2) * gone).sum(axis=1))
-
-    @cached_property
-    def _at(self) -> Floats:
-        at = self.network.node_position[self.network.inner.ravel()]
-        return np.pad(at, ((1, 0), (0, 0)))
-
-    @cached_property
-    def _place(self) -> dict[int | None, int]:
-        return {node: i for i, node in enumerate(node_numbers(self.network), start=1)}
-
-    @cached_property
-    def _places(self) -> list[Ints]:
-        return [np.array([self._place[n] for n in m.candidates]) for m in self.schedule.moves]
 
     def without_choice(self) -> Iterator[tuple[int, Ints]]:
         """Yield the levels, last first, of steps without an open grip, and their state (1, r)."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import partial
 from numbers import Integral
 
 from seqopt.errors import StepError, did_you_mean
-from seqopt.scene._checks import short
-from seqopt.scene.parts import Robot
+from seqopt.scene._checks import settle, short
+from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Near
 from seqopt.sequence.site import Site
@@ -111,25 +110,27 @@ class FreeRules:
     direction: Direction = Direction.BUILD
 
     def __post_init__(self) -> None:
-        for name, kind in _CHOICES:
-            object.__setattr__(self, name, _choice(name, kind, getattr(self, name)))
+        for name, kind in _CHOICES.items():
+            settle(self, **{name: _choice(name, kind, getattr(self, name))})
         for name in ("robots", "placers"):
             given = getattr(self, name)
             names = (given,) if isinstance(given, str) else given
             if not isinstance(names, tuple | list) or not all(isinstance(n, str) for n in names):
                 raise StepError(f"rule {name}: {short(given)}; give names of robots")
-            twice = [n for n in names if names.count(n) > 1]
-            if twice:
+            if twice := [n for n in names if names.count(n) > 1]:
                 raise StepError(f"rule {name}: {twice[0]} occurs twice; name it once")
-            object.__setattr__(self, name, tuple(names))
-        for name in ("least_grips", "regrips"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, _count(name, getattr(self, name)))
+            settle(self, **{name: tuple(names)})
+        for name in _COUNTS:
+            if (count := getattr(self, name)) is None:
+                continue
+            if not isinstance(count, Integral) or isinstance(count, bool) or count < 0:
+                raise StepError(f"rule {name}: {short(count)}; give a whole number from 0 on")
+            settle(self, **{name: int(count)})
         for name in ("begin", "finish"):
             if not isinstance(getattr(self, name), Site | None):
                 raise StepError(f"rule {name}: {short(getattr(self, name))}; give a seqopt.Site")
         if self.candidates:
-            object.__setattr__(self, "candidates", Near(self.candidates).rule)
+            settle(self, candidates=Near(self.candidates).rule)
 
     def span(self, scene: Scene) -> tuple[int, int]:
         """Return how many bricks stand where the build begins, and where it ends."""
@@ -226,6 +227,7 @@ class FreeRules:
     def described(self, scene: Scene) -> dict[str, object]:
         """Return the rules with their values, ready for JSON. Result: by name."""
         names = [scene.robots[i].name for i in self.team(scene)]
+        sites = {"begin": self.begin, "finish": self.finish}
         return {
             "robots": names,
             "placers": list(self.placers) or names,
@@ -236,11 +238,7 @@ class FreeRules:
             "ending": self.ending.value,
             "candidates": self.candidates or "all",
             **({"direction": self.direction.value} if self.takes_down else {}),
-            **{
-                name: site.described(scene)
-                for name, site in (("begin", self.begin), ("finish", self.finish))
-                if site is not None
-            },
+            **{name: site.described(scene) for name, site in sites.items() if site is not None},
         }
 
     def loosened(self, scene: Scene) -> Iterator[tuple[str, FreeRules]]:
@@ -259,12 +257,12 @@ class FreeRules:
                 yield f"{name}={said}", replace(self, **{name: value})  # type: ignore[arg-type]
 
 
-_CHOICES = (
-    ("newest", Newest),
-    ("payload", Payload),
-    ("ending", Ending),
-    ("direction", Direction),
-)  # rules of which one of a few is chosen
+_CHOICES: dict[str, type[Enum]] = {
+    "newest": Newest,
+    "payload": Payload,
+    "ending": Ending,
+    "direction": Direction,
+}  # rules of which one of a few is chosen
 
 _LOOSEST = (
     ("candidates", "", "all"),
@@ -275,11 +273,7 @@ _LOOSEST = (
 
 
 def _usual_grips(robots: int) -> int:
-    """Return how many nodes are held at least by default: two, while one robot is free to place.
-
-    >>> [_usual_grips(robots) for robots in (1, 2, 3, 4)]
-    [0, 1, 2, 2]
-    """
+    """Return how many nodes are held at least by default: two, while one robot is free to place."""
     return max(0, min(2, robots - 1))
 
 
@@ -303,20 +297,18 @@ def parse_rules(
         raise StepError(f"{where} {short(given)}: give a seqopt.FreeRules, or as least_grips=1")
     found = FreeRules()
     for each in several:
-        found = each if isinstance(each, FreeRules) else _with_rule(found, each, where)
+        if isinstance(each, FreeRules):
+            found = each
+            continue
+        name, _, text = each.partition("=")
+        if name not in RULES:
+            hint, known = did_you_mean(name, RULES), ", ".join(RULES)
+            raise StepError(f"{where} {each} does not exist{hint}; give one of {known}")
+        value: object = int(text) if name in _COUNTS and text.isdecimal() else text
+        if name == "placers":
+            value = tuple(part.strip() for part in text.split(","))
+        found = replace(found, **{name: _UNBOUND.get((name, text), value)})  # type: ignore[arg-type]
     return replace(found, robots=robots) if robots else found
-
-
-def _with_rule(rules: FreeRules, words: str, where: str) -> FreeRules:
-    """Return rules with one from ``NAME=VALUE``."""
-    name, _, text = words.partition("=")
-    if name not in RULES:
-        hint, known = did_you_mean(name, RULES), ", ".join(RULES)
-        raise StepError(f"{where} {words} does not exist{hint}; give one of {known}")
-    value: object = int(text) if name in _COUNTS and text.isdecimal() else text
-    if name == "placers":
-        value = tuple(part.strip() for part in text.split(","))
-    return replace(rules, **{name: _UNBOUND.get((name, text), value)})  # type: ignore[arg-type]
 
 
 def with_robots(scene: Scene, count: int) -> Scene:
@@ -333,14 +325,12 @@ def with_robots(scene: Scene, count: int) -> Scene:
         raise StepError(f"{short(count)} robots: the free schedule takes one to {MOST_ROBOTS}")
     robots = list(scene.robots[:count])
     names = {robot.name for robot in robots}
+    fresh = [f"rob{i}" for i in range(1, 2 * MOST_ROBOTS + 1) if f"rob{i}" not in names]
     payload = max((robot.payload for robot in scene.robots), default=float("nan"))
-    fresh = (f"rob{i}" for i in range(1, 2 * MOST_ROBOTS + 1) if f"rob{i}" not in names)
-    ways = [(robot.stiffness, robot.rotational_stiffness) for robot in scene.robots[:1]]
-    shift, turn = ways[0] if ways else (None, None)
-    more = partial(Robot, payload=payload, stiffness=shift, rotational_stiffness=turn)
-    more = partial(more, durations=scene.robots[0].durations if scene.robots else None)
-    robots += [more(name=next(fresh)) for _ in range(count - len(robots))]
-    return replace(scene, robots=tuple(robots))
+    like = robots[0] if robots else Robot(name=fresh[0], payload=payload)
+    more = replace(like, payload=payload, reach=Anywhere(), arm=None)
+    robots += [replace(more, name=name) for name in fresh[: count - len(robots)]]
+    return scene.with_robots(*robots)
 
 
 def _choice(name: str, kind: type[Enum], given: object) -> Enum:
@@ -352,9 +342,3 @@ def _choice(name: str, kind: type[Enum], given: object) -> Enum:
         raise StepError(
             f"rule {name}: {short(given)}{hint}; give one of {', '.join(known)}"
         ) from None
-
-
-def _count(name: str, given: object) -> int:
-    if not isinstance(given, Integral) or isinstance(given, bool) or given < 0:
-        raise StepError(f"rule {name}: {short(given)}; give a whole number from 0 on")
-    return int(given)

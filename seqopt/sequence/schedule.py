@@ -61,30 +61,22 @@ class Near:
         if not nodes:
             return ()
         name, _, most = self.rule.partition(":")
-        away = (_joints_away if name == "near" else _meters_away)(scene, bricks)
+        placed = scene.placed[:bricks]
+        if name == "near":  # counted in joints
+            import networkx as nx  # noqa: PLC0415  # slow to import, for this only
+
+            names = [brick.name for brick in placed]
+            graph: nx.Graph[int] = nx.Graph(joint.bricks for joint in scene.joints)
+            graph = graph.subgraph(names).copy()
+            graph.add_nodes_from(names)
+            joints = nx.multi_source_dijkstra_path_length(graph, {*names[-_NEWEST:]})
+            away = {n: float(joints.get(b.name, math.inf)) for b in placed for n in b.nodes}
+        else:
+            ends = [brick.position for brick in placed[-_NEWEST:]]
+            points = {n: b.node_position(n) for b in placed for n in b.nodes}
+            away = {n: min(math.dist(at, end) for end in ends) for n, at in points.items()}
         limit = max(float(most), min(away.get(n, math.inf) for n in nodes))
         return tuple(node for node in nodes if away.get(node, math.inf) <= limit)
-
-
-def _joints_away(scene: Scene, bricks: int) -> dict[int, float]:
-    """Return how many joints part the nodes of placed bricks from the newest."""
-    import networkx as nx  # noqa: PLC0415  # slow to import, for this only
-
-    placed = scene.placed[:bricks]
-    names = [brick.name for brick in placed]
-    graph: nx.Graph[int] = nx.Graph(joint.bricks for joint in scene.joints).subgraph(names).copy()
-    graph.add_nodes_from(names)
-    away = nx.multi_source_dijkstra_path_length(graph, {*names[-_NEWEST:]})
-    return {n: float(away.get(b.name, math.inf)) for b in placed for n in b.nodes}
-
-
-def _meters_away(scene: Scene, bricks: int) -> dict[int, float]:
-    """Return how far the nodes of placed bricks are from the centroids of the newest, m."""
-    placed = scene.placed[:bricks]
-    ends = [brick.position for brick in placed[-_NEWEST:]]
-    return {
-        n: min(math.dist(b.node_position(n), end) for end in ends) for b in placed for n in b.nodes
-    }
 
 
 @dataclass(frozen=True)
@@ -297,9 +289,6 @@ def thin(schedule: Schedule, rule: str) -> Schedule:
     return replace(schedule, moves=moves, left_out=said)
 
 
-_Island = frozenset[int]
-
-
 def acting_bodies(network: Network, bricks: int) -> Ints:
     """Return which bricks (s, 2) the springs of a partial structure join, by places in build order.
 
@@ -310,7 +299,7 @@ def acting_bodies(network: Network, bricks: int) -> Ints:
     return np.asarray(springs.bodies[(springs.since <= bricks) & springs.stiffness.any(axis=1)])
 
 
-def islands(network: Network, bricks: int) -> tuple[_Island, ...]:
+def islands(network: Network, bricks: int) -> tuple[frozenset[int], ...]:
     """Return the bricks of every part of a partial structure that no joint ties to a ground end.
 
     >>> from dataclasses import replace

@@ -25,7 +25,7 @@ from seqopt.sequence.steps import (
     check_sequence,
     check_step,
 )
-from seqopt.sequence.three_robots import SCHEDULES, make_schedule, open_schedule, robot_loop
+from seqopt.sequence.three_robots import SCHEDULES, open_schedule, robot_loop
 
 
 def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
@@ -100,12 +100,10 @@ def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
     """Return the rows of a table of steps: the number of the line, and its cells by column."""
     wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
     columns, rows = read_table(text, what, StepError)
-    for column in wanted:
-        if column not in columns:
-            raise StepError(f"{what}: column {column} is missing; give {', '.join(wanted)}")
-    for column in wanted:
-        if columns.count(column) > 1:
-            raise StepError(f"{what}: column {column} occurs twice; keep one")
+    if lacking := [column for column in wanted if column not in columns]:
+        raise StepError(f"{what}: column {lacking[0]} is missing; give {', '.join(wanted)}")
+    if twice := [column for column in wanted if columns.count(column) > 1]:
+        raise StepError(f"{what}: column {twice[0]} occurs twice; keep one")
     return rows
 
 
@@ -241,7 +239,7 @@ def find_schedule(
     if schedule is None:
         return robot_loop(network, robots or min(len(network.scene.robots), MOST))
     if isinstance(schedule, str) and schedule in SCHEDULES:
-        return make_schedule(schedule, network, robots)
+        return SCHEDULES[schedule](network, robots)
     if robots:
         raise StepError(
             f"robots {', '.join(robots)}: only a schedule by name takes them "
@@ -254,11 +252,6 @@ def find_schedule(
                 f"{network.scene.name}; make it from the network of this scene"
             )
         return schedule
-    return _from_file(network, schedule)
-
-
-def _from_file(network: Network, schedule: object) -> Schedule:
-    """Return the schedule of a file, unless it is a name that does not exist or no file at all."""
     known = f"{', '.join(SCHEDULES)}, or a CSV file, or {FREE}"
     if not isinstance(schedule, str | Path):
         raise StepError(f"schedule {short(schedule)}: give a Schedule, or one of {known}")

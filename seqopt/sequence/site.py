@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from numbers import Integral
 
 from seqopt.errors import StepError
-from seqopt.scene._checks import finite, short
+from seqopt.scene._checks import finite, settle, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step, StepKind, _check_state
 
@@ -50,12 +50,10 @@ class Site:
     ages: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.step < 0:
-            object.__setattr__(self, "step", int(self.bricks != 0))
         ages = tuple(finite("site: age", age, 0.0) for age in self.ages)
         if len(ages) > max(self.bricks, 0):
             raise StepError(f"site: {len(ages)} ages of {self.bricks} bricks; give one for each")
-        object.__setattr__(self, "ages", ages)
+        settle(self, ages=ages, step=self.step if self.step >= 0 else int(self.bricks != 0))
 
     @classmethod
     def after(cls, steps: Sequence[Step], count: int) -> Site:

@@ -114,9 +114,9 @@ def check_sequence(
 
 def _check_part(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
     """Return the steps of a build or of a part of one, whatever stands before the first of them."""
-    for step in require_steps(steps)[:1]:
-        _check_state(scene, step, f"step {step.number}")
-    if len(steps) > 1 or not steps:
+    if require_steps(steps):
+        _check_state(scene, steps[0], f"step {steps[0].number}")
+    if len(steps) != 1:
         check_sequence(scene, steps[1:], steps[0] if steps else None)
     return tuple(steps)
 
@@ -186,36 +186,23 @@ def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
             )
         if old != new:
             (dropped if new is None else taken).append(old if new is None else new)
-    if removes:
-        _check_removal(scene, step, (taken, dropped), where)
-        return
-    releases = step.kind is StepKind.RELEASE
-    if (len(taken), bool(dropped)) != ((0, True) if releases else (1, False)):
+    brick = scene.placed[step.bricks - (not removes)]
+    right, wanted = len(taken) == 1 and not dropped, "such a step takes one, drops none"
+    if step.kind is StepKind.RELEASE:
+        right, wanted = bool(dropped) and not taken, "such a step takes none and drops some"
+    elif removes:
+        right = not taken and len(dropped) == 1
+        right &= all(node in brick.nodes for node in dropped if isinstance(node, Integral))
+        wanted = f"one robot alone holds brick {brick.name}, at one of {list(brick.nodes)}, and "
+        wanted += "takes it away"
+    if not right:
         given, left = (", ".join(map(str, grips)) for grips in (taken, dropped))
-        wanted = "takes none and drops some" if releases else "takes one, drops none"
-        raise StepError(
-            f"{where}: it takes grips [{given}] and drops [{left}]; such a step {wanted}"
-        )
-    brick = scene.placed[step.bricks - 1]
+        raise StepError(f"{where}: it takes grips [{given}] and drops [{left}]; {wanted}")
     given_node = step.kind is StepKind.PLACE and isinstance(taken[0], Integral)
     if given_node and taken[0] not in brick.nodes:
         raise StepError(
             f"{where}: its new grip is on node {taken[0]}; "
             f"hold brick {brick.name} at one of {list(brick.nodes)}"
-        )
-
-
-def _check_removal(
-    scene: Scene, step: AnyStep, changed: tuple[list[object], list[object]], where: str
-) -> None:
-    """Require that one robot takes the newest brick away, and that nobody else moves."""
-    (taken, dropped), brick = changed, scene.placed[step.bricks]
-    fit = [node in brick.nodes for node in dropped if isinstance(node, Integral)]
-    if taken or len(dropped) != 1 or not all(fit):
-        given, left = (", ".join(map(str, grips)) for grips in changed)
-        raise StepError(
-            f"{where}: it takes grips [{given}] and drops [{left}]; one robot alone holds brick "
-            f"{brick.name}, at one of {list(brick.nodes)}, and takes it away"
         )
 
 

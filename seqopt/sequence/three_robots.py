@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from seqopt.errors import StepError, did_you_mean
+from seqopt.errors import StepError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene._armed import reachable
@@ -13,7 +13,6 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import (
-    Method,
     _says_reach,
     alternate,
     cast,
@@ -31,30 +30,25 @@ def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> S
     it lasts; to a move that places a brick, the nodes of this brick alone. Moves are numbered from
     0 in the order in which they are made.
     """
-    count = 1 + max((number for step in steps for number in step.moves), default=-1)
-    moves = tuple(_move(network, steps, k) for k in range(count))
-    schedule = Schedule(method, network.scene, tuple(steps), moves)
+    scene, moves = network.scene, list[Move]()
+    for number in range(1 + max((move for step in steps for move in step.moves), default=-1)):
+        present = [step for step in steps if number in step.moves]
+        first = present[0]
+        robot = scene.robots[first.grips.index(OpenGrip(number))]
+        nodes = reachable(scene, robot, first.bricks)
+        if first.kind is StepKind.PLACE:  # what places a brick holds it
+            nodes = tuple(n for n in nodes if n in scene.placed[first.bricks - 1].nodes)
+        held = {grip for step in present for grip in step.grips}
+        free = tuple(node for node in nodes if node not in held)
+        if not free:
+            raise StepError(
+                f"step {first.number} ({first.kind.value}): no node is open to {robot.name}: of "
+                f"those that it may hold it reaches {len(nodes)}, and others hold these; extend "
+                "its reach or let another robot take this grip"
+            )
+        moves.append(Move(robot.name, first.number, first.bricks, free))
     check_support(network, steps, moves)
-    return schedule
-
-
-def _move(network: Network, steps: Sequence[OpenStep], number: int) -> Move:
-    scene = network.scene
-    present = [step for step in steps if number in step.moves]
-    first = present[0]
-    robot = scene.robots[first.grips.index(OpenGrip(number))]
-    nodes = reachable(scene, robot, first.bricks)
-    if first.kind is StepKind.PLACE:  # what places a brick holds it
-        nodes = tuple(n for n in nodes if n in scene.placed[first.bricks - 1].nodes)
-    held = {grip for step in present for grip in step.grips}
-    free = tuple(node for node in nodes if node not in held)
-    if not free:
-        raise StepError(
-            f"step {first.number} ({first.kind.value}): no node is open to {robot.name}: of those "
-            f"that it may hold it reaches {len(nodes)}, and others hold these; extend its reach or "
-            "let another robot take this grip"
-        )
-    return Move(robot.name, first.number, first.bricks, free)
+    return Schedule(method, scene, tuple(steps), tuple(moves))
 
 
 @_says_reach
@@ -112,7 +106,11 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
             f"scene {scene.name}: {len(scene.robots)} robots and {len(scene.placed)} bricks; "
             f"this method needs {in_words(count)} robots and {in_words(count + 1)} bricks"
         )
-    turns = _rotation(count, len(scene.placed) - count)
+    longest = [*range(1, count - 1), 0, count - 1]  # who has held longest, again and again
+    turns = [
+        _Turn(*(longest[(k - ago) % count] for ago in (1, 2, 0)))
+        for k in range(len(scene.placed) - count)
+    ]
     chosen = find_robots(scene, names, f"the loop of {count}", count)
     roles = [{role} for role in range(count)]
     for brick, turn in enumerate(turns, start=count):
@@ -122,20 +120,14 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
 
 
 class _Turn(NamedTuple):
-    """The roles of one turn of the loop: who moves, who places next, who releases after that."""
+    """The roles of one turn of the loop, each named by the first brick that it places.
+
+    Who has held longest moves in the next turn, and places in the one after.
+    """
 
     mover: int
     placer: int
     oldest: int
-
-
-def _rotation(count: int, turns: int) -> list[_Turn]:
-    """Return who does what, turn by turn; a role is named by the first brick that it places.
-
-    Who has held longest moves in the next turn, and places in the one after.
-    """
-    oldest = [*range(1, count - 1), 0, count - 1]  # again and again
-    return [_Turn(*(oldest[(k - ago) % count] for ago in (1, 2, 0))) for k in range(turns)]
 
 
 def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> list[OpenStep]:
@@ -244,12 +236,7 @@ def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) ->
     network = network_of(network)
     chosen = find_robots(network.scene, robots, "modified-sequential", 3)
     plain = sequential(network, robots[:2])
-    steps = _supported(network.scene, plain, chosen[2:] if robots else chosen)
-    return open_schedule("modified-sequential", network, steps)
-
-
-def _supported(scene: Scene, plain: Sequence[Step], helpers: Sequence[int]) -> list[OpenStep]:
-    """Return the steps of the sequential method with the grip of a helper."""
+    helpers = chosen[2:] if robots else chosen
     steps: list[OpenStep] = []
     moves, helper = 0, helpers[0]
 
@@ -264,11 +251,11 @@ def _supported(scene: Scene, plain: Sequence[Step], helpers: Sequence[int]) -> l
             continue
         if support is not None:
             add(StepKind.RELEASE, step, None)
-        if 1 < step.bricks < len(scene.placed):
+        if 1 < step.bricks < len(network.scene.placed):
             moves += 1
-            helper = _free(scene, plain[k : k + 3], [helper, *helpers])
+            helper = _free(network.scene, plain[k : k + 3], [helper, *helpers])
             add(StepKind.REPOSITION, step, OpenGrip(moves - 1))
-    return steps
+    return open_schedule("modified-sequential", network, steps)
 
 
 def _free(scene: Scene, window: Sequence[Step], helpers: Sequence[int]) -> int:
@@ -284,17 +271,9 @@ def _free(scene: Scene, window: Sequence[Step], helpers: Sequence[int]) -> int:
     )
 
 
-SCHEDULES: dict[str, Method[Schedule]] = {
+SCHEDULES: dict[str, Callable[..., Schedule]] = {
     "three-robot": three_robot_loop,
     "modified-sequential": modified_sequential,
     "two-robot": _two_robot_loop,
     "loop": robot_loop,
 }
-
-
-def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
-    """Return a schedule of `SCHEDULES` by name, with robots in the order of their roles."""
-    if name not in SCHEDULES:
-        why = f"does not exist{did_you_mean(name, SCHEDULES)}; give one of {', '.join(SCHEDULES)}"
-        raise StepError(f"schedule {name!r} {why}")
-    return SCHEDULES[name](network, robots)

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 import typing
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from contextlib import suppress
 from dataclasses import replace
 from functools import wraps
 from itertools import permutations
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -22,7 +24,7 @@ from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network, PartKind
 from seqopt.scene._armed import within_reach
-from seqopt.scene.parts import Brick, Reach, Robot, Side, Sphere
+from seqopt.scene.parts import Anywhere, Brick, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import acting_bodies, check_support
 from seqopt.sequence.steps import Step, StepKind, check_sequence
@@ -37,68 +39,47 @@ def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str
 
     ``exists``: whether it does in a scene, which is the same save for what robots reach.
     """
-    limited = [r for r in scene.robots if r.arm is None and isinstance(r.reach, Side | Sphere)]
+    limited = {
+        robot.name: robot.reach
+        for robot in scene.robots
+        if robot.arm is None and not isinstance(robot.reach, Anywhere)
+    }
     alone = 0
-    for some in ([robot] for robot in limited):
-        if more := _least(scene, some, exists):
+    for name, reach in limited.items():
+        if more := _least(scene, {name: reach}, exists):
             alone += 1
-            yield _said(some[0], more)
+            if isinstance(reach, Sphere):
+                radius = math.ceil(_MM * (reach.radius + more) - 1e-6) / _MM
+                yield f"a reach of {radius:.6g} m of {name} ({reach.radius:.6g} m now)"
+            else:
+                yield f"a reach of {name} that is {more:.6g} m longer"
     if not alone and len(limited) > 1 and (more := _least(scene, limited, exists)):
         yield f"a reach that is {more:.6g} m longer of every robot that does not reach everything"
 
 
-def _said(robot: Robot, more: float) -> str:
-    """Return the reach of a robot that is enough, in words."""
-    if isinstance(robot.reach, Sphere):
-        radius = math.ceil(_MM * (robot.reach.radius + more) - 1e-6) / _MM
-        return f"a reach of {radius:.6g} m of {robot.name} ({robot.reach.radius:.6g} m now)"
-    return f"a reach of {robot.name} that is {more:.6g} m longer"
+def _least(
+    scene: Scene, reaches: Mapping[str, Side | Sphere], exists: Callable[[Scene], bool]
+) -> float:
+    """Return how much longer some reaches have to be at least, in whole mm; zero if it is vain.
 
-
-def _least(scene: Scene, some: Sequence[Robot], exists: Callable[[Scene], bool]) -> float:
-    """Return how much longer some robots have to reach at least, in whole mm; zero if it is vain.
-
-    Only lengths at which one more node is reached make a difference.
+    Only lengths at which one more node is reached make a difference. ``reaches``: by robot.
     """
-    lacks = {
-        math.ceil(_MM * lack - 1e-6) / _MM
-        for robot in some
-        for brick in scene.placed
-        for node in brick.nodes
-        if (lack := _lack(robot.reach, brick.node_position(node))) > 0
-    }
-    steps = sorted(lacks)
-    if not steps or not exists(_longer(scene, some, steps[-1])):
+    points = [brick.node_position(node) for brick in scene.placed for node in brick.nodes]
+    lacks = (reach.lack(point) for reach in reaches.values() for point in points)
+    steps = sorted({math.ceil(_MM * lack - 1e-6) / _MM for lack in lacks if lack > 0})
+
+    def is_enough(more: float) -> bool:
+        robots = (
+            replace(robot, reach=reaches[robot.name].longer(more))
+            if robot.name in reaches
+            else robot
+            for robot in scene.robots
+        )
+        return exists(scene.with_robots(*robots))
+
+    if not steps or not is_enough(steps[-1]):
         return 0.0
-    low, high = -1, len(steps) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if exists(_longer(scene, some, steps[middle])) else (middle, high)
-    return steps[high]
-
-
-def _lack(reach: Reach, point: Sequence[float]) -> float:
-    """Return how far a point is out of reach, m."""
-    if isinstance(reach, Sphere):
-        return math.dist(reach.center, point) - reach.radius
-    if isinstance(reach, Side):
-        return float(np.dot(reach.toward, np.subtract(reach.point, point)))
-    return 0.0
-
-
-def _longer(scene: Scene, some: Sequence[Robot], more: float) -> Scene:
-
-    def changed(robot: Robot) -> Robot:
-        reach = robot.reach
-        if robot not in some:
-            return robot
-        if isinstance(reach, Sphere):
-            return replace(robot, reach=replace(reach, radius=reach.radius + more))
-        assert isinstance(reach, Side)
-        x, y, z = (p - more * t for p, t in zip(reach.point, reach.toward, strict=True))
-        return replace(robot, reach=replace(reach, point=(x, y, z)))
-
-    return scene.with_robots(*map(changed, scene.robots))
+    return steps[bisect_left(steps, 1, hi=len(steps) - 1, key=is_enough)]
 
 
 def _says_reach(make: _Make) -> _Make:
@@ -112,15 +93,14 @@ def _says_reach(make: _Make) -> _Make:
             said = str(error)
             if ASKS not in said:
                 raise
-            scene = network if isinstance(network, Scene) else network.scene
 
         def exists(other: Scene) -> bool:
-            try:
+            with suppress(StepError):
                 make(build_network(other), robots)
-            except StepError:
-                return False
-            return True
+                return True
+            return False
 
+        scene = network if isinstance(network, Scene) else network.scene
         ways = " or ".join(_enough_reach(scene, exists))
         raise StepError(said.replace(ASKS, f"give {ways}") if ways else said)
 
@@ -128,7 +108,7 @@ def _says_reach(make: _Make) -> _Make:
 
 
 _Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
-_Ways = dict[_Pair, tuple[int, tuple[_Pair, ...]]]  # by pair: changes so far, pairs so far
+_Way = tuple[int, tuple[_Pair, ...]]  # changes so far, pairs so far
 
 
 def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> list[int]:
@@ -168,7 +148,7 @@ def _take_turns(
     """
     scene = network.scene
     rank = {robot: i for i, robot in enumerate(robots)}
-    ways: _Ways = {
+    ways: dict[_Pair, _Way] = {  # the best one to every pair that can be at work
         (placer, holder): (0, ((rank[placer], rank[holder]),))
         for placer, holder in starts or permutations(robots, 2)
     }
@@ -177,21 +157,15 @@ def _take_turns(
         possible = {pair: way for pair, way in ways.items() if pair[0] in able}
         if not possible:
             raise _nobody(scene, [pair[0] for pair in ways], able, k)
-        ways = _go_on(possible, rank, swapped=k == 0 or brick.name in swap_after)
+        ways = {}
+        for (placer, holder), (changes, path) in possible.items():
+            stays = k == 0 or brick.name in swap_after
+            free, held = (holder, placer) if stays else (placer, holder)
+            for after in (robot for robot in rank if robot != held):
+                way = (changes + (after != free), (*path, (rank[after], rank[held])))
+                ways[after, held] = min(way, ways.get((after, held), way))
     path = min(possible.values())[1]
     return [(robots[placer], robots[holder]) for placer, holder in path]
-
-
-def _go_on(ways: _Ways, rank: Mapping[int, int], *, swapped: bool) -> _Ways:
-    """Return the best way to every pair that can be at work at the next brick."""
-    out: _Ways = {}
-    for (placer, holder), (changes, path) in ways.items():
-        free, held = (holder, placer) if swapped else (placer, holder)
-        for after in rank:
-            if after != held:
-                way = (changes + (after != free), (*path, (rank[after], rank[held])))
-                out[after, held] = min(way, out.get((after, held), way))
-    return out
 
 
 def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepError:
@@ -230,17 +204,13 @@ def _first_match(fits: Sequence[Sequence[int]]) -> list[int]:
     """Return the first way to give every role a robot of its own; none if there is no way."""
     for robot in fits[0] if fits else ():
         rest = [[other for other in fit if other != robot] for fit in fits[1:]]
-        if _matched(rest):
+        if not all(rest):
+            continue
+        count = 1 + max(map(max, rest), default=0)
+        able = np.array([np.isin(np.arange(count), fit) for fit in rest], bool).reshape(-1, count)
+        if (maximum_bipartite_matching(csr_array(able), perm_type="column") >= 0).all():
             return [robot, *_first_match(rest)]
     return []
-
-
-def _matched(fits: Sequence[Sequence[int]]) -> bool:
-    """Return whether every role can have a robot that no other has."""
-    if not fits or not all(fits):
-        return not fits
-    able = np.array([np.isin(np.arange(1 + max(map(max, fits))), fit) for fit in fits])
-    return bool((maximum_bipartite_matching(csr_array(able), perm_type="column") >= 0).all())
 
 
 def in_words(number: int) -> str:
@@ -312,14 +282,6 @@ def degeneration(network: Network, method: str) -> str:
 
 
 _Grip = TypeVar("_Grip")
-_Made_co = TypeVar("_Made_co", covariant=True)
-
-
-class Method(Protocol[_Made_co]):
-    """A rule that makes a sequence of steps, or a schedule."""
-
-    def __call__(self, network: Network | Scene, robots: Sequence[str] = ()) -> _Made_co:
-        """Return what builds a scene, by robots in the order of their roles, or found by reach."""
 
 
 def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
@@ -402,11 +364,6 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     tuple of Step
         Checked; every grip is given.
 
-    Raises
-    ------
-    StepError
-        As in `sequential`.
-
     Examples
     --------
     >>> import seqopt
@@ -419,7 +376,10 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     return _two_robots(network, "cantilever", swaps, robots)
 
 
-METHODS: dict[str, Method[tuple[Step, ...]]] = {"sequential": sequential, "cantilever": cantilever}
+METHODS: dict[str, Callable[..., tuple[Step, ...]]] = {
+    "sequential": sequential,
+    "cantilever": cantilever,
+}
 
 
 def alternate(

@@ -23,7 +23,7 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, require_steps
 from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _first_to_fail, _verdict_of, bonded
-from seqopt.stability.limit_analysis import CAP, GAP, Claim, Compile, Sense, compile_equilibrium
+from seqopt.stability.limit_analysis import CAP, GAP, Claim, Sense, compile_equilibrium
 from seqopt.work.progress import Tell, with_progress
 
 _ENDLESS = (1 - GAP) * CAP  # multiples from which on none is the largest
@@ -72,14 +72,12 @@ class LoadFactor(FrozenValue):
         return f"<LoadFactor: {self.factor:.6g} times {self.load:.6g} N{first}>"
 
 
-def load_factor(
-    assembly: Assembly, mortar: Mortar, compiled: Compile = compile_equilibrium
-) -> LoadFactor:
+def load_factor(assembly: Assembly, mortar: Mortar) -> LoadFactor:
     """Return the largest multiple of its applied loads with which an assembly stands."""
     size = float(np.abs(assembly.applied_load).max())  # over the force scale
     force = float(np.linalg.norm(assembly.applied[:, :3], axis=1).sum())
     scaled = replace(assembly, applied=assembly.applied / (size or 1.0))  # so that z is no share
-    prove, lacking = Prover(scaled, compiled), bonded(assembly, mortar)
+    prove, lacking = Prover(scaled, compile_equilibrium), bonded(assembly, mortar)
     bare = prove(replace(lacking, applied=(0.0, 0.0)))
     unloaded, values, motion = (
         _verdict_of(bare),

@@ -20,7 +20,7 @@ from seqopt.errors import SceneError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.stability._held_states import CompileHeld, HeldStates, compile_held, node_assembly
+from seqopt.stability._held_states import HeldStates, compile_held, node_assembly
 from seqopt.stability._prover import DIRECTIONS, FINE, NEAR, hulls, sideways
 from seqopt.stability._screens import FALLS, STANDS, Part, Screen, held_parts
 from seqopt.stability.assessment import ROUGHEST, bonded
@@ -39,8 +39,6 @@ class Margins:
     network : Network or Scene
     mortar : Mortar or str
         Of all joints; or its name.
-    compiled : callable, optional
-        Makes the programs to solve; the registered one by default.
 
     Attributes
     ----------
@@ -56,13 +54,10 @@ class Margins:
            [778., 778.]])
     """
 
-    def __init__(
-        self, network: Network | Scene, mortar: Mortar | str, compiled: CompileHeld = compile_held
-    ) -> None:
+    def __init__(self, network: Network | Scene, mortar: Mortar | str) -> None:
         self.network, self.mortar = network_of(network), find_mortar(mortar)
-        self._compile = compiled
         self._levels: dict[tuple[str, Part], tuple[HeldStates, ...]] = {}
-        self.screens = {self.mortar.friction: Screen(self.network, self.mortar, 0.0, compiled)}
+        self.screens = {self.mortar.friction: Screen(self.network, self.mortar)}
 
     @property
     def solved(self) -> int:
@@ -148,7 +143,7 @@ class Margins:
             """Narrow some brackets by whether sets stand with a friction."""
             if friction not in self.screens:
                 mortar = replace(self.mortar, friction=friction)
-                self.screens[friction] = Screen(self.network, mortar, 0.0, self._compile)
+                self.screens[friction] = Screen(self.network, mortar)
             found = self.screens[friction].stands(bricks, sets[rows], _of_rows(payload, rows))
             stand, fall = rows[found == STANDS], rows[found == FALLS]
             out[stand, 1] = np.minimum(out[stand, 1], friction)
@@ -179,7 +174,7 @@ class Margins:
             if (name, part) not in self._levels:
                 assembly = node_assembly(self.network, bricks, held=part[1])
                 self._levels[name, part] = tuple(
-                    HeldStates(assembly, case, self._compile) for case in cases(assembly)
+                    HeldStates(assembly, case, compile_held) for case in cases(assembly)
                 )
             states = self._levels[name, part]
             out = out or [np.zeros((len(np.asarray(grips[0])), 2)) for _ in states]

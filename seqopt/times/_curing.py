@@ -21,7 +21,6 @@ from seqopt.errors import SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
-from seqopt.stability._prover import Proven
 from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import compile_equilibrium
@@ -120,7 +119,11 @@ class CuringBuilds:
             self._bond = bond
             assembly, proven, _ = self._chain(bricks, grips)
             self.asked += 1
-            self._found[key] = _verdict_of(proven), _motion(assembly, proven)
+            found, motion = _verdict_of(proven), None
+            if found is Verdict.FALLS:
+                scales = np.repeat([1.0, assembly.scales[1]], 3)
+                motion = np.asarray(proven.answer.motion / scales)
+            self._found[key] = found, motion
         return self._found[key]
 
     def waits(self, step: AnyStep, placed: Sequence[float], start: float) -> tuple[float, str]:
@@ -159,12 +162,6 @@ class CuringBuilds:
         bond = self.joints.at(step.bricks, np.array([time]), placed)[0]
         assert isinstance(step, Step)  # of a plan: no grip is open
         return self.verdict(step.bricks, step.grips, bond)[0] is Verdict.STANDS
-
-
-def _motion(assembly: Assembly, proven: Proven) -> Floats | None:
-    if _verdict_of(proven) is not Verdict.FALLS:
-        return None
-    return np.asarray(proven.answer.motion / np.repeat([1.0, assembly.scales[1]], 3))
 
 
 def mortar_waits(network: Network, standing: Standing | None) -> Waits | None:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seqopt.contact.assembly import Assembly
 from seqopt.contact.curing import Curing
 from seqopt.contact.faces import step_assembly
 from seqopt.errors import SolverError
@@ -26,10 +25,8 @@ def makespan_of_steps(problem: States, steps: Sequence[Step], starts: Sequence[f
     """Return how long a build takes, s, and require that no step comes before its mortar holds."""
     standing, scene, begin = problem.standing, problem.network.scene, problem.rules.begin
     if standing is None or standing.curing is None:
-        starts = ()
-    else:
-        check_cured(problem.network, steps, standing, starts, begin)
-    return [0.0, *step_ends(scene, steps, starts, begin)][-1]
+        return [0.0, *step_ends(scene, steps, begin=begin)][-1]
+    return check_cured(problem.network, steps, standing, starts, begin)[-1]
 
 
 def step_ends(
@@ -86,8 +83,8 @@ def check_cured(
     standing: Standing,
     starts: Sequence[float],
     begin: Site | None = None,
-) -> None:
-    """Require that the state of every step stands with what its joints have when it starts.
+) -> tuple[float, ...]:
+    """Return when steps end, s; each must stand with what its joints have when it starts.
 
     ``starts``: of the steps, s; what is changed is in its place when the step ends; ``begin``:
     where the build begins; what stands there is as old as it says. Verdicts are of
@@ -99,7 +96,7 @@ def check_cured(
         raise SolverError(f"{len(starts)} starts for {len(steps)} steps")
     ends = step_ends(network.scene, steps, starts, begin)
     if curing is None:
-        return
+        return ends
     found = dict[object, Verdict]()
     placed = dict.fromkeys(range(0 if begin is None else begin.bricks), 0.0)
     placed |= {k: -age for k, age in enumerate(() if begin is None else begin.ages)}
@@ -111,7 +108,7 @@ def check_cured(
         )
         key = step.bricks, step.grips, bond
         if key not in found:
-            found[key] = _verdict(whole, bond, standing)
+            found[key] = verdict(whole.with_bond(np.array(bond)), standing.mortar)
         if found[key] is not Verdict.STANDS:
             raise SolverError(
                 f"step {step.number} is not proven to stand with the bond that its joints have at "
@@ -119,10 +116,7 @@ def check_cured(
             )
         if step.kind is StepKind.PLACE:
             placed[step.bricks - 1] = end
-
-
-def _verdict(whole: Assembly, bond: tuple[float, ...], standing: Standing) -> Verdict:
-    return verdict(whole.with_bond(np.array(bond)), standing.mortar)
+    return ends
 
 
 def _share(curing: Curing, joint: str, now: float, placed: Sequence[float | None]) -> float:

@@ -24,7 +24,7 @@ from seqopt.plan.solving import layers_of, states_of
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim
 from seqopt.responses.quantities import RESPONSES
-from seqopt.sequence.three_robots import make_schedule
+from seqopt.sequence import three_robots
 from seqopt.study.published import EQUATIONS
 from tests.brute_force import ONES
 from tests.builders import small_arch
@@ -40,7 +40,7 @@ GOALS = {Aim.SUM: "sum", Aim.PEAK: "minmax"}
 def posed(schedule, criterion="ratio", bricks=5):
     """A problem without goals: the formulation says what is minimized."""
     engine = seqopt.make_engine("compliance", small_arch(bricks))
-    moves = make_schedule(schedule, engine.network)
+    moves = three_robots.SCHEDULES[schedule](engine.network)
     return seqopt.pose(engine, moves, CRITERIA.get(criterion, EQUATIONS))
 
 

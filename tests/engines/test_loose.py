@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.harness.scenes import grip_sets, running_bond
+from seqopt.engines._grip_compliance import RIGID
 from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.frame import FrameEngine
@@ -235,7 +236,7 @@ def test_the_first_correction_is_the_error(arch25):
     right = refinement.grip_forces(operator, columns, index).force
     wrong = right * (1 + 1e-6)
     change, more = better._correction(
-        _Asked(columns, index, None), better._states(index, wrong), wrong
+        _Asked(columns, index, RIGID), better._states(index, wrong), wrong
     )
     assert wrong + more == pytest.approx(right, rel=1e-12)
     assert np.abs(more).max() == pytest.approx(1e-6 * np.abs(right).max(), rel=1e-3)

@@ -18,7 +18,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import OVER_METHODS, RankSum, WeightedSum, equal
-from seqopt.problem.requirements import NEVER, ROUNDED, SceneFacts, _own_scales, crown
+from seqopt.problem.requirements import NEVER, ROUNDED, SceneFacts, crown
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Sphere
 from seqopt.sequence.rules import FreeRules
@@ -106,7 +106,7 @@ def test_a_method_that_falls_on_its_way_gives_no_scales():
             (table,) = stand.values()
             assert facts.reference["M_sup"] == table["M_sup_Nm"].max()
         else:
-            assert facts.reference == _own_scales(network)
+            assert facts.reference == facts.own_scales
             assert facts.basis == " over payload, weight and size"
 
 
@@ -150,9 +150,7 @@ def test_scales_of_a_scene_go_with_its_units():
     """Powers of two: the same digits in other units of length, force and stiffness."""
     scene = one_places(5)
     length, force, softness = 2.0, 8.0, 4.0
-    own, other = (
-        _own_scales(build_network(s)) for s in (scene, rescaled(scene, length, force, softness))
-    )
+    own, other = (facts_of(s).own_scales for s in (scene, rescaled(scene, length, force, softness)))
     ratio = {name: other[name] / own[name] for name in ("F_largest", "T_max", "M_sup")}
     assert ratio == {"F_largest": force, "T_max": force, "M_sup": force * length}
     assert all(value > 0 for value in own.values())

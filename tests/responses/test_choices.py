@@ -13,7 +13,7 @@ from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.responses import _blocks as batches
-from seqopt.responses._choices import CHOICE_RESPONSES, evaluate_choices
+from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.quantities import responses_of
 from seqopt.responses.table import step_fields
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
@@ -71,11 +71,12 @@ def test_only_what_is_asked_is_evaluated(engine25, loop25):
 def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):
     schedule = three_robot_loop(engine25.network)
     monkeypatch.setattr(batches, "BLOCK", 10**9)
-    whole, models = evaluate_choices(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
+    whole = Evaluation(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
+    assert whole.steps
     monkeypatch.setattr(batches, "BLOCK", 100)
-    parts, again = evaluate_choices(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
-    assert models == again
-    for a, b in zip(parts, whole, strict=True):
+    parts = Evaluation(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
+    assert parts.models == whole.models
+    for a, b in zip(parts.steps, whole.steps, strict=True):
         for name in CHOICE_RESPONSES:
             most = 1e-11 * np.nanmax(np.abs(b.responses[name]), initial=0.0)
             assert a.responses[name] == pytest.approx(b.responses[name], abs=most, nan_ok=True)

@@ -122,7 +122,7 @@ def test_tables_say_who_does_what_when():
         ("rob9:fetch=30", "no robot 'rob9'"),
         ("fetch=x", "fetch is 'x'; give a number"),
         ("fetsch=3", "'fetsch' is none"),
-        ("fetch=1,fetch=2", "stands there twice"),
+        ("fetch=1,fetch=2", "'fetch' is given twice"),
         (f"{WORDS},speed=0", "speed is 0.0; give a positive number"),
         (f"{WORDS.replace('30', '-1')}", "fetch is -1.0; give seconds"),
     ],

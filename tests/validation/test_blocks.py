@@ -9,6 +9,7 @@ import pytest
 
 from experiments.discrete.parts.arch_pads import AtCorners
 from seqopt.contact.mortar import DRY, Mortar
+from seqopt.engines._grip_compliance import RIGID
 from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.engines.discrete._equilibrium_path import settle
 from seqopt.engines.discrete._system import build_system
@@ -51,7 +52,7 @@ def test_an_open_base_tilts_as_statics_says():
     size, lean, stiffness = (0.4, 0.3, 0.5), math.radians(25), 1e9
     net = build_network(block(size, lean))
     system = build_system(net, 1, Mortar(friction=1.0), BedStiffness(stiffness, stiffness))
-    found = settle(_held_nodes(net, system, np.zeros(0, int), None, []))
+    found = settle(_held_nodes(net, system, np.zeros(0, int), RIGID, []))
     assert found.rests
     eccentric = size[2] / 2 * math.tan(lean)
     assert eccentric > size[0] / 6  # else all of it would press

@@ -54,15 +54,11 @@ class PaddedEngine(DiscreteEngine):
         self._pinch = pinch
 
     def _hold(
-        self,
-        system: System,
-        columns: Ints,
-        compliance: GripCompliance | None,
-        springs: list[_Spring],
+        self, system: System, columns: Ints, compliance: GripCompliance, springs: list[_Spring]
     ) -> Held:
         if self._pinch is None:
             return super()._hold(system, columns, compliance, springs)
-        far = (compliance or GripCompliance()).offsets(1, len(columns))[0]
+        far = compliance.offsets(1, len(columns))[0]
         blocks = [sparse.csr_array((6, 6))] * (len(system.load) // 6)
         units, pull = np.outer(system.unit[:6], system.unit[:6]), np.zeros_like(system.load)
         inner = self.network.node_position[self.network.inner.ravel()]

@@ -30,11 +30,10 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance, simplest
 from seqopt.network.build import build_network
 from seqopt.problem.requirements import Criterion
-from seqopt.report._compared import comparison_blocks, printed_largest, shown_tables
+from seqopt.report._compared import comparison_blocks, format_details, printed_largest, shown_tables
 from seqopt.report._pages import comparison_page
 from seqopt.report.comparison import CLOSED, Comparison, compare
 from seqopt.report.softness import _softness_lines, held_softly, turning_points
-from seqopt.report.text import format_details
 from seqopt.responses.table import builds_in_words
 from seqopt.stability._builds import BuildProver
 from seqopt.workflow import DEFAULTS

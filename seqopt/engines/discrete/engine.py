@@ -52,7 +52,7 @@ class DiscreteEngine(OpeningEngine):
         self._mortar, self._bed = mortar, bed
         self._systems: dict[int, System] = {}
 
-    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance | None) -> Fields:
+    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance) -> Fields:
         network = self._network
         require_resistance(network, bricks, columns, compliance)
         if bricks not in self._systems:
@@ -66,11 +66,7 @@ class DiscreteEngine(OpeningEngine):
         return _fields(network, held, found, columns, springs)
 
     def _hold(
-        self,
-        system: System,
-        columns: Ints,
-        compliance: GripCompliance | None,
-        springs: list[_Spring],
+        self, system: System, columns: Ints, compliance: GripCompliance, springs: list[_Spring]
     ) -> Held:
         return _held_nodes(self._network, system, columns, compliance, springs)
 
@@ -111,10 +107,10 @@ class _Spring(NamedTuple):
 
 
 def _springs(
-    network: Network, system: System, columns: Ints, compliance: GripCompliance | None
+    network: Network, system: System, columns: Ints, compliance: GripCompliance
 ) -> list[_Spring]:
     """Return the soft grips of one set as springs."""
-    if compliance is None or compliance.matrix is None:
+    if compliance.matrix is None:
         return []
     grips, out = len(columns), []
     nodes = network.node_position[network.inner.ravel()[columns]]
@@ -142,11 +138,11 @@ def _held_nodes(
     network: Network,
     system: System,
     columns: Ints,
-    compliance: GripCompliance | None,
+    compliance: GripCompliance,
     springs: list[_Spring],
 ) -> Held:
     """Return a system whose nodes are held: rigidly, or by springs of soft grips."""
-    count, compliance = len(system.load) // 6, compliance or GripCompliance()
+    count = len(system.load) // 6
     blocks, taken = [np.eye(6)] * count, np.zeros_like(system.load)
     pads, pull = [sparse.csr_array((6, 6))] * count, np.zeros_like(system.load)
     rigid, far = ~compliance.soft(1, len(columns))[0], compliance.offsets(1, len(columns))[0]

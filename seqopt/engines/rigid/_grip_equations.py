@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from seqopt.arrays import Bools, Floats, Ints, frozen
-from seqopt.engines._grip_compliance import GripCompliance
+from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import _couples
 from seqopt.engines.rigid._operator import ComplianceOperator, Doubts
 
@@ -175,7 +175,7 @@ def grip_forces(
     columns: Ints,
     index: Ints,
     pairs: Pairs | None = None,
-    compliance: GripCompliance | None = None,
+    compliance: GripCompliance = RIGID,
 ) -> _GripForces:
     """Return the forces of grips, by which their nodes stay, or go as far as they are compliant.
 
@@ -187,11 +187,7 @@ def grip_forces(
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
-    off = (
-        None
-        if compliance is None or compliance.moved is None
-        else _in_rows(operator, -compliance.moved)
-    )
+    off = None if compliance.moved is None else _in_rows(operator, -compliance.moved)
     dead = operator.dead_displacement.take(rows)
     force, pivot = _solved(operator, pairs, rows, dead, compliance, off)
     return _GripForces(force.T, pivot)
@@ -202,7 +198,7 @@ def trusted(
     index: Ints,
     found: _GripForces,
     most: float,
-    compliance: GripCompliance | None = None,
+    compliance: GripCompliance = RIGID,
 ) -> Bools:
     """Return which sets' forces (S,) rounding changes little enough.
 
@@ -211,17 +207,15 @@ def trusted(
     """
     doubts = operator.doubts if isinstance(operator, ComplianceOperator) else operator
     lowest, least = found.lowest, np.inf
-    if compliance is None or compliance.moved is None:  # else forces may undo what the weight does
-        own = (
-            0.0 if compliance is None else 2.0
-        )  # of what soft grips yield, that forces undo as well
+    if compliance.moved is None:  # else forces may undo what the weight does
+        own = 0.0 if compliance.rigid else 2.0  # of what soft grips yield, that forces undo as well
         least = len(found.pivot) * doubts.worst + own
     out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
         return out
     rest = slice(None) if len(out) <= _MANY else np.flatnonzero(~out & (lowest > 0))
     part = _GripForces(found.force[rest], found.pivot[:, rest])
-    own_compliance = None if compliance is None else compliance.select(rest)
+    own_compliance = compliance.select(rest)
     sure = _doubts(operator, index[rest], part, own_compliance) <= most
     out[rest] |= sure & (lowest[rest] > 0)
     return out
@@ -231,7 +225,7 @@ def _doubts(
     operator: ComplianceOperator | Doubts,
     index: Ints,
     found: _GripForces,
-    compliance: GripCompliance | None = None,
+    compliance: GripCompliance = RIGID,
 ) -> Floats:
     """Return the error (S,) of forces for rounding of one part in one, over the largest of each.
 
@@ -245,7 +239,7 @@ def _doubts(
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         own += (root * size).sum(axis=0)
         own *= scale
-        if isinstance(operator, ComplianceOperator) and compliance is not None:
+        if isinstance(operator, ComplianceOperator) and not compliance.rigid:
             own = _with_compliance(operator, own, size, root / scale, compliance)
         own /= found.pivot
         most = size.max(axis=0, initial=np.finfo(float).tiny)
@@ -287,7 +281,7 @@ def still_forces(
     columns: Ints,
     index: Ints,
     moved: Floats,
-    compliance: GripCompliance | None = None,
+    compliance: GripCompliance = RIGID,
     off: Floats | None = None,
 ) -> Floats:
     """Return the forces (S, k) with which grips undo given displacements of their nodes.
@@ -339,7 +333,7 @@ def _solved(
     pairs: Pairs,
     rows: Ints,
     dead: Floats,
-    compliance: GripCompliance | None,
+    compliance: GripCompliance,
     off: Floats | None,
 ) -> tuple[Floats, Floats]:
     """Return forces at loads (k, S) that undo displacements (k, S), and scaled pivots (k, S).
@@ -358,7 +352,7 @@ def _solved(
     np.negative(dead, out=system[-1])
     scale = 1 / operator.softness if operator.loose else 1.0
     apart = None
-    if compliance is not None and compliance.matrix is not None:
+    if compliance.matrix is not None:
         apart = _soften(system, operator, pairs, compliance, off)
     else:
         if off is not None:

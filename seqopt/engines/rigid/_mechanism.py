@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines._grip_compliance import GripCompliance
+from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.errors import MechanismError
 from seqopt.network._mechanics import (
     Statics,
@@ -148,11 +148,9 @@ def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csc_array:
 _UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
 
 
-def _kept_from_turning(columns: Ints, bricks: int, compliance: GripCompliance | None) -> Floats:
+def _kept_from_turning(columns: Ints, bricks: int, compliance: GripCompliance) -> Floats:
     """Return the turns (n, 6b) of bricks that grips of one set resist."""
-    turns = np.zeros(len(columns), dtype=bool)
-    if compliance is not None:
-        turns = compliance.transmit_moments(1, len(columns))[0]
+    turns = compliance.transmit_moments(1, len(columns))[0]
     out = np.zeros((3 * int(turns.sum()), 6 * bricks))
     for n, brick in enumerate(columns[turns] // 2):
         out[3 * n : 3 * n + 3, 6 * brick + 3 : 6 * brick + 6] = np.eye(3)
@@ -160,7 +158,7 @@ def _kept_from_turning(columns: Ints, bricks: int, compliance: GripCompliance | 
 
 
 def free_motion(
-    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance = RIGID
 ) -> Floats | None:
     """Return a motion that deforms no spring with any stiffness and moves no held node.
 
@@ -183,7 +181,7 @@ def free_motion(
 
 
 def require_resistance(
-    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance = RIGID
 ) -> None:
     """Raise `MechanismError` if one grip set leaves a motion that nothing resists.
 

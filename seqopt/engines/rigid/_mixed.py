@@ -22,7 +22,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.engines._grip_compliance import GripCompliance
+from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines._twice import add_products
 from seqopt.engines.interface import Fields, join_sets, no_sets
 from seqopt.engines.rigid._mechanism import Ungripped, require_resistance, ungripped_system
@@ -133,10 +133,7 @@ class MixedSystem(FrozenValue):
 
 
 def mixed_system(
-    parts: Ungripped,
-    grips: Ints,
-    shift: Floats | None = None,
-    compliance: GripCompliance | None = None,
+    parts: Ungripped, grips: Ints, shift: Floats | None = None, compliance: GripCompliance = RIGID
 ) -> MixedSystem:
     """Return the system of one grip set.
 
@@ -153,7 +150,7 @@ def mixed_system(
     force = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
     rows = sparse.csr_array(sparse.csr_array(force.T) @ motion)
     corner, weight = None, np.ones(force.shape[1])
-    if compliance is not None and compliance.matrix is not None:
+    if compliance.matrix is not None:
         rows, force, flexibility = _with_flexibility(parts, grips, rows, force, compliance)
         corner = parts.unit * flexibility
         weight = 1 / np.maximum(1.0, np.diag(corner))
@@ -258,7 +255,7 @@ _LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it make
 
 
 def solve_mixed(
-    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance = RIGID
 ) -> Fields:
     """Return the fields of grip sets, one factorization for each.
 
@@ -268,7 +265,7 @@ def solve_mixed(
     parts = ungripped_system(network, bricks)
     answers = [no_sets(network, bricks, columns.shape[1])]
     for i, grips in enumerate(columns):
-        own = None if compliance is None else compliance.select(slice(i, i + 1))
+        own = compliance.select(slice(i, i + 1))
         solution = solve_load(parts, grips, parts.load, parts.moved, own)
         answers.append(respond(network, parts.statics, parts.motion, grips[None], solution))
     return join_sets(answers)
@@ -279,7 +276,7 @@ def solve_load(
     grips: Ints,
     pull: Floats,
     moved: Floats | float = 0.0,
-    compliance: GripCompliance | None = None,
+    compliance: GripCompliance = RIGID,
 ) -> Solution:
     """Return how a partial structure answers to a load while a grip set holds its nodes still.
 
@@ -293,7 +290,7 @@ def solve_load(
     joints, last = len(parts.wrench_unit), len(parts.wrench_unit) + len(parts.twist_unit)
     load = np.zeros(system.matrix.shape[0])
     load[:joints], load[joints:last] = moved, pull
-    if compliance is not None and compliance.moved is not None:
+    if compliance.moved is not None:
         load[last:] = system.weight * (system.force[: 3 * len(grips)].T @ compliance.moved.ravel())
     try:
         factors = splu(system.matrix)
@@ -337,7 +334,7 @@ def _corrected(
 
 
 def borne(
-    force: Floats, grips: int, compliance: GripCompliance | None
+    force: Floats, grips: int, compliance: GripCompliance
 ) -> tuple[Floats, Floats, Bools | None]:
     """Return forces, N, and moments, N m, of grips (S, r, 3), and which are soft.
 
@@ -345,9 +342,9 @@ def borne(
     """
     sets = len(force)
     moment = np.zeros((sets, grips, 3))
-    if compliance is not None and force.shape[1] > 3 * grips:
+    if force.shape[1] > 3 * grips:
         moment = compliance.lever * force[:, 3 * grips :].reshape(sets, grips, 3)
-    soft = None if compliance is None else compliance.soft(sets, grips)
+    soft = compliance.soft(sets, grips)
     return force[:, : 3 * grips].reshape(sets, grips, 3), moment, soft
 
 

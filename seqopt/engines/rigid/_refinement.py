@@ -30,7 +30,7 @@ from scipy.sparse import csgraph
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._grip_compliance import GripCompliance, _lever_of
+from seqopt.engines._grip_compliance import RIGID, GripCompliance, _lever_of
 from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import _by_grip, grip_forces, still_forces
 from seqopt.engines.rigid._hanging import Hanging, HangingSystem
@@ -265,7 +265,7 @@ class Refinement:
         operator: ComplianceOperator | None = None,
         largest: float = LAST_CORRECTION,
         basis: Basis = SPACE,
-        compliance: GripCompliance | None = None,
+        compliance: GripCompliance = RIGID,
     ) -> Fields:
         """Return all fields of grip sets.
 
@@ -278,7 +278,7 @@ class Refinement:
         if operator is None or self.held.loose:
             operator, basis = self.own, SPACE
         corrector = _Corrector(self, operator, largest, basis)
-        own = [None if compliance is None else compliance.select(part) for part in every]
+        own = [compliance.select(part) for part in every]
         parts = (corrector.together(columns[p], h) for p, h in zip(every, own, strict=True))
         return join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
 
@@ -318,7 +318,7 @@ class _Asked(NamedTuple):
 
     columns: Ints  # (S, r)
     loads: Ints  # (S, k); rows of the operator's loads at the grips
-    compliance: GripCompliance | None  # in the operator's directions
+    compliance: GripCompliance  # in the operator's directions
 
     @property
     def grips(self) -> int:
@@ -327,7 +327,7 @@ class _Asked(NamedTuple):
 
     def of(self, which: Ints) -> _Asked:
         """Return some of the sets."""
-        compliance = None if self.compliance is None else self.compliance.select(which)
+        compliance = self.compliance.select(which)
         return _Asked(self.columns[which], self.loads[which], compliance)
 
 
@@ -345,27 +345,27 @@ class _Corrector:
         self.held, self.inner = system.held, system.inner
         self.operator, self.largest, self.basis = operator, largest, basis
 
-    def together(self, columns: Ints, compliance: GripCompliance | None = None) -> Fields:
+    def together(self, columns: Ints, compliance: GripCompliance = RIGID) -> Fields:
         """Return the fields of a few sets."""
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)
-        own = None if compliance is None else compliance.within(self.basis.force, self.basis.wrench)
+        own = compliance.within(self.basis.force, self.basis.wrench)
         found = grip_forces(operator, columns, index, compliance=own)
         if operator.loose:
             for at in np.flatnonzero(~(found.lowest >= _HARDLY_HELD)):
-                mine = None if compliance is None else compliance.select(slice(at, at + 1))
+                mine = compliance.select(slice(at, at + 1))
                 require_resistance(self.network, bricks, columns[at], mine)
         states = self._states(index, found.force)
         force = self._in_space(found.force, columns.shape[1])
         done = self._correct(_Asked(columns, index, own), states, force)
         wrench, twist = unscaled(parts, states[done])
-        mine = None if compliance is None else compliance.select(done)
+        mine = compliance.select(done)
         solution = Solution(twist, wrench, *borne(force[done], columns.shape[1], mine))
         motion = operator.maps.motion if self.basis is SPACE else parts.motion
         fields = respond(self.network, parts.statics, motion, columns[done], solution)
         if done.all():
             return fields
-        rest = None if compliance is None else compliance.select(~done)
+        rest = compliance.select(~done)
         return merge_sets(done, fields, solve_mixed(self.network, bricks, columns[~done], rest))
 
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
@@ -442,7 +442,7 @@ class _Corrector:
     def _off(self, asked: _Asked, force: Floats) -> Floats | None:
         """Return how far grips let their nodes be, (S, r, w); None if rigid and in place."""
         compliance, grips = asked.compliance, asked.grips
-        if compliance is None:
+        if compliance.rigid:
             return None
         width, moments = self.operator.directions, self.operator.moments
         out = np.zeros((len(force), grips, width + moments))

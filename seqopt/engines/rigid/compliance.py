@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._grip_compliance import GripCompliance, read_compliance
+from seqopt.engines._grip_compliance import RIGID, GripCompliance, read_compliance
 from seqopt.engines.interface import (
     SHAPES,
     SPACE,
@@ -111,7 +111,7 @@ class _Tried:
 def _try_forces(
     operator: ComplianceOperator,
     columns: Ints,
-    compliance: GripCompliance | None = None,
+    compliance: GripCompliance = RIGID,
     *,
     even: bool,
     accuracy: float,
@@ -127,18 +127,17 @@ def _try_forces(
     for start in range(0, sets, _CHUNK):
         part = slice(start, start + _CHUNK)
         mine = pairs if sets <= _CHUNK else pairs.within(start, start + _CHUNK)
-        own = None if compliance is None else compliance.select(part)
+        own = compliance.select(part)
         found = grip_forces(operator, columns[part], index[part], mine, own)
         force[part] = found.force
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
     if np.count_nonzero(good) < sets:
         force[~good] = 0.0
-    if compliance is not None and len(pairs.sets):
+    if not compliance.rigid and len(pairs.sets):
         pairs = pairs.only(pairs.rigid(compliance, *columns.shape))
     if not even:
         good &= ~_cancels(operator, index, force)
-    lever = 1.0 if compliance is None else compliance.lever
-    return _Tried(operator, columns, index, force, pairs, lever, good)
+    return _Tried(operator, columns, index, force, pairs, compliance.lever, good)
 
 
 def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
@@ -230,22 +229,16 @@ class ComplianceEngine(NamedEngine):
         found = self._found(bricks, columns, compliance, want)
         return require_finite(found, bricks, grips)
 
-    def _require_known(self, columns: Ints, compliance: GripCompliance | None) -> None:
+    def _require_known(self, columns: Ints, compliance: GripCompliance) -> None:
         """Raise `GripError` where a grip set is none that the directions of bricks can answer."""
 
-    def _found(
-        self, bricks: int, columns: Ints, compliance: GripCompliance | None, want: Want
-    ) -> Fields:
+    def _found(self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want) -> Fields:
         """Return what is wanted of grip sets, corrected where the operator is not enough."""
         tried: _Tried | None = None
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._even
             accuracy = self._accepted(want)
-            own = (
-                None
-                if compliance is None
-                else compliance.within(self._basis.force, self._basis.wrench)
-            )
+            own = compliance.within(self._basis.force, self._basis.wrench)
             tried = _try_forces(operator, columns, own, even=even, accuracy=accuracy)
         sure = 0 if tried is None else np.count_nonzero(tried.trusted)
         if tried is None or (len(columns) and not sure):
@@ -257,7 +250,7 @@ class ComplianceEngine(NamedEngine):
                 found["grip_moment"] = found["grip_moment"] @ self._basis.moment
         if sure < len(columns):
             wrong = ~tried.trusted
-            rest = None if compliance is None else compliance.select(wrong)
+            rest = compliance.select(wrong)
             better = self._refined(bricks, columns[wrong], rest, want)
             for name, values in found.items():
                 values[wrong] = getattr(better, name)
@@ -275,7 +268,7 @@ class ComplianceEngine(NamedEngine):
         columns, numbers = grip_columns(self._network, bricks, grips), np.asarray(grips)
         compliance = read_compliance(self._network, columns, numbers, None)
         self._require_known(columns, compliance)
-        if not compiled or compliance is not None or not can_compile():
+        if not compiled or not compliance.rigid or not can_compile():
             fields = self._found(bricks, columns, compliance, want)
             return extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
@@ -289,7 +282,7 @@ class ComplianceEngine(NamedEngine):
                 self._grown.reach(bricks)
                 found, size, apart = _try_grown(self._grown, columns, want, accuracy)
         if np.count_nonzero(apart):
-            fields = self._found(bricks, columns[apart], None, want)
+            fields = self._found(bricks, columns[apart], RIGID, want)
             rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
@@ -353,7 +346,7 @@ class ComplianceEngine(NamedEngine):
         return GrownExtremes(self._builder)
 
     def _refined(
-        self, bricks: int, columns: Ints, compliance: GripCompliance | None, want: Want
+        self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want
     ) -> Fields:
         """Return what is wanted of grip sets that the operator alone answers not well enough."""
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
