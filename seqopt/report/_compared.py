@@ -30,6 +30,11 @@ RESPONSES = {
 }  # above each column of responses, and how wide it is
 OF_PAPER = "In the paper: "  # with which notes about it begin
 MODIFIED = "modified-sequential"
+TITLES = {
+    CLOSED: "fixed sequences, nothing to choose",
+    MODIFIED: "modified sequential method, some grips chosen",
+    FREE: "free schedule: any robot may place, hold or release next",
+}  # above the rows of a problem
 
 
 def format_comparison(
@@ -104,11 +109,20 @@ def _responses(comparison: Comparison) -> Iterator[str]:
         cells = (f"{names[line]:>{names[2]}}" for names in RESPONSES.values())
         yield f"{'':{NAME}}{''.join(cells)}".rstrip()
     for problem, rows in comparison.table.groupby("problem", sort=False):
-        yield _title_of(str(problem))
+        yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")
         for name, more in _unlike(rows).items():
             label = f"  {name}{f' +{more}' if more else ''}"
-            row = "".join(_cells(comparison, name, rows.T[name]))
-            yield f"{label:{NAME}}{row}".rstrip()
+            row, paper, cells = rows.T[name], printed_largest(comparison, name), ""
+            marks = {
+                "F_rob": "!" if row["overloaded"] else " ",
+                "D_max": "?" * bool(row["outside"]),
+            }
+            for response, (_, _, width) in RESPONSES.items():
+                value = float(row[response])
+                said = f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
+                said += f" ({paper[response]:.1f})" if response in paper else ""
+                cells += f"{said + marks.get(response, ''):>{width}}"
+            yield f"{label:{NAME}}{cells}".rstrip()
 
 
 def _stands(comparison: Comparison) -> Iterator[str]:
@@ -117,7 +131,7 @@ def _stands(comparison: Comparison) -> Iterator[str]:
     heads = "".join(f"{each.mortar:>9}" for each in first)
     yield f"{'':{NAME}}{'steps':>5}{heads}   first, {first[0].mortar}".rstrip()
     for problem, rows in comparison.table.groupby("problem", sort=False):
-        yield _title_of(str(problem))
+        yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")
         same: dict[object, list[str]] = {}
         for name in map(str, rows.index):
             same.setdefault(comparison.verdicts[name], []).append(name)
@@ -140,18 +154,6 @@ def _plainness(name: str) -> tuple[bool, bool, str]:
     if found is None:
         return False, False, name
     return found.kind is not FormulationKind.EXACT, found.takes_budgets, name
-
-
-def _cells(comparison: Comparison, name: str, row: pd.Series[float]) -> Iterator[str]:
-    """Yield the largest responses of a row, each with what the paper prints."""
-    paper = printed_largest(comparison, name)
-    for response, (_, _, width) in RESPONSES.items():
-        value = float(row[response])
-        said = f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
-        said += f" ({paper[response]:.1f})" if response in paper else ""
-        if response == "F_rob":
-            said += "!" if row["overloaded"] else " "
-        yield f"{said + ('?' if response == 'D_max' and row['outside'] else ''):>{width}}"
 
 
 def printed_largest(comparison: Comparison, name: str) -> dict[str, float]:
@@ -189,7 +191,7 @@ def _choices(comparison: Comparison) -> Iterator[str]:
     yield f"{'':{NAME}}{'objective':>10}{'gap':>9}{'steps':>7}{'models':>9}{'seconds':>9}  kind"
     chosen = comparison.table[comparison.table["objective"].notna()]
     for problem, rows in chosen.groupby("problem", sort=False):
-        yield _title_of(str(problem))
+        yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")
         for name, row in rows.iterrows():
             steps = len(comparison.tables[str(name)])
             models, seconds = (
@@ -237,16 +239,6 @@ def _notes(comparison: Comparison) -> Iterator[list[str]]:
         if found:
             lines = [f"- {text.removeprefix(OF_PAPER)}" for text in found]
             yield [heading, *lines]
-
-
-def _title_of(problem: str) -> str:
-    """Return what a problem is called above its rows."""
-    titles = {
-        CLOSED: "fixed sequences, nothing to choose",
-        MODIFIED: "modified sequential method, some grips chosen",
-        FREE: "free schedule: any robot may place, hold or release next",
-    }
-    return titles.get(problem, f"{problem} loop, grips chosen by a formulation")
 
 
 def format_details(comparison: Comparison, scene: Scene) -> str:

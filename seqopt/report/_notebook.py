@@ -64,7 +64,13 @@ def card(value: object) -> str:
     images = ""
     with suppress(ExtraError):
         for figure in shown.draw():
-            source = f"data:image/png;base64,{b64encode(_small(figure)).decode()}"
+            from PIL import Image  # noqa: PLC0415  # comes with matplotlib, an extra
+
+            large, small = io.BytesIO(), io.BytesIO()
+            figure.savefig(large, format="png", dpi=DPI)
+            few = Image.open(large).convert("RGB").quantize(COLORS, Image.Quantize.FASTOCTREE)
+            few.save(small, format="png", optimize=True)
+            source = f"data:image/png;base64,{b64encode(small.getvalue()).decode()}"
             images += (
                 f'<img alt="{title}" src="{source}" style="display:block;max-width:100%;'
                 'height:auto;background:#fff;border-radius:6px;margin-bottom:0.5em">'
@@ -75,17 +81,6 @@ def card(value: object) -> str:
         f"</thead><tbody>{cells}</tbody></table>"
         f'<div style="flex:1 1 20em;min-width:0">{images}</div></div>'
     )
-
-
-def _small(figure: Figure) -> bytes:
-    """Return a figure as a small PNG of few colors."""
-    from PIL import Image  # noqa: PLC0415  # comes with matplotlib, an extra
-
-    large, small = io.BytesIO(), io.BytesIO()
-    figure.savefig(large, format="png", dpi=DPI)
-    picture = Image.open(large).convert("RGB")
-    picture.quantize(COLORS, Image.Quantize.FASTOCTREE).save(small, format="png", optimize=True)
-    return small.getvalue()
 
 
 @singledispatch

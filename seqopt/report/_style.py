@@ -110,24 +110,23 @@ def dress(*panels: Axes) -> None:
 def plain(*axes: Axis) -> None:
     """Write the numbers of logarithmic axes as people do: 0.01, 1, 500.
 
-    Between two decades also 2 and 5 are labeled, where fewer than three would be.
+    Powers of ten stand for many zeros. Between two decades also 2 and 5 are labeled, where fewer
+    than three would be.
     """
+
+    def in_full(value: float, _: object) -> str:
+        if 1e-4 <= value < 1e6:
+            return f"{value:,g}"
+        power = int(np.floor(np.log10(value) + 0.01))
+        digit = round(value / 10.0**power)
+        return f"${'' if digit == 1 else f'{digit}·'}10^{{{power}}}$"
+
     for axis in axes:
         low, high = axis.get_view_interval()
         few = np.floor(np.log10(high)) - np.ceil(np.log10(low)) < FEW - 1
         axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: _in_full(value)))
+        axis.set_major_formatter(FuncFormatter(in_full))
         axis.set_minor_locator(NullLocator())
-
-
-def _in_full(value: float) -> str:
-    """Return a number as people write it, as a power of ten where it has many zeros."""
-    if 1e-4 <= value < 1e6:
-        return f"{value:,g}"
-    power = int(np.floor(np.log10(value) + 0.01))
-    digit = round(value / 10.0**power)
-    times = "" if digit == 1 else f"{digit}·"
-    return f"${times}10^{{{power}}}$"
 
 
 def name_panels(*panels: Axes) -> None:

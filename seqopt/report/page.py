@@ -141,7 +141,7 @@ class _Drawn:
 
     wide: bytes
     narrow: bytes
-    said: str
+    alt: str
 
 
 def _structure_data(network: Network) -> dict[str, object]:
@@ -449,7 +449,7 @@ def _part(caption: str, part: pd.DataFrame | _Drawn) -> str:
         return (
             f'<figure class="drawn"><figcaption>{escape(caption)}</figcaption><picture>'
             f'<source media="(max-width: {NARROW}px)" srcset="{narrow}">'
-            f'<img src="{wide}" alt="{escape(part.said)}"></picture></figure>'
+            f'<img src="{wide}" alt="{escape(part.alt)}"></picture></figure>'
         )
     body = (
         part.map(_cell_text)

@@ -122,7 +122,7 @@ def answered(asked: Compare, found: Found) -> Answer:
     headings = [block.partition("\n")[0] for block in blocks]
     blocks += [format_details(result, scene)] if asked.details else []
     if result.speed is not None:
-        blocks.append("\n".join([SPEED, *result.speed.told(wrapped)]))
+        blocks.append("\n".join([SPEED, *result.speed.describe(wrapped)]))
     softly = held_softly(engine, shown_tables(result), grips, asked.tell)
     turns = turning_points(softly, _fixed(result)) if grips else ()
     if grips:

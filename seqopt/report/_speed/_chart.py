@@ -129,10 +129,12 @@ def speed_chart(*speeds: SpeedTable, width: float = WIDTH) -> Figure:
     for speed, title, (gaps, errors) in zip(speeds, titles, panels.T, strict=True):
         gaps.set_title(title, fontsize=None if alone else SMALL)
         errors.set_xlabel("time from scene to plan [s]")
-        for axes, name in ((gaps, "gap"), (errors, "error")):
-            seen = _seen(speed, name)
+        table: pd.DataFrame = speed.table.assign(kept=speed.kept)
+        heights = (100 * table["gap"], table["error"].clip(lower=NONE))  # none is at the foot
+        for axes, height in zip((gaps, errors), heights, strict=True):
+            seen: pd.DataFrame = table.assign(height=height)[np.isfinite(height.to_numpy(float))]
             taken += _points(axes, speed, seen)
-            labels += _named(axes, seen, speed.take.name, engines=name == "error")
+            labels += _named(axes, seen, speed.take.name, engines=axes is errors)
         _limits(speed, gaps, errors)
     _scales(panels, speeds)
     dress(*panels.ravel())
@@ -151,17 +153,6 @@ def _words(row: pd.Series[float]) -> str:
 def _look(engine: str, *, filled: bool = True) -> dict[str, Any]:
     known = ENGINES.index(engine) if engine in ENGINES else len(ENGINES)
     return look(known).mark(filled=filled)
-
-
-def _seen(speed: SpeedTable, name: str) -> pd.DataFrame:
-    """Return the rows with a point, how high it is, and whether it is kept: not dominated.
-
-    Gaps are in percent; an error of none is at the foot of the axis.
-    """
-    table: pd.DataFrame = speed.table.assign(kept=speed.kept)
-    height = 100 * table[name] if name == "gap" else table[name].clip(lower=NONE)
-    found: pd.DataFrame = table.assign(height=height)[np.isfinite(table[name].to_numpy(float))]
-    return found
 
 
 def _points(

@@ -26,11 +26,11 @@ USUAL_NAMES = (USUAL[On.LAYERS], USUAL[On.STATES])
 
 
 def dominated(table: pd.DataFrame) -> Bools:
-    """Return which rows another one beats: at least as good in everything, and better in something.
+    """Return which rows are dominated: another is as good in everything, and better in something.
 
     ``table``: with ``seconds``, ``gap``, ``error`` and ``exact``: what proves its plan is not
-    beaten by what does not. A row without a plan is beaten. Times count as equal where they differ
-    by less than `SAME`, so that noise beats nobody.
+    dominated by what does not. A row without a plan is dominated. Times count as equal where they
+    differ by less than `SAME`, so that noise decides nothing.
     """
     known = np.isfinite(table[["seconds", "gap", "error"]].to_numpy(float)).all(axis=1)
     seconds, proves = table["seconds"].to_numpy(float), table["exact"].to_numpy(bool)
@@ -136,16 +136,18 @@ class SpeedTable:
     def rows(self) -> pd.DataFrame:
         """Return the table in words, gaps in percent, with a mark for what nobody beats."""
         table = self.table
-        names = [way_named(row, engine=False) for _, row in table.iterrows()]
-        marks = np.where(self.kept, "yes", "")
-        found = pd.DataFrame({"engine": table["engine"], "formulation": names})
-        found["time, s"] = table["seconds"]
-        found["above the best, %"] = 100 * table["gap"]
-        found["error of responses"] = table["error"]
-        found["how it ended"], found["not beaten"] = table["status"], marks
-        return found
+        columns = {
+            "engine": table["engine"],
+            "formulation": [way_named(row, engine=False) for _, row in table.iterrows()],
+            "time, s": table["seconds"],
+            "above the best, %": 100 * table["gap"],
+            "error of responses": table["error"],
+            "how it ended": table["status"],
+            "not beaten": np.where(self.kept, "yes", ""),
+        }
+        return pd.DataFrame(columns)
 
-    def told(self, wrapped: Callable[[str], str]) -> Iterator[str]:
+    def describe(self, wrapped: Callable[[str], str]) -> Iterator[str]:
         """Yield what to take, the table, and what its columns are, as lines."""
         yield from (wrapped(self.sentence), "", *self.lines(), "")
         yield wrapped(
@@ -164,9 +166,10 @@ class SpeedTable:
             for at, row in own.drop(without.index).iterrows():
                 mark = "*" if self.kept[self.table.index.get_loc(at)] else " "
                 late = f"  {CUT}" if row["status"] == CUT else ""
+                gap = "forbidden" if np.isinf(row["gap"]) else f"{100 * row['gap']:.2g} %"
                 yield (
                     f"{mark} {way_named(row, engine=False):27}{_digits(row['seconds']):>9}"
-                    f"{gap_text(row['gap']):>10}{error_text(row['error']):>10}{late}"
+                    f"{gap:>10}{error_text(row['error']):>10}{late}"
                 )
             for _, rows in without.groupby("why", sort=False):
                 one = way_named(rows.iloc[0], engine=False)
@@ -199,11 +202,6 @@ def seconds_text(seconds: float) -> str:
     ('0.101 s', '26.0 s', '512 s')
     """
     return f"{_digits(seconds)} s"
-
-
-def gap_text(gap: float) -> str:
-    """Return a gap in percent."""
-    return "-" if np.isnan(gap) else "forbidden" if np.isinf(gap) else f"{100 * gap:.2g} %"
 
 
 def error_text(error: float) -> str:
