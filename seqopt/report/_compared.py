@@ -106,8 +106,8 @@ def _unlike(table: pd.DataFrame) -> dict[str, int]:
 def _responses(comparison: Comparison) -> Iterator[str]:
     """Yield the table of the largest responses; rows with the same figures are one."""
     for line in (0, 1):
-        cells = (f"{names[line]:>{names[2]}}" for names in RESPONSES.values())
-        yield f"{'':{NAME}}{''.join(cells)}".rstrip()
+        heads = (f"{names[line]:>{names[2]}}" for names in RESPONSES.values())
+        yield f"{'':{NAME}}{''.join(heads)}".rstrip()
     for problem, rows in comparison.table.groupby("problem", sort=False):
         yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")
         for name, more in _unlike(rows).items():
