@@ -13,10 +13,11 @@ import os
 import shlex
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, is_dataclass, replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -27,10 +28,9 @@ from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import Reader, cut, in_words, short, which_fit
 from seqopt.scene._durations import Durations
 from seqopt.scene._overlaps import overlapping
-from seqopt.scene._props import Prop
 from seqopt.scene.arm import Arm
-from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Load, Reach, Robot, Side, Sphere
-from seqopt.scene.scene import Scene, in_order
+from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Robot, Side, Sphere
+from seqopt.scene.scene import _KINDS, Scene, in_order
 from seqopt.scene.shape import Polyhedron
 
 _SHOWN = 3  # pairs of bricks that interpenetrate; more are counted
@@ -105,15 +105,9 @@ def _named(bricks: list[Brick]) -> str:
 
 
 _VERSION = 1
-_UNSAID = (
-    *("thickness", "face", "shape", "node_offsets", "movement", "position", "since"),
-    *("stiffness", "rotational_stiffness", "arm", "durations", "speed"),  # of robots
-    *("direction", "capacity"),  # of props
-)
-"""Left out of a file where there is none."""
-_UNLOADED = {"loads": (), "wind": (0.0, 0.0, 0.0), "weight_factor": 1.0, "props": ()}
-# not said either
+_SAID = ("blocked_nodes", "gravity", "provenance", "closes_with")  # in files by default as well
 _REACHES: dict[str, type[Reach]] = {"anywhere": Anywhere, "side": Side, "sphere": Sphere}
+_ANYWHERE = MappingProxyType({"kind": "anywhere"})
 _DATA = resources.files("seqopt").joinpath("data")
 
 
@@ -377,20 +371,8 @@ def _scene_from_document(document: object, source: str) -> Scene:
 def _scene_from_dict(document: dict[str, Any]) -> Scene:
     """Return the scene of a document that obeys the schema."""
     content = {key: value for key, value in document.items() if key not in ("format", "version")}
-    content["bricks"] = [_brick(**brick) for brick in content["bricks"]]
-    content["joints"] = [Joint(**joint) for joint in content["joints"]]
-    content["grounds"] = [Ground(**ground) for ground in content["grounds"]]
-    content["loads"] = [Load(**load) for load in content.get("loads", ())]
-    content["props"] = [Prop(**prop) for prop in content.get("props", ())]
-    content["robots"] = [
-        Robot(
-            **robot
-            | {"reach": _reach(**robot.get("reach", {"kind": "anywhere"}))}
-            | ({"arm": Arm(**robot["arm"])} if robot.get("arm") else {})
-            | ({"durations": Durations(**robot["durations"])} if robot.get("durations") else {})
-        )
-        for robot in content["robots"]
-    ]
+    for kind, make in {**_KINDS, "bricks": _brick, "robots": _robot}.items():
+        content[kind] = [make(**entry) for entry in content.get(kind, ())]
     return Scene(**content)
 
 
@@ -402,29 +384,30 @@ def _brick(shape: dict[str, Any] | None = None, **entry: Any) -> Brick:
     return Brick(**entry, shape=solid)
 
 
+def _robot(reach: Mapping[str, Any] = _ANYWHERE, **entry: Any) -> Robot:
+    within = {key: value for key, value in reach.items() if key != "kind"}
+    for name, kind in (("arm", Arm), ("durations", Durations)):
+        entry[name] = kind(**entry[name]) if entry.get(name) else None
+    return Robot(**entry, reach=_REACHES[reach["kind"]](**within))
+
+
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
     """Return a scene as a document that obeys the schema."""
-    document = {"format": "seqopt-scene", "version": _VERSION, **asdict(scene)}
-    for key, usual in _UNLOADED.items():
-        if document[key] == usual:
-            del document[key]
-    kinds = ("bricks", "joints", "grounds", "robots", "loads", "props")
-    for kind in (kind for kind in kinds if kind in document):
-        document[kind] = tuple(map(_said, document[kind]))
-    names = {cls: kind for kind, cls in _REACHES.items()}
-    for entry, robot in zip(document["robots"], scene.robots, strict=True):
-        entry["reach"] = {"kind": names[type(robot.reach)], **entry["reach"]}
-        if robot.durations is not None:
-            entry["durations"] = _said(entry["durations"])
-        if robot.arm is not None:
-            usual = {each.name: each.default for each in fields(Arm)}
-            entry["arm"] = {k: v for k, v in entry["arm"].items() if v != usual[k]}
-    return document
+    return {"format": "seqopt-scene", "version": _VERSION, **_entry(scene)}
 
 
-def _said(entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry without what is none and then left out."""
-    return {key: value for key, value in entry.items() if value is not None or key not in _UNSAID}
+def _entry(part: Any) -> dict[str, Any]:
+    """Return the fields of a part of a scene by name, without what is as it is by default."""
+    kinds = {cls: {"kind": kind} for kind, cls in _REACHES.items()}
+    out: dict[str, Any] = {**kinds.get(type(part), {})}
+    for each in fields(part):
+        value = getattr(part, each.name)
+        if value != each.default or each.name in _SAID:
+            several = isinstance(value, tuple) and value and is_dataclass(value[0])
+            out[each.name] = tuple(map(_entry, value)) if several else value
+            if is_dataclass(value):
+                out[each.name] = _entry(value)
+    return out
 
 
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:
@@ -469,7 +452,3 @@ def _from(folder: Path | None, model: str) -> Path:
     if folder is None or not place.is_relative_to(folder):
         return place
     return place.relative_to(folder)
-
-
-def _reach(kind: str, **given: Any) -> Reach:
-    return _REACHES[kind](**given)
