@@ -8,13 +8,13 @@ props do.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 from seqopt.arrays import Terse, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import check, positive, unless_none, vector, whole
+from seqopt.scene._checks import check, positive, settle, unless_none, vector, whole
 from seqopt.scene.parts import Brick, Robot, _each_way
 
 _NEAR = 1.0  # of a node from where a prop is said to be, over the smallest side of its brick
@@ -55,7 +55,14 @@ class Prop(Terse):
             raise SceneError("prop: give the node that it holds, or a position near one")
         newtons = unless_none(partial(positive, unit="N"))
         ways = unless_none(partial(_each_way, unit="N/m, or none if rigid"))
-        check(self, self.label, stiffness=ways, direction=unless_none(_unit), capacity=newtons)
+        check(self, self.label, stiffness=ways, direction=unless_none(vector), capacity=newtons)
+        if self.direction is not None:
+            size = math.hypot(*self.direction)
+            if not size > 0:
+                given = list(self.direction)
+                raise SceneError(f"{self.label}: direction is {given}; give one that is not zero")
+            x, y, z = self.direction  # no zero with a minus
+            settle(self, direction=(x / size + 0.0, y / size + 0.0, z / size + 0.0))
 
     @property
     def label(self) -> str:
@@ -67,14 +74,6 @@ class Prop(Terse):
         """A robot that gives way and carries as much."""
         payload = math.nextafter(math.inf, 0) if self.capacity is None else self.capacity
         return Robot(name=self.label, payload=payload, stiffness=self.stiffness)
-
-
-def _unit(where: str, values: Iterable[float]) -> Vector:
-    x, y, z = vector(where, values)
-    size = math.hypot(x, y, z)
-    if not size > 0:
-        raise SceneError(f"{where} is {[x, y, z]}; give one that is not zero")
-    return x / size + 0.0, y / size + 0.0, z / size + 0.0  # no zero with a minus
 
 
 def settled_props(props: Sequence[Prop], bricks: Mapping[int, Brick]) -> tuple[Prop, ...]:

@@ -178,22 +178,22 @@ def arch(form: ArchForm) -> Scene:
     >>> arch(ArchForm(span=2.0, rise=0.7, bricks=12))
     <Scene circular arch 2 x 0.7: 12 bricks, 11 joints, 2 ground ends, 3 robots>
     """
-    return _first_that_fits("arch", form, lambda count: _arch(form, count))
+    return _first_that_fits(form, lambda count: _arch(form, count))
 
 
-def _first_that_fits(what: str, form: ArchForm, make: Callable[[int], Scene]) -> Scene:
+def _first_that_fits(form: ArchForm, make: Callable[[int], Scene]) -> Scene:
     """Return the scene of the first number of bricks that can be built, the best ones first."""
     refused: SceneError | None = None
-    for count in [form.bricks] if form.bricks else _counts(form)[:_TRIED]:
+    for count in [form.bricks] if form.bricks else _counts(form):
         try:
             return make(count)
         except SceneError as error:
             refused = refused or error
-    raise refused or SceneError(f"{what}: no number of bricks fills its curve; give one")
+    raise refused or SceneError("arch: no number of bricks fills its curve; give one")
 
 
 def _arch(form: ArchForm, count: int) -> Scene:
-    gap, points = _laid(form, form.line, count)
+    gap, points = _laid(form, count)
     step = np.diff(points, axis=0)
     long, width, thickness = form.dimensions
     shift, turn = form.law.over_rectangle(width, thickness)
@@ -229,17 +229,17 @@ def _counts(form: ArchForm) -> list[int]:
     few_enough("arch", most // 2)
     over = np.cumsum(form.lengths(most) + form.gap) - way
     off = np.abs(over) / np.arange(1, most + 1)  # what each joint is wider, or narrower
-    return [int(count) + 2 for count in np.argsort(off[1:], kind="stable")]
+    return [int(count) + 2 for count in np.argsort(off[1:], kind="stable")[:_TRIED]]
 
 
-def _laid(form: ArchForm, line: _Line, count: int) -> tuple[float, Floats]:
+def _laid(form: ArchForm, count: int) -> tuple[float, Floats]:
     """Return the width of the joints, and the points (n + 1, 2) between bricks that fill a curve.
 
     The first and the last brick end at a springing, half a joint behind and before.
     """
     from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
 
-    lengths = form.lengths(count)
+    lengths, line = form.lengths(count), form.line
 
     def left(gap: float) -> float:
         points = _chords(line, lengths[:-1] + gap)
@@ -383,12 +383,12 @@ def _barrel(
         gap=gap,
         density=density,
     )
-    return _first_that_fits("vault", form, lambda count: _vault(form, columns, count))
+    return _first_that_fits(form, lambda count: _vault(form, columns, count))
 
 
 def _vault(form: ArchForm, columns: int, courses: int) -> Scene:
     few_enough("vault", columns * courses)
-    _, points = _laid(form, form.line, courses)
+    _, points = _laid(form, courses)
     step = np.diff(points, axis=0)
     tangents = np.insert(step / np.linalg.norm(step, axis=1)[:, None], 1, 0.0, axis=1)
     ends = np.insert(points, 1, 0.0, axis=1)  # in space

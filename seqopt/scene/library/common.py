@@ -324,8 +324,13 @@ def _overlaps(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _O
     """Return where boxes look at each other, by default with the faces that do so most."""
     a, b = np.array(pairs, dtype=np.int64).T
     step = shapes.place[b] - shapes.place[a]
-    if normals is None:
-        axes = _facing(shapes, a, b)
+    if normals is None:  # of the first's faces, each with the most nearly parallel one of the
+        # second, those beyond which the other box lies farthest, in its size
+        turned = shapes.frame[a] @ shapes.frame[b].transpose(0, 2, 1)
+        partner = np.abs(turned).argmax(axis=2)
+        second = np.take_along_axis(_beyond(shapes, b, a), partner, axis=1)
+        facing = (_beyond(shapes, a, b) + second).argmax(axis=1)
+        axes = facing, partner[np.arange(len(a)), facing]
     else:  # across the faces that look most nearly along given directions
         size = (np.abs(shapes.frame[i] @ normals[:, :, None])[..., 0] for i in (a, b))
         axes = next(size).argmax(axis=1), next(size).argmax(axis=1)
@@ -369,19 +374,6 @@ def _between(shapes: Boxes, pairs: _Pairs, found: _Overlaps) -> tuple[Floats, li
     widest = end - start + taper
     thick: list[float] = np.where(widest > THICKEST * thin, widest, 0.0).tolist()
     return place, thick
-
-
-def _facing(shapes: Boxes, a: Ints, b: Ints) -> tuple[Ints, Ints]:
-    """Return the axes across the faces of first and second boxes that look at each other.
-
-    Of the first's faces, each with the most nearly parallel one of the second, it is those beyond
-    which the other box lies farthest, in its size.
-    """
-    turned = shapes.frame[a] @ shapes.frame[b].transpose(0, 2, 1)
-    partner = np.abs(turned).argmax(axis=2)
-    second = np.take_along_axis(_beyond(shapes, b, a), partner, axis=1)
-    axis = (_beyond(shapes, a, b) + second).argmax(axis=1)
-    return axis, partner[np.arange(len(a)), axis]
 
 
 def _beyond(shapes: Boxes, which: Ints, other: Ints) -> Floats:
