@@ -74,14 +74,6 @@ class StateRows(Terse):
         """The places of nodes in build order, from 1."""
         return {node: i for i, node in enumerate(node_numbers(self.network), start=1)}
 
-    @cached_property
-    def _distance(self) -> Floats:
-        """Distances of nodes, (2B + 1, 2B + 1), m; none from or to node 0."""
-        at = self.network.node_position[self.network.inner.ravel()]
-        out = np.zeros((len(at) + 1,) * 2)
-        out[1:, 1:] = np.linalg.norm(at[:, None] - at[None], axis=2)
-        return frozen(out)
-
     def require_codes(self, regrips: int = 0) -> None:
         """Raise a `StepError` if states of a level are more than can be numbered."""
         base = 1 + (2 if self.parks else 1) * 2 * len(self.network.inner)
@@ -181,6 +173,14 @@ class FreeSpace(StateRows):
     def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves that place the next brick: none of them is a regrip."""
         return ((self.places(level, states), False),)
+
+    @cached_property
+    def _distance(self) -> Floats:
+        """Distances of nodes, (2B + 1, 2B + 1), m; none from or to node 0."""
+        at = self.network.node_position[self.network.inner.ravel()]
+        out = np.zeros((len(at) + 1,) * 2)
+        out[1:, 1:] = np.linalg.norm(at[:, None] - at[None], axis=2)
+        return frozen(out)
 
     def start(self) -> Ints:
         """Return the one state in which the build begins, (1, c).

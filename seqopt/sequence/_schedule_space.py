@@ -14,7 +14,7 @@ from math import prod
 
 import numpy as np
 
-from seqopt.arrays import Bools, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence._carrying import can_carry, carried
@@ -123,8 +123,14 @@ class ScheduleSpace(StateRows):
         way, came = np.zeros(len(source)), states[source]
         if self.parks:
             gone = (after > 0) & (after != came) & (came != 0)
-            way = (self._distance[np.abs(after), np.abs(came)] * gone).sum(axis=1)
+            moved = self._at[np.abs(after)] - self._at[np.abs(came)]
+            way = (np.linalg.norm(moved, axis=2) * gone).sum(axis=1)
         return ((Moves(source, after, way), step.kind is StepKind.REPOSITION),)
+
+    @cached_property
+    def _at(self) -> Floats:
+        """Positions of places (2B + 1, 3), m; distances of all pairs would take much memory."""
+        return np.pad(self.network.node_position[self.network.inner.ravel()], ((1, 0), (0, 0)))
 
     def without_choice(self) -> Iterator[tuple[int, Ints]]:
         """Yield the levels, last first, of steps without an open grip, and their state (1, r)."""
