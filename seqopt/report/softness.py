@@ -21,6 +21,7 @@ from seqopt.report.text import IN_UNITS, QUANTITIES
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import solve_sets
 from seqopt.responses.quantities import CHOSEN_BY
+from seqopt.responses.table import _steps_in_table
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell, with_progress
@@ -94,14 +95,11 @@ _States = dict[tuple[int, int], dict[_State, set[str]]]  # builds, by brick and 
 def _states(scene: Scene, tables: Mapping[str, pd.DataFrame]) -> _States:
     """Return the builds that pass each grip set, by brick count and number of grips, ascending."""
     out: _States = {}
-    columns = [f"{robot.name}_node" for robot in scene.robots]
     for name, table in tables.items():
-        pairs = zip(table["bricks"], table[columns].to_numpy(object), strict=True)
-        for bricks, row in pairs:
-            nodes = [int(node) if pd.notna(node) else None for node in row]
-            robots = tuple(i for i, node in enumerate(nodes) if node is not None)
-            level = out.setdefault((int(bricks), len(robots)), {})
-            level.setdefault((scene.grip_numbers(nodes), robots), set()).add(name)
+        for step in _steps_in_table(scene, table):
+            robots = tuple(i for i, node in enumerate(step.grips) if node is not None)
+            level = out.setdefault((step.bricks, len(robots)), {})
+            level.setdefault((scene.grip_numbers(step.grips), robots), set()).add(name)
     return dict(sorted(out.items()))
 
 
