@@ -97,18 +97,21 @@ def _in_range(numbers: Ints, count: int, what: str) -> Ints:
 
 
 def _arcs_of(instance: Instance, nodes: Ints) -> Ints:
-    """Return the arcs between nodes, the first of those side by side; the start may be left out."""
+    """Return the arcs between nodes, of those side by side the least; the start may be left out."""
     if len(nodes) and nodes[0] == 0:
         nodes = nodes[1:]
     before = np.concatenate([[0], nodes[:-1]]).astype(np.int64)
     codes = instance.source.astype(np.int64) * instance.nodes + instance.target
     wanted = before * instance.nodes + nodes
+    order = np.arange(len(codes))
+    if (np.diff(codes) == 0).any():
+        order = np.lexsort((*instance.asked.amounts.T[::-1], codes))
     at = np.searchsorted(codes, wanted)
     for step, (place, code) in enumerate(zip(at.tolist(), wanted.tolist(), strict=True), start=1):
         if place == len(codes) or codes[place] != code:
             first, second = divmod(code, instance.nodes)
             raise SolverError(f"step {step}: no arc leads from node {first} to node {second}")
-    return np.asarray(at)
+    return np.asarray(order[at])
 
 
 def _value(instance: Instance, goal: _Target, path: _Walk) -> float:

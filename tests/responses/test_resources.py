@@ -233,7 +233,7 @@ def test_costs_are_the_same_where_responses_are_not_kept(engine25, loop25, crite
     assert streamed.evaluation.models == problem.evaluation.models
     for name in ("cascade", "minimax", "beam"):
         plan, other = solve(problem, name), solve(streamed, name)
-        assert plan.selection.choice == other.selection.choice
+        assert plan.choice == other.choice
         assert plan.table().equals(other.table())
     with pytest.raises(MemoryShortError, match="do not fit into the memory"):
         _ = streamed.evaluation.steps
