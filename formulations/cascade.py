@@ -31,7 +31,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import FormulationKind, On, Reads, Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import lexicographic, moves_along
+from seqopt.graph.paths import lexicographic, moves_along, tied
 from seqopt.problem.problem import Aim
 
 CHARGES = ("later", "earlier")
@@ -74,7 +74,7 @@ def at_hand(graph: Graph, *ways: tuple[int, ...]) -> tuple[int, ...]:
     )
     for path in ways:
         taken = graph.amounts[moves_along(graph, path)][:, graph.goals :].sum(axis=0)
-        if (taken <= np.array(graph.caps)).all():
+        if (taken <= np.array([tied(cap) for cap in graph.caps])).all():
             return path
     return ()
 
