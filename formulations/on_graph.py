@@ -148,14 +148,18 @@ def on_graph(  # noqa: PLR0913  # the fields of a formulation
 
     Parameters
     ----------
-    name, summary, kind, aim, takes_budgets, reads, windowed, alone
-        As of `Formulation`.
+    name, summary : str
+        What it is called, and what it does in a few words.
     choose : callable
         Returns a `Choice` of a `Graph` whose moves are all on paths from the start to an end; stops
         when a `Watch` says so; its options are keyword arguments with defaults. Of states whose
         first goal is a peak, the graph has those below that of a first plan, by a narrow search.
+    kind : FormulationKind, optional
+        What it promises.
     on : On, optional
         What it is listed for; it runs on every graph.
+    aim, takes_budgets, reads, windowed, alone : optional
+        As of `seqopt.graph.formulation.Formulation`.
 
     Returns
     -------

@@ -165,9 +165,12 @@ def parse_robust(text: str) -> RobustAim:
     if text in known:
         return known[text]
     name, _, number = text.partition("=")
-    with suppress(ValueError):
-        if name == RobustKind.CVAR.value and not math.isnan(level := float(number)):
-            return cvar(level)
+    level = math.nan
+    if name == RobustKind.CVAR.value:
+        with suppress(ValueError):
+            level = float(number)
+    if not math.isnan(level):
+        return cvar(level)
     hint = did_you_mean(name, (*known, RobustKind.CVAR.value))
     raise ProblemError(
         f"robust aim {text} does not exist{hint}; give worst-peak, worst-total or cvar=0.9, say"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from seqopt.graph.formulation import formulations
 from seqopt.graph.layers.ranking import rank_choice
+from seqopt.plan.solving import solve
 from seqopt.study.published import published_choice, published_plan
 
 
@@ -13,9 +13,9 @@ def test_the_loop_with_the_published_nodes_is_the_published_plan(arch25, loop25,
 
 def test_the_window_rank_is_the_studys_search(problem25):
     """The choice of the cascade is first in its own window, move by move."""
-    choice = formulations()["cascade"].solve(problem25).choice
+    choice = solve(problem25, "cascade").choice
     assert (rank_choice(problem25, choice)["rank_in_window"] == 1).all()
-    exact = formulations()["overlap_dp"].solve(problem25).choice
+    exact = solve(problem25, "overlap_dp").choice
     assert (rank_choice(problem25, exact)["rank_overlap"] == 1).all()
 
 
