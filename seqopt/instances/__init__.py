@@ -7,6 +7,26 @@
 >>> seqopt.judge_instance(instance, plan.nodes).gap
 0.0
 
-Files hold the graph and what is asked of its paths (`seqopt.save_instance`, `seqopt.read_instance`);
-MPS and LP files hold it as an integer program.
+Files hold the graph and what is asked of its paths (`save_instance`, `read_instance`); MPS and LP
+files hold it as an integer program.
 """
+
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
+
+if TYPE_CHECKING:
+    from seqopt.instances._files import read_instance, save_instance
+    from seqopt.instances.answers import judge_instance
+    from seqopt.instances.compiled import compile_instance
+
+__all__ = ["compile_instance", "judge_instance", "read_instance", "save_instance"]
+__getattr__, __dir__ = later(
+    __name__,
+    {
+        "compile_instance": "compiled",
+        "judge_instance": "answers",
+        "read_instance": "_files",
+        "save_instance": "_files",
+    },
+)
