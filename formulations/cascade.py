@@ -29,7 +29,7 @@ from formulations.choice import Choice, onward
 from formulations.on_graph import on_graph
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import FormulationKind, On, Reads, Watch
+from seqopt.graph.formulation import FormulationKind, On, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic, moves_along, tied
 from seqopt.problem.problem import Aim
@@ -99,5 +99,5 @@ FORMULATION = on_graph(
     on=On.LAYERS,
     aim=Aim.SUM,
     alone=True,
-    reads=Reads.WINDOW,
+    windowed=(),
 )

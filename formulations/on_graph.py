@@ -18,7 +18,7 @@ from formulations.states._search import after_margins, best_order, best_total, c
 from formulations.states._totals import cheapest_by, least_total
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
-from seqopt.graph.formulation import Formulation, FormulationKind, On, Reads, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
 from seqopt.graph.orders import AllOrders, OrderSelection
@@ -140,7 +140,6 @@ def on_graph(  # noqa: PLR0913  # the fields of a formulation
     on: On = On.STATES,
     aim: Aim | None = None,
     takes_budgets: bool = False,
-    reads: Reads = Reads.ALL,
     windowed: tuple[tuple[str, int | str], ...] | None = None,
     alone: bool = False,
 ) -> Formulation:
@@ -158,7 +157,7 @@ def on_graph(  # noqa: PLR0913  # the fields of a formulation
         What it promises.
     on : On, optional
         What it is listed for; it runs on every graph.
-    aim, takes_budgets, reads, windowed, alone : optional
+    aim, takes_budgets, windowed, alone : optional
         As of `seqopt.graph.formulation.Formulation`.
 
     Returns
@@ -166,6 +165,4 @@ def on_graph(  # noqa: PLR0913  # the fields of a formulation
     Formulation
     """
     solve, also = OnGraph(name, choose, takes_budgets), tuple(o for o in EVERYWHERE if o is not on)
-    return Formulation(
-        name, summary, kind, aim, solve, reads, takes_budgets, windowed, on, also, alone
-    )
+    return Formulation(name, summary, kind, aim, solve, takes_budgets, windowed, on, also, alone)

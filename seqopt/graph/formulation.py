@@ -174,13 +174,6 @@ class FormulationKind(Enum):
     BOUND = "bound"  # a proven bound; its choice is exact where nothing couples the moves
 
 
-class Reads(Enum):
-    """Which steps a formulation looks at."""
-
-    ALL = "all"  # every pair in every shared step
-    WINDOW = "window"  # by default, shared steps only for choices already made
-
-
 class End(Enum):
     """How a formulation ended."""
 
@@ -203,14 +196,13 @@ class Formulation:
         Over layers, what it minimizes: the sum of the costs, or the largest cost; None elsewhere,
         where a problem has its goals.
     solve : callable
-        Takes the graph and named options, returns what is chosen: of layers a `Selection`, of
-        states a `seqopt.graph.solution.StatePath`.
-    reads : Reads
-        Which steps it looks at with its default options.
+        Takes what it is given and named options, returns a `seqopt.graph.solution.StatePath`; of
+        orders a `seqopt.graph.orders.OrderSelection`.
     takes_budgets : bool
         Whether it can keep totals over the build within budgets.
     windowed : tuple of (str, int or str), optional
-        Options with which it looks at one window after the other, if it does so only with these.
+        Options with which it looks at one window after the other; empty if it always does, None if
+        it never does.
     on : On, optional
         What it is given: layers, states, orders, scenarios.
     also : tuple of On, optional
@@ -231,7 +223,6 @@ class Formulation:
     kind: FormulationKind
     aim: Aim | None
     solve: Callable[..., Any]
-    reads: Reads = Reads.ALL
     takes_budgets: bool = False
     windowed: tuple[tuple[str, int | str], ...] | None = None
     on: On = On.LAYERS
@@ -250,8 +241,7 @@ class Formulation:
     @property
     def window_options(self) -> dict[str, int | str] | None:
         """Options with which it looks at one window after the other; None if it never does."""
-        never = self.windowed is None and self.reads is not Reads.WINDOW
-        return None if never else dict(self.windowed or ())
+        return None if self.windowed is None else dict(self.windowed)
 
     @property
     def options(self) -> dict[str, Any]:
@@ -349,7 +339,7 @@ def _load(entry: EntryPoint) -> Formulation:
             "let the entry point name a Formulation"
         )
     kinds: dict[str, Any] = {"name": str, "summary": str, "kind": FormulationKind, "on": On}
-    kinds |= {"also": tuple, "reads": Reads, "takes_budgets": bool, "aim": Aim | None}
+    kinds |= {"also": tuple, "takes_budgets": bool, "aim": Aim | None}
     kinds["solve"] = Callable
     for field_name, kind in kinds.items():
         value = getattr(found, field_name)

@@ -15,7 +15,7 @@ from seqopt.engines._kinds import OpeningEngine
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Reads
+from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind
 from seqopt.graph.instance import Instance
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios import ScenarioLayers
@@ -322,7 +322,7 @@ class Plan(ShownBuild):
     @property
     def models_needed(self) -> int:
         """How many different models the formulation looks at: fewer where it asks for windows."""
-        return self._window_models if self.formulation.reads is Reads.WINDOW else self.models
+        return self._window_models if self.formulation.windowed == () else self.models
 
     @property
     def _window_models(self) -> int:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from formulations import beam, rank_search
 from formulations.solvers import anatomy, minimize, minimize_whole
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.formulation import FormulationKind, Reads, Watch
+from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.formulation import formulations as registered
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.problem.problem import Aim
@@ -153,17 +153,17 @@ def test_what_each_promises():
         FormulationKind.HEURISTIC,
     )
     promised = {
-        "beam": (heuristic, Aim.SUM, Reads.ALL, False),
-        "cascade": (heuristic, Aim.SUM, Reads.WINDOW, False),
-        "minimax": (exact, Aim.PEAK, Reads.ALL, False),
-        "overlap_dp": (exact, Aim.SUM, Reads.ALL, False),
-        "overlap_lp": (bound, Aim.SUM, Reads.ALL, True),
-        "overlap_mip": (exact, Aim.SUM, Reads.ALL, True),
-        "rank_search": (heuristic, Aim.SUM, Reads.ALL, False),
+        "beam": (heuristic, Aim.SUM, None, False),
+        "cascade": (heuristic, Aim.SUM, (), False),
+        "minimax": (exact, Aim.PEAK, None, False),
+        "overlap_dp": (exact, Aim.SUM, None, False),
+        "overlap_lp": (bound, Aim.SUM, None, True),
+        "overlap_mip": (exact, Aim.SUM, None, True),
+        "rank_search": (heuristic, Aim.SUM, (("horizon", 1),), False),
     }
     for name, promise in promised.items():
         own = ALL[name]
-        assert (name, own.kind, own.aim, own.reads, own.takes_budgets) == (name, *promise)
+        assert (name, own.kind, own.aim, own.windowed, own.takes_budgets) == (name, *promise)
 
 
 @given(problem=problems())

@@ -233,15 +233,6 @@ def _array_by_array(made: Callable[..., Floats], *costs: LayeredCosts | Budget) 
     return LayeredCosts(single, tuple(map(made, *(each.shared for each in costs))))
 
 
-def _where_allowed(costs: LayeredCosts, amounts: LayeredCosts | Budget) -> LayeredCosts:
-    """Return amounts of choices that are allowed by costs; the others are infinite."""
-
-    def taken(cost: Floats, amount: Floats) -> Floats:
-        return np.where(np.isfinite(cost), amount, np.inf)
-
-    return _array_by_array(taken, costs, amounts)
-
-
 def _least_to_go(arcs: Sequence[Floats]) -> list[Floats]:
     """Return the least sum of arcs to the end, from the source, (1,), and every candidate (C_k,).
 
@@ -251,11 +242,3 @@ def _least_to_go(arcs: Sequence[Floats]) -> list[Floats]:
     for arc in reversed(arcs):
         rest.insert(0, (arc + rest[0]).min(axis=1))
     return rest
-
-
-def _least_path(arcs: Sequence[Floats], rest: Sequence[Floats]) -> tuple[int, ...]:
-    """Return the choice whose arcs add up to least; ``rest`` as of `_least_to_go`."""
-    choice: list[int] = []
-    for arc, ahead in zip(arcs, rest[1:], strict=True):
-        choice.append(int(np.argmin(arc[choice[-1] if choice else 0] + ahead)))
-    return tuple(choice)

@@ -277,21 +277,6 @@ class Layers(Shown):
         ranked = self._sums[1] if aim is Aim.SUM else self._peaks[1]
         return {"respond": self.evaluation.seconds, "rank": ranked}
 
-    def conditional(self, move: int, before: int) -> Floats:
-        """Return the cost of a move's candidates in the shared steps, given the move before.
-
-        Ranks are those among the candidates of this move alone.
-
-        ``move``, ``before``: a move, and the candidate chosen for the move before it. Result
-        (C_k,).
-        """
-        out = np.zeros(len(self.schedule.moves[move].candidates))
-        for choices in self.window_choices(move, before):
-            faced = self.faced(choices, before)
-            if len(faced.moves) == 2:
-                out = out + self.step_costs(faced)
-        return np.where(_possible_after(self.schedule, move, before), out, np.inf)
-
     def window_choices(self, move: int, before: int) -> tuple[StepChoices, ...]:
         """Return the steps that a move decides, for its candidates alone.
 
