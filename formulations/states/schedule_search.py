@@ -140,9 +140,9 @@ class _Search:
         problem, floors = self._problem, tuple(map(tied, floors_of_goals(self._problem)))
         self.bound = floors[0]
         try:
-            # later goals need all states that take as much: a wider search may spare them
+            # in a large problem a wider search may spare most of all states
             sets = comb(2 * len(problem.network.inner), problem.space.robots)
-            many = len(problem.goals) > 1 and sets * problem.space.levels > MANY
+            many = sets * problem.space.levels > MANY
             for wider in (1, WIDER):
                 if wider > 1 and not many and (self.incumbent or self._options.dear):
                     break  # it is worth its time where the first one found nothing
