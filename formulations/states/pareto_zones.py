@@ -21,12 +21,12 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats
 from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
-from seqopt.plan.front import FrontSelection, _FrontProblem
+from seqopt.plan.front import FrontSelection, _StateFront
 from seqopt.work.progress import Tell
 
 
 def solve(
-    problem: _FrontProblem, *, seconds: float = np.inf, progress: Tell = lambda _: None
+    problem: _StateFront, *, seconds: float = np.inf, progress: Tell = lambda _: None
 ) -> FrontSelection:
     """Return all vectors that no plan dominates, and a plan for each.
 

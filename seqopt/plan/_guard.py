@@ -32,42 +32,29 @@ Result = TypeVar("Result")
 def called(
     name: str, judged: Callable[[], object], kind: type[Result], solve: Callable[[], object]
 ) -> Result:
-    """Return what a formulation returns, if that is what it should be.
+    """Return the answer, of a kind, of a formulation by name, which ``solve`` calls.
 
-    ``name``: of the formulation; ``judged``: returns what its answer is judged by; ``kind``: what
-    it has to return; ``solve``: calls it. Result: of that kind. Raises `SolverError` if it raises
+    ``judged``: returns what its answer is judged by. Raises `SolverError` if the formulation raises
     anything but an error of seqopt or an interrupt, returns something else, or changes what it is
-    judged by.
-    """
-    with unchanged(name, judged):
-        try:
-            found = solve()
-        except (SeqoptError, MemoryError, KeyboardInterrupt):
-            raise
-        except BaseException as error:  # whatever a formulation of others may raise, exits too
-            raise SolverError(f"formulation {name} failed: {message_of(error)}") from error
-    if not isinstance(found, kind):
-        raise SolverError(
-            f"formulation {name} returned a {type(found).__name__}, not a {kind.__name__}"
-        )
-    return found
-
-
-@contextmanager
-def unchanged(name: str, judged: Callable[[], object]) -> Iterator[None]:
-    """Require that values stay what they are while a formulation works.
-
-    ``name``: of the formulation; ``judged``: returns them. Raises `SolverError` if one does not,
-    also where the formulation fails.
+    judged by, also where it fails.
     """
     before = checksum(judged())
     try:
-        yield
+        found = solve()
+    except (SeqoptError, MemoryError, KeyboardInterrupt):
+        raise
+    except BaseException as error:  # whatever a formulation of others may raise, exits too
+        raise SolverError(f"formulation {name} failed: {message_of(error)}") from error
     finally:
         if checksum(judged()) != before:
             raise SolverError(
                 f"formulation {name} changed the problem that it is judged by; make it use copies"
             )
+    if not isinstance(found, kind):
+        raise SolverError(
+            f"formulation {name} returned a {type(found).__name__}, not a {kind.__name__}"
+        )
+    return found
 
 
 @contextmanager
@@ -143,10 +130,9 @@ CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 
 
 def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
-    """Return a selection with numbers where numbers belong.
+    """Return the answer of a formulation by name with numbers where numbers belong.
 
-    ``name``: of the formulation that made it; ``goals``: how many goals there are. Raises
-    `SolverError` if a number is none, or there are too few.
+    Raises `SolverError` if a number is none, or there are not as many as goals.
     """
     with readable(name):
         states = tuple(tuple(map(_whole, state)) for state in found.states)
@@ -161,7 +147,10 @@ def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
         visited = tuple(map(_wholes, found.visited))
         prices = tuple(tuple(map(float, each)) for each in found.prices)
         grips = tuple(tuple(map(_whole, row)) for row in found.grips)
-        proofs = tuple(_arrays(proof) for proof in found.proofs)
+        proofs = tuple(
+            LabelProof(_wholes(rows), np.array(labels, dtype=float), np.array(own, dtype=float))
+            for rows, labels, own in found.proofs
+        )
         starts, motions = tuple(map(float, found.starts)), tuple(map(_motion, found.motions))
         timed = starts, float(found.ends), motions
         told = (visited, prices, text(found.stopped), grips, proofs, *timed)
@@ -196,12 +185,6 @@ def _motion(given: Floats) -> Floats:
     return out
 
 
-def _arrays(proof: LabelProof) -> LabelProof:
-    states, labels, prices = proof
-    numbers = [np.array(part, dtype=float) for part in (labels, prices)]
-    return LabelProof(_wholes(states), *numbers)
-
-
 def require_fit(
     budgets: Sequence[Budget], formulation: Formulation, options: Mapping[str, object]
 ) -> None:
@@ -216,10 +199,7 @@ def require_fit(
 
 
 def require_time(formulation: Formulation, time_limit: float) -> None:
-    """Raise an error unless a time limit is one, and the formulation can keep it.
-
-    ``time_limit``: s. Raises `ProblemError` if it is no time, or the formulation takes none.
-    """
+    """Raise a `ProblemError` unless a time limit, s, is one, and the formulation can keep it."""
     if not isinstance(time_limit, Real) or not time_limit >= 0:
         raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
     limited = formulation.watched or "seconds" in formulation.options

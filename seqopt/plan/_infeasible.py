@@ -53,21 +53,14 @@ PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this muc
 
 
 def smallest_conflict(instance: Instance) -> tuple[_Cap, ...]:
-    """Return as few caps of an instance as possible that no path keeps together.
-
-    Result: empty if no set of caps is proven to conflict.
-    """
-    counts = range(1, len(instance.caps) + 1)
-    sets = chain.from_iterable(combinations(instance.caps, count) for count in counts)
-    return next((some for some in sets if _conflict(instance, some)), ())
-
-
-def _conflict(instance: Instance, caps: tuple[_Cap, ...]) -> bool:
-    """Return whether it is proven that no path keeps all of some caps."""
-    nothing = np.zeros(instance.arcs)
-    case, sizes = case_of(instance.graph, nothing, _limited(caps), 1.0)
-    bound, _ = least_within(case, np.zeros_like(sizes), laid_down=instance.is_layered)
-    return bound >= PROVEN
+    """Return the fewest caps of an instance proven to conflict: no path keeps all; or none."""
+    counts, nothing = range(1, len(instance.caps) + 1), np.zeros(instance.arcs)
+    for some in chain.from_iterable(combinations(instance.caps, count) for count in counts):
+        case, sizes = case_of(instance.graph, nothing, _limited(some), 1.0)
+        bound, _ = least_within(case, np.zeros_like(sizes), laid_down=instance.is_layered)
+        if bound >= PROVEN:
+            return some
+    return ()
 
 
 def _limited(caps: Sequence[_Cap]) -> list[tuple[int, float]]:
@@ -75,21 +68,16 @@ def _limited(caps: Sequence[_Cap]) -> list[tuple[int, float]]:
 
 
 def claimed(name: str, why: str, *, exact: bool) -> InfeasibleError | NothingFoundError:
-    """Return the error of a formulation, by name, where it is not proven that there is no plan.
-
-    ``exact``: whether it looks at all plans, and so claims that none is allowed; else it found
-    none.
-    """
+    """Return the error of a formulation, not proven; ``exact``: it looks at all plans."""
     if exact:
         return InfeasibleError(f"claimed by {name}, and not proven: {why}")
     return NothingFoundError(f"{name} found none, and there may be one: {why}")
 
 
 def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
-    """Return the error that says which caps no path keeps, or that this is claimed alone.
+    """Return the error that names the caps in conflict; a `SolverError` where a path keeps all.
 
-    ``instance``: it is said that no path is within all its caps; ``name``, ``exact``: of the
-    formulation that says so, as of `claimed`. Result: a `SolverError` where one is.
+    ``name``, ``exact``: of the formulation that says that none does, as of `claimed`.
     """
     found = smallest_conflict(instance)
     if not found and instance.is_layered and is_kept(instance.graph, _limited(instance.caps)):
@@ -133,7 +121,7 @@ class _LateError(Exception):
 
 @dataclass(frozen=True)
 class Look:
-    """Looks at the states that plans of problems may pass, until a time of the clock."""
+    """Explores the states that plans may pass, until a time of the clock."""
 
     end: float = np.inf
 
@@ -245,12 +233,10 @@ def _of_criterion(problem: States) -> tuple[Goal, ...]:
 
 
 def _why_impossible(problem: States, seconds: float = np.inf) -> str:
-    """Return why no plan is allowed, in a line.
+    """Return the brick at which all builds stop and what would help, known by then, in a line.
 
-    ``problem``: which has no plan; ``seconds``: after which it says what it found by then. Result:
-    naming the brick at which it stops and what opens a way: a rule to loosen, or how far a limit
-    has to be raised. An engine that has a ``rigid`` one leaves this to it: what is tried here may
-    be far beyond what joints carry, where discrete elements take seconds a state.
+    An engine that has a ``rigid`` one leaves this to it: what is tried here may be far beyond what
+    joints carry, where discrete elements take seconds a state.
     """
     engine = getattr(problem.engine, "rigid", problem.engine)
     problem = _with_any_margin(replace(problem, engine=engine))
@@ -287,10 +273,9 @@ def _where(problem: States, look: Look) -> str:
 
 
 def _too_heavy(book: RuleBook, left: Sequence[int]) -> str:
-    """Return which brick cannot be carried, as the end of a line: the next one, or a later one.
+    """Return which brick is too heavy, as the end of a line: the next, or a later no robot lifts.
 
-    ``left``: how many bricks there are with each that is to be carried; of later ones that which
-    no robot carries that reaches it.
+    ``left``: brick counts with each brick that is to be carried.
     """
     for bricks in left:
         near = [r for r in book.team if book.named(r) and book.newest_nodes[r, bricks]]
@@ -354,7 +339,12 @@ def _what_helps(problem: States, look: Look) -> str:
     ways = [*_opening(problem, look)]
     if {*ways} <= {ARMS, APART}:  # of the same arms two rules may ask less
         arms = (ARMS, APART) if ways else ()
-        pairs = (pair for pair in _pairs(problem, look) if not pair.endswith(arms))
+        pairs = (
+            f"{text}{BOTH}{other}"
+            for text, rules in _loosened(problem)
+            for other in _opening(replace(problem, rules=rules), look)
+            if not other.endswith(arms)
+        )
         ways = [*ways, *islice(pairs, 1), *(() if ways else _propped(problem, look))]
     if not ways:
         return ", whatever two rules or limits are loosened; extend a reach or add a robot"
@@ -414,15 +404,13 @@ def _supporting(problem: States, look: Look) -> Iterator[str]:
 
 def _propped(problem: States, look: Look) -> Iterator[str]:
     """Yield that props help, if one at every brick does."""
-    scene = problem.network.scene
+    scene, moves = problem.network.scene, problem.rules
     if scene.props or recipe_of(problem.engine) is None or problem.scenarios:
         return
-    moves = problem.rules
     sites = (moves.begin, moves.finish) if isinstance(moves, FreeRules) else ()
     held = {node for site in sites if site is not None for node in site.holds(scene)}
     props = (prop for prop in scene.with_centering().props if prop.node not in held)
-    propped = _in_scene(problem, scene.with_props(*props))
-    if look.exists(propped):
+    if look.exists(_in_scene(problem, scene.with_props(*props))):
         yield CENTERING
 
 
@@ -447,18 +435,10 @@ def _loosened(problem: States) -> Iterator[tuple[str, FreeRules]]:
             yield text, rules
 
 
-def _pairs(problem: States, look: Look) -> Iterator[str]:
-    """Yield two that open a way together: rules, or a rule and a limit."""
-    for text, rules in _loosened(problem):
-        for other in _opening(replace(problem, rules=rules), look):
-            yield f"{text}{BOTH}{other}"
-
-
 def _enough(problem: States, way: str, look: Look) -> str:
     """Return how far a limit has to be raised, or a payload, where it is that is loosened."""
     if way == STANDING and not any(demand.tilt for demand in problem.demands):
         own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=STEPS)
-
         states = look.standing(bare)
 
         def exists(bond: float) -> bool:
@@ -485,9 +465,13 @@ def _enough(problem: States, way: str, look: Look) -> str:
 def _enough_limit(problem: States, way: str, look: Look) -> str:
     """Return how far a limit has to be raised; other ways as they are."""
     found = [limit for limit in problem.limits if limit.label == way]
-    name = found[0].response if found else way
-    if not found or not (name in STATE_RESPONSES or is_tolerance(name)):
-        return _typed(way) if not found else PROPS if way == PROP_EXCESS else f"no limit on {way}"
+    if not found:  # with the words of the command line behind it, where it is rules alone
+        words = way.split(BOTH)
+        known = all(rule.partition("=")[0] in RULES for rule in words)
+        return f"{way} (--rule {' --rule '.join(words)})" if known else way
+    name = found[0].response
+    if not (name in STATE_RESPONSES or is_tolerance(name)):
+        return PROPS if way == PROP_EXCESS else f"no limit on {way}"
     rest = tuple(limit for limit in problem.limits if limit not in found)
     least = worst_least(replace(problem, limits=rest), name, look)
     forces = (LARGEST, *(robot_response(r.name) for r in problem.network.scene.robots))
@@ -527,22 +511,13 @@ def _enough_payload(problem: States, exists: Callable[[float], bool]) -> str:
     return f"a payload of {newton} N (--payload {newton})"
 
 
-def _typed(way: str) -> str:
-    """Return a way with the words of the command line behind it, where it is rules alone."""
-    rules = way.split(BOTH)
-    known = all(rule.partition("=")[0] in RULES for rule in rules)
-    return f"{way} (--rule {' --rule '.join(rules)})" if known else way
-
-
 LOOK = Look()
 
 
 def worst_least(problem: States, response: str, look: Look = LOOK) -> float:
-    """Return the least worst value of a response that a plan within the other limits reaches.
+    """Return the least peak of a response among plans, SI units; infinite if there is no plan.
 
-    ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``; ``look``:
-    returns the states that a problem's plans may pass. Result: SI units; infinite if there is no
-    plan.
+    ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``.
     """
     found = look(replace(problem, goals=(Goal(Measure.PEAK, response),)))
     return least_peak(found.graph().graph, 0) if found.whole else np.inf

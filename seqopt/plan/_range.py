@@ -20,12 +20,12 @@ from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses._range import Moved, most_moved
-from seqopt.sequence.steps import Step
 from seqopt.work._clock import INTERRUPT, Clock
 
 RANGE = "how far it leaves the linear range"  # what it is called where there was no time for it
 NONE_KEEPS = "no plan keeps it"
 UNKNOWN = "whether any plan keeps it is not known"
+INTERRUPTED = f"{UNKNOWN} (interrupted)"
 Found = TypeVar("Found")
 
 
@@ -40,22 +40,6 @@ class _WithPlan(Protocol):
     def problem(self) -> Problem: ...
 
 
-class _WithPlans(Protocol):
-    """Several plans, each of an engine."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    @property
-    def steps(self) -> tuple[tuple[Step, ...], ...]: ...
-    @property
-    def engines(self) -> tuple[Engine, ...]: ...
-    @property
-    def moved(self) -> tuple[Moved, ...]: ...
-    @property
-    def stopped(self) -> str: ...
-
-
-FoundPlans = TypeVar("FoundPlans", bound=_WithPlans)
 FoundPlan = TypeVar("FoundPlan", bound=_WithPlan)
 
 
@@ -113,13 +97,13 @@ def best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Cloc
     if problem.says_range or plan.moved is None:
         return plan
     if plan.ended is End.INTERRUPTED:
-        return replace(plan, beyond=f"{UNKNOWN} (interrupted)" * leaves(plan.moved))
+        return replace(plan, beyond=INTERRUPTED * leaves(plan.moved))
     try:
         found, why = keeping(
             plan, plan.moved, lambda: measured(solved(problem.within_range(1.0)), clock)
         )
     except KeyboardInterrupt:
-        found, why = interrupted(plan), f"{UNKNOWN} (interrupted)"
+        found, why = interrupted(plan), INTERRUPTED
     return replace(found, beyond=why)
 
 
@@ -133,34 +117,6 @@ def best_of_several(problem: Problem, found: Callable[[Problem], FoundPlan]) -> 
     try:
         best, why = keeping(first, first.plan.moved, lambda: found(problem.within_range(1.0)))
     except KeyboardInterrupt:
-        best, why = replace(first, plan=interrupted(first.plan)), f"{UNKNOWN} (interrupted)"
+        best, why = replace(first, plan=interrupted(first.plan)), INTERRUPTED
     own = replace(best.problem, limits=problem.limits)
     return replace(best, plan=replace(best.plan, problem=own, beyond=why), problem=own)
-
-
-def best_front(
-    problem: Problem, found: Callable[[Problem], FoundPlans], clock: Clock
-) -> FoundPlans:
-    """Return the same of a Pareto set: all of its plans keep the range, or none can."""
-
-    def measured_front(asked: Problem) -> FoundPlans:
-        front = found(asked)
-
-        def measure() -> tuple[Moved, ...]:
-            pairs = zip(front.engines, front.steps, strict=True)
-            return tuple(most_moved((own,), steps) for own, steps in pairs)
-
-        moved: tuple[Moved, ...] = clock.spare(RANGE, measure, ())
-        return replace(front, moved=moved)
-
-    front = measured_front(problem)
-    if problem.says_range or not front.moved:
-        return front
-    farthest = max(front.moved, key=lambda each: each.share)
-    if front.stopped == INTERRUPT:
-        return replace(front, beyond=f"{UNKNOWN} (interrupted)" * leaves(farthest))
-    try:
-        kept, why = keeping(front, farthest, lambda: measured_front(problem.within_range(1.0)))
-    except KeyboardInterrupt:
-        kept, why = replace(front, stopped=INTERRUPT), f"{UNKNOWN} (interrupted)"
-    return replace(kept, beyond=why)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import operator
 import time
 from collections.abc import Callable, Mapping
@@ -38,7 +37,7 @@ from seqopt.plan._status import FoundOrder
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Aim
 from seqopt.responses.resources import HERE
-from seqopt.scene.scene import Order, in_order
+from seqopt.scene.scene import in_order
 from seqopt.work._workers import keep
 
 AIMS = {SUM: Aim.SUM, PEAK: Aim.PEAK}
@@ -100,7 +99,7 @@ def solve_states(graph: States, formulation: Formulation, run: Run) -> Plan:
 def _solved(problem: States, formulation: Formulation, run: Run) -> Plan:
     start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
     told = {} if run.progress is None else {"progress": run.progress}
-    limit = {} if math.isinf(run.left) else {"seconds": run.left}
+    limit = {"seconds": run.left} if isfinite(run.left) else {}
     options = {**run.options, **told, **limit}
     with run.clock.needed("finding a first plan"):
         selection = _selected(formulation, (problem, twin), options, explain=run.explains)
@@ -122,11 +121,6 @@ def _solved(problem: States, formulation: Formulation, run: Run) -> Plan:
     return Plan(problem, problem, formulation, selection, certificate, steps, seconds)
 
 
-def _judged(problem: States) -> States:
-    """Return what a formulation must not change; who works for it may."""
-    return replace(problem, resources=HERE)
-
-
 def _selected(
     formulation: Formulation,
     problems: tuple[States, States],
@@ -136,13 +130,15 @@ def _selected(
 ) -> StatePath:
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
     (problem, twin), start, name = problems, time.perf_counter(), formulation.name
+    limit = float(options.get("seconds", inf))
     solve = partial(formulation.solve, problem, **options)
     if barred(problem) is not None:  # what every plan passes is asked before any is sought
-        raise confirmed(twin, name, float(options.get("seconds", math.inf)), explain=explain)
+        raise confirmed(twin, name, limit, explain=explain)
+    judged = partial(replace, problem, resources=HERE)  # who works for a formulation may change
     try:
-        selection = called(name, partial(_judged, problem), StatePath, solve)
+        selection = called(name, judged, StatePath, solve)
     except InfeasibleError as error:
-        left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
+        left = limit - (time.perf_counter() - start)
         why = confirmed(twin, name, left, exact=formulation.looks_at_all, explain=explain)
         standing = problem.standing
         if type(why) is SolverError and standing is not None and standing.curing is not None:
@@ -170,10 +166,8 @@ def solve_orders(problem: AllOrders, formulation: Formulation, run: Run) -> Plan
     is better.
     """
     formulation.require_options(run.options)
-    start, options = time.perf_counter(), dict(run.options)
-    if not np.isinf(run.left):
-        options["seconds"] = run.left
-    means = problem.states.resources
+    start, means = time.perf_counter(), problem.states.resources
+    options = {**run.options, **({"seconds": run.left} if isfinite(run.left) else {})}
     means = replace(means, progress=run.progress or means.progress)
     twin = _judged_orders(problem)  # which no formulation can reach
     ends = start + float(options.get("seconds", inf))
@@ -194,11 +188,19 @@ def solve_orders(problem: AllOrders, formulation: Formulation, run: Run) -> Plan
 
 def _planned(name: str, problem: AllOrders, selection: OrderSelection, *, proof: bool) -> Plan:
     """Return the best plan of an order, which must be worth what is claimed."""
-    _require_allowed(name, problem, selection.order)
+    in_order(problem.scene, selection.order)  # it names every brick once
+    if not problem.allows(selection.order):
+        raise SolverError(f"{name}: its order places a brick that nothing ties")
     plan = solve_states(
         problem.planned(selection.order), find_formulation("schedule_search"), Run(proof=proof)
     )
-    _require_worth(name, plan.selection.objective[0], selection)
+    (value, *_), claimed, bound = plan.selection.objective, selection.objective, selection.bound
+    most = TOLERANCE * max(abs(value), abs(claimed))
+    if not (abs(value - claimed) <= most and bound <= value + most):  # NaN is no bound
+        raise SolverError(
+            f"{name}: the value of the order is {value:.9g}; claimed are {claimed:.9g} and "
+            f"a bound of {bound:.9g}"
+        )
     return plan
 
 
@@ -223,7 +225,11 @@ def _selected_order(
         if some is False and problem.down is None:  # whose whole may be beyond limits
             raise without_order(problem, found.name, end - time.perf_counter()) from None
         raise claimed(found.name, str(error), exact=found.looks_at_all) from None
-    return _with_numbers(found.name, said)
+    with readable(found.name):
+        order = tuple(operator.index(brick) for brick in said.order)
+        objective, bound = float(said.objective), float(said.bound)
+        evaluated, weights = operator.index(said.evaluated), tuple(map(float, said.weights))
+        return OrderSelection(order, objective, bound, evaluated, text(said.stopped), weights)
 
 
 def _judged_orders(problem: AllOrders) -> AllOrders:
@@ -237,9 +243,11 @@ def _proven(name: str, problem: AllOrders, selection: OrderSelection, end: float
         return False
     bound = min(selection.bound, selection.objective)
     if problem.states.totals:  # what weights leave open, labels of the search alone close
-        states = replace(problem.states, weights=_weights(name, problem, selection))
-        weighed = replace(problem, states=states)
-        return finds_better_order(weighed, bound, end=end) is False
+        if len(selection.weights) != len(problem.states.scenarios):
+            raise SolverError(f"{name}: there is no weight for every scenario")
+        valid = problem.states.over.allowed(np.array(selection.weights))  # whatever was said
+        weighed = replace(problem.states, weights=tuple(valid.tolist()))
+        return finds_better_order(replace(problem, states=weighed), bound, end=end) is False
     better = finds_better_order(problem, bound, end=end)
     if better and not problem.states.budgets:  # of plans without these
         raise SolverError(
@@ -247,39 +255,3 @@ def _proven(name: str, problem: AllOrders, selection: OrderSelection, end: float
             "with less"
         )
     return better is False
-
-
-def _weights(name: str, problem: AllOrders, selection: OrderSelection) -> tuple[float, ...]:
-    """Return weights of scenarios that prove a bound, whatever was said."""
-    count = len(problem.states.scenarios)
-    if len(selection.weights) != count:
-        raise SolverError(f"{name}: there is no weight for every scenario")
-    return tuple(problem.states.over.allowed(np.array(selection.weights)).tolist())
-
-
-def _with_numbers(name: str, found: OrderSelection) -> OrderSelection:
-    """Return a selection with numbers where numbers belong."""
-    with readable(name):
-        order = tuple(operator.index(brick) for brick in found.order)
-        objective, bound = float(found.objective), float(found.bound)
-        evaluated = operator.index(found.evaluated)
-        weights = tuple(map(float, found.weights))
-        return OrderSelection(order, objective, bound, evaluated, text(found.stopped), weights)
-
-
-def _require_allowed(name: str, problem: AllOrders, order: Order) -> None:
-    """Raise an error if an order does not name every brick once, or is none of those asked for."""
-    in_order(problem.scene, order)
-    if not problem.allows(order):
-        raise SolverError(f"{name}: its order places a brick that nothing ties")
-
-
-def _require_worth(name: str, value: float, selection: OrderSelection) -> None:
-    """Raise an error if an order is not worth what is claimed, or less than its bound."""
-    claimed, bound = selection.objective, selection.bound
-    most = TOLERANCE * max(abs(value), abs(claimed))
-    if not (abs(value - claimed) <= most and bound <= value + most):  # NaN is no bound
-        raise SolverError(
-            f"{name}: the value of the order is {value:.9g}; claimed are {claimed:.9g} and "
-            f"a bound of {bound:.9g}"
-        )

@@ -26,29 +26,22 @@ def chosen_table(
     search: WindowSearch | None,
     grips: pd.DataFrame,
 ) -> pd.DataFrame:
-    """Return what was chosen for every move and what it is worth.
+    """Return the choice and its costs, move by move, as of `seqopt.plan.plan.Plan.table`.
 
     ``search``: what was looked at, where not all models were solved; ``grips``: of the plan.
-    Result: as of `seqopt.plan.plan.Plan.table`.
     """
-    worths = pd.DataFrame([*_worths(problem, choice, aim, search)])
-    return moves_table(problem, choice, grips).join(worths)
-
-
-def _worths(
-    problem: Layers, choice: tuple[int, ...], aim: Aim, search: WindowSearch | None
-) -> Iterator[dict[str, float]]:
-    """Yield the cells of the table that say what the choice of every move is worth."""
+    rows = []
     for k, (before, now) in enumerate(pairwise((0, *choice))):
         if search is not None:
             costs = search.costs(k)
             margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
-            yield {"cost": costs[now], "margin": margin}
+            rows.append({"cost": costs[now], "margin": margin})
         else:
             layered = aim.costs(problem)
             rank = rank_of(move_costs(problem, k, before), now)
             single, shared = layered.single[k][now], layered.shared[k][before, now]
-            yield {"single_cost": single, "shared_cost": shared, "rank_in_window": rank}
+            rows.append({"single_cost": single, "shared_cost": shared, "rank_in_window": rank})
+    return moves_table(problem, choice, grips).join(pd.DataFrame(rows))
 
 
 def split_objectives(problem: Layers, choice: tuple[int, ...], *, heuristic: bool) -> Objectives:

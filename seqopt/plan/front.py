@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -26,11 +25,10 @@ from seqopt.judge.schedules import plan_values
 from seqopt.plan._guard import called, readable, text
 from seqopt.plan._infeasible import confirmed, without_order
 from seqopt.plan._paths import PROOF
-from seqopt.plan._range import best_front, leaves
-from seqopt.plan._rounding import _rounded_up, _rounding_steps
+from seqopt.plan._range import INTERRUPTED, RANGE, keeping, leaves
 from seqopt.plan.solving import graph_of, states_of
 from seqopt.problem.problem import Measure, Problem
-from seqopt.responses._range import Moved
+from seqopt.responses._range import Moved, most_moved
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene import Order
 from seqopt.sequence.rules import Ending
@@ -39,9 +37,37 @@ from seqopt.work._clock import INTERRUPT, Clock
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Tell, with_progress
 
+TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
+DIGITS = 9  # after the first
+EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
+
+
+def _rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -> Floats:
+    """Return what every number is rounded up to multiples of, (k,); zero where it is not.
+
+    Raises `ProblemError` if a name is none of these, or a step is no positive number.
+    """
+    for name, step in (rounding or {}).items():
+        if name not in names or not 0 < step < np.inf:
+            known = ", ".join(names)
+            raise ProblemError(f"round {name}={step:g}: give a positive step for one of {known}")
+    return np.array([(rounding or {}).get(name, 0.0) for name in names])
+
+
+def _rounded_up(values: Floats, steps: Floats) -> Floats:
+    """Return values (..., k) rounded up to multiples of steps (k,), to ten digits where that is 0.
+
+    What differs by less than ten digits is the same: no plan is better by an error of rounding.
+    """
+    safe = np.where(steps > 0, steps, 1.0)
+    size = np.abs(np.where((values != 0) & np.isfinite(values), values, 1.0))
+    digit = 10.0 ** (np.floor(np.log10(size)) - DIGITS)
+    plain = np.where(np.isfinite(values), np.round(values / digit) * digit, values)
+    return np.where(steps > 0, np.ceil(values / safe - EDGE) * safe, plain)
+
 
 class _StateFront:
-    """The schedule of a problem whose goals are all to be small at once.
+    """The schedule of a problem whose goals are all to be small at once: what formulations get.
 
     ``problem``: its goals are responses, margins of stability, and of a free schedule steps and
     regrips; ``rounding``: what numbers are rounded up to multiples of, by name, SI units; none by
@@ -93,7 +119,7 @@ class _StateFront:
         return [k for k, measure in enumerate(measures) if measure is not Measure.PEAK]
 
     def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
-        """Return a plan below bounds (k,) that none beats, and before it its point (k,), if any."""
+        """Return a point (k,) below bounds (k,) that no plan dominates, SI units, and its plan."""
         below = self._below(bounds)
         if not below.ends[reached(below)].any():
             return None
@@ -115,7 +141,9 @@ class _StateFront:
     def _below(self, bounds: Floats) -> Graph:
         """Return the moves to states whose values are all below bounds."""
         graph, kept = self._visited.graph, np.ones(len(self._visited.graph.source), dtype=bool)
-        for amounts, bound in zip(graph.amounts.T, self._peaks(bounds), strict=True):
+        bounds = bounds.copy()
+        bounds[self._counted] = np.inf
+        for amounts, bound in zip(graph.amounts.T, bounds, strict=True):
             kept &= amounts < bound
         return graph.only(kept)
 
@@ -134,13 +162,8 @@ class _StateFront:
     def _of(self, measure: Measure) -> int:
         return next(k for k in self._counted if self._problem.goals[k].measure is measure)
 
-    def _peaks(self, bounds: Floats) -> Floats:
-        out = bounds.copy()
-        out[self._counted] = np.inf
-        return out
-
     def is_empty_below(self, bounds: Floats) -> bool:
-        """Return whether there is no plan below bounds (k,), by distances from the empty site."""
+        """Return whether no plan is below bounds (k,): another route, from the empty site."""
         graph = self._below(bounds)
         if not self._counted:
             return not graph.ends[reached(graph)].any()
@@ -169,12 +192,15 @@ class _StateFront:
         return steps_of(self._problem.space, plan)  # type: ignore[arg-type]
 
     def values(self, plan: object, claimed: Floats) -> Floats:
-        """Return the goals' values (k,) of a plan, from the responses of its steps."""
+        """Return the goals' values (k,) of a plan, from its responses, rounded; SI units.
+
+        ``claimed`` (k,): the values with which margins of stability are compared.
+        """
         found = plan_values(self._of_plan(plan), self.steps(plan), claimed.tolist())
         return _rounded_up(np.array(found), self._round)
 
     def engine(self, plan: object) -> Engine:
-        """Return what computes the responses of a plan."""
+        """Return what computes the responses of a plan, of the scene in its build order."""
         return self._of_plan(plan).engine
 
     def _of_plan(self, plan: object) -> States:
@@ -236,41 +262,6 @@ def _require_memory(found: Explorer) -> None:
         raise ProblemError("pareto: the states of all orders do not fit the memory; give an order")
 
 
-TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
-
-
-class _FrontProblem(Protocol):
-    """What a formulation of Pareto sets is given."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The numbers that are to be small."""
-
-    def anew(self) -> _FrontProblem:
-        """Return the same problem with nothing known of it, for its judge."""
-
-    def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
-        """Return a plan, as `steps` takes it, that no other one below bounds (k,) beats in all.
-
-        Its point (k,) in SI units is before it; every number is less than its bound.
-        """
-
-    def is_empty_below(self, bounds: Floats) -> bool:
-        """Return whether there is no plan below bounds (k,), found by another route."""
-
-    def steps(self, plan: object) -> tuple[Step, ...]:
-        """Return the checked steps of a plan from `best_below`."""
-
-    def engine(self, plan: object) -> Engine:
-        """Return what computes the responses of a plan, of the scene in its build order."""
-
-    def values(self, plan: object, claimed: Floats) -> Floats:
-        """Return the numbers (k,) of a plan, from the responses of its steps; SI units, rounded.
-
-        ``claimed`` (k,): the values with which margins of stability are compared.
-        """
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class FrontSelection(FrozenValue):
     """The points of a Pareto set, and what its formulation claims of them.
@@ -318,7 +309,7 @@ _NONE_YET = "no plan was found yet; give more"
 
 
 def find_front(
-    problem: Problem | _FrontProblem,
+    problem: Problem | _StateFront,
     formulation: Formulation | str = "pareto_zones",
     *,
     rounding: Mapping[str, float] | None = None,
@@ -341,17 +332,39 @@ def find_front(
         return _front_of(problem, formulation, seconds, progress, clock or Clock())
     end, watch = time.perf_counter() + seconds, clock or Clock()
 
-    def found(asked: Problem) -> Front:
+    def measured(asked: Problem) -> Front:
         with watch.needed("posing the problem"):
-            graph = _posed(asked, rounding)
+            graph = graph_of(asked)
+            if not isinstance(graph, AllOrders):
+                posed = _StateFront(states_of(asked), rounding)
+            elif graph.down is None:
+                posed = _OrderFront(graph, rounding)
+            else:
+                raise ProblemError("a Pareto set of take-downs is of one order; give an order")
         left = max(0.0, end - time.perf_counter())
-        return _front_of(graph, formulation, left, progress, watch)
+        front = _front_of(posed, formulation, left, progress, watch)
 
-    return best_front(problem, found, watch)
+        def measure() -> tuple[Moved, ...]:
+            pairs = zip(front.engines, front.steps, strict=True)
+            return tuple(most_moved((own,), steps) for own, steps in pairs)
+
+        return replace(front, moved=watch.spare(RANGE, measure, ()))
+
+    front = measured(problem)
+    if problem.says_range or not front.moved:
+        return front
+    farthest = max(front.moved, key=lambda each: each.share)
+    if front.stopped == INTERRUPT:
+        return replace(front, beyond=INTERRUPTED * leaves(farthest))
+    try:  # all of its plans keep the range, or none can
+        kept, why = keeping(front, farthest, lambda: measured(problem.within_range(1.0)))
+    except KeyboardInterrupt:
+        kept, why = replace(front, stopped=INTERRUPT), INTERRUPTED
+    return replace(kept, beyond=why)
 
 
 def _front_of(
-    problem: _FrontProblem, formulation: Formulation, seconds: float, progress: Tell, clock: Clock
+    problem: _StateFront, formulation: Formulation, seconds: float, progress: Tell, clock: Clock
 ) -> Front:
     """Return the Pareto set of a problem, judged."""
     start = time.perf_counter()
@@ -374,7 +387,9 @@ def _front_of(
             raise SolverError(
                 f"the values of a plan are {values.tolist()}, not {point.tolist()} as claimed"
             )
-    _require_apart(points)
+    for i, point in enumerate(points):
+        if (np.delete(points, i, axis=0) <= point).all(axis=1).any():
+            raise SolverError(f"the point {point.tolist()} is dominated by another one")
     stopped = found.stopped
     if not stopped:
         complete = partial(_require_complete, problem, points, progress)
@@ -386,26 +401,20 @@ def _front_of(
     return Front(found_points, plans, engines, not stopped, spent, stopped=stopped)
 
 
-def _posed(problem: Problem, rounding: Mapping[str, float] | None) -> _FrontProblem:
-    """Return the states whose paths are plans, in one build order or in all."""
-    found = graph_of(problem)
-    if isinstance(found, AllOrders):
-        if found.down is not None:
-            raise ProblemError("a Pareto set of take-downs is of one order; give an order")
-        return _OrderFront(found, rounding)
-    return _StateFront(states_of(problem), rounding)
-
-
 def _found(
-    name: str, problems: tuple[_FrontProblem, _FrontProblem], solve: Callable[[], object]
+    name: str, problems: tuple[_StateFront, _StateFront], solve: Callable[[], object]
 ) -> FrontSelection:
-    """Return what a formulation says; an error that no plan is allowed, once that is proven."""
+    """Return what a formulation says, in numbers; raise that no plan exists once it is proven."""
     twin = problems[1]
     try:
         found = called(name, lambda: problems, FrontSelection, solve)
     except InfeasibleError:
         found = FrontSelection(np.zeros((0, len(twin.names))), ())
-    found = _with_numbers(name, found, twin.names)
+    with readable(name):
+        points = np.array(found.points, dtype=float).reshape(-1, len(twin.names))
+        if not np.isfinite(points).all() or len(points) != len(found.plans):
+            raise ValueError(f"{len(points)} points, {len(found.plans)} plans, or one is no number")
+        found = FrontSelection(points, tuple(found.plans), text(found.stopped))
     if len(found.points) or found.stopped:
         return found
     if not twin.is_empty_below(np.full(len(twin.names), np.inf)):
@@ -413,23 +422,7 @@ def _found(
     raise InfeasibleError("pareto: no plan is within the limits; relax one")
 
 
-def _with_numbers(name: str, found: FrontSelection, names: Sequence[str]) -> FrontSelection:
-    """Return a selection with numbers where numbers belong."""
-    with readable(name):
-        points = np.array(found.points, dtype=float).reshape(-1, len(names))
-        if not np.isfinite(points).all() or len(points) != len(found.plans):
-            raise ValueError(f"{len(points)} points, {len(found.plans)} plans, or one is no number")
-        return FrontSelection(points, tuple(found.plans), text(found.stopped))
-
-
-def _require_apart(points: Floats) -> None:
-    for i, point in enumerate(points):
-        others = np.delete(points, i, axis=0)
-        if (others <= point).all(axis=1).any():
-            raise SolverError(f"the point {point.tolist()} is dominated by another one")
-
-
-def _require_complete(problem: _FrontProblem, points: Floats, progress: Tell) -> None:
+def _require_complete(problem: _StateFront, points: Floats, progress: Tell) -> None:
     """Raise an error if a plan exists that no point dominates: bounds are searched again."""
     bounds = upper_bounds(points)
     for bound in with_progress("proving that no plan is missing", bounds, progress):
@@ -464,7 +457,7 @@ def upper_bounds(points: Floats) -> Floats:
     return np.array(kept)
 
 
-def _table(problem: _FrontProblem, points: Floats, plans: Sequence[Sequence[Step]]) -> pd.DataFrame:
+def _table(problem: _StateFront, points: Floats, plans: Sequence[Sequence[Step]]) -> pd.DataFrame:
     table = pd.DataFrame(points, columns=[*problem.names])
     counts = {
         "steps": [len(steps) for steps in plans],

@@ -170,9 +170,8 @@ class Policy(FrozenValue):
     ) -> int:
         """Return which free robot of a kind takes a grip: one that is not seen to stay free."""
         free = [r for r in kind if now[0][r] is None]
-        place = {int(n): i for i, n in enumerate(self.nodes, start=1)}
         for robot in reversed(free):
-            stay = -place.get(now[1][robot], 0)
+            stay = -self._place.get(now[1][robot], 0)
             if stay in left and len(free) > 1:
                 left.remove(stay)
                 free.remove(robot)

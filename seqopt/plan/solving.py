@@ -65,7 +65,10 @@ def _with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Pla
         return plan
     first = _found(plan)
     most = max(robot.arm.choices for robot in scene.robots if robot.arm is not None)
-    floor, bounds = _floor(plan)
+    floor, bounds = dict[str, float](), tuple[float, ...]()  # for display, and in SI units
+    if plan.certificate is not None and plan.gap is not None:
+        bounds = plan.certificate.bounds
+        floor = plan._by_goal(bounds[: len(plan.goals)])
     if not first.unreached or recipe_of(problem.engine) is None:
         proven = bool(floor) and not first.unreached
         return replace(plan, arms=KeptPostures(first, most, most, floor, bounds, proven))
@@ -78,7 +81,9 @@ def _with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Pla
             break
         found = _found(other)
         if not found.unreached:
-            best = bool(floor) and _no_worse(other, floor)
+            pairs = [(v, floor[name]) for name, v in other.objective.items() if name in floor]
+            none_below = all(v <= low + _SAME * max(abs(v), abs(low)) for v, low in pairs)
+            best = bool(floor) and none_below
             return replace(other, arms=KeptPostures(found, most, fewer, floor, bounds, best))
     return replace(plan, arms=KeptPostures(first, most, most, floor, bounds, best=False))
 
@@ -89,33 +94,16 @@ def _found(plan: Plan) -> PlanPostures:
     return found
 
 
-def _floor(plan: Plan) -> tuple[dict[str, float], tuple[float, ...]]:
-    """Return what no plan stays below, where that is proven, as people read it and as it is."""
-    proof = plan.certificate
-    if proof is None or plan.gap is None:
-        return {}, ()
-    return plan._by_goal(proof.bounds[: len(plan.goals)]), proof.bounds
-
-
-def _no_worse(plan: Plan, floor: dict[str, float]) -> bool:
-    pairs = [(value, floor[name]) for name, value in plan.objective.items() if name in floor]
-    return all(value <= low + _SAME * max(abs(value), abs(low)) for value, low in pairs)
-
-
 def _narrowed(problem: Problem, plan: Plan, postures: int) -> Problem:
     """Return a problem with fewer postures at each node, and the criterion of its plan."""
 
     def fewer(scene: Scene) -> Scene:
-        return scene.with_robots(
-            *(
-                robot
-                if robot.arm is None
-                else replace(
-                    robot, arm=replace(robot.arm, postures=min(postures, robot.arm.postures))
-                )
-                for robot in scene.robots
-            )
-        )
+        arms = [
+            arm and replace(arm, postures=min(postures, arm.postures))
+            for arm in (robot.arm for robot in scene.robots)
+        ]
+        pairs = zip(scene.robots, arms, strict=True)
+        return scene.with_robots(*(replace(robot, arm=arm) for robot, arm in pairs))
 
     return _moved(problem, fewer(problem.scene), plan, [fewer(each) for each in problem.scenarios])
 
@@ -123,19 +111,14 @@ def _narrowed(problem: Problem, plan: Plan, postures: int) -> Problem:
 def _moved(
     problem: Problem, scene: Scene, plan: Plan | None = None, scenarios: Sequence[Scene] = ()
 ) -> Problem:
-    """Return a problem with other robots, otherwise the same; with the criterion of a plan."""
+    """Return a problem with other robots, and the criterion of a plan, scales included."""
     engine, moves = engine_for(problem.engine, scene), problem.moves
     if isinstance(moves, Schedule):
         moves = replace(moves, scene=scene)
-    criterion = problem.criterion if plan is None else _criterion(plan)
+    criterion = problem.criterion if plan is None else plan._of_scene.criterion
     return replace(
         problem, engine=engine, moves=moves, criterion=criterion, scenarios=tuple(scenarios)
     )
-
-
-def _criterion(plan: Plan) -> Criterion:
-    """Return the criterion of a plan, with all numbers that it takes from the scene."""
-    return plan._of_scene.criterion
 
 
 AIMS = {Aim.SUM: Goal(Measure.SUM), Aim.PEAK: Goal(Measure.PEAK)}
@@ -163,7 +146,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     also: Sequence[str] = (),
     resources: Resources = HERE,
 ) -> Problem:
-    """Return the problem of a build, of whatever schedule; words stand for values everywhere.
+    """Create a `Problem` of a build; strings are parsed.
 
     Parameters
     ----------
@@ -197,12 +180,8 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     asked = {"goals": goals, "limits": limits, "budgets": budgets, "stands": stands}
     worlds = {"scenarios": scenarios, "over": over, "orders": orders}
     more = {"also": also, "resources": resources}
-    return _scaled(Problem.asked(simplest(engine), moves, criterion, **asked, **worlds, **more))
-
-
-def _scaled(problem: Problem) -> Problem:
-    """Return a problem whose criterion has the numbers of the scene; raise what does not fit."""
-    posed = replace(problem, criterion=_usual_criterion(problem))
+    problem = Problem.asked(simplest(engine), moves, criterion, **asked, **worlds, **more)
+    posed = replace(problem, criterion=_scaled_criterion(problem))
     posed.graphs.update(problem.graphs)
     return posed
 
@@ -221,16 +200,19 @@ def natural(problem: Problem) -> On:
 
 
 def in_layers(moves: Schedule | FreeRules) -> bool:
-    """Return whether candidates of moves can be chosen in layers: whatever is wrong, it says so."""
+    """Return whether steps have at most two open grips, so that candidates form layers."""
     return not isinstance(moves, FreeRules) and getattr(moves, "has_pairs", True)
 
 
 def usual(problem: Problem) -> str:
     """Return the name of the formulation that solves a problem if none is named."""
-    on = natural(problem)
-    if on is On.LAYERS and problem.scenarios:
+    return _usual_on(natural(problem), robust=bool(problem.scenarios), capped=bool(problem.budgets))
+
+
+def _usual_on(on: On, *, robust: bool, capped: bool) -> str:
+    if on is On.LAYERS and robust:
         return "minimax"
-    return "labels" if on is On.LAYERS and problem.budgets else USUAL[on]
+    return "labels" if on is On.LAYERS and capped else USUAL[on]
 
 
 def graph_of(problem: Problem, on: On | None = None) -> Graph:
@@ -262,7 +244,7 @@ def states_of(problem: Problem) -> States:
     return states
 
 
-def _usual_criterion(problem: Problem) -> Criterion:
+def _scaled_criterion(problem: Problem) -> Criterion:
     """Return the criterion with the numbers of the scene; raise what the usual graph says."""
     if natural(problem) in (On.STATES, On.ORDERS, On.TIMES):
         return states_of(problem).criterion
@@ -484,23 +466,18 @@ def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> 
 
     if isinstance(problem, Instance):
         return solve_instance(problem, formulation, run)
-    graphs = {
-        States: On.STATES,
-        AllOrders: On.ORDERS,
-        ScenarioLayers: On.SCENARIOS,
-        Layers: On.LAYERS,
-    }
-    on = next((on for kind, on in graphs.items() if isinstance(problem, kind)), None)
-    if on is None:
-        raise ProblemError(
-            f"a {type(problem).__name__} is not a problem; give one that seqopt.pose made"
-        )
-    sought, name = on is On.ORDERS, USUAL[on]
-    if isinstance(problem, States) and problem.is_timed:
-        on, name = On.TIMES, USUAL[On.TIMES]
-    elif isinstance(problem, ScenarioLayers) and problem.aim.aim is Aim.PEAK:
-        on, name = On.LAYERS, "minimax"
-    elif on is On.LAYERS and problem.budgets:
-        name = "labels"
-    found = as_formulation(formulation or name, on)
-    return _solver(On.ORDERS if sought else on)(problem, found, run)
+    match problem:
+        case States():
+            on = On.TIMES if problem.is_timed else On.STATES
+        case AllOrders():
+            on = On.ORDERS
+        case ScenarioLayers():
+            on = On.LAYERS if problem.aim.aim is Aim.PEAK else On.SCENARIOS
+        case Layers():
+            on = On.LAYERS
+        case _:
+            kind = type(problem).__name__
+            raise ProblemError(f"a {kind} is not a problem; give one that seqopt.pose made")
+    capped = on is On.LAYERS and bool(problem.budgets)
+    name = formulation or _usual_on(on, robust=isinstance(problem, ScenarioLayers), capped=capped)
+    return _solver(on)(problem, as_formulation(name, on), run)

@@ -54,11 +54,14 @@ class FoundProps(Terse):
         return len(self.problem.scene.props)
 
     @property
+    def _solved(self) -> int:
+        return int(self.tried["outcome"].str.startswith("solved").sum())
+
+    @property
     def said(self) -> str:
         """What was chosen, and what ruled the rest out, in words."""
         nodes = ", ".join(str(prop.node) for prop in self.problem.scene.props)
-        solved = int(self.tried["outcome"].str.startswith("solved").sum())
-        looked = len(self.tried)
+        looked, solved = len(self.tried), self._solved
         where = f" at node{'s' * (self.count > 1)} {nodes}" if nodes else ""
         end = "no set of as many or fewer is better" if self.proven else "another may be better"
         end += f", by a model {OUTSIDE}" if self.plan.outside else ""
@@ -69,13 +72,12 @@ class FoundProps(Terse):
 
     def described(self) -> dict[str, object]:
         """Return the same for a summary, ready for JSON."""
-        solved = int(self.tried["outcome"].str.startswith("solved").sum())
         return {
             "props": self.count,
             "nodes": [prop.node for prop in self.problem.scene.props],
             "sets": self.sets,
-            "solved": solved,
-            "cut": len(self.tried) - solved,
+            "solved": self._solved,
+            "cut": len(self.tried) - self._solved,
             "proven": self.proven,
         }
 
@@ -165,9 +167,8 @@ class _Search(Tried):
 
     def _is_cut(self, chosen: _Set, bricks: int) -> bool:
         """Return whether sets that have these props alone up to a brick count are ruled out."""
-        return any(
-            self._until(chosen, stop) in self._cuts[stop] for stop in self._cuts if stop <= bricks
-        )
+        early = ((stop, sets) for stop, sets in self._cuts.items() if stop <= bricks)
+        return any(self._until(chosen, stop) in sets for stop, sets in early)
 
     def _until(self, chosen: _Set, bricks: int) -> _Set:
         return tuple(i for i in chosen if self._since[i] <= bricks)
@@ -189,7 +190,10 @@ class _Search(Tried):
         """Return what is known of a set, in words, and the values of its best plan."""
         try:
             problem = _moved(self._problem, scene)
-            stop = Proof(states_of(problem)).stops_at(self._wanted())
+            first = problem.goals[0]
+            peak = first.measure is Measure.PEAK and not first.of_margins
+            incumbent = self._best[:1] if self._plan is not None and peak else ()
+            stop = Proof(states_of(problem)).stops_at(incumbent)
             if stop is not None:
                 self._cuts.setdefault(stop, set()).add(self._until(chosen, stop))
                 self._farthest = max(self._farthest, (stop, chosen), key=itemgetter(0))
@@ -200,10 +204,3 @@ class _Search(Tried):
             return f"no plan: {error}", (inf,)
         except NothingFoundError as error:
             return self._open(error)
-
-    def _wanted(self) -> tuple[float, ...]:
-        """Return what the first goal of a plan must not exceed, if states say so."""
-        first = self._problem.goals[0]
-        if self._plan is None or first.of_margins or first.measure is not Measure.PEAK:
-            return ()
-        return self._best[:1]

@@ -80,26 +80,18 @@ def goes_on(states: States, steps: Sequence[Step]) -> dict[str, float]:
     assert isinstance(rules, FreeRules)
     scene, kept = states.network.scene, rules.payload is Payload.KEPT
     begun = (_begin_step(scene, rules.begin), *steps)
-    over = _carrying_excesses(scene, begun) if kept else ()
-    if over:
+    if kept and (over := _carrying_excesses(scene, begun)):
         raise StepError(f"payload exceeded: {over[0]}")
     check_free(states.network, rules, steps)
     check_postures(scene, steps)
-    over = overloads(scene, analyze(states.engine, steps)) if kept else ()
-    if over:
-        raise StepError(f"payload exceeded: {over[0]}")
-    values = plan_values(states, steps, starts=_starts(states, steps))
+    if kept and (excess := overloads(scene, analyze(states.engine, steps))):
+        raise StepError(f"payload exceeded: {excess[0]}")
+    starts: tuple[float, ...] = ()  # s, at the earliest, where steps wait for mortar
+    if (waits := offered("mortar_waits")(states.network, states.standing)) is not None:
+        starts = tuple(t.start for t in offered("step_times")(scene, steps, waits, rules.begin))
+    values = plan_values(states, steps, starts=starts)
     pairs = zip(states.goals, states.names, values, strict=False)
     return {name: goal.shown(value) for goal, name, value in pairs}
-
-
-def _starts(states: States, steps: Sequence[Step]) -> tuple[float, ...]:
-    """Return when steps that go on start at the earliest, s, where they wait for mortar."""
-    waits = offered("mortar_waits")(states.network, states.standing)
-    if waits is None:
-        return ()
-    times = offered("step_times")(states.network.scene, steps, waits, states.rules.begin)
-    return tuple(time.start for time in times)
 
 
 def compared(plan: Plan, old: Sequence[Step]) -> dict[str, object]:
