@@ -10,7 +10,7 @@ from operator import le
 import numpy as np
 
 from formulations.choice import Choice, Choose
-from formulations.states._totals import StopError, cheapest_by, least_total
+from formulations.states._totals import LeastTotal, StopError, cheapest_by, least_total
 from seqopt._interrupts import answered
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
@@ -26,12 +26,12 @@ from seqopt.graph.orders import (
     Trial,
     order_value,
 )
-from seqopt.graph.paths import Best, distances, lexicographic, path_values, reached, tied
+from seqopt.graph.paths import Best, _on_paths, lexicographic, path_values, reached, tied
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore
 from seqopt.graph.states.states import States
 from seqopt.plan.search._margin_search import best_margin, bisected, with_margin
-from seqopt.problem.problem import Goal, Measure
+from seqopt.problem.problem import Goal, Measure, RobustAim
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Stage, Tell
 
@@ -74,7 +74,9 @@ def _order_of_path(
     states, order = problem.states, problem.scene.build_order
     space = OrderStates(problem, MOST_PARTS)
     found = Explorer(space, width, tell)
-    own = np.inf if width or states.totals or states.budgets else _own_value(problem)
+    own = np.inf  # or the value of the scene's own order, if it is one of those asked for
+    if problem.allows(order) and not (width or states.totals or states.budgets):
+        own = order_value(problem, Trial(order, np.inf))
     found.rise(own if space.peaks[0] else np.inf)
     if not found.whole:
         raise found.without_plan("no order of the bricks has a plan")
@@ -84,7 +86,7 @@ def _order_of_path(
         return _order_within(found, problem, len(space.parts) - 1)
     found.refine()
     visited = found.graph()
-    chosen_ = choose(_on_paths(visited.graph), watch)
+    chosen_ = choose(visited.graph.only(_on_paths(visited.graph)), watch)
     path, value, stopped = chosen_.path, own, "time" * chosen_.stopped
     if path and path_values(visited.graph, path)[0] < own:
         value, order = path_values(visited.graph, path)[0], problem.order_of(visited.of(path))
@@ -92,12 +94,6 @@ def _order_of_path(
         raise TimeUpError("no order with a plan was found yet; give more")
     bound = min(chosen_.bounds[0] if chosen_.bounds else -np.inf, value)
     return OrderSelection(order, value, bound, len(space.parts) - 1, stopped)
-
-
-def _own_value(problem: AllOrders) -> float:
-    """Return the value of the scene's own order; infinite if it is none of those asked for."""
-    own = problem.scene.build_order
-    return order_value(problem, Trial(own, np.inf)) if problem.allows(own) else np.inf
 
 
 def _order_of_margin(problem: AllOrders, tell: Watching) -> OrderSelection:
@@ -135,13 +131,18 @@ def _order_of_total(
     found: Explorer, problem: AllOrders, choose: Choose, watch: Watch
 ) -> OrderSelection:
     """Return the order of the path of least total over scenarios."""
-    visited = found.graph()
-    best = least_total(
-        _on_paths(visited.graph), problem.states.over, cheapest_by(choose, watch), watch
-    )
+    visited, best = _least_total(found, problem.states.over, choose, watch)
     stopped, parts = "time" * watch.over, len({part for _, part, _ in visited.states})
     order, weights = problem.order_of(visited.of(best.path)), tuple(best.weights.tolist())
     return OrderSelection(order, best.value, best.bound, parts - 1, stopped, weights)
+
+
+def _least_total(
+    found: Explorer, aim: RobustAim, choose: Choose, watch: Watch
+) -> tuple[Visited, LeastTotal]:
+    visited = found.graph()
+    graph = visited.graph.only(_on_paths(visited.graph))
+    return visited, least_total(graph, aim, cheapest_by(choose, watch), watch)
 
 
 def shortest(graph: Graph, _: Watch) -> Choice:
@@ -164,10 +165,7 @@ def best_total(
             if width is not None:
                 return best_total(problem, choose, watch, tell)
             raise found.without_plan("no plan is allowed")
-        visited = found.graph()
-        best = least_total(
-            _on_paths(visited.graph), problem.over, cheapest_by(choose, watch), watch
-        )
+        visited, best = _least_total(found, problem.over, choose, watch)
     except StopError as stop:
         raise _too_little(stop) from None
     plan = _selection(visited, Best(best.path, (best.value,)))
@@ -187,7 +185,7 @@ def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> Sta
         graph, states = wide.graph()
         graph = replace(graph, caps=problem.budgets)
         with answered(watch.interrupt):
-            best = choose(_on_paths(graph), watch)
+            best = choose(graph.only(_on_paths(graph)), watch)
     except (StopError, KeyboardInterrupt) as stop:
         return plan_by_then(first, stop)
     stopped = ("interrupt" if watch.interrupted else "time") * best.stopped
@@ -199,12 +197,6 @@ def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> Sta
     known = (*best.bounds, *[-np.inf] * (graph.goals - len(best.bounds)))
     bound = tuple(map(min, found.objective, (*known, *found.objective[graph.goals :])))
     return replace(found, bound=bound, stopped=stopped, prices=best.prices)
-
-
-def _on_paths(graph: Graph) -> Graph:
-    """Return the graph with the moves that are on paths from the start to an end."""
-    to_end = np.isfinite(distances(graph, np.ones(len(graph.source)), back=True))
-    return graph.only(reached(graph)[graph.source] & to_end[graph.target])
 
 
 def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watching:

@@ -23,7 +23,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances, fewest_moves
+from seqopt.graph.paths import distances, fewest_moves, moves_along
 
 ROUNDS = 25  # of cutting planes
 CLOSED = 1e-7  # share of the bound to which prices are the best
@@ -90,15 +90,7 @@ def _cheapest(graph: Graph, work: Floats, prices: Floats) -> tuple[Floats, tuple
         tight = costs + left[graph.target] <= left[graph.source] + slack
     tight &= np.isfinite(left[graph.target])
     path = fewest_moves(graph.only(tight))
-    moves = moves_of(graph, path)
-    return left, path, work[moves].sum(axis=0)
-
-
-def moves_of(graph: Graph, path: Sequence[int]) -> Ints:
-    """Return the moves (k,) of a path, its start left out: the first of those side by side."""
-    codes = graph.source.astype(np.int64) * graph.states + graph.target
-    wanted = np.array((0, *path[:-1])) * graph.states + np.array(path)
-    return np.asarray(np.searchsorted(codes, wanted))
+    return left, path, work[moves_along(graph, path)].sum(axis=0)
 
 
 def _highest(planes: Floats, sizes: Floats) -> tuple[Floats, float]:
@@ -160,8 +152,7 @@ class Labels(NamedTuple):
 
     def only(self, rows: Ints | Bools) -> Labels:
         """Select rows."""
-        every = (self.state[rows], self.end[rows], self.since[rows])
-        return Labels(*every, self.sums[rows], self.before[rows], self.placed[rows])
+        return Labels(*(each[rows] for each in self))
 
     @property
     def size(self) -> int:
@@ -170,14 +161,7 @@ class Labels(NamedTuple):
 
 
 def _joined(parts: Sequence[Labels]) -> Labels:
-    return Labels(
-        np.concatenate([part.state for part in parts]),
-        np.concatenate([part.end for part in parts]),
-        np.concatenate([part.since for part in parts]),
-        np.concatenate([part.sums for part in parts]),
-        np.concatenate([part.before for part in parts]),
-        np.concatenate([part.placed for part in parts]),
-    )
+    return Labels(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,12 +266,10 @@ class Sweep:
         return fresh
 
     def _first(self) -> Labels:
-        columns = self._timed.free.shape[1]
-        none = np.zeros((1, len(self._caps.sums)))
-        start, since = np.zeros(1, dtype=np.int64), np.zeros((1, columns))
-        curing = self._timed.curing
+        start, curing = np.zeros(1, dtype=np.int64), self._timed.curing
+        since, sums = (np.zeros((1, n)) for n in (self._timed.free.shape[1], len(self._caps.sums)))
         placed = np.zeros((1, 0)) if curing is None else curing.placed[None].copy()
-        return Labels(start, np.zeros(1), since, none, np.full(1, -1), placed)
+        return Labels(start, np.zeros(1), since, sums, np.full(1, -1), placed)
 
     def _bounds(self, labels: Labels) -> Floats:
         """Return when builds through labels end at least, and what sums they take, (N, 1 + q)."""
@@ -394,8 +376,7 @@ class Sweep:
             worse = (keys[rows - back] <= keys[rows]).all(axis=1)
             beaten[rows[worse]] = True
             rows = rows[~worse]
-        stays = np.sort(order[~beaten & new[order]])
-        return every.only(stays)
+        return every.only(np.sort(order[~beaten & new[order]]))
 
     def _path(self, every: Sequence[Labels], number: int) -> tuple[int, ...]:
         """Return the states of the path of a label, the start left out."""

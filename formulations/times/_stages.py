@@ -23,15 +23,14 @@ from formulations.times._labels import (
     Sweep,
     Swept,
     best_prices,
-    moves_of,
 )
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError, NothingFoundError
 from seqopt.graph._explore import Visited
 from seqopt.graph._timed import TimedGraph
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import Graph, LabelProof
-from seqopt.graph.paths import distances, keep_best, reached, tied
+from seqopt.graph.graph import LabelProof
+from seqopt.graph.paths import _best_moves, _on_paths, moves_along, tied
 from seqopt.problem.problem import Goal, Measure
 
 BEAMS = (100, 1000, 5000)  # widths of the searches for a first path
@@ -137,17 +136,13 @@ class Stages:
         self, problem: Goals, visited: Visited, choose: Choose, watch: Watch, timed: TimedGraph
     ) -> None:
         self._problem, self._choose, self._watch = problem, choose, watch
-        self._visited = visited
-        self._timed = timed
-        graph = self._timed.graph
+        self._visited, self._timed = visited, timed
         budgets = dict(enumerate(problem.budgets, start=len(problem.aims)))
         is_time = {k: problem.goals[k].measure is Measure.MAKESPAN for k in budgets}
         time = min((tied(cap) for k, cap in budgets.items() if is_time[k]), default=np.inf)
         sums = tuple((k, tied(cap)) for k, cap in budgets.items() if not is_time[k])
-        kept = _on_paths(graph, np.ones(len(graph.source), dtype=bool))
-        self._stage = StageFound(
-            kept, Caps(time, sums), filtered=not budgets and timed.curing is None
-        )
+        filtered = not budgets and timed.curing is None
+        self._stage = StageFound(_on_paths(timed.graph), Caps(time, sums), filtered)
 
     def run(self) -> StageFound:
         """Return what is found; raise an `InfeasibleError` if no path is within all caps."""
@@ -171,20 +166,16 @@ class Stages:
 
     def _filter(self, k: int) -> None:
         """Leave out moves that are on no path which is best in a goal."""
-        stage, graph = self._stage, self._timed.graph
-        _, least = keep_best(graph.only(stage.kept), k)
-        amounts = graph.amounts[:, k]
-        if graph.peaks[k]:
-            kept = stage.kept & (amounts <= tied(least))
-        else:
-            some = graph.only(stage.kept)
-            before = distances(some, some.amounts[:, k])
-            after = distances(some, some.amounts[:, k], back=True)
-            with np.errstate(invalid="ignore"):
-                sums = before[graph.source] + amounts + after[graph.target]
-            kept = stage.kept & (sums <= tied(least))
-        stage.kept = _on_paths(graph, kept)
+        stage, kept = self._stage, self._stage.kept.copy()
+        kept[kept], least = _best_moves(self._timed.graph.only(kept), k)
+        stage.kept = self._on_paths(kept)
         stage.bounds.append(least)
+
+    def _on_paths(self, kept: Bools) -> Bools:
+        """Return which of some moves (m,) are on paths from the start to an end."""
+        out = kept.copy()
+        out[out] = _on_paths(self._timed.graph.only(kept))
+        return out
 
     def _makespan(self) -> None:
         """Find the least makespan; from then on it is a cap."""
@@ -192,11 +183,9 @@ class Stages:
         prices = best_prices(timed, stage.kept, self._watch)
         swept = beams(timed, stage.kept, stage.caps, prices, self._watch)
         first = Chosen(swept.path, swept.best, prices.bound)
+        found = first
         if first.value > prices.bound * (1 + ALMOST):
-            asked = Asked(timed, stage.kept, stage.caps, prices, first, self._watch)
-            found = self._choose(asked)
-        else:
-            found = first
+            found = self._choose(Asked(timed, stage.kept, stage.caps, prices, first, self._watch))
         if not found.path and found.late:
             raise StopError("time")
         if not found.path or found.value > tied(stage.caps.time):
@@ -223,7 +212,7 @@ class Stages:
         try:
             while low < high:
                 middle = (low + high) // 2
-                kept = _on_paths(self._timed.graph, stage.kept & (amounts <= levels[middle]))
+                kept = self._on_paths(stage.kept & (amounts <= levels[middle]))
                 swept = self._reach(kept, prices)
                 if swept.path:
                     stage.path = swept.path
@@ -278,10 +267,8 @@ class Stages:
         caps = replace(stage.caps, sums=(*stage.caps.sums, (STEPS, most)))
         prices = best_prices(self._timed, stage.kept, Watch(0.0))
         try:
-            goal = len(stage.caps.sums)
-            swept = Sweep(self._timed, prices, stage.kept, caps).run(
-                self._watch, width=BEAMS[1], goal=goal
-            )
+            sweep = Sweep(self._timed, prices, stage.kept, caps)
+            swept = sweep.run(self._watch, width=BEAMS[1], goal=len(stage.caps.sums))
         except LateError:
             return
         stage.path = swept.path or stage.path
@@ -289,14 +276,14 @@ class Stages:
     def _taken(self, path: Sequence[int], k: int) -> float:
         """Return what a goal that is no makespan takes of a path."""
         graph = self._timed.graph
-        amounts = graph.amounts[moves_of(graph, path), k]
+        amounts = graph.amounts[moves_along(graph, path), k]
         return float(amounts.max(initial=0.0) if graph.peaks[k] else amounts.sum())
 
     def least(self, path: Sequence[int]) -> float:
         """Return how long a path takes by all that is known of its waits, s."""
         graph = self._timed.graph
         codes = graph.source.astype(np.int64) * graph.states + graph.target
-        kept = np.isin(codes, codes[moves_of(graph, path)])
+        kept = np.isin(codes, codes[moves_along(graph, path)])
         prices = best_prices(self._timed, kept, Watch(0.0))
         return Sweep(self._timed, prices, kept, Caps()).run(Watch()).best
 
@@ -316,10 +303,3 @@ class Stages:
         state = np.concatenate([own.state for own in labels])
         states = np.column_stack([self._timed.levels[state], rows[state]])
         return LabelProof(states, np.concatenate(parts), each)
-
-
-def _on_paths(graph: Graph, kept: Bools) -> Bools:
-    """Return which moves (m,) bool, of some, are on paths from the start to an end."""
-    some = graph.only(kept)
-    to_end = np.isfinite(distances(some, np.ones(len(some.source)), back=True))
-    return kept & reached(graph, kept)[graph.source] & to_end[graph.target]

@@ -20,12 +20,12 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import InfeasibleError, NothingFoundError, SolverError, TimeUpError
+from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
 from seqopt.graph._labels import LabelSearch, cheapest_within, ground
 from seqopt.graph.duality import ROUNDING, least_sum
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import TIED, tied
+from seqopt.graph.paths import tied
 
 ROUNDS = 60  # of cutting planes
 CLOSED = 1e-9  # share of a value to which prices are the best
@@ -71,7 +71,7 @@ def within_budgets(
     that is open, and none was found.
     """
     watch, goals = watch or Watch(), len(graph.peaks) - len(caps)
-    limited = [*zip(range(goals, len(graph.peaks)), caps, strict=True)]
+    limited = [*enumerate(caps, start=goals)]
     bounds, prices, best = [], [], _some_path(graph, caps, watch)
     for goal in range(goals):
         if graph.peaks[goal]:
@@ -100,13 +100,13 @@ def within_budgets(
 def _some_path(graph: Graph, caps: Sequence[float], watch: Watch) -> _Path:
     """Return a path whose last columns are within caps."""
     goals = len(graph.peaks) - len(caps)
-    limited = [*zip(range(goals, len(graph.peaks)), caps, strict=True)]
-    found = _least_sum(graph, np.zeros(len(graph.source)), limited)
+    nothing = np.zeros(len(graph.source))
+    found = _least_sum(graph, nothing, [*enumerate(caps, start=goals)])
     path = _path(graph, found.moves)
     if path is not None:
         return path
     if found.bound <= _rounding(graph, found.prices, caps):
-        nothing, most = np.zeros(len(graph.source)), [tied(cap) for cap in caps]
+        most = [tied(cap) for cap in caps]
         asked = ground(graph, nothing, graph.amounts[:, goals:], most, found.prices)
         until = Watch(watch.left)  # it is told no costs that are none
         met = cheapest_within(asked, NONE, until, LABELS, any_path=True)
@@ -260,55 +260,20 @@ def _cheapest(graph: Graph, costs: Floats) -> Ints | None:
         return None
     state, moves = int(ends[np.argmin(least[ends])]), list[int]()
     while state != 0:
-        ends_of = (before[state] + np.arange(2)).astype(graph.source.dtype)  # no copy of all
-        first, last = np.searchsorted(graph.source, ends_of)
-        own = first + np.flatnonzero(graph.target[first:last] == state)
+        out = graph.moves_from(int(before[state]))
+        own = out.start + np.flatnonzero(graph.target[out] == state)
         moves.append(int(own[np.argmin(costs[own])]))
         state = int(before[state])
     return np.array(moves[::-1], dtype=np.int64)
 
 
-def budget_bounds(
-    graph: Graph,
-    values: Sequence[float],
-    claimed: Sequence[float],
-    priced: tuple[Sequence[float], Sequence[Sequence[float]]],
-) -> tuple[float, ...]:
-    """Return what no path within budgets stays below, by prices: checked with arithmetic alone.
-
-    ``graph``: its last columns are limited; ``values``, ``claimed``: of a path, and the bounds that
-    are claimed for worst amounts; ``priced``: caps of the last columns; by goal, prices of these
-    and of the sums before it.
-    """
-    caps, prices = priced
-    goals = len(graph.peaks) - len(caps)
-    limited, out = [*zip(range(goals, len(graph.peaks)), caps, strict=True)], []
-    for goal in range(goals):
-        amounts, price = graph.amounts[:, goal], np.maximum(prices[goal], 0.0)
-        taken = np.array([cap for _, cap in limited])
-        if price.shape != taken.shape or not np.isfinite(price).all():
-            raise SolverError(f"{price.size} prices where {taken.size} numbers belong")
-        paid = graph.amounts[:, [c for c, _ in limited]] @ price
-        rounding = _rounding(graph, price, taken)
-        if graph.peaks[goal]:
-            better = amounts < claimed[goal] - TIED * abs(claimed[goal])
-            least = least_sum(graph.only(better), paid[better])
-            no_path = least == np.inf or least > price @ taken + rounding
-            out.append(claimed[goal] if no_path else -np.inf)
-            graph = graph.only(amounts <= tied(values[goal]))
-        else:
-            out.append(least_sum(graph, amounts + paid) - float(price @ taken) - rounding)
-            limited.append((goal, values[goal]))
-    return tuple(out)
-
-
 def is_beyond(graph: Graph, caps: Sequence[float]) -> bool:
     """Return whether potentials prove that no path is within all caps on the last columns."""
-    columns = [*range(len(graph.peaks) - len(caps), len(graph.peaks))]
-    amounts, most = graph.amounts[:, columns], np.array([tied(cap) for cap in caps])
+    goals, most = len(graph.peaks) - len(caps), np.array([tied(cap) for cap in caps])
+    amounts = graph.amounts[:, goals:]
     if any(least_sum(graph, costs) > cap for costs, cap in zip(amounts.T, most, strict=True)):
         return True
-    nothing, limited = np.zeros(len(graph.source)), [*zip(columns, caps, strict=True)]
-    prices = _least_sum(graph, nothing, limited).prices  # of all caps together
+    limited = [*enumerate(caps, start=goals)]
+    prices = _least_sum(graph, np.zeros(len(graph.source)), limited).prices  # of all together
     together = float(prices @ most) + _rounding(graph, prices, caps)
     return least_sum(graph, amounts @ prices) > together

@@ -64,20 +64,26 @@ def lexicographic(graph: Graph) -> Best:
 
 
 def keep_best(graph: Graph, goal: int) -> tuple[Graph, float]:
-    """Return the moves on paths that are best in a goal, and its least value."""
+    """Return the subgraph of the paths that are best in a goal, and its least value."""
+    kept, least = _best_moves(graph, goal)
+    return graph.only(kept), least
+
+
+def _best_moves(graph: Graph, goal: int) -> tuple[Bools, float]:
+    """Return which moves (m,) are on paths that are best in a goal, and its least value."""
     amounts = graph.amounts[:, goal]
     if graph.peaks[goal]:
         least = least_peak(graph, goal)
-        return graph.only(amounts <= tied(least)), least
+        return amounts <= tied(least), least
     before, after = distances(graph, amounts), distances(graph, amounts, back=True)
     least = float(after[0])
     if not np.isfinite(least):
         raise InfeasibleError("no path leads to an end")
-    return graph.only(before[graph.source] + amounts + after[graph.target] <= tied(least)), least
+    return before[graph.source] + amounts + after[graph.target] <= tied(least), least
 
 
 def tied(value: float) -> float:
-    """Return up to what values count as one: no path is better by an error of rounding."""
+    """Return the largest value that equals this one up to rounding."""
     return value + TIED * abs(value)
 
 
@@ -139,6 +145,12 @@ def distances(graph: Graph, costs: Floats, *, back: bool = False) -> Floats:
     return np.asarray(dijkstra(matrix.T.tocsr(), indices=ends, min_only=True))
 
 
+def _on_paths(graph: Graph) -> Bools:
+    """Return which moves are on paths from the start to an end, (m,)."""
+    to_end = np.isfinite(distances(graph, np.ones(len(graph.source)), back=True))
+    return np.asarray(reached(graph)[graph.source] & to_end[graph.target])
+
+
 def moves_out(graph: Graph, states: Ints) -> tuple[Ints, Ints]:
     """Return the moves that lead from states (n,): from which row each does, and its number."""
     numbers = np.arange(graph.states + 1).astype(graph.source.dtype)
@@ -170,8 +182,16 @@ def path_values(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
 
 def fewest_moves(graph: Graph) -> tuple[int, ...]:
     """Return the states on a path of fewest moves, the first of them in the order of states."""
-    after = distances(graph, np.ones(len(graph.source)), back=True)
-    tight = graph.only(after[graph.target] == after[graph.source] - 1)
+    costs = np.ones(len(graph.source))
+    return _first_path(graph, costs, distances(graph, costs, back=True))
+
+
+def _first_path(graph: Graph, costs: Floats, after: Floats) -> tuple[int, ...]:
+    """Return the states on a shortest path by whole costs (m,), the first one of equal ones.
+
+    ``after`` (n,): the least that is left from every state to an end.
+    """
+    tight = graph.only(after[graph.target] + costs == after[graph.source])
     state, path = 0, list[int]()
     while after[state] > 0:
         state = int(tight.target[np.searchsorted(tight.source, state)])
@@ -294,11 +314,8 @@ class _Sums:
 
     def best(self, states: Ints) -> Ints:
         """Return the best move from every one of some states; -1 where there is none, (n,)."""
-        source, out = self._graph.source, np.full(len(states), -1, dtype=np.int64)
-        ends = np.searchsorted(source, states, side="right")
-        counts = ends - np.searchsorted(source, states)
-        moves = np.repeat(ends - np.cumsum(counts), counts) + np.arange(counts.sum())
-        row = np.repeat(np.arange(len(states)), counts)
+        out = np.full(len(states), -1, dtype=np.int64)
+        row, moves = moves_out(self._graph, states)
         found = self._costs[moves] + self.totals[self._graph.target[moves]]
         able = self._used[moves] & np.isfinite(found[:, -1])
         moves, row, found = moves[able], row[able], found[able]
@@ -377,11 +394,5 @@ def _fewest_open(graph: Graph, known: Ints) -> tuple[Ints, Floats]:
     part = graph.only((known[graph.target] != FAILS) & (known[graph.source] != FAILS))
     costs = np.where(known[part.target] == PASSES, 1.0, 1.0 + OPEN)
     after = distances(part, costs, back=True)
-    if not np.isfinite(after[0]):
-        return np.zeros(0, dtype=np.int64), after
-    tight = after[part.target] + costs == after[part.source]  # whole numbers
-    part, state, path = part.only(tight), 0, list[int]()
-    while not graph.ends[state]:
-        state = int(part.target[np.searchsorted(part.source, state)])
-        path.append(state)
+    path = _first_path(part, costs, after) if np.isfinite(after[0]) else ()
     return np.array(path, dtype=np.int64), after

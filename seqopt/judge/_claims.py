@@ -1,4 +1,4 @@
-"""What no path through an instance stays below: claims of others, and what the judge finds itself.
+"""Lower bounds of paths through an instance: claims of others, and what the judge finds itself.
 
 A claim is about one goal, those before it being at their values. A sum is proven by potentials that
 no arc violates, a peak by a cut that no cheaper arc leaves. What is capped, and sums before, may be
@@ -142,20 +142,44 @@ def _kept(graph: Graph, costs: Floats, potentials: Floats) -> float:
 
 
 def _own_sum(stage: Stage, goal: _Target, value: float) -> float:
-    """Return what a sum is at least, by prices that the judge finds."""
+    """Return the lower bound of a sum by multipliers that the judge finds."""
     costs = stage.graph.amounts[:, goal.columns[0]]
     if not stage.limited:
         return least_sum(stage.graph, costs)
-    prices = _own_prices(stage, costs, value)
-    pairs = zip(prices.tolist(), stage.limited, strict=True)
-    return _sum(stage, costs, Claim(), [(price, c, most) for price, (_, c, most) in pairs])
+    limited = [(c, most) for _, c, most in stage.limited]
+    case, sizes = case_of(stage.graph, costs, limited, value)
+    prices = least_within(case, np.zeros(len(sizes)), laid_down=False)[1] / sizes
+    pairs = zip(prices.tolist(), limited, strict=True)
+    return _sum(stage, costs, Claim(), [(price, *cap) for price, cap in pairs])
 
 
-def _own_prices(stage: Stage, costs: Floats, value: float) -> Floats:
-    """Return multipliers of what is limited whose bound on a sum is high, at most some value."""
-    case, sizes = case_of(stage.graph, costs, [(c, most) for _, c, most in stage.limited], value)
-    found = least_within(case, np.zeros(len(sizes)), laid_down=False)[1]
-    return np.asarray(found / sizes)
+def budget_bounds(
+    graph: Graph,
+    values: Sequence[float],
+    claimed: Sequence[float],
+    priced: tuple[Sequence[float], Sequence[Sequence[float]]],
+) -> tuple[float, ...]:
+    """Return Lagrangian lower bounds of paths under caps on the last columns, goal by goal.
+
+    ``values``, ``claimed``: of a path, and the bounds that are claimed for worst amounts;
+    ``priced``: the caps; by goal, multipliers of these and of the sums before it.
+    """
+    caps, multipliers = priced
+    first, out = len(graph.peaks) - len(caps), list[float]()
+    stage = Stage(graph, tuple(("", c, cap) for c, cap in enumerate(caps, start=first)))
+    for k in range(first):
+        own = [max(0.0, price) for price in multipliers[k]]
+        if len(own) != len(stage.limited) or not np.isfinite(own).all():
+            raise SolverError(f"{len(own)} prices where {len(stage.limited)} numbers belong")
+        limited = [(price, c, most) for price, (_, c, most) in zip(own, stage.limited, strict=True)]
+        goal = _Target("", PEAK if graph.peaks[k] else SUM, (k,))
+        if graph.peaks[k]:
+            out.append(_peak(stage, goal, Claim(claimed[k]), limited))
+            stage = next_stage(stage, goal, values[k])
+        else:  # what is tied with a value would loosen the bounds of later goals
+            out.append(_sum(stage, stage.graph.amounts[:, k], Claim(), limited))
+            stage = stage._replace(limited=(*stage.limited, ("", k, values[k])))
+    return tuple(out)
 
 
 def within_caps(instance: Instance, value: float, prices: Mapping[str, float]) -> float:

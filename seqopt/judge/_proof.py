@@ -14,12 +14,13 @@ import numpy as np
 
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph._budgets import budget_bounds, is_beyond
+from seqopt.graph._budgets import is_beyond
 from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import FAILS, PASSES, _lazy_path, lexicographic, reached
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
+from seqopt.judge._claims import budget_bounds
 from seqopt.judge._rule_moves import Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator
 from seqopt.judge._twin import Twin

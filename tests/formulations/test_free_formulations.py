@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from formulations.choice import Choice
 from formulations.on_graph import on_graph
-from formulations.states._search import _on_paths, path_values
+from formulations.states._search import path_values
 from formulations.states._totals import least_total
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.formulation import FormulationKind, On, Watch, find_formulation, formulation_names
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import fewest_moves, lexicographic
+from seqopt.graph.paths import _on_paths, fewest_moves, lexicographic
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
@@ -108,7 +108,7 @@ def test_all_agree_with_brute_force_under_any_rules(build):
 @given(graph=graphs())
 @settings(max_examples=30)
 def test_it_finds_the_best_path_of_any_graph(name, graph):
-    graph = _on_paths(graph)
+    graph = graph.only(_on_paths(graph))
     found = sorted(values_of(graph, moves) for moves in simple_paths(graph))
     if found:
         choice = ALL[name].solve.choose(graph, Watch(np.inf))
@@ -244,8 +244,9 @@ def test_the_least_total_over_scenarios_is_that_of_every_path(graph, level):
     if not paths:
         return
     aim = WORST_TOTAL if level is None else cvar(level)
+    once = once.only(_on_paths(once))
     found = least_total(
-        _on_paths(once), aim, lambda g: (lexicographic(g).path, lexicographic(g).values[0]), Watch()
+        once, aim, lambda g: (lexicographic(g).path, lexicographic(g).values[0]), Watch()
     )
     least = aim.each(np.array(paths)).min()
     assert found.value == pytest.approx(least) == pytest.approx(found.bound)
