@@ -15,7 +15,7 @@ from seqopt.errors import InfeasibleError, NothingFoundError
 from seqopt.graph.graph import Graph, Rows
 from seqopt.graph.paths import strictly_below
 
-PENDING, OPEN, CLOSED = 0, 1, 2  # of a state: above the threshold, visited, not allowed
+NEW, PENDING, OPEN, CLOSED = range(4)  # of a state: above the threshold, visited, not allowed
 Key: TypeAlias = Any  # which part, whatever a space calls it; it can be hashed
 
 
@@ -24,7 +24,7 @@ Valued = Callable[[Ints], tuple[Floats, Bools, float]]
 
 
 class Part:
-    """The states of one part that were met so far, in the order in which they were."""
+    """Discovered states of one part, in the order of their discovery."""
 
     def __init__(self, width: int, kind: np.dtype[Any], goals: int) -> None:
         self.states = np.zeros((0, width), dtype=kind)
@@ -36,19 +36,21 @@ class Part:
         self._rows = np.zeros(0, dtype=np.int32)
 
     def add(self, codes: Ints, states: Ints) -> Rows:
-        """Return the rows of states, of which those that are new are added, not yet valued."""
+        """Return the rows of states; new ones are added, not yet valued."""
         distinct, first, back = np.unique(codes, return_index=True, return_inverse=True)
         at = np.searchsorted(self._codes, distinct)
         new = np.ones(len(distinct), dtype=bool)
         inside = at < len(self._codes)
         new[inside] = self._codes[at[inside]] != distinct[inside]
-        rows = np.empty(len(distinct), dtype=np.int32)
+        rows, more = np.empty(len(distinct), dtype=np.int32), int(new.sum())
         rows[~new] = self._rows[at[~new]]
-        rows[new] = np.arange(len(self.states), len(self.states) + new.sum())
-        if new.any():
+        rows[new] = np.arange(len(self.states), len(self.states) + more)
+        if more:
             self.states = np.concatenate([self.states, states[first[new]]])
-            self.mark = np.concatenate([self.mark, np.zeros(new.sum(), dtype=np.int8)])
-            self.exact = np.concatenate([self.exact, np.zeros(new.sum(), dtype=bool)])
+            for name in ("values", "mark", "exact", "floor"):
+                own = getattr(self, name)
+                grown = np.concatenate([own, np.zeros((more, *own.shape[1:]), own.dtype)])
+                setattr(self, name, grown)
             self._codes = np.insert(self._codes, at[new], distinct[new])
             self._rows = np.insert(self._rows, at[new], rows[new])
         return rows[back]
@@ -60,27 +62,16 @@ class Part:
             setattr(out, name, getattr(self, name).copy())
         return out
 
-    def value(self, valued: Valued) -> None:
-        """Value the states that were added since the last time."""
-        known = len(self.values)
-        if known == len(self.states):
-            return
-        values, allowed, most = valued(self.states[known:])
-        self.values = np.concatenate([self.values, values])
-        self.floor = np.concatenate([self.floor, values[:, 0] > most])
-        self.mark[known:][~allowed] = CLOSED
-
-    def raise_floors(self, rows: Ints, valued: Valued) -> bool:
-        """Value those of some rows again whose values are floors; return if there are any."""
-        rows = rows[self.floor[rows]]
+    def value(self, rows: Ints, valued: Valued) -> bool:
+        """Evaluate states, new ones or those whose values are floors; return if there are any."""
         if len(rows):
             self.values[rows], allowed, most = valued(self.states[rows])
             self.floor[rows] = self.values[rows, 0] > most
-            self.mark[rows[~allowed]] = CLOSED
+            self.mark[rows] = np.where(allowed, PENDING, CLOSED)
         return len(rows) > 0
 
     def order(self) -> Ints:
-        """Return the rows of visited states, by their codes."""
+        """Return the rows of visited states, sorted by code."""
         return np.asarray(self._rows[self.mark[self._rows] == OPEN])
 
 
@@ -178,11 +169,6 @@ class _Space(Protocol):
         """Return in which states (n, c) of the last level a build may end, (n,)."""
 
 
-def _least(part: Part, rows: Ints, count: int) -> Ints:
-    """Return so many of some rows, those of least value."""
-    return np.asarray(rows[np.argsort(part.values[rows, 0], kind="stable")[:count]])
-
-
 class Explorer:
     """The states of a space that are reached through states below a threshold, which may rise.
 
@@ -228,7 +214,7 @@ class Explorer:
         self._start = space.first, key
         part = self._part(*self._start)
         part.add(space.codes(key, states), states)
-        part.value(lambda _: (np.zeros((1, len(space.peaks))), np.ones(1, dtype=bool), np.inf))
+        part.mark[0] = PENDING
         self.threshold, self.below = -np.inf, np.inf
         self.reached = self.level = space.first
         self.passes = self.nbytes = 0
@@ -264,7 +250,9 @@ class Explorer:
         level, deepest, few = self._space.levels, -1, FEW
         turns = TURNS * self._space.levels
         while not self.whole and turns:
-            found = self._eligible_on(level)
+            parts = self._parts[level].items()
+            eligible = ((key, part, self._eligible(key, part)) for key, part in parts)
+            found = next((each for each in eligible if len(each[2])), None)
             if found is None:
                 level -= 1
                 if level < self._space.first:
@@ -272,7 +260,7 @@ class Explorer:
                 continue
             turns -= 1
             key, part, fresh = found
-            fresh = _least(part, fresh, few)
+            fresh = fresh[np.argsort(part.values[fresh, 0], kind="stable")[:few]]
             self.level = level
             self._open(level, key, part, fresh)
             self._go_on(level, key, part, fresh)
@@ -311,8 +299,9 @@ class Explorer:
     @property
     def excluded(self) -> float:
         """The least that the first goal takes of a state above the threshold; infinite if none."""
-        least = [p.values[p.mark[: len(p.values)] == PENDING, 0] for p in self._all()]
-        return float(min((values.min() for values in least if len(values)), default=np.inf))
+        every = (part for parts in self._parts for part in parts.values())
+        least = (p.values[p.mark == PENDING, 0].min(initial=np.inf) for p in every)
+        return float(min(least, default=np.inf))
 
     @property
     def complete(self) -> bool:
@@ -328,9 +317,6 @@ class Explorer:
             return InfeasibleError(why)
         return NothingFoundError(f"{why} among the states that were looked at; look at all")
 
-    def _all(self) -> Iterator[Part]:
-        return (part for parts in self._parts for part in parts.values())
-
     def _part(self, level: int, key: Key) -> Part:
         return self._parts[level].setdefault(key, Part(*self._shape))
 
@@ -339,8 +325,12 @@ class Explorer:
         visited = [np.zeros(0, dtype=np.int64)]
         while True:
             fresh = self._eligible(key, part)
-            if self._width is not None:
-                fresh = fresh[self._best(part.values[fresh, 0])[: self._width]]
+            if self._width is not None:  # least first; those that are small enough in any order
+                values, places = part.values[fresh, 0], np.arange(len(fresh))
+                enough = values <= self._enough
+                drawn = np.where(enough, self._draws.random(len(values)), places)
+                order = np.lexsort((drawn, np.where(enough, -np.inf, values)))
+                fresh = fresh[order[: self._width]]
                 part.mark[part.mark == PENDING] = CLOSED
             if not len(fresh):
                 return np.concatenate(visited)
@@ -355,36 +345,28 @@ class Explorer:
             moves = self._space.within(key, part.states[fresh])
             self._keep((level, key, key), fresh, moves, part)
 
-    def _eligible_on(self, level: int) -> tuple[Key, Part, Ints] | None:
-        """Return the first part of a level that has states to visit, and these."""
-        for key, part in self._parts[level].items():
-            if len(fresh := self._eligible(key, part)):
-                return key, part, fresh
-        return None
-
     def _eligible(self, key: Key, part: Part) -> Ints:
         """Return the states that are to be visited, all new ones being valued."""
+
+        def valued(states: Ints) -> tuple[Floats, Bools, float]:
+            return *self._space.values(key, states, rough=True, most=self._most), self._most
+
         while True:
-            part.value(lambda states: self._values(key, states))
-            fresh = np.flatnonzero((part.mark == PENDING) & self._below(part.values))
-            if self._space.floors and part.raise_floors(fresh, lambda s: self._values(key, s)):
+            part.value(np.flatnonzero(part.mark == NEW), valued)
+            first, below = part.values[:, 0], self.below
+            inside = (part.mark == PENDING) & (first <= self._most)
+            if np.isfinite(below):
+                inside &= first < strictly_below(below)
+            fresh = np.flatnonzero(inside)
+            if self._space.floors and part.value(fresh[part.floor[fresh]], valued):
                 continue
-            if not len(close := self._undecided(part, fresh)):
+            close = fresh[:0]
+            if np.isfinite(below):  # six digits do not say whether these lie below the cut
+                near = np.abs(first[fresh] - below) <= BAND * abs(below)
+                close = fresh[near & ~part.exact[fresh]]
+            if not len(close):
                 return fresh
             part.values[close], part.exact[close] = self._exact(key, part.states[close]), True
-
-    def _best(self, values: Floats) -> Ints:
-        """Return places of values (n,), least first; those that are small enough in any order."""
-        enough = values <= self._enough
-        drawn = np.where(enough, self._draws.random(len(values)), np.arange(len(values)))
-        return np.lexsort((drawn, np.where(enough, -np.inf, values)))
-
-    def _undecided(self, part: Part, rows: Ints) -> Ints:
-        """Return those rows whose six digits do not say whether they lie below the cut."""
-        if np.isinf(self.below):
-            return rows[:0]
-        close = np.abs(part.values[rows, 0] - self.below) <= BAND * abs(self.below)
-        return np.asarray(rows[close & ~part.exact[rows]])
 
     def refine(self, values: Sequence[float] | None = None) -> bool:
         """Value states exactly that are close to the worst values of a path; return if any were.
@@ -394,7 +376,7 @@ class Explorer:
         found = False
         for parts in self._parts[1:]:
             for key, part in parts.items():
-                close = ~part.exact[: len(part.values)] & (part.mark[: len(part.values)] == OPEN)
+                close = ~part.exact & (part.mark == OPEN)
                 near = np.full(len(close), values is None)
                 for column, peak in enumerate(self._space.peaks):
                     if peak and values is not None:
@@ -410,29 +392,17 @@ class Explorer:
         return self._space.values(key, states, rough=False, most=np.inf)[0]
 
     def close(self, part: tuple[int, Key], states: Ints) -> None:
-        """Leave out visited states of a part, given by its level and key, from now on."""
-        level, key = part
-        found = self._parts[level][key]
-        found.mark[found.add(self._space.codes(key, states), states)] = CLOSED
-
-    def _values(self, key: Key, states: Ints) -> tuple[Floats, Bools, float]:
-        """Return six digits of values, which states are allowed, and the most that counts."""
-        values, allowed = self._space.values(key, states, rough=True, most=self._most)
-        return values, allowed, self._most
+        """Exclude visited states of a part, given by its level and key."""
+        found = self._parts[part[0]][part[1]]
+        found.mark[found.add(self._space.codes(part[1], states), states)] = CLOSED
 
     @property
     def _most(self) -> float:
-        """What the first goal may take of a visited state, for all that six digits say."""
+        """What the first goal may take of a visited state, up to the error of six digits."""
         if not self._space.peaks[0]:
             return np.inf
         most = min(self.threshold, self.below)
         return most + (BAND * abs(most) if np.isfinite(most) else 0.0)
-
-    def _below(self, values: Floats) -> Bools:
-        inside = values[:, 0] <= self._most
-        if np.isfinite(self.below):
-            inside &= values[:, 0] < strictly_below(self.below)
-        return np.asarray(inside)
 
     def _go_on(self, level: int, key: Key, part: Part, fresh: Ints) -> None:
         """Add what visited states lead to on the next level."""
@@ -459,26 +429,20 @@ class Explorer:
         for (level, key), order in zip(keys, orders, strict=True):
             number[level, key] = np.full(len(self._parts[level][key].mark), -1, dtype=np.int32)
             number[level, key][order] = firsts[level, key] + np.arange(len(order))
-        sources, targets, amounts = [], [], []
+        moves = []
         for (level, key, to), parts in self._moves.items():
             source, target, taken = map(np.concatenate, zip(*parts, strict=True))
             further = level + (to != key)
             source, found = number[level, key][source], number[further, to][target]
             kept = (source >= 0) & (found >= 0)
             values = self._parts[further][to].values[target[kept]]
-            sources.append(source[kept])
-            targets.append(found[kept])
-            amounts.append(self._space.amounts(values, taken[kept]))
-        states = tuple(
-            (level, key, self._parts[level][key].states[order])
-            for (level, key), order in zip(keys, orders, strict=True)
-        )
-        ends = [
-            self._space.ended(key, rows)
-            if level == self._space.levels
-            else np.zeros(len(rows), bool)
-            for level, key, rows in states
-        ]
-        source, target, taken = map(np.concatenate, (sources, targets, amounts))
-        graph = Graph(source, target, taken, self._space.peaks, np.concatenate(ends))
-        return Visited(graph, states)
+            moves.append((source[kept], found[kept], self._space.amounts(values, taken[kept])))
+        ordered = [(*key, order) for key, order in zip(keys, orders, strict=True)]
+        states = tuple((level, key, self._parts[level][key].states[o]) for level, key, o in ordered)
+        ends, last = np.zeros(sum(map(len, orders)), dtype=bool), self._space.levels
+        for level, key, rows in states:
+            if level == last:
+                first = firsts[level, key]
+                ends[first : first + len(rows)] = self._space.ended(key, rows)
+        source, target, taken = map(np.concatenate, zip(*moves, strict=True))
+        return Visited(Graph(source, target, taken, self._space.peaks, ends), states)
