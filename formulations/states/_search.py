@@ -12,7 +12,6 @@ import numpy as np
 from formulations.choice import Choice, Choose
 from formulations.states._totals import LeastTotal, StopError, cheapest_by, least_total
 from seqopt._interrupts import answered
-from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph._budgets import Within, within_budgets
 from seqopt.graph._explore import Explorer, Key, Visited
@@ -335,17 +334,11 @@ def exact_best(found: Explorer, budgets: Sequence[float] = ()) -> tuple[Visited,
 
 def _selection(visited: Visited, best: Best | Within) -> StatePath:
     """Return a path as a plan, and with it the states that a better one could pass."""
+    (graph, states), value = visited, best.values[0]
     rows = tuple((level, *state.tolist()) for level, _, state in visited.of(best.path))
-    hint = _passable(visited, best.values[0])
+    kept = graph.amounts[:, 0] <= tied(value) if graph.peaks[0] else None
+    parts = np.split(reached(graph, kept), np.cumsum([len(own) for *_, own in states])[:-1])
+    hint = tuple(own[inside] for (*_, own), inside in zip(states, parts, strict=True))
     if isinstance(best, Within):
         return StatePath(rows, best.values, best.bounds, hint, best.prices)
     return StatePath(rows, best.values, best.values, hint)
-
-
-def _passable(visited: Visited, value: float) -> tuple[Ints, ...]:
-    """Return the states that paths within a value of the first goal can pass, by brick count."""
-    graph, states = visited
-    kept = graph.amounts[:, 0] <= tied(value) if graph.peaks[0] else None
-    ends = np.cumsum([len(rows) for *_, rows in states])
-    parts = np.split(reached(graph, kept), ends[:-1])
-    return tuple(rows[inside] for (*_, rows), inside in zip(states, parts, strict=True))

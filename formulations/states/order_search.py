@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -75,10 +76,6 @@ class _Search:
             self.resources.progress(what)
         if self.watch.over:
             raise StopError("time")
-
-    def tell_bricks(self, found: Explorer) -> None:
-        """Say how far all orders are looked at."""
-        self.tell(Stage("all orders", found.level / len(self.problem.scene.bricks)))
 
     def try_order(self, order: Order) -> None:
         """Keep an order if it is allowed, and better than the best so far."""
@@ -166,7 +163,9 @@ def _all_orders(search: _Search, most: int) -> bool:
         ceiling = threshold = np.finfo(float).max
     elif np.isfinite(ceiling):
         threshold = max(ceiling / FAR_BELOW, search.bound)
-    found = Explorer(space, tell=search.tell_bricks)
+    found = Explorer(
+        space, tell=lambda it: search.tell(Stage("all orders", it.level / space.levels))
+    )
     try:
         while not found.rise(threshold):
             search.bound = max(search.bound, min(found.excluded, ceiling))
@@ -178,21 +177,16 @@ def _all_orders(search: _Search, most: int) -> bool:
     finally:
         search.evaluated = max(search.evaluated, len(space.parts) - 1)
     if found.whole:
-        _take_best(search, found)
+        visited, best = exact_best(found)
+        if best.values[0] < search.value * (1 - BETTER):
+            search.value = best.values[0]
+            search.order = search.problem.order_of(visited.of(_first_ending(visited)))
     elif not search.order:
         raise found.without_plan(
             "no order of the bricks has a plan; extend a reach, loosen a rule or raise a limit"
         )
     search.bound = search.value
     return True
-
-
-def _take_best(search: _Search, found: Explorer) -> None:
-    """Keep the best order below the threshold, if it is better than the one that is known."""
-    visited, best = exact_best(found)
-    if best.values[0] < search.value * (1 - BETTER):
-        search.value = best.values[0]
-        search.order = search.problem.order_of(visited.of(_first_ending(visited)))
 
 
 def _first_ending(visited: Visited) -> tuple[int, ...]:

@@ -121,25 +121,29 @@ def of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
     aims = tuple(Goal(own.get(goal.kind, Measure.SUM)) for goal in instance.goals)
     caps = [Measure.MAKESPAN if c.column is None else Measure.SUM for c in instance.caps]
     asked = Goals((*aims, *map(Goal, caps)), aims, tuple(cap.most for cap in instance.caps))
-    stages = Stages(
-        asked,
-        Visited(timed.graph, ((0, 0, np.arange(instance.nodes)[:, None]),)),
-        choose,
-        watch,
-        timed,
-    )
+    visited = Visited(timed.graph, ((0, 0, np.arange(instance.nodes)[:, None]),))
+    stages = Stages(asked, visited, choose, watch, timed)
     try:
         found = stages.run()
     except StopError as stop:
         return plan_by_then(None, stop)
-    makespan = stages.least(found.path)
-    pairs = zip(aims, stages.values(found.path), strict=False)
-    values = [makespan if goal.measure is Measure.MAKESPAN else v for goal, v in pairs]
-    bounds = [min(b, v) for b, v in zip(found.bounds, values, strict=False)]
-    bounds += values[len(bounds) :]
+    values = _timed_values(aims, stages.values(found.path), stages.least(found.path))
     states, late = tuple((node,) for node in found.path), "time" * found.late
-    proofs = tuple(found.proofs)
-    return StatePath(states, tuple(values), tuple(bounds), stopped=late, proofs=proofs)
+    proofs, bounds = tuple(found.proofs), _no_higher(found.bounds, values)
+    return StatePath(states, values, bounds, stopped=late, proofs=proofs)
+
+
+def _timed_values(
+    goals: Sequence[Goal], values: Sequence[float], makespan: float
+) -> tuple[float, ...]:
+    """Return the values of goals, those of makespans replaced."""
+    pairs = zip(goals, values, strict=False)
+    return tuple(makespan if goal.measure is Measure.MAKESPAN else v for goal, v in pairs)
+
+
+def _no_higher(bounds: Sequence[float], values: tuple[float, ...]) -> tuple[float, ...]:
+    """Return bounds that are no higher than values, which stand for those that are missing."""
+    return (*map(min, bounds, values), *values[len(bounds) :])
 
 
 @dataclass(frozen=True, repr=False)
@@ -260,20 +264,13 @@ def _plan(
     soonest = waits.try_soonest(problem, states)
     if soonest is None:
         return None
-    values = [
-        soonest.makespan if goal.measure is Measure.MAKESPAN else value
-        for goal, value in zip(problem.goals, stages.values(found.path), strict=True)
-    ]
-    bounds = [min(b, v) for b, v in zip(found.bounds, values, strict=False)]
-    bounds += values[len(bounds) :]
-    hint = tuple(rows for *_, rows in visited.states)
-    late = "time" if found.late else ""
+    values = _timed_values(problem.goals, stages.values(found.path), soonest.makespan)
     return StatePath(
         states,
-        tuple(values),
-        tuple(bounds),
-        hint,
-        stopped=late,
+        values,
+        _no_higher(found.bounds, values),
+        tuple(rows for *_, rows in visited.states),
+        stopped="time" * found.late,
         grips=soonest.grips,
         proofs=(*found.proofs,),
         starts=soonest.starts,
@@ -290,8 +287,7 @@ def _by_then(
     soonest = waits.try_soonest(problem, found.states)
     if soonest is None:
         raise TimeUpError("no plan that stands while mortar cures was found yet; give more")
-    pairs = zip(problem.goals, found.objective, strict=True)
-    values = tuple(soonest.makespan if g.measure is Measure.MAKESPAN else v for g, v in pairs)
+    values = _timed_values(problem.goals, found.objective, soonest.makespan)
     for value, cap in zip(values[len(problem.aims) :], problem.budgets, strict=True):
         if value > tied(cap):
             raise TimeUpError("no plan within all budgets was found yet; give more")

@@ -26,6 +26,7 @@ whole numbers of milliseconds at the most; where durations are not, bounds give 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -82,18 +83,8 @@ def _scaled(asked: Asked, steps: int) -> _Scaled:
     return _Scaled(less[0], less[1], FINEST, 2.0 * steps / FINEST)
 
 
-@dataclass(frozen=True, eq=False)
-class _Layers:
-    """Which moves can be the first, second, … of a build that ends before some time.
-
-    ``moves`` (tuple of (m_i,) int): by how many were taken before.
-    """
-
-    moves: tuple[Ints, ...]
-
-
-def _layers(asked: Asked, most: float) -> _Layers:
-    """Return moves by how many were taken before, as far as prices leave room for them."""
+def _layers(asked: Asked, most: float) -> tuple[Ints, ...]:
+    """Return which moves (m_i,) can be the first, second, … of a build that ends by some time."""
     timed, graph = asked.timed, asked.timed.graph
     move = np.flatnonzero(asked.kept)
     source, target = graph.source[move], graph.target[move]
@@ -117,7 +108,7 @@ def _layers(asked: Asked, most: float) -> _Layers:
         out.append(move[rows])
         on = graph.ends.copy()
         on[source[rows]] = True
-    return _Layers(tuple(out[::-1]))
+    return tuple(out[::-1])
 
 
 class _Program:
@@ -128,7 +119,7 @@ class _Program:
         self._model: Any = cp.CpModel()
         self.taken: list[tuple[Any, int]] = []  # whether a move is taken, and which
 
-    def build(self, layers: _Layers) -> bool:
+    def build(self, layers: Sequence[Ints]) -> bool:
         """Write the program down; return whether time was not over before it was done."""
         timed, model = self._asked.timed, self._model
         columns = range(timed.free.shape[1])
@@ -141,7 +132,7 @@ class _Program:
         self._end = model.new_int_var(0, last, "end")
         soon, left = self._around()
         first = np.searchsorted(timed.move, np.arange(len(timed.graph.source) + 1))
-        for moves in layers.moves:
+        for moves in layers:
             if self._asked.watch.over:
                 return False
             acts = np.concatenate([np.arange(first[m], first[m + 1]) for m in moves.tolist()])
@@ -279,7 +270,7 @@ def _least(asked: Asked) -> Chosen:
     if not np.isfinite(most):
         return first._replace(late=True)  # nothing says how long builds may take
     layers = _layers(asked, most)
-    scaled = _scaled(asked, len(layers.moves))
+    scaled = _scaled(asked, len(layers))
     program = _Program(asked, cp, scaled, most)
     if not program.build(layers):
         return first._replace(late=True)

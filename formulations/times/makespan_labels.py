@@ -45,8 +45,13 @@ def _least(asked: Asked) -> Chosen:
     """Return the path of least makespan, with the labels that prove it."""
     best, bound = asked.first, asked.prices.bound
     labels: tuple[Labels, ...] = ()
-    if not best.path:
-        return _without_first(asked)
+    if not best.path:  # narrow searches found nothing, as budgets leave little
+        try:
+            sweep = Sweep(asked.timed, asked.prices, asked.kept, asked.caps)
+            found = sweep.run(asked.watch, most=MOST)
+        except LateError:
+            return Chosen((), np.inf, bound, late=True)
+        return Chosen(found.path, found.best, found.best, tuple(found.kept))
     start = bound
     for share in SHARES:
         limit = start + (best.value - start) * share if share < 1.0 else best.value * (1 - ALMOST)
@@ -63,15 +68,6 @@ def _least(asked: Asked) -> Chosen:
         if bound >= best.value * (1 - ALMOST):
             break
     return Chosen(best.path, best.value, best.value, labels)
-
-
-def _without_first(asked: Asked) -> Chosen:
-    """Return the same where narrow searches found nothing, as budgets leave little."""
-    try:
-        swept = Sweep(asked.timed, asked.prices, asked.kept, asked.caps).run(asked.watch, most=MOST)
-    except LateError:
-        return Chosen((), np.inf, asked.prices.bound, late=True)
-    return Chosen(swept.path, swept.best, swept.best, tuple(swept.kept))
 
 
 FORMULATION = in_time(

@@ -17,6 +17,7 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Moves
 from seqopt.graph.paths import keep_best
+from seqopt.graph.scenarios import _pickled
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore, move_amounts
 from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
@@ -87,11 +88,9 @@ class AllOrders(Shown):
         left = [name for name in self.scene.build_order if name not in placed]
         if self.among is Orders.ANY:
             return tuple(left)
-        return tuple(b for b in left if self.ties[b] & placed or self._on_ground(b, placed))
-
-    def _on_ground(self, brick: int, placed: frozenset[int]) -> bool:
-        grounds = (ground for ground in self.scene.grounds if ground.brick == brick)
-        return any(g.closes_with is None or g.closes_with in {*placed, brick} for g in grounds)
+        grounds = self.scene.grounds
+        founded = {g.brick for g in grounds if g.closes_with in {None, *placed, g.brick}}
+        return tuple(b for b in left if self.ties[b] & placed or b in founded)
 
     def allows(self, order: Sequence[int]) -> bool:
         """Return whether an order of all bricks' names is one of those that are sought in."""
@@ -117,8 +116,12 @@ class AllOrders(Shown):
 
     def at(self, order: Order) -> States:
         """Return the free schedule of one order."""
-        engine, *others = (_anew(e, order) for e in (self.states.engine, *self.states.scenarios))
-        return replace(self.states, engine=engine, scenarios=tuple(others))
+        made = list[Engine]()
+        for engine in (self.states.engine, *self.states.scenarios):
+            recipe = recipe_of(engine)
+            assert recipe is not None  # as was required
+            made.append(recipe.make(build_network(engine.network.scene, order)))
+        return replace(self.states, engine=made[0], scenarios=tuple(made[1:]))
 
 
 def _built(states: States) -> States:
@@ -138,13 +141,6 @@ def _built(states: States) -> States:
         )
     up = replace(rules, direction=Direction.BUILD, begin=None, ending=Ending.ONE_BY_ONE)
     return replace(states, rules=up, spares=True)
-
-
-def _anew(engine: Engine, order: Order) -> Engine:
-    """Return an engine of the same kind for the same scene in another order."""
-    recipe, network = recipe_of(engine), build_network(engine.network.scene, order)
-    assert recipe is not None
-    return recipe.make(network)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -180,17 +176,13 @@ def whole_bound(problem: AllOrders) -> float:
     free = problem.judging(problem.scene.build_order)
     if free.goals[0].measure is not Measure.PEAK:
         return -np.inf
-    numbers = node_numbers(free.network)
-    scene = problem.scene
+    numbers, scene, least = node_numbers(free.network), problem.scene, -np.inf
     taken = {*scene.blocked_nodes, *(prop.node for prop in scene.props)}
-    places = [i for i, n in enumerate(numbers, 1) if n not in taken]
-    least = -np.inf
-    of_robots = {*scene.grip_kinds.of_robot[: len(scene.robots)].tolist()}
     every = [  # whoever holds them
         place + k * len(numbers)
-        for k in sorted(of_robots)
-        for place in places
-        if can_hold(scene, k, numbers[place - 1])
+        for k in sorted({*scene.grip_kinds.of_robot[: len(scene.robots)].tolist()})
+        for place, node in enumerate(numbers, start=1)
+        if node not in taken and can_hold(scene, k, node)
     ]
     fewest = max(1, free.free_rules.fewest_grips(scene) - len(scene.props))
     sets = _sets(every, fewest, free.space.robots, len(numbers))
@@ -238,11 +230,10 @@ class TooManySetsError(ProblemError):
 
 @dataclass(frozen=True)
 class OrderStates:
-    """The states of a free schedule in all orders, a part for every set of bricks and newest brick.
+    """The states of all orders, a part for every set of standing bricks and newest brick.
 
-    ``most``: how many parts there may be; ``every_goal``: whether all goals count, as where there
-    are budgets, not the first alone; ``parts``: those that were looked at, each in an order that
-    begins with its set.
+    ``most``: how many parts there may be; ``every_goal``: whether all goals count, not the first
+    alone; ``parts``: those that were looked at, each in an order that begins with its set.
     """
 
     problem: AllOrders
@@ -339,10 +330,9 @@ class OrderStates:
                 )
             own = self.problem.scene.build_order
             first = [name for name in own if name in part[0] and name != part[1]]
-            rest = [name for name in own if name not in part[0]]
-            newest = (part[1],) if part[0] else ()
             stand = [name for name in self.problem.stands if name in first]
-            order = (*stand, *(b for b in first if b not in stand), *newest, *rest)
+            newest = (part[1],) if part[0] else ()
+            order = tuple(dict.fromkeys((*stand, *first, *newest, *own)))
             problem = (self.problem.at if self._all_count else self.problem.judging)(order)
             kind = ScenarioSums if problem.totals else FreeStates
             self.parts[part] = kind(problem, standing=bool(problem.demands))
@@ -399,13 +389,7 @@ def trying(problem: AllOrders, *, elsewhere: bool) -> Callable[[Trial], float]:
     sent = ("engine", "scenarios")
     rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name not in sent}
     others = tuple(map(packed, free.scenarios))
-    try:
-        content = pickle.dumps((rest, others, problem.among))
-    except Exception as error:  # whatever objects of others may raise
-        raise ProblemError(
-            f"criterion {free.criterion.name}: it cannot be sent to other processes ({error}); "
-            "define it in a module, or let this process work alone"
-        ) from error
+    content = _pickled((rest, others, problem.among), free.criterion)
     return partial(_sent, packed(free.engine), content)
 
 

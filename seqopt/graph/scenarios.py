@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 
@@ -16,10 +16,10 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
-from seqopt.graph.layers.costs import Budget, LayeredCosts, _array_by_array
+from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.problem import Aim, RobustAim
-from seqopt.problem.requirements import ResponsesAsked
+from seqopt.problem.requirements import Criterion, ResponsesAsked
 from seqopt.responses._choices import Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene._armed import hold_alike
@@ -27,7 +27,7 @@ from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
-from seqopt.work._workers import Crew, hire, map_ordered
+from seqopt.work._workers import hire, map_ordered
 from seqopt.work.progress import Progress
 
 
@@ -51,7 +51,7 @@ def engine_for(engine: Engine, scene: Scene) -> Engine:
 
 
 def require_alike(nominal: Scene, scene: Scene, number: int) -> None:
-    """Raise an error if the choices of a schedule do not mean the same in a scenario."""
+    """Raise a `ProblemError` if a scenario differs in more than stiffness, density, position."""
     if not isinstance(scene, Scene):
         raise ProblemError(f"scenario {number}: {short(scene)} is not a scene")
 
@@ -135,14 +135,13 @@ def _costs(task: _ScenarioTask) -> ScenarioCosts:
         raise SolverError(f"{task.name}: {error}") from error
 
 
-def _require_sendable(tasks: Sequence[_ScenarioTask], crew: Crew | None) -> None:
-    """Raise an error if tasks are to go to other processes and cannot be sent."""
+def _pickled(content: object, criterion: Criterion) -> bytes:
+    """Return what is sent to other processes; a `ProblemError` if the criterion cannot be."""
     try:
-        pickle.dumps(tasks[: crew is not None])
+        return pickle.dumps(content)
     except Exception as error:  # whatever objects of others may raise
-        name = tasks[0].asked.criterion.name
         raise ProblemError(
-            f"criterion {name}: it cannot be sent to other processes ({error}); "
+            f"criterion {criterion.name}: it cannot be sent to other processes ({error}); "
             "define it in a module, or let this process work alone"
         ) from error
 
@@ -186,7 +185,7 @@ class ScenarioLayers(Shown):
         tasks = _tasks_of(self.nominal, self.scenes)
         progress = Progress("scenarios", len(tasks), resources.progress)
         with hire(resources.executor, resources.workers) as crew:
-            _require_sendable(tasks, crew)
+            _pickled(tasks[: crew is not None], self.nominal.criterion)  # says if they cannot be
             done = map_ordered(_costs, tasks, crew, done=lambda *_: progress.add(1))
             with closing(done) as found:
                 return tuple(found), time.perf_counter() - start
@@ -300,17 +299,14 @@ def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
 
     ``layers``: of the same moves. Raises `InfeasibleError` if no choice is allowed in all of them.
     """
-    out = _array_by_array(_largest, *layers)
+    # one after the other: all in one array would be a large one
+    single, shared = (
+        tuple(reduce(np.maximum, each) for each in zip(*arrays, strict=True))
+        for arrays in ([own.single for own in layers], [own.shared for own in layers])
+    )
+    out = LayeredCosts(single, shared)
     try:
         out.continuable()
     except InfeasibleError as error:
         raise InfeasibleError(f"over all {len(layers)} scenarios, {error}") from error
-    return out
-
-
-def _largest(*costs: Floats) -> Floats:
-    """Return the largest of costs, one after the other: all in one array would be a large one."""
-    out = np.array(costs[0])
-    for each in costs[1:]:
-        np.maximum(out, each, out=out)
     return out

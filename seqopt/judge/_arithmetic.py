@@ -35,8 +35,8 @@ BELOW = 1e-9  # by how much a path must be better, over the size of the value
 def judge_path(instance: Instance, answer: Answer) -> Certificate:
     """Check a path through an instance, and bounds with what is to prove them.
 
-    Result: values, and what no path stays below: by what is given; where nothing is, by potentials,
-    a cut or multipliers that the judge finds itself. A bound without proof counts as claimed.
+    Result: values, and lower bounds: by the proofs given; without any by potentials, a cut or
+    multipliers that the judge finds itself. A bound without proof counts as claimed.
     Raises `SolverError` if the path does not lead from node 0 to an end, exceeds a cap or is worth
     something else than is claimed; or if a bound is higher than what is to prove it.
     """
@@ -116,13 +116,9 @@ def _arcs_of(instance: Instance, nodes: Ints) -> Ints:
 
 def _value(instance: Instance, goal: _Target, path: _Walk) -> float:
     own: Floats = instance.amounts[path.arcs][:, list(goal.columns)]
-    worth = {
-        SUM: lambda: float(own.sum()),
-        PEAK: lambda: float(own.max(initial=0.0)),
-        TAIL: lambda: _target_sums(goal, own.sum(axis=0)),
-        TIME: lambda: path.ends,
-    }
-    return worth[goal.kind]()
+    if goal.kind in (TIME, PEAK):
+        return path.ends if goal.kind == TIME else float(own.max(initial=0.0))
+    return _target_sums(goal, own.sum(axis=0)) if goal.kind == TAIL else float(own.sum())
 
 
 def _spent(instance: Instance, path: _Walk) -> dict[str, float]:
@@ -150,9 +146,8 @@ def _bounds(
         bound = proven(instance, stage, goal, claim, value)
         if _lays_down(instance, claim) and bound < value - BELOW * abs(value):
             bound = max(bound, within_caps(instance, value, claim.prices))
-        bare = claim.potentials is None and claim.cut is None
-        bare &= claim.weights is None and claim.shares is None and not claim.prices
-        bare &= claim.labels is None
+        proofs = claim.potentials, claim.cut, claim.weights, claim.shares, claim.labels
+        bare = not claim.prices and all(proof is None for proof in proofs)
         _require_modest(goal, claim, (value, bound), bare=bare)
         if not bound < value - BELOW * abs(value):
             bound = value

@@ -176,12 +176,8 @@ class StateEvaluator:
             parts.append(Reachable(own[new][ok], rows[ok], values[ok], onward))
             count += int(ok.sum())
             fresh = np.concatenate([entries[:0], *(m.states for m in onward if m.level == level)])
-        return Reachable(
-            np.concatenate([part.codes for part in parts]),
-            np.concatenate([part.states for part in parts]),
-            np.concatenate([part.values for part in parts]),
-            [move for part in parts for move in part.onward],
-        )
+        codes, rows, values = map(np.concatenate, zip(*(part[:3] for part in parts), strict=True))
+        return Reachable(codes, rows, values, [move for part in parts for move in part.onward])
 
     def valued(self, level: int, states: Ints, asked: Filter) -> tuple[Floats, Bools]:
         """Return values of goals in states (n, g), and which states pass a filter (n,)."""

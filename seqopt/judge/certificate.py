@@ -96,7 +96,7 @@ class Certificate(FrozenValue):
     values : tuple of float
         The value of every goal, recomputed; of candidates one, in the unit of the criterion.
     bounds : tuple of float
-        What no plan stays below, goals before it being at their values, computed again from the
+        Lower bound of every goal, those before it being at their values, computed again from the
         data; minus infinity where nothing is proven.
     gap : float
         What is left between them, over the size of the values: of the costs that a choice of
@@ -135,7 +135,7 @@ class Certificate(FrozenValue):
 
     @property
     def bound(self) -> float:
-        """What no plan stays below in the first goal."""
+        """Lower bound of the first goal."""
         return self.bounds[0]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +51,8 @@ class LayeredCosts(FrozenValue):
             )
         for k, shape in enumerate(zip((1, *self.sizes[:-1]), self.sizes, strict=True)):
             self._check_move(k, shape)
-        if sum(_largest(costs) for costs in (*self.single, *self.shared)) == np.inf:
+        some = [*map(_values, (*self.single, *self.shared))]  # the largest that is allowed counts
+        if sum(float(np.abs(v[np.isfinite(v)]).max(initial=0.0)) for v in some) == np.inf:
             raise ProblemError("the costs are so large that their sum overflows; rescale them")
         super().__post_init__()
 
@@ -125,12 +126,6 @@ def _copied(costs: Floats) -> Floats:
     if given.size and not any(given.strides):
         return np.broadcast_to(np.array(given.flat[0], dtype=float), given.shape)
     return np.array(given, dtype=float)
-
-
-def _largest(costs: Floats) -> float:
-    """Return the largest size of a cost, those that are not allowed aside."""
-    some = _values(costs)
-    return float(np.abs(some[np.isfinite(some)]).max(initial=0.0))
 
 
 def _values(costs: Floats) -> Floats:
@@ -225,12 +220,6 @@ class Joined:
             return self._found[moves]
         nothing = self._join is np.add or np.isinf(self._least)
         return np.broadcast_to(0.0 if nothing else self._least, shape)
-
-
-def _array_by_array(made: Callable[..., Floats], *costs: LayeredCosts | Budget) -> LayeredCosts:
-    """Return the costs that a function makes of several, given the arrays of one place at once."""
-    single = tuple(map(made, *(each.single for each in costs)))
-    return LayeredCosts(single, tuple(map(made, *(each.shared for each in costs))))
 
 
 def _least_to_go(arcs: Sequence[Floats]) -> list[Floats]:

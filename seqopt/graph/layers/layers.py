@@ -94,19 +94,6 @@ def _window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepCh
     return tuple(replace(each, moves=moves[each.step.number]) for each in found.steps)
 
 
-def _possible(choices: StepChoices) -> Bools:
-    """Return which choices have any response at all: all are NaN where arms cannot be."""
-    known = [~np.isnan(values) for values in choices.responses.values()]
-    return np.asarray(np.any(known, axis=0) if known else True)
-
-
-def _after(choices: StepChoices, before: int) -> StepChoices:
-    """Return a step, of two open moves only the choices after a candidate of the first."""
-    row = before if len(choices.moves) == 2 else slice(None)
-    responses = {name: values[row] for name, values in choices.responses.items()}
-    return replace(choices, responses=responses)
-
-
 def _pairs_as_moves(
     schedule: Schedule, asked: Sequence[tuple[int, int]], wanted: Sequence[Ints]
 ) -> Schedule:
@@ -286,7 +273,12 @@ class Layers(Shown):
         """
         if self.evaluation.streams:
             return _window_anew(self.evaluation, move, before)
-        return tuple(_after(choices, before) for choices in self._decided.get(move, ()))
+        found = []
+        for choices in self._decided.get(move, ()):  # of two open moves the row of the first
+            row = before if len(choices.moves) == 2 else slice(None)
+            responses = {name: values[row] for name, values in choices.responses.items()}
+            found.append(replace(choices, responses=responses))
+        return tuple(found)
 
     @cached_property
     def _decided(self) -> Mapping[int, Sequence[StepChoices]]:
@@ -322,7 +314,9 @@ class Layers(Shown):
         if _counts_every_step(criterion) and {*criterion.wanted(1)} <= {*choices.responses}:
             bricks = choices.step.bricks
         costs = criterion.costs(choices.responses, bricks, len(move.candidates))
-        costs = np.where(np.isfinite(costs) & _possible(choices), costs, np.inf)
+        known = [~np.isnan(values) for values in choices.responses.values()]
+        able = np.any(known, axis=0) if known else True  # all are NaN where arms cannot be
+        costs = np.where(np.isfinite(costs) & able, costs, np.inf)
         for limit in self.limits:
             costs[limit.exceeded(choices.responses[limit.response])] = np.inf
         return costs
@@ -436,10 +430,15 @@ def travel(problem: Layers, bound: float) -> Budget:
     first move those between given nodes too; m. Raises `ProblemError` if a robot goes from the grip
     of a move to that of another one that is not the next.
     """
-    single, shared = _empty(problem)
+    (single, shared), at = _empty(problem), problem.schedule.scene.node_position
     for robot, ends in _ways(problem.schedule):
         moves = [end.move for end in ends if isinstance(end, OpenGrip)]
-        way = _distances(problem, *(_nodes(problem.schedule, end) for end in ends))
+        nodes = [
+            problem.schedule.moves[end.move].candidates if isinstance(end, OpenGrip) else (end,)
+            for end in ends
+        ]
+        first, second = ([*map(at, own)] for own in nodes)
+        way = np.array([[math.dist(a, b) for b in second] for a in first])
         if not moves:
             shared[0] += way[0, 0]
         elif len(moves) == 1:
@@ -468,16 +467,7 @@ def _ways(schedule: Schedule) -> Iterator[tuple[str, tuple[_Grip, _Grip]]]:
                 yield robot.name, ends
 
 
-def _nodes(schedule: Schedule, grip: _Grip) -> tuple[int, ...]:
-    return schedule.moves[grip.move].candidates if isinstance(grip, OpenGrip) else (grip,)
-
-
 def _empty(problem: Layers) -> tuple[list[Floats], list[Floats]]:
     sizes = problem.sums.sizes
     pairs = zip((1, *sizes[:-1]), sizes, strict=True)
     return [np.zeros(size) for size in sizes], [np.zeros(pair) for pair in pairs]
-
-
-def _distances(problem: Layers, first: tuple[int, ...], second: tuple[int, ...]) -> Floats:
-    at = problem.schedule.scene.node_position
-    return np.array([[math.dist(at(a), at(b)) for b in second] for a in first])

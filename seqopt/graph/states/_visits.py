@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
-from seqopt.graph._explore import Explorer, Moves
+from seqopt.graph._explore import Explorer, Moves, _Space
 from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import Measure
@@ -18,7 +18,7 @@ from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_space import FreeSpace
 from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.rules import Ending
-from seqopt.sequence.site import Site, _begin_step
+from seqopt.sequence.site import _begin_step
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
@@ -86,11 +86,8 @@ def steps_in_hands(
             raise SolverError(f"step {step.number}: robots hold other nodes than its state says")
         out.append(own)
     scene = space.network.scene
-    return check_sequence(scene, out, _begin_step(scene, _begin_of(space)))
-
-
-def _begin_of(space: FreeSpace | ScheduleSpace) -> Site | None:
-    return space.schedule.begin if isinstance(space, ScheduleSpace) else space.rules.begin
+    rules = space.schedule if isinstance(space, ScheduleSpace) else space.rules
+    return check_sequence(scene, out, _begin_step(scene, rules.begin))
 
 
 def _scheduled_steps(space: ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
@@ -155,8 +152,8 @@ def with_held(problem: States, graph: Graph, held: Bools) -> Graph:
 
 
 @dataclass(frozen=True)
-class FreeStates:
-    """The states of a free schedule, a part for every brick count.
+class FreeStates(_Space):
+    """The states of a free schedule as an `Explorer` visits them, a part for every level.
 
     Moves take a column each: whether they are regrips, and how far robots go, m.
 
@@ -170,33 +167,26 @@ class FreeStates:
 
     @property
     def levels(self) -> int:
-        """How many bricks there are, or steps of a schedule."""
         return self.problem.space.levels
 
     @property
     def first(self) -> int:
-        """The level on which the build begins."""
         return self.problem.space.first
 
     @property
     def peaks(self) -> tuple[bool, ...]:
-        """By goal, whether its worst counts."""
         return tuple(goal.measure is Measure.PEAK for goal in self.problem.goals)
 
     def start(self) -> tuple[int, Ints]:
-        """Return where the build begins."""
         return self.first, self.problem.space.start()
 
     def codes(self, part: int, states: Ints) -> Ints:
-        """Return a number for every state."""
         return self.problem.space.codes(states)
 
     def within(self, part: int, states: Ints) -> Moves:
-        """Return the moves that place no brick."""
         return _joined(self.problem.space.within(part, states, regrips=self.regrips), states)
 
     def onward(self, part: int, states: Ints) -> Iterator[tuple[int, Moves]]:
-        """Yield the moves that place the next brick, or take the next step of a schedule."""
         rows = self.able(part, states)
         moves = self.placed(part, states[rows])
         yield part + 1, moves._replace(source=rows[moves.source])
@@ -211,7 +201,6 @@ class FreeStates:
 
     @property
     def complete(self) -> bool:
-        """Whether no move is left out."""
         return self.regrips
 
     @property
@@ -222,17 +211,14 @@ class FreeStates:
     def values(
         self, part: int, states: Ints, *, rough: bool, most: float = np.inf
     ) -> tuple[Floats, Bools]:
-        """Return what goals take of states, and which are allowed."""
         if self.standing:
             return self.problem.standing_values(part, states, most=most)
         return self.problem.values(part, states, rough=rough, most=most)
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
-        """Return what goals take of moves."""
         return move_amounts(self.problem, values, taken)
 
     def ended(self, part: int, states: Ints) -> Bools:
-        """Return which states end the build."""
         return self.problem.space.ended(states)
 
 
@@ -241,12 +227,10 @@ class ScenarioSums(FreeStates):
 
     @property
     def peaks(self) -> tuple[bool, ...]:
-        """None."""
         return (False,) * len(self.problem.each)
 
     @property
     def floors(self) -> bool:
-        """None."""
         return False
 
     def values(
@@ -263,7 +247,6 @@ class ScenarioSums(FreeStates):
         return out, np.isin(np.arange(len(states)), rows)
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
-        """Return the values of the states that moves lead to."""
         return values
 
 
