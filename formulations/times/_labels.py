@@ -152,7 +152,7 @@ class Labels(NamedTuple):
 
     def only(self, rows: Ints | Bools) -> Labels:
         """Select rows."""
-        return self._make(each[rows] for each in self)
+        return Labels._make(each[rows] for each in self)
 
     @property
     def size(self) -> int:
