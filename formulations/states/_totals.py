@@ -6,7 +6,7 @@ A path :math:`p` has a total :math:`c_s(p)` in every scenario, and the aim makes
 finds for a single sum, and a bound on all. What the best weights leave open is closed by labels,
 vectors of totals: with the least from every state on, under each of some weights, a label has a
 bound, and the one with the lowest is continued first. Labels whose bound is not below the best path
-are left out, and so is one of a state where another one is nowhere above.
+are left out, and so is one that another one of its state dominates.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class StopError(Exception):
 
 
 def cheapest_by(choose: Choose, watch: Watch) -> _Cheapest:
-    """Return what finds the path of least sum by a formulation, and what none stays below."""
+    """Return an oracle of the shortest path and its lower bound."""
 
     def cheapest(graph: Graph) -> tuple[tuple[int, ...], float]:
         found = choose(graph, watch)
@@ -47,7 +47,7 @@ def cheapest_by(choose: Choose, watch: Watch) -> _Cheapest:
 
 
 class LeastTotal(NamedTuple):
-    """A path, its value, what no path stays below, and the weights (S,) that prove most of it."""
+    """Incumbent, its value, lower bound and the weights (S,) that prove most of it."""
 
     path: tuple[int, ...]
     value: float
@@ -59,8 +59,7 @@ def least_total(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch)
     """Return the path of least total.
 
     ``graph``: with a sum for every scenario, all of it on paths from the start to ends;
-    ``cheapest``: returns the path of least sum through a graph with one goal, and what none stays
-    below.
+    ``cheapest``: an oracle of the shortest path through a graph with one goal, and its bound.
     """
     paths = _Paths(graph, aim, cheapest)
     weighed = best_weights(paths, watch)

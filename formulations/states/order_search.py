@@ -11,7 +11,7 @@ bottleneck path
    \qquad s_i = (S_i, b_i, \text{who holds which node}),
 
 from the empty site to all bricks. A threshold rises, as for one order, until states below it
-connect both; what no order stays below is then the least. An arch of :math:`n` bricks that is built
+connect both; the least value is among these. An arch of :math:`n` bricks that is built
 from its ends has some :math:`n^2` pairs :math:`(S, b)`, and any order of it is one of them.
 
 Where there are more than ``most`` pairs it goes on as a *heuristic*: from the best of a few orders

@@ -37,9 +37,9 @@ NONE = LabelSearch(None, np.inf, -np.inf)
 class Within(NamedTuple):
     """A path within budgets.
 
-    ``path``: its states, the start left out; ``values``: what every column takes of it, the
-    budgets' last; ``bounds``: what no path within them stays below, goals before it being at their
-    values; ``prices``: by goal, of the budgets and of the sums before it, that prove its bound.
+    ``path``: its states, the start left out; ``values``: of every column, the budgets' last;
+    ``bounds``: lexicographic lower bounds within the budgets; ``prices``: by goal, multipliers of
+    the budgets and of the sums before it, that prove its bound.
     """
 
     path: tuple[int, ...]
@@ -220,7 +220,7 @@ def _least_sum(
 
 
 def _next_prices(planes: Sequence[tuple[float, Floats]], caps: Floats) -> tuple[Floats, float]:
-    """Return the prices under which the cheapest of the paths met is dearest, and what it takes."""
+    """Return the multipliers that maximize the least of the planes, and that maximum."""
     costs, over = map(np.array, zip(*planes, strict=True))
     if len(caps) == 1:
         return _highest_of_lines(costs, over[:, 0], caps)
@@ -239,7 +239,7 @@ def _next_prices(planes: Sequence[tuple[float, Floats]], caps: Floats) -> tuple[
 
 
 def _highest_of_lines(costs: Floats, over: Floats, caps: Floats) -> tuple[Floats, float]:
-    """Return the same of one budget: where two of the lines meet, or at an end."""
+    """Return the same for one budget: where two lines meet, or at an end."""
     size = max(float(np.abs(caps).max()), float(np.abs(over).max())) or 1.0
     most = DEAREST * (float(np.abs(costs).max(initial=0.0)) or 1.0) / size
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""What no path through a graph stays below, by weak duality: checked with arithmetic alone.
+"""Lower bounds of all paths through a graph by weak duality, checked with arithmetic alone.
 
 A sum is bounded by potentials: no move leads to a state by less than the difference of both states'
 potentials, so that no path takes less than the end's potential. A worst amount is bounded by a cut:
@@ -20,7 +20,7 @@ ROUNDING = 1e-12  # by how much sums may be off, over the largest potential
 
 
 def lexicographic_bounds(graph: Graph, values: Sequence[float]) -> tuple[float, ...]:
-    """Return what no path stays below in every goal, those before it being at their values.
+    """Return lexicographic lower bounds of all paths, goals before each being at their values.
 
     Infinite where no path leads to an end, minus infinity where an inequality does not hold.
     """

@@ -198,7 +198,7 @@ class ScenarioLayers(Shown):
         return (task.problem() for task in _tasks_of(self.nominal, self.scenes))
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return what the costs of all scenarios took, of whatever aim: ``respond``, s."""
+        """Return the run time of evaluating all scenarios, ``respond``, s; of both aims."""
         return {"respond": self._found[1]}
 
     @property

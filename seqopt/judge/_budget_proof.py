@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
@@ -48,12 +48,8 @@ class Case:
         return np.asarray(dijkstra(matrix, indices=[0])[0])
 
 
-@dataclass(frozen=True, eq=False)
-class _Parts:
-    """Ends of paths: their first state, priced and plain cost, what they take.
-
-    And a bound on what any path that ends so costs.
-    """
+class _Parts(NamedTuple):
+    """Ends of paths: first state, priced and plain cost, what they take, and a bound."""
 
     at: Ints
     behind: Floats
@@ -62,8 +58,8 @@ class _Parts:
     bound: Floats
 
     def of(self, rows: Ints | Bools) -> _Parts:
-        """Return some of them."""
-        return _Parts(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+        """Select rows."""
+        return _Parts._make(each[rows] for each in self)
 
 
 def case_of(

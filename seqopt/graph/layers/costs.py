@@ -20,20 +20,11 @@ class LayeredCosts(FrozenValue):
     One candidate per move is to be chosen; choices ``o`` cost
     ``sum_k single[k][o[k]] + sum_k shared[k][o[k-1], o[k]]``.
 
-    Parameters
-    ----------
-    single : tuple of (C_k,) float
-        Cost of each candidate in the steps in which its move alone is open; infinite where it is
-        not allowed.
-    shared : tuple of (C_{k-1}, C_k) float
-        Cost of each pair in the steps that the move shares with the one before. The first move has
-        none before it: an array of shape (1, C_0).
-
-    Raises
-    ------
-    ProblemError
-        If there is no move, a move has no candidates, a shape is wrong, a value is NaN, or values
-        are so large that their sum overflows.
+    ``single`` (tuple of (C_k,) float): of each candidate in the steps in which its move alone is
+    open; infinite where it is not allowed; ``shared`` (tuple of (C_{k-1}, C_k) float): of each pair
+    in the steps that the move shares with the one before; of the first move (1, C_0). Raises
+    `ProblemError` if there is no move, a move has no candidates, a shape is wrong, a value is NaN,
+    or values are so large that their sum overflows.
     """
 
     single: tuple[Floats, ...]

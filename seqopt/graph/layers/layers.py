@@ -79,10 +79,7 @@ def _possible_after(schedule: Schedule, move: int, before: int) -> Bools:
 
 
 def _window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:
-    """Return the steps that a move decides after a candidate of the one before, solved anew.
-
-    ``evaluation``: whose responses are not kept.
-    """
+    """Return the steps that a move decides after a candidate of the one before, solved anew."""
     schedule = evaluation.schedule
     nodes = {move - 1: schedule.moves[move - 1].candidates[before]} if move else {}
     found = replace(
@@ -116,20 +113,11 @@ def _pairs_as_moves(
 
 @dataclass(frozen=True, repr=False)
 class Layers(Shown):
-    """Support placement over a whole build.
+    """Support placement over a whole build; responses, sums and peaks are computed on first use.
 
-    Nothing is computed before it is asked for: responses, sums and peaks each on first use.
-
-    Attributes
-    ----------
-    criterion : Criterion
-        What a step costs.
-    limits : tuple of Limit
-        Bounds that no step may exceed, whether or not a grip is open in it.
-    evaluation : Evaluation
-        Raw responses of every open step.
-    budgets : tuple of Budget
-        Caps on totals over the build.
+    ``criterion``: what a step costs; ``limits``: bounds that no step may exceed, whether or not a
+    grip is open in it; ``evaluation``: raw responses of every open step; ``budgets``: caps on
+    totals over the build.
     """
 
     criterion: Criterion
@@ -166,7 +154,7 @@ class Layers(Shown):
 
     @property
     def alone_in_scene(self) -> Layers:
-        """The same of the scene itself, whatever scenarios there are."""
+        """The same problem, in its own scene."""
         return self
 
     @property

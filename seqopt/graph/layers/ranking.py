@@ -177,7 +177,7 @@ def _reliability(problem: Layers, choice: Sequence[int], k: int) -> dict[str, ob
 
 
 def _chosen(problem: Layers, choice: Sequence[int], k: int) -> dict[str, object]:
-    """Return what a table says of a move whatever it is about."""
+    """Return the columns that all tables have of a move."""
     move = problem.schedule.moves[k]
     what = {"move": k + 1, "step": move.step, "bricks": move.bricks, "robot": move.robot}
     return {**what, "node": move.candidates[choice[k]]}
