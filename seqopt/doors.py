@@ -19,11 +19,11 @@ from typing import Any, TypeAlias, TypeVar
 import pandas as pd
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.bare import instance as _instance
 from seqopt._cli.commands import analyze as _analyze
 from seqopt._cli.commands import assess as _assess
 from seqopt._cli.commands import compare as _compare
 from seqopt._cli.commands import exporting as _export
+from seqopt._cli.commands import instance as _instance
 from seqopt._cli.commands import pareto as _pareto
 from seqopt._cli.commands import reach as _reach
 from seqopt._cli.commands import replan as _replan

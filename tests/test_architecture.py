@@ -181,7 +181,7 @@ def test_rooms_are_looked_up_in_four_places_only():
     """
     known = ["_cli.arguments", "_cli.main", "_later", "_registry"]
     assert hidden_arrows(sources("seqopt")) == ["seqopt", *(f"seqopt.{each}" for each in known)]
-    commands = {f"seqopt._cli.{c.where.partition(':')[0]}" for c in COMMANDS.values()}
+    commands = {f"seqopt._cli.commands.{c.where.partition(':')[0]}" for c in COMMANDS.values()}
     assert commands <= set(graph("seqopt"))
     assert {room(module) for module in OFFERS.values()} <= OUTER
 

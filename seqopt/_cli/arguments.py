@@ -77,7 +77,7 @@ def _layout(prog: str) -> argparse.HelpFormatter:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Command:
-    """A command in a few words, and where in `seqopt._cli` the class is of what it is asked.
+    """A command in a few words, and which class of `seqopt._cli.commands` says what it is asked.
 
     Its module has ``run`` as well, and is loaded when it is asked for.
     """
@@ -87,7 +87,7 @@ class _Command:
 
     def load(self) -> ModuleType:
         """Return the module."""
-        return import_module(f"seqopt._cli.{self.where.partition(':')[0]}")
+        return import_module(f"seqopt._cli.commands.{self.where.partition(':')[0]}")
 
     @property
     def asked(self) -> Any:
@@ -96,32 +96,24 @@ class _Command:
 
 
 COMMANDS = {
-    "compare": _Command("show all ways to build a scene side by side", "commands.compare:Compare"),
-    "optimize": _Command(
-        "choose where robots hold, and write the plan", "commands.optimize:Optimize"
-    ),
-    "replan": _Command("plan the rest of a build after a change", "commands.replan:Replan"),
-    "next": _Command("look up the best next move of a build", "commands.next:Next"),
-    "pareto": _Command(
-        "find all plans that no other one beats in every aim", "commands.pareto:Pareto"
-    ),
-    "analyze": _Command(
-        "compute forces and displacements in every step", "commands.analyze:Analyze"
-    ),
-    "times": _Command("say how long a build takes, and who does what when", "commands.times:Times"),
-    "assess": _Command("prove which steps stand, and with what margins", "commands.assess:Assess"),
-    "report": _Command("make a page that shows plans step by step", "commands.report:Report"),
-    "reach": _Command("say which arms reach which nodes, and how", "commands.reach:Reach"),
-    "scene": _Command("check, describe, export or list scenes", "commands.scene:SceneAsked"),
+    "compare": _Command("show all ways to build a scene side by side", "compare:Compare"),
+    "optimize": _Command("choose where robots hold, and write the plan", "optimize:Optimize"),
+    "replan": _Command("plan the rest of a build after a change", "replan:Replan"),
+    "next": _Command("look up the best next move of a build", "next:Next"),
+    "pareto": _Command("find all plans that no other one beats in every aim", "pareto:Pareto"),
+    "analyze": _Command("compute forces and displacements in every step", "analyze:Analyze"),
+    "times": _Command("say how long a build takes, and who does what when", "times:Times"),
+    "assess": _Command("prove which steps stand, and with what margins", "assess:Assess"),
+    "report": _Command("make a page that shows plans step by step", "report:Report"),
+    "reach": _Command("say which arms reach which nodes, and how", "reach:Reach"),
+    "scene": _Command("check, describe, export or list scenes", "scene:SceneAsked"),
     "import": _Command(
-        "make a scene of an assembly of COMPAS, a mesh or a table", "commands.importing:Import"
+        "make a scene of an assembly of COMPAS, a mesh or a table", "importing:Import"
     ),
-    "export": _Command("write a plan in a format of others", "commands.exporting:Export"),
-    "instance": _Command("write the graph of a problem, for any solver", "bare.instance:Instance"),
-    "judge": _Command("check a bare solution of an instance, and a bound", "bare.judge:Judge"),
-    "completion": _Command(
-        "let the shell complete words of seqopt", "commands.completion:Completion"
-    ),
+    "export": _Command("write a plan in a format of others", "exporting:Export"),
+    "instance": _Command("write the graph of a problem, for any solver", "instance:Instance"),
+    "judge": _Command("check a bare solution of an instance, and a bound", "judge:Judge"),
+    "completion": _Command("let the shell complete words of seqopt", "completion:Completion"),
 }
 
 

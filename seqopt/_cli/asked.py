@@ -6,11 +6,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from seqopt._cli.answer import Answer, Status
+from seqopt._cli.given import NamedSteps, given_plan, given_scene, given_steps
 from seqopt._cli.options import Asked, Built, Computed, Fixed, Judged, Posed, Stands, Strict, Timed
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_robots
-from seqopt._cli.words.given import NamedSteps, given_plan, given_scene, given_steps
-from seqopt._cli.words.props import parse_props
+from seqopt._cli.values import (
+    asked_standing,
+    mortar_word,
+    parse_grips,
+    parse_payload,
+    parse_props,
+    parse_robots,
+)
 from seqopt.arms._plan_postures import arm_faults
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import Mortar, _mortar_name

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from seqopt._cli.given import is_folder
 from seqopt._cli.options import Asked
-from seqopt._cli.words.given import is_folder
 from seqopt._files import (
     csv_text,
     require_apart,

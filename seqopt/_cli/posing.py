@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from seqopt._cli.asked import asked_engine, asked_scene, in_seconds
+from seqopt._cli.given import Place, asked_place, between, kept_place
 from seqopt._cli.options import Posed
 from seqopt._cli.outputs import require_out
 from seqopt._cli.values import (
@@ -15,10 +16,9 @@ from seqopt._cli.values import (
     asked_standing,
     count_word,
     parse_numbers,
+    parse_props,
     parse_robots,
 )
-from seqopt._cli.words.props import parse_props
-from seqopt._cli.words.where import Place, asked_place, between, kept_place
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.graph.formulation import On, find_formulation

@@ -147,13 +147,13 @@ def test_a_fault_of_the_program_has_a_status_that_no_answer_has():
     """Python ends with 1, which is the status of what does not hold."""
     program = """
 import sys
-import seqopt._cli.bare.judge
+import seqopt._cli.commands.judge
 from seqopt.__main__ import run
 
 def fails(options):
     raise KeyError(chr(27) + "[2J")
 
-seqopt._cli.bare.judge.run = fails
+seqopt._cli.commands.judge.run = fails
 sys.argv = ["seqopt", "judge", "a", "b"]
 sys.exit(run())
 """

@@ -228,7 +228,7 @@ def _plain(number: Any) -> object:
 def run(asked: Assess) -> Answer:
     """Assess every step of a sequence, or map builds; tables are written whatever the verdicts."""
     if asked.map is not None:
-        from seqopt._cli.mapping import answer_map  # noqa: PLC0415  # for maps only
+        from seqopt._cli.commands.mapping import answer_map  # noqa: PLC0415  # for maps only
 
         return answer_map(asked, asked.map, (asked.holds or "dry,epoxy").split(","))
     if asked.load_factor:

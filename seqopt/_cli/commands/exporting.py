@@ -10,8 +10,8 @@ from typing import Any
 from seqopt._cli import options
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import posture_trouble, scene_facts
+from seqopt._cli.given import plan_folder
 from seqopt._cli.options import word
-from seqopt._cli.words.given import plan_folder
 from seqopt._files import require_apart, write_text
 from seqopt.arms._plan_postures import arm_faults
 from seqopt.exchange._tasks import Postures

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from seqopt._cli.answer import Answer
+from seqopt._cli.given import read_place
 from seqopt._cli.options import Asked, word
-from seqopt._cli.words.where import read_place
 from seqopt.errors import StepError
 from seqopt.plan._range import NONE_KEEPS
 from seqopt.plan.policy import FILE, Advice, Policy

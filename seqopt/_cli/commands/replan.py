@@ -11,12 +11,11 @@ from typing import Any, NamedTuple
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands import optimize
+from seqopt._cli.given import Place, plan_folder
 from seqopt._cli.options import Aimed, Cost, Cured, Judged, Postures, Rules, Strict, Timed, word
 from seqopt._cli.outputs import ALWAYS, require_out
 from seqopt._cli.posing import Change
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.words.given import plan_folder
-from seqopt._cli.words.where import Place
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
 from seqopt.exchange._measured import read_measured

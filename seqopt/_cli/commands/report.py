@@ -8,9 +8,9 @@ from typing import Any
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_engine, asked_prover, asked_scene, posture_trouble, scene_facts
+from seqopt._cli.given import file_name, plan_folder
 from seqopt._cli.options import Built, Judged, Postures, word
 from seqopt._cli.outputs import figure_notes, keep_apart
-from seqopt._cli.words.given import file_name, plan_folder
 from seqopt._files import require_folder, write_folder, write_text
 from seqopt._showing import PAGE, display
 from seqopt.network.build import build_network

@@ -11,9 +11,9 @@ import numpy as np
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_scene, posture_trouble, scene_facts, size_line
+from seqopt._cli.given import file_name
 from seqopt._cli.options import Built, Postures
 from seqopt._cli.outputs import keep_apart
-from seqopt._cli.words.given import file_name
 from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network

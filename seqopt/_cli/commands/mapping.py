@@ -10,7 +10,7 @@ from seqopt._cli.options import Fixed
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs, written_to
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import count_word, mortar_word
-from seqopt._cli.words.given import given_plan
+from seqopt._cli.given import given_plan
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.engines.registry import USUAL, make_engine, versions

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands.optimize import Optimize
+from seqopt._cli.given import file_name, given_scene
 from seqopt._cli.outputs import keep_apart
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.values import parse_time_limit
-from seqopt._cli.words.given import file_name, given_scene
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instance import Instance as Graph

@@ -1,1 +1,0 @@
-"""Commands of whoever never sees a scene: instances, and the judge of their solutions."""

@@ -1,1 +1,0 @@
-"""Words of options that are read with their scene."""
