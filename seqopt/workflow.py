@@ -198,7 +198,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
 def _with_defaults(
     criterion: Criterion | str | None, aim: str | None, over: RobustAim | str, *, states: bool
 ) -> tuple[Criterion, str | tuple[()]]:
-    """Return criterion and aims of a problem, those by default where nothing is said."""
+    """Return criterion and aims of a problem, or their defaults."""
     usual = DEFAULTS[FREE if states else "any other"]
     of_totals = str(over) != str(WORST_PEAK)  # they are of sums
     return find_criterion(criterion or usual.criterion), aim or (not of_totals and usual.aim) or ()

@@ -75,7 +75,7 @@ class Answer:
     status: Status = Status.DONE
 
     def document(self, command: str) -> Any:
-        """Return what scripts are told of a command, ready for JSON."""
+        """Return facts and status of a command, ready for JSON."""
         said = {
             "command": command,
             "seqopt": version("seqopt"),
@@ -89,10 +89,7 @@ class Answer:
 
 
 def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) -> Status:
-    """Print an answer in the form that is asked for; return its status.
-
-    Where its files are written, nothing is lost if nobody hears.
-    """
+    """Print an answer as text, paths or JSON; where files are written, a closed output is no error."""
     if as_json:
         show(json.dumps(answer.document(command), indent=2, allow_nan=False) + "\n")
     elif quiet:

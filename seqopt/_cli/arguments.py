@@ -144,19 +144,11 @@ class _Parser(argparse.ArgumentParser):
         self.exit(Status.BAD_INPUT)
 
 
-class _HelpAll(argparse.Action):
-    """The option that prints the help of a command with all its options."""
+class _Show(argparse.Action):
+    """An option that prints a text, which is made then alone."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        show(parser.format_help())
-        parser.exit()
-
-
-class _Version(argparse.Action):
-    """The option that prints the version, which is looked up then alone."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        show(f"seqopt {version('seqopt')}\n")
+        show(self.const(parser))
         parser.exit()
 
 
@@ -173,7 +165,10 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
         "seqopt COMMAND --help-all has all of its options.",
     )
     about = "show program's version number and exit"
-    whole.add_argument("--version", action=_Version, nargs=0, default=SUPPRESS, help=about)
+    how: dict[str, Any] = {"action": _Show, "nargs": 0, "default": SUPPRESS}
+    whole.add_argument(
+        "--version", const=lambda _: f"seqopt {version('seqopt')}\n", help=about, **how
+    )
     whole.color = False  # signs of color would be printed as codes
     commands = whole.add_subparsers(
         required=True, title="commands", metavar="COMMAND", dest="command"
@@ -185,7 +180,7 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
             from seqopt._cli.signatures import fill  # noqa: PLC0415  # of which help needs nothing
 
             all_help = "show every option of the command, and exit"
-            added.add_argument(ALL, action=_HelpAll, nargs=0, default=SUPPRESS, help=all_help)
+            added.add_argument(ALL, const=_Parser.format_help, help=all_help, **how)
             fill(added, command.asked)
         if asked == name:
             whole.asked, whole.spoken = name, tuple(added._option_string_actions)
@@ -193,10 +188,7 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
 
 
 def request(words: Sequence[str], tell: Any = None) -> tuple[str, Any]:
-    """Return the command that words ask for, and what it is asked; a wrong word ends the program.
-
-    ``tell``: told how far it is.
-    """
+    """Return the command that words name, and its options; a wrong word ends the program."""
     options = vars(parser(asked_command(words)).parse_args(words))
     from seqopt._cli.signatures import parsed  # noqa: PLC0415  # of which help needs nothing
 

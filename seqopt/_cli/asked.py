@@ -6,24 +6,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.given import NamedSteps, given_plan, given_scene, given_steps
-from seqopt._cli.options import Asked, Built, Computed, Fixed, Judged, Posed, Stands, Strict, Timed
+from seqopt._cli.given import given_scene
+from seqopt._cli.options import Asked, Built, Computed, Judged, Posed, Stands, Strict, Timed
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import (
-    asked_standing,
-    mortar_word,
-    parse_grips,
-    parse_payload,
-    parse_props,
-    parse_robots,
-)
+from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_props
 from seqopt.arms._plan_postures import arm_faults
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import Mortar, _mortar_name
 from seqopt.engines._kinds import ChoosingEngine, Level
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, LIMITED, _chooser_of, make_engine, simplest
-from seqopt.errors import ExtraError, ProblemError, SceneError, StepError
+from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import (
@@ -37,12 +30,10 @@ from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.rules import MOST_ROBOTS, FreeRules, _usual_grips, with_robots
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.steps import AnyStep, Step, _idle_note
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.steps import Step
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability._settlement import _settlement_said
 from seqopt.stability.assessment import Verdict
-from seqopt.study.published import PUBLISHED
 from seqopt.work._clock import INTERRUPT, TIME, Clock
 
 
@@ -64,10 +55,7 @@ def size_line(scene: Scene) -> str:
 
 
 def asked_scene(asked: Built, *, ranged: bool = False) -> Scene:
-    """Return the scene that a command is asked for, in the order that it is asked for.
-
-    ``ranged``: whether a range of stiffnesses leaves the scene's own.
-    """
+    """Return the scene with order, robots, props and grips of the options; ``ranged``: a range is none."""
     if asked.order == "search":
         raise ProblemError(
             "--order search: only the free schedule has it; give optimize --schedule free"
@@ -85,7 +73,7 @@ def asked_scene(asked: Built, *, ranged: bool = False) -> Scene:
 
 
 def in_seconds(asked: Timed | Posed, scene: Scene) -> Scene:
-    """Return a scene whose robots take as long as a command is told."""
+    """Return a scene with the durations of --durations."""
     try:
         return scene.with_durations(*asked.durations)
     except SceneError as error:
@@ -107,21 +95,6 @@ def asked_engine(asked: Computed, network: Network) -> Engine:
         raise SceneError(f"--engine {asked.engine}: {why}") from error
 
 
-def asked_steps(asked: Fixed, network: Network) -> NamedSteps:
-    """Return the closed sequence that a command is asked for, and what it is called.
-
-    Raises `SceneError`, `StepError` if the method is not for the scene, or robots are named beside
-    a plan.
-    """
-    robots = parse_robots(asked.robots)
-    if asked.robots and (given_plan(asked) is not None or asked.method == PUBLISHED):
-        raise StepError(
-            f"--robots {asked.robots}: a plan says itself who holds; leave it out, or give "
-            f"--method {' or '.join(METHODS)}"
-        )
-    return given_steps(asked, network, robots)
-
-
 def posture_trouble(asked: Asked, scene: Scene) -> str:
     """Compute postures of arms, or take those that are kept; return why there are none, if so."""
     try:
@@ -132,10 +105,7 @@ def posture_trouble(asked: Asked, scene: Scene) -> str:
 
 
 def level_notes(asked: Computed, engine: Engine) -> tuple[str, ...]:
-    """Return which levels an engine that picks them took, and why.
-
-    Where none is named, only that of joints that open: which other one was enough is said of steps.
-    """
+    """Return which levels a choosing engine took, and why; where none is named, only discrete."""
     named = asked.engine is not None
     if (chooser := _chooser_of(engine)) is not None:
         choice = chooser.choice
@@ -148,11 +118,6 @@ def level_notes(asked: Computed, engine: Engine) -> tuple[str, ...]:
         if named or choice.level is Level.DISCRETE
     ]
     return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))
-
-
-def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
-    """Return the robots that never grip, in words."""
-    return tuple(_idle_note(scene, "robots", steps))
 
 
 def exceeded(scene: Scene, *tables: _Columns) -> tuple[str, ...]:
@@ -171,12 +136,10 @@ def rule_notes(rules: FreeRules | Schedule, scene: Scene) -> tuple[str, ...]:
     if not isinstance(rules, FreeRules) or rules.least_grips is not None:
         return ()
     team, least = len(rules.team(scene)), rules.fewest_grips(scene)
+    if least == _usual_grips(MOST_ROBOTS):
+        return ()
     robots = "1 robot takes" if team == 1 else f"{team} robots take"
-    return (
-        ()
-        if least == _usual_grips(MOST_ROBOTS)
-        else (f"rules: least_grips={least}, as {robots} part",)
-    )
+    return (f"rules: least_grips={least}, as {robots} part",)
 
 
 def arm_notes(scene: Scene, builds: Mapping[str, Sequence[Step]]) -> tuple[str, ...]:
@@ -217,7 +180,7 @@ def asked_prover(asked: Judged, network: Network) -> BuildProver:
 
 
 def refused(prover: BuildProver) -> tuple[str, ...]:
-    """Return why it is not said which steps stand, if it is not known, and what that leaves out."""
+    """Return why verdicts are missing, if they are, and what they leave out."""
     said = (f"stability: not proven; {prover.refusal}",) if prover.refusal else ()
     return (*said, *_settlement_notes(prover.scene)) if prover.asks else said
 
@@ -270,18 +233,17 @@ def strictly(
 
     ``verdicts``: by build, with the mortar of the scene last; ``unreached``: as of `arm_notes`.
     """
-    answer = marked(answer, outside)
-    answer = replace(answer, facts={**answer.facts, "payloads_exceeded": list(over)})
-    falls = []
+    answer, falls = marked(answer, outside), list[str]()
+    facts = {**answer.facts, "payloads_exceeded": list(over)}
     if verdicts is not None:
         found = {n: {each.mortar: each.facts() for each in own} for n, own in verdicts.items()}
-        answer = replace(answer, facts={**answer.facts, "stability": found})
+        facts["stability"] = found
         last = {name: own[-1] for name, own in verdicts.items()}
         falls = [f"{name}, {own}" for name, own in last.items() if own.count(Verdict.FALLS)]
     if unreached:
-        lines = (f"arms: {each}" for each in unreached)
-        answer = replace(answer, notes=(*answer.notes, *lines))
-        answer = replace(answer, facts={**answer.facts, "arms_cannot": list(unreached)})
+        facts["arms_cannot"] = list(unreached)
+    notes = (*answer.notes, *(f"arms: {each}" for each in unreached))
+    answer = replace(answer, facts=facts, notes=notes)
     wrong = {
         "payload exceeded": over,
         "arms cannot": unreached,

@@ -14,6 +14,7 @@ from tempfile import mkdtemp
 from typing import NamedTuple
 
 from seqopt._cli.options import Asked, Built, Fixed, Posed
+from seqopt._cli.values import parse_robots
 from seqopt._files import csv_text, read_text, write_folder
 from seqopt.arms.reach import find_postures
 from seqopt.engines.registry import USUAL, make_engine
@@ -94,18 +95,24 @@ def plan_folder(asked: Asked, given: object, *, free: bool = False) -> Path:
     return folder
 
 
-def given_steps(asked: Fixed, network: Network, robots: Sequence[str]) -> NamedSteps:
+def asked_steps(asked: Fixed, network: Network) -> NamedSteps:
     """Return the closed sequence that a command is asked for, or the usual one.
 
-    Raises `SceneError` if the method is not for the scene.
+    Raises `SceneError`, `StepError` if the method is not for the scene, or robots are named beside
+    a plan.
     """
+    robots = parse_robots(asked.robots)
     scene, plan, method = network.scene, given_plan(asked), asked.method
+    if asked.robots and (plan is not None or method == PUBLISHED):
+        raise StepError(
+            f"--robots {asked.robots}: a plan says itself who holds; leave it out, or give "
+            f"--method {' or '.join(METHODS)}"
+        )
     if isinstance(plan, ShownBuild):
         return NamedSteps(plan.title, plan.steps)
     if plan is not None:
-        return NamedSteps(
-            plan.stem, read_plan(scene, plan / "plan.csv" if is_folder(plan) else plan)
-        )
+        file = plan / "plan.csv" if is_folder(plan) else plan
+        return NamedSteps(plan.stem, read_plan(scene, file))
     find_postures(scene, asked.cache, asked.tell)
     if method is None:
         build = _usual(asked, network, robots)
@@ -147,10 +154,7 @@ class Place:
 
 
 def asked_place(text: str | None, name: str, scene: Scene) -> tuple[Scene, Place]:
-    """Return where an option, ``from`` or ``to``, says that a build begins or ends.
-
-    The scene is returned in an order that begins with the bricks that stand.
-    """
+    """Return the place of --from or --to, and the scene in an order that begins with its bricks."""
     if text is None:
         return scene, Place()
     try:
@@ -160,10 +164,7 @@ def asked_place(text: str | None, name: str, scene: Scene) -> tuple[Scene, Place
 
 
 def kept_place(asked: Posed, keep: str, scene: Scene, begin: Place) -> tuple[Scene, Place]:
-    """Return where a take-down ends: with the bricks that are to be kept.
-
-    The scene is returned in an order that begins with these.
-    """
+    """Return where a take-down ends by --keep, and the scene in an order that begins with these."""
     where = f"--keep {keep}"
     if asked.to is not None:
         raise StepError(f"{where}: --to {asked.to} says already what stays; leave one out")

@@ -44,16 +44,6 @@ class _Later(ModuleType):
         return getattr(import_module(self.__name__), name)
 
 
-def _put_off() -> None:
-    """Let libraries wait that few commands need, or only the start of SciPy looks at."""
-    import numpy as np  # noqa: PLC0415  # of which help needs nothing
-
-    sys.modules.setdefault("pandas", _Later("pandas"))
-    for part in ("ctypeslib", "f2py", "fft", "polynomial", "testing"):
-        if part not in vars(np):
-            vars(np)[part] = sys.modules.setdefault(f"numpy.{part}", _Later(f"numpy.{part}"))
-
-
 def load(words: Sequence[str]) -> None:
     """Load the libraries of the command that words ask for, if they ask for one.
 
@@ -63,7 +53,13 @@ def load(words: Sequence[str]) -> None:
     gc.disable()
     asked = asked_command(words)
     if asked in COMMANDS:
-        _put_off()
+        import numpy as np  # noqa: PLC0415  # of which help needs nothing
+
+        # few commands need pandas, only the start of SciPy looks at these parts
+        sys.modules.setdefault("pandas", _Later("pandas"))
+        for part in ("ctypeslib", "f2py", "fft", "polynomial", "testing"):
+            if part not in vars(np):
+                vars(np)[part] = sys.modules.setdefault(f"numpy.{part}", _Later(f"numpy.{part}"))
         if any(map(os.path.exists, words)):
             import jsonschema  # noqa: F401, PLC0415  # scene files need it
 

@@ -42,10 +42,7 @@ def figure_notes() -> tuple[str, ...]:
 
 
 def comparison_files(result: Comparison, softly: pd.DataFrame) -> dict[str, bytes | str]:
-    """Return the tables of a comparison by file name, and its figures if they can be drawn.
-
-    ``softly``: what builds come to for grips of several stiffnesses, if that is asked.
-    """
+    """Return tables and figures of a comparison by file name; ``softly``: by stiffness of grips."""
     loop, speed = result.loop, result.speed
     files: dict[str, bytes | str] = {
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
@@ -90,10 +87,7 @@ def _bare_files(
 
 
 def _plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
-    """Return the tables and tasks of a plan by file name.
-
-    ``choices``: whether every choice is in a table.
-    """
+    """Return tables and tasks of a plan by file name; ``choices``: with those of every choice."""
     tables = {"plan": plan.responses()}
     if not isinstance(plan.graph, States):
         tables["selection"] = plan.table()

@@ -101,8 +101,7 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
     words: dict[str, Any] = {"limits": parse_limits(asked.limit, scene, "--limit")}
     (parse_caps if of_states else parse_budgets)(asked.budget)  # said before anything is built
     words["resources"] = asked_resources(asked, None if of_states else asked.tell)
-    aim = None if asked.robust is None else _asked_aim(asked.robust)
-    known, unseen = (None, None) if aim is None else _asked_scenarios(asked, scene)
+    aim, known, unseen = _asked_scenarios(asked, scene)
     words |= {} if aim is None else {"scenarios": known, "over": aim}
     require_out(asked)
     engine = asked_engine(asked, build_network(scene))
@@ -200,20 +199,21 @@ def _require_known(asked: Posed, *, of_states: bool) -> None:
             raise ProblemError(f"--{name}: {why}")
 
 
-def _asked_aim(text: str) -> RobustAim:
+def _asked_scenarios(
+    asked: Posed, scene: Scene
+) -> tuple[RobustAim | None, Scenarios | None, Scenarios | None]:
+    """Return the aim over scenarios, those to choose by, and those of the next seed that judge."""
+    if asked.robust is None:
+        return None, None, None
     try:
-        return parse_robust(text)
+        aim = parse_robust(asked.robust)
     except ProblemError as error:
         raise ProblemError(f"--robust: {error}") from error
-
-
-def _asked_scenarios(asked: Posed, scene: Scene) -> tuple[Scenarios, Scenarios | None]:
-    """Return the scenarios to choose by, and those of the next seed that judge if any are to."""
     count = count_word(asked.scenarios, "--scenarios", MOST, usual=COUNT)
     seed, known = count_word(asked.seed, "--seed", MOST, least=0), asked.unseen
     other = None if known is None else count_word(known, "--unseen", MOST)
     drawn = _drawn(scene, asked.vary, count, seed)
-    return drawn, None if other is None else _drawn(scene, asked.vary, other, seed + 1)
+    return aim, drawn, None if other is None else _drawn(scene, asked.vary, other, seed + 1)
 
 
 def _drawn(scene: Scene, vary: Sequence[str], count: int, seed: int) -> Scenarios:

@@ -118,8 +118,10 @@ def complain(text: str, style: str = "bad") -> None:
     text = harmless(text)
     try:
         if sys.stderr is not None:
-            clear = CLEAR if is_terminal(sys.stderr) else ""  # what a watcher shows there
-            print(clear + _for_people(text, style), file=sys.stderr, flush=True)
+            watched = is_terminal(sys.stderr)
+            text = wrapped(text, rest="  ") if watched else text
+            text = BEGIN.sub(lambda begin: painted(begin[0], style, sys.stderr), text)
+            print(CLEAR * watched + text, file=sys.stderr, flush=True)
     except OSError:
         silence(sys.stderr)
 
@@ -127,13 +129,6 @@ def complain(text: str, style: str = "bad") -> None:
 def note(text: str) -> None:
     """Print what is worth knowing on standard error; else as `complain`."""
     complain(text, "doubt")
-
-
-def _for_people(text: str, style: str) -> str:
-    """Return a line as it is, or wrapped and with its first word in color for a terminal."""
-    if is_terminal(sys.stderr):
-        text = wrapped(text, rest="  ")
-    return BEGIN.sub(lambda begin: painted(begin[0], style, sys.stderr), text)
 
 
 def flush() -> None:

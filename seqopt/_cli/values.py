@@ -42,10 +42,7 @@ def speed_seconds(text: str | None) -> float:
 
 
 def count_word(text: str | None, where: str, most: int, least: int = 1, usual: int = 0) -> int:
-    """Return a whole number from the least to the most, or the usual one where none is given.
-
-    ``where`` is the argument, for messages.
-    """
+    """Return a whole number within bounds, or the usual one; ``where``: argument, for messages."""
     if text is None:
         return usual
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
@@ -197,10 +194,7 @@ def asked_standing(asked: Stands) -> Standing | None:
 
 
 def asked_criterion(asked: Cost | Posed, usual: Criterion) -> Criterion | None:
-    """Return the criterion that a command is asked for, with what it ranks among; None of nothing.
-
-    ``usual``: of what ranks are said if no criterion is named.
-    """
+    """Return the criterion of the options, if any; ``usual``: that which options of ranks refine."""
     said = {"crown": asked.crown, "ranked": asked.ranked, "among": asked.among}
     given = {name: text for name, text in said.items() if text is not None}
     if asked.criteria is None and not given:

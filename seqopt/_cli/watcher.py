@@ -1,4 +1,4 @@
-"""How far a command is, on the terminal of whoever waits for it: one line, gone when it is done."""
+"""Progress of a command on the terminal: one line, cleared when it is done."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Watcher:
             self._lock.release()
 
     def __call__(self, told: object) -> None:
-        """Take note of what is being done: a stage with its share, or words."""
+        """Record the current stage with its share, or in words."""
         if not self._shows:
             return
         with self._lock:

@@ -16,13 +16,12 @@ from seqopt._cli.asked import (
     arm_notes,
     asked_engine,
     asked_scene,
-    asked_steps,
     exceeded,
-    idle_notes,
     level_notes,
     scene_facts,
     strictly,
 )
+from seqopt._cli.given import asked_steps
 from seqopt._cli.options import Computed, Fixed, Postures, Strict, word
 from seqopt._cli.outputs import keep_apart, put_table
 from seqopt._cli.values import parse_time_limit
@@ -38,7 +37,7 @@ from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
 from seqopt.problem._limit_words import length_word
 from seqopt.problem.requirements import _prop_faults, overloads
-from seqopt.responses._enough import Enough, what_was_enough
+from seqopt.responses._enough import what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
 from seqopt.responses.quantities import _plain, _steps_in_words, length_text
@@ -50,7 +49,7 @@ from seqopt.responses.table import (
     response_table,
     step_fields,
 )
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
 from seqopt.work._clock import Clock
@@ -109,9 +108,11 @@ def run(asked: Analyze) -> Answer:
     keep_apart(asked, asked.out, asked.fields)
     clock, faults = Clock(parse_time_limit(asked.time_limit)), dict[int, SeqoptError]()
     with clock.needed("reading scene and steps"):
-        engine, steps = _asked(asked)
+        scene = asked_scene(asked)
+        find_postures(scene, asked.cache, asked.tell)
+        network = build_network(scene)
+        engine, steps = asked_engine(asked, network), asked_steps(asked, network).steps
     network, within = engine.network, LinearRange(engine)
-    scene = network.scene
     in_time = _InTime(_step_answers(asked, within, steps), clock)
     solved = _solved(engine, in_time, faults)
     answers = solved if asked.fields is None else list(solved)
@@ -144,7 +145,11 @@ def run(asked: Analyze) -> Answer:
         notes=(
             *off,
             *level_notes(asked, engine),
-            *_notes(within, steps, table, enough),
+            *within.unchecked,
+            *(() if enough is None else enough.lines),
+            *(f"payload exceeded: {excess}" for excess in overloads(scene, table)),
+            *(f"props: {fault}" for fault in _prop_faults(scene, table)),
+            *_idle_note(scene, "robots", steps),
             *_not_done(clock),
         ),
         failures=(*failures, *([INTERRUPTED] if clock.interrupted else ())),
@@ -153,26 +158,6 @@ def run(asked: Analyze) -> Answer:
     )
     unreached = arm_notes(scene, {"": computed})
     return strictly(answer, asked, exceeded(scene, table), outside, unreached=unreached)
-
-
-def _asked(asked: Analyze) -> tuple[Engine, tuple[Step, ...]]:
-    """Return the steps that are asked for, and what computes their responses."""
-    scene = asked_scene(asked)
-    find_postures(scene, asked.cache, asked.tell)
-    network = build_network(scene)
-    return asked_engine(asked, network), asked_steps(asked, network).steps
-
-
-def _notes(
-    within: LinearRange, steps: Sequence[Step], table: pd.DataFrame, enough: Enough | None
-) -> Iterator[str]:
-    """Yield what is worth knowing of steps beside their responses."""
-    scene = within.engine.network.scene
-    yield from within.unchecked
-    yield from () if enough is None else enough.lines
-    yield from (f"payload exceeded: {excess}" for excess in overloads(scene, table))
-    yield from (f"props: {fault}" for fault in _prop_faults(scene, table))
-    yield from idle_notes(scene, steps)
 
 
 def _solved(
@@ -239,29 +224,23 @@ def _status_of(faults: Mapping[int, SeqoptError], ended: Status) -> Status:
 def _with_tolerances(
     asked: Analyze, engine: Engine, steps: Sequence[Step], table: pd.DataFrame
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Return a table with how far grips may be off, if that is asked for, and what is said."""
+    """Return a table with tolerances of grips, if --tolerance asks for them, and notes on these."""
     if asked.tolerance is None:
         return table, ()
     table = with_tolerances(engine, steps, table)
-    return table, _tolerance_notes(engine, steps, table, asked.tolerance)
-
-
-def _tolerance_notes(
-    engine: Engine, steps: Sequence[Step], table: pd.DataFrame, asked: str
-) -> tuple[str, ...]:
-    """Return how far grips may be off, and how soft they must be for what is asked."""
-    at = int(table[COLUMN].to_numpy(float).argmin())
-    least, number = 1e-3 * float(table[COLUMN].iloc[at]), int(table["step"].iloc[at])
-    said = f"tolerance: grips may be {length_text(least)} off (step {number})"
-    if not asked:
-        return (said,)
-    wanted = length_word(asked, f"--tolerance {asked}")
-    short = [int(n) for n in table["step"][1e-3 * table[COLUMN].to_numpy(float) < wanted]]
+    off, numbers = 1e-3 * table[COLUMN].to_numpy(float), table["step"].astype(int)
+    at = int(off.argmin())
+    said = f"tolerance: grips may be {length_text(float(off[at]))} off (step {numbers.iloc[at]})"
+    if not asked.tolerance:
+        return table, (said,)
+    wanted = length_word(asked.tolerance, f"--tolerance {asked.tolerance}")
+    short = numbers[off < wanted].tolist()
     if not short:
-        return (f"{said}, no less than {length_text(wanted)}",)
+        return table, (f"{said}, no less than {length_text(wanted)}",)
     found = stiffness_for(engine, steps, wanted)
     how = "however soft they are" if found is None else f"unless softer than {_plain(found, 3)} N/m"
-    return (f"{said}, less than {length_text(wanted)} in {_steps_in_words(short)}, {how}",)
+    less = f"less than {length_text(wanted)} in {_steps_in_words(short)}"
+    return table, (f"{said}, {less}, {how}",)
 
 
 def _late(
@@ -287,10 +266,7 @@ _Answered = tuple[Step, Fields | SeqoptError]
 def _step_answers(
     asked: Analyze, within: LinearRange, steps: Sequence[Step]
 ) -> Iterator[_Answered]:
-    """Return steps with their fields, each from scratch or with what earlier ones lock in.
-
-    One that is not solved from scratch has its error.
-    """
+    """Return steps with fields, or the error, from scratch or with what earlier steps lock in."""
     each, engine = with_progress("steps", steps, asked.tell), within.engine
 
     def answer(step: Step) -> Fields | SeqoptError:
@@ -319,15 +295,15 @@ class _InTime:
         self._answers, self._clock, self.interrupted = answers, clock, False
 
     def __iter__(self) -> Iterator[_Answered]:
-        while (answer := self._next()) is not None:
+        while True:
+            try:
+                with ending(self._clock.left):
+                    answer = next(self._answers, None)
+            except TimeoutError:
+                return
+            except KeyboardInterrupt:
+                self.interrupted = True
+                return
+            if answer is None:
+                return
             yield answer
-
-    def _next(self) -> _Answered | None:
-        try:
-            with ending(self._clock.left):
-                return next(self._answers, None)
-        except TimeoutError:
-            return None
-        except KeyboardInterrupt:
-            self.interrupted = True
-            return None

@@ -15,13 +15,8 @@ import numpy as np
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import (
-    _settlement_notes,
-    asked_scene,
-    asked_steps,
-    carrying_notes,
-    scene_facts,
-)
+from seqopt._cli.asked import _settlement_notes, asked_scene, carrying_notes, scene_facts
+from seqopt._cli.given import asked_steps
 from seqopt._cli.options import Fixed
 from seqopt._cli.outputs import keep_apart, put_table, require_out, write_outputs, written_to
 from seqopt._cli.values import MOST_WORKERS, count_word, mortar_word
@@ -194,7 +189,7 @@ class Rows:
             return
         fresh = len(self.rows) == self.taken_up + 1
         kept = self.rows if fresh else [row]
-        texts = [json.dumps(each, default=_plain) for each in kept]
+        texts = [json.dumps(each, default=lambda number: number.item()) for each in kept]
         lines = [f"{self._checksum(text)} {text}" for text in texts]
         try:
             if fresh:  # what was cut short is not kept
@@ -207,7 +202,7 @@ class Rows:
             raise FileError(wrong) from error
 
     def where(self, total: int, what: str) -> str:
-        """Return where the rows found so far are, for whoever ended the run; empty if nowhere."""
+        """Return how many rows are kept and where, as a message; empty if there are none."""
         if self.path is None or not self.rows:
             return ""
         found = f"{len(self.rows)} of {total} {what}"
@@ -218,11 +213,6 @@ class Rows:
         if self.path is not None:
             with suppress(OSError):
                 self.path.unlink(missing_ok=True)
-
-
-def _plain(number: Any) -> object:
-    """Return a number of NumPy as one of Python."""
-    return number.item()
 
 
 def run(asked: Assess) -> Answer:
@@ -244,7 +234,8 @@ def run(asked: Assess) -> Answer:
     lines = [f"{_with_mortar(name)}: {format_rows(own)}" for name, own in each.items()]
     answer = put_table(asked.out, rows, "\n".join(lines) + ";")
     kept.done()
-    counts = {name: _counted(own) for name, own in each.items()}
+    found = {name: Counter(row["verdict"] for row in own) for name, own in each.items()}
+    counts = {name: {v.value: own[v.value] for v in Verdict} for name, own in found.items()}
     undecided = [row["step"] for row in rows if row["verdict"] == Verdict.UNDECIDED.value]
     unsure = _steps_in_words([*dict.fromkeys(undecided)])
     said = f"{unsure}: undecided; this says nothing about them"
@@ -283,12 +274,6 @@ def _asked_mortars(asked: Assess) -> dict[str, Mortar]:
     own = replace(mortar_word(asked.mortar or "epoxy", "--mortar"), **given)
     dry = () if asked.mortar else (Mortar(friction=own.friction),)
     return {_mortar_name(mortar): mortar for mortar in (*dry, own)}
-
-
-def _counted(rows: Sequence[Row]) -> dict[str, int]:
-    """Return how many steps have each verdict."""
-    found = Counter(row["verdict"] for row in rows)
-    return {verdict.value: found[verdict.value] for verdict in Verdict}
 
 
 def _found(

@@ -124,7 +124,9 @@ def answered(asked: Compare, found: Found) -> Answer:
     if result.speed is not None:
         blocks.append("\n".join([SPEED, *result.speed.describe(wrapped)]))
     softly = held_softly(engine, shown_tables(result), grips, asked.tell)
-    turns = turning_points(softly, _fixed(result)) if grips else ()
+    shown = shown_tables(result)
+    closed = result.table.index[result.table["problem"] == CLOSED]  # these leave nothing to choose
+    turns = turning_points(softly, [n for n in map(str, closed) if n in shown]) if grips else ()
     if grips:
         lines = [wrapped(line, first="- ") for line in turns or [NO_TURN]]
         blocks += ["\n".join([SOFTLY, *_softness_lines(softly, [*softly["build"].unique()])])]
@@ -135,7 +137,15 @@ def answered(asked: Compare, found: Found) -> Answer:
         files = comparison_files(result, softly) | {PAGE: comparison_page(engine, result)}
         files["summary.json"] = json.dumps(about, indent=2) + "\n"
         written = write_outputs(asked, lambda: files)
-        blocks.append(_where(asked.out, speed=result.speed is not None))
+        speed = result.speed is not None
+        blocks.append(
+            f"written to {asked.out}\n"
+            f"  {PAGE}: every build step by step; open it in a browser\n"
+            "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
+            "  summary.json: the criteria with their numbers, the engine, and versions of packages"
+            + "\n  speed.csv: a row per engine and formulation" * speed
+            + "\n  *.png, *.svg: the figures" * (not figure_notes())
+        )
     else:
         more = "" if asked.details else "; --details shows more here"
         blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
@@ -158,23 +168,6 @@ def answered(asked: Compare, found: Found) -> Answer:
     over = exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)
     return strictly(answer, asked, over, left, result.verdicts)
-
-
-def _fixed(result: Comparison) -> list[str]:
-    """Return the methods that leave nothing to choose."""
-    fixed = result.table.index[result.table["problem"] == CLOSED]
-    return [name for name in map(str, fixed) if name in shown_tables(result)]
-
-
-def _where(folder: Path, *, speed: bool) -> str:
-    timed = "\n  speed.csv: a row per engine and formulation" * speed
-    return (
-        f"written to {folder}\n"
-        f"  {PAGE}: every build step by step; open it in a browser\n"
-        "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
-        "  summary.json: the criteria with their numbers, the engine, and versions of packages"
-        f"{timed}"
-    ) + ("" if figure_notes() else "\n  *.png, *.svg: the figures")
 
 
 def _facts(result: Comparison) -> dict[str, object]:

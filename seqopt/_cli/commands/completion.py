@@ -27,7 +27,6 @@ from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import CRITERIA, PUBLISHED
 
-SHELLS = ("bash", "zsh", "fish")
 AIMS = ("minmax", "sum", "steps", "regrips", "travel", "bond", "friction", "tilt")
 SHORT = re.compile(r"[:;(]|, (?:as|if|or) ")  # where what matters of a help text ends
 

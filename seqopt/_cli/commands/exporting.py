@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +16,6 @@ from seqopt.arms._plan_postures import arm_faults
 from seqopt.exchange._tasks import Postures
 from seqopt.exchange.exports import EXPORTS, LOST, TASKS, export_plan, read_folder
 from seqopt.problem._limit_words import number_word
-from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +62,13 @@ def run(asked: Export) -> Answer:
     scene, steps = read_folder(folder)
     given = asked.distance
     distance = None if given is None else number_word(given, f"--distance {given}")
-    notes, postures = _arms(asked, scene, steps)
+    notes: tuple[str, ...] = ()
+    postures: Postures | None = None  # of other formats than tasks
+    if asked.format in TASKS and scene.has_arms:
+        if trouble := posture_trouble(asked, scene):
+            notes, postures = (f"arms: grips are proposals without postures; {trouble}",), {}
+        else:
+            notes = tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps))
     text = export_plan(scene, steps, asked.format, asked.source, distance, postures)
     said, lost = f"{len(steps)} steps", LOST.get(asked.format)
     if lost:
@@ -78,17 +81,3 @@ def run(asked: Export) -> Answer:
     write_text(asked.out, text)
     said = f"{said} written to {asked.out}"
     return Answer(facts=facts, text=said, written=(asked.out,), notes=notes)
-
-
-def _arms(
-    asked: Export, scene: Scene, steps: Sequence[Step]
-) -> tuple[tuple[str, ...], Postures | None]:
-    """Return what there is to say of arms in a plan, and postures: none where they are not known.
-
-    Other formats than those of tasks have none.
-    """
-    if asked.format not in TASKS or not scene.has_arms:
-        return (), None
-    if trouble := posture_trouble(asked, scene):
-        return (f"arms: grips are proposals without postures; {trouble}",), {}
-    return tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps)), None

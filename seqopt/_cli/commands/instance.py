@@ -23,10 +23,6 @@ from seqopt.problem._limit_words import number_word
 from seqopt.work._clock import Clock
 
 SAID = ("--quiet", "--json")
-OUT = (
-    "file to write: .npz (the instance), .mps, .lp or .pbtxt (a program, the last for CP-SAT); "
-    "without an end a folder with all of them"
-)
 
 
 @dataclass(frozen=True, kw_only=True)

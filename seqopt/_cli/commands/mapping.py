@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
+from seqopt._cli.asked import asked_scene, scene_facts
+from seqopt._cli.given import asked_steps, given_plan
 from seqopt._cli.options import Fixed
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs, written_to
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import count_word, mortar_word
-from seqopt._cli.given import given_plan
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.engines.registry import USUAL, make_engine, versions

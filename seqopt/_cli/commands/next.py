@@ -10,7 +10,7 @@ from seqopt._cli.given import read_place
 from seqopt._cli.options import Asked, word
 from seqopt.errors import StepError
 from seqopt.plan._range import NONE_KEEPS
-from seqopt.plan.policy import FILE, Advice, Policy
+from seqopt.plan.policy import FILE, Policy
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene_file import load_scene
@@ -58,15 +58,10 @@ def run(asked: Next) -> Answer:
         "proven": policy.checked,
         "keeps_linear_range": policy.keeps_range,
     }
-    return Answer(facts=facts, text="\n".join(_lines(advice, policy)))
-
-
-def _lines(advice: Advice, policy: Policy) -> list[str]:
-    """Return a move and what is left, in words."""
     values = ", ".join(f"{name} {value_text(name, v)}" for name, v in advice.values.items())
-    first = policy.goals[0]
     proof = "the table was not checked"
     if policy.checked:
-        proof = f"{policy.checked:,} moves prove that nothing has a lower {first}"
+        proof = f"{policy.checked:,} moves prove that nothing has a lower {policy.goals[0]}"
     outside = [] if policy.keeps_range else [f"{OUTSIDE}: {NONE_KEEPS}"]
-    return [*outside, str(advice), f"the rest takes: {values}; {proof}"]
+    lines = [*outside, str(advice), f"the rest takes: {values}; {proof}"]
+    return Answer(facts=facts, text="\n".join(lines))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -19,7 +19,6 @@ from seqopt._cli.asked import (
     asked_prover,
     asked_scene,
     exceeded,
-    idle_notes,
     in_seconds,
     kept_range,
     level_notes,
@@ -57,16 +56,13 @@ from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import OUTSIDE
-from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.steps import StepKind
+from seqopt.sequence.steps import StepKind, _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
 from seqopt.work._clock import Clock
 from seqopt.work.progress import within
 
 if TYPE_CHECKING:
-    from seqopt.arms._bases import FoundBases
-    from seqopt.plan._studies.fewest_props import FoundProps
     from seqopt.plan.out_of_sample import Trial
 
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
@@ -203,9 +199,8 @@ class Found:
     plan: Plan
     assemble: float
     prover: BuildProver
-    bases: FoundBases | None = None
+    outer: Mapping[str, Any] = field(default_factory=dict)  # bases or props that were compared
     whole: str = ""
-    props: FoundProps | None = None
     clock: Clock = field(default_factory=Clock)
 
     @cached_property
@@ -220,7 +215,7 @@ class Found:
 
     @cached_property
     def analyzed(self) -> bool:
-        """Whether there was time for the responses of the plan, and for what is said by them."""
+        """Whether there was time for responses, linear range and overloads of the plan."""
 
         def analyze() -> bool:
             _ = self.plan.departures, self.plan.enough, self.plan.overloads
@@ -249,21 +244,19 @@ class Found:
         """Let another process begin to prove what stands: a command may start one, no script."""
         return self.prover.begun(self.plan.steps) if self.clock.left else nullcontext()
 
-    @property
-    def own(self) -> tuple[BuildVerdicts, ...]:
-        """The same, by mortar alone."""
-        return self.verdicts.get(self.plan.title, ())
-
     @cached_property
     def report(self) -> dict[str, object]:
         """The summary, and what the command adds to it."""
+        plan = self.plan
+        loop = plan.method == "three-robot" and not isinstance(plan.graph, States)
+        counts = paper_models(plan.layers.schedule) if loop else ()
         out = self.summary | {
-            "seconds": {"assemble": self.assemble, **self.plan.seconds},
-            "models_paper_count": _paper_count(self.plan),
-            "stability": {each.mortar: each.facts() for each in self.own},
+            "seconds": {"assemble": self.assemble, **plan.seconds},
+            "models_paper_count": dict(zip(("cascading", "overlap"), counts, strict=False)) or None,
+            "stability": {v.mortar: v.facts() for v in self.verdicts.get(plan.title, ())},
         }
         out |= {"left_out": dict(self.clock.left_out)} if self.clock.left_out else {}
-        out |= {} if self.props is None else {"fewest_props": self.props.described()}
+        out |= {name: each.described() for name, each in self.outer.items() if name != "bases"}
         known, unseen = self.posed.known, self.posed.unseen
         if known is None:
             return out
@@ -315,14 +308,12 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
         clock.interrupted |= plan.ended is End.INTERRUPTED
         return plan
 
-    bases = None if asked.bases is None else _bases(asked, asked.bases, posed.problem, choose)
-    props = None if posed.fewest is None else _props(asked, posed, choose)
-    outer = bases or props
-    plan = choose(posed.problem) if outer is None else outer.plan
+    outer = _outer(asked, posed, choose)
+    plan = next(iter(outer.values())).plan if outer else choose(posed.problem)
     plan = at_sufficient_level(plan, choose, clock)
     prover = asked_prover(asked, plan.engine.network)
     whole = _from_empty(posed.whole, plan, choose)
-    return Found(posed, plan, assemble, prover, bases, whole, props, clock)
+    return Found(posed, plan, assemble, prover, outer, whole, clock)
 
 
 def answered(asked: Optimize, found: Found) -> Answer:
@@ -339,7 +330,7 @@ def _files(
     asked: Optimize, found: Found, tables: Mapping[str, bytes | str]
 ) -> dict[str, bytes | str]:
     """Return the files of a plan by name, with its tables and tasks; at least what it is alone."""
-    plan, outer, made = found.plan, found.bases or found.props, dict[str, bytes | str]()
+    plan, made = found.plan, dict[str, bytes | str]()
     tasks = {kind: str(tables[f"tasks.{kind}"]) for kind in ("csv", "json") if tables}
     others: dict[str, Callable[[], str | bytes]] = {}
     if asked.policy:
@@ -353,9 +344,7 @@ def _files(
     for name, make in others.items():
         content = found.clock.spare(name, make, None)
         made |= {} if content is None else {name: content}
-    if outer is not None:
-        name = "bases.csv" if found.props is None else "fewest_props.csv"
-        made[name] = csv_text(outer.tried)
+    made |= {f"{name}.csv": csv_text(each.tried) for name, each in found.outer.items()}
     if found.trial is not None:
         made["scenarios.csv"] = csv_text(found.trial.table)
     if rows := trace_rows(plan.trace):
@@ -389,28 +378,25 @@ def _values(plan: Plan) -> str:
     return f"{OUTSIDE}: " * plan.is_far + ", ".join([*values, *steps])
 
 
-def _props(asked: Optimize, posed: PosedProblem, choose: Callable[[Problem], Plan]) -> FoundProps:
-    """Return the best plan of the fewest props."""
+def _outer(
+    asked: Optimize, posed: PosedProblem, choose: Callable[[Problem], Plan]
+) -> Mapping[str, Any]:
+    """Return the best plan over bases, or of the fewest props, by that name, if it is asked for."""
+    if asked.bases is None and posed.fewest is None:
+        return {}
     if asked.no_proof:
-        raise ProblemError("--no-proof: props are compared by proven plans; leave it out")
-    from seqopt.plan._studies.fewest_props import fewest_props  # noqa: PLC0415  # few ask for it
+        what = "props" if asked.bases is None else "bases"
+        raise ProblemError(f"--no-proof: {what} are compared by proven plans; leave it out")
+    if posed.fewest is not None:
+        from seqopt.plan._studies.fewest_props import fewest_props  # noqa: PLC0415  # few ask for it
 
-    assert posed.fewest is not None
-    return fewest_props(posed.problem, posed.fewest, choose, asked.tell)
-
-
-def _bases(
-    asked: Optimize, words: str, problem: Problem, choose: Callable[[Problem], Plan]
-) -> FoundBases:
-    """Return the best plan over the bases that are asked for."""
-    if asked.no_proof:
-        raise ProblemError("--no-proof: bases are compared by proven plans; leave it out")
+        return {"fewest_props": fewest_props(posed.problem, posed.fewest, choose, asked.tell)}
     from seqopt.arms._base_words import asked_places  # noqa: PLC0415  # few ask for it
     from seqopt.arms._bases import choose_bases  # noqa: PLC0415
 
     scene = in_seconds(asked, asked_scene(asked))
-    places = asked_places(scene, words)
-    return choose_bases(problem, scene, places, choose, asked.tell)
+    places = asked_places(scene, asked.bases or "")
+    return {"bases": choose_bases(posed.problem, scene, places, choose, asked.tell)}
 
 
 def _how(asked: Optimize, formulation: Formulation) -> Run:
@@ -428,44 +414,22 @@ def _how(asked: Optimize, formulation: Formulation) -> Run:
 def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
     """Return what a plan is worth, once it is written."""
     plan, clock = found.plan, found.clock
-    scene = plan.engine.network.scene
-    early = plan.ended is End.INTERRUPTED
+    scene, early = plan.engine.network.scene, plan.ended is End.INTERRUPTED
     over = exceeded(scene, plan._columns) if found.analyzed and not early else ()
-    enough = _enough_payload(plan) if over else ()
-    lines = [_value(found) if not found.analyzed else f"{_held(plan)}; {_value(found)}"]
-    page = found.analyzed and PAGE not in clock.left_out
-    lines += [f"{_search(plan)}; {written_to(asked.out, page=page)}"]
-    lines += map(wrapped, waits_said(plan) if plan.certificate is not None else ())
-    lines += [f"stability, {each}" for each in found.own]
-    lines += [wrapped(each.said) for each in (found.bases, found.props) if each is not None]
-    lines += [wrapped(found.whole)] if found.whole else []
     facts: dict[str, object] = {
         "scene": scene_facts(scene),
         "summary": lambda: found.report,
         "proof": _proof(plan),
+        **{name: each.tried for name, each in found.outer.items()},
+        **({} if plan.order is None else {"order": plan.order.selection.order}),
     }
-    outer = {"bases": found.bases, "fewest_props": found.props}
-    facts |= {name: each.tried for name, each in outer.items() if each is not None}
-    if plan.order is not None:
-        facts["order"] = order = plan.order.selection.order
-        lines.append(wrapped(", ".join(map(str, order)), first="order: "))
-    said = (*(plan.enough.lines if found.analyzed else ()), f"proof: {_proof(plan)}")
+    ended = INTERRUPTED if early else "seqopt: interrupted; the plan was chosen by then"
     answer = Answer(
         facts={**facts, "plan": plan.responses if found.analyzed else _steps_table(plan)},
-        text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over), *enough]),
+        text="\n".join(_lines(asked, found, over)),
         written=written,
-        notes=(
-            *level_notes(asked, plan.engine),
-            *_posed_notes(found.posed.problem),
-            *rule_notes(found.posed.problem.moves, scene),
-            *(() if plan.arms is None else (f"arms: {plan.arms}",)),
-            *(() if early else said),
-            *idle_notes(scene, plan.steps),
-            *_time_notes(plan),
-            *refused(found.prover),
-            *_not_done(clock),
-        ),
-        failures=_interrupted(clock, early=early),
+        notes=tuple(_notes(asked, found)),
+        failures=(ended,) if early or clock.interrupted else (),
         status=Status.INTERRUPTED if clock.interrupted else Status.DONE,
     )
     unreached = () if plan.arms is None else faults_in_words(plan.arms.postures)
@@ -475,33 +439,52 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
     return kept_range(answer, plan.beyond if far else None)
 
 
-def _held(plan: Plan) -> str:
-    """Return how much robots hold and nodes move at most, and whether that is to be relied on."""
-    from seqopt.report.text import _headline  # noqa: PLC0415  # where there is a plan
+def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
+    """Yield what robots hold, what a plan was chosen by, how it was found, and what stands."""
+    plan, scene = found.plan, found.plan.engine.network.scene
+    held = ""
+    if found.analyzed:
+        from seqopt.report.text import _headline  # noqa: PLC0415  # where there is a plan
 
-    first = f"{OUTSIDE}: " if plan.outside else ""
-    return f"{first}{_headline(plan.engine.network.scene, plan._columns)}"
+        held = f"{OUTSIDE}: " * bool(plan.outside) + f"{_headline(scene, plan._columns)}; "
+    yield f"{held}{_value(found)}"
+    counts = [f"{len(plan.steps)} steps"]
+    if isinstance(plan.graph, States):
+        counts.append(f"{plan.regrips} regrip{'s' * (plan.regrips != 1)}")
+    counts += [] if plan.order is not None else [f"{plan.models:,} models"]
+    search = f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"
+    page = found.analyzed and PAGE not in found.clock.left_out
+    yield f"{search}; {written_to(asked.out, page=page)}"
+    yield from map(wrapped, waits_said(plan) if plan.certificate is not None else ())
+    yield from (f"stability, {each}" for each in found.verdicts.get(plan.title, ()))
+    yield from (wrapped(each.said) for each in found.outer.values())
+    yield from [wrapped(found.whole)] if found.whole else []
+    if plan.order is not None:
+        yield wrapped(", ".join(map(str, plan.order.selection.order)), first="order: ")
+    yield from (f"payload exceeded: {excess}" for excess in over)
+    if over and (loads := overloads(scene, plan._columns)):
+        yield _payload_advice(plan.engine, plan.steps, loads)
 
 
-def _interrupted(clock: Clock, *, early: bool) -> tuple[str, ...]:
-    """Return what an interrupt ended, in a line. ``early``: whether choosing or its proof."""
-    if early:
-        return (INTERRUPTED,)
-    return ("seqopt: interrupted; the plan was chosen by then",) if clock.interrupted else ()
-
-
-def _enough_payload(plan: Plan) -> tuple[str, ...]:
-    """Return what is enough for a plan in which a payload is exceeded: one, or softer grips."""
-    over = overloads(plan.engine.network.scene, plan._columns)
-    return (_payload_advice(plan.engine, plan.steps, over),) if over else ()
-
-
-def _time_notes(plan: Plan) -> tuple[str, ...]:
-    """Return how long a plan takes where that is known, and no aim."""
-    if plan.makespan is None or "makespan" in plan.goals:
-        return ()
-    what = "the build" if plan.steps[0].number == 1 else "what is left"
-    return (f"time: {what} takes {plan.makespan:.6g} s; --aim makespan makes it short",)
+def _notes(asked: Optimize, found: Found) -> Iterator[str]:
+    """Yield what is worth knowing of a plan: levels, rules, scales, proof, idle robots, time."""
+    plan, problem = found.plan, found.posed.problem
+    scene, criterion = plan.engine.network.scene, problem.criterion.name
+    yield from level_notes(asked, plan.engine)
+    if criterion.endswith(OWN):
+        yield f"criterion: {criterion}: no fixed method builds this scene to take scales from"
+    yield from rule_notes(problem.moves, scene)
+    if plan.arms is not None:
+        yield f"arms: {plan.arms}"
+    if plan.ended is not End.INTERRUPTED:
+        yield from plan.enough.lines if found.analyzed else ()
+        yield f"proof: {_proof(plan)}"
+    yield from _idle_note(scene, "robots", plan.steps)
+    if plan.makespan is not None and "makespan" not in plan.goals:
+        what = "the build" if plan.steps[0].number == 1 else "what is left"
+        yield f"time: {what} takes {plan.makespan:.6g} s; --aim makespan makes it short"
+    yield from refused(found.prover)
+    yield from _not_done(found.clock)
 
 
 def _value(found: Found) -> str:
@@ -521,23 +504,6 @@ def _value(found: Found) -> str:
     return f"{value}; over unseen ones {others}"
 
 
-def _search(plan: Plan) -> str:
-    """Return which formulation found a plan, what it is, and how many models that took."""
-    counts = [f"{len(plan.steps)} steps"]
-    if isinstance(plan.graph, States):
-        counts.append(f"{plan.regrips} regrip{'s' * (plan.regrips != 1)}")
-    counts += [] if plan.order is not None else [f"{plan.models:,} models"]
-    return f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"
-
-
-def _posed_notes(problem: Problem) -> tuple[str, ...]:
-    """Return whether scales are not those of fixed methods."""
-    name = problem.criterion.name
-    if not name.endswith(OWN):
-        return ()
-    return (f"criterion: {name}: no fixed method builds this scene to take scales from",)
-
-
 def _proof(plan: Plan) -> str:
     """Return which proof was enough, and what another could still change."""
     proof, looked = plan.certificate, f"{plan.models:,} models"
@@ -553,11 +519,3 @@ def _proof(plan: Plan) -> str:
         "is better" if plan.gap <= TOLERANCE else f"is better by more than {100 * plan.gap:.3g} %"
     )
     return f"{looked} were enough; {other} {better if isfinite(plan.gap) else 'is looked at'}"
-
-
-def _paper_count(plan: Plan) -> dict[str, int] | None:
-    """Return how many models the paper counts for the loop of three robots; none for others."""
-    if plan.method != "three-robot" or isinstance(plan.graph, States):
-        return None
-    schedule: Schedule = plan.layers.schedule
-    return dict(zip(("cascading", "overlap"), paper_models(schedule), strict=True))

@@ -191,7 +191,9 @@ def answered(asked: Pareto, found: Found) -> Answer:
         _ = found.methods
     _ = found.departures
     if asked.out is not None:
-        files = clock.spare(DETAILS, partial(_front_files, asked, found), _bare_files(found))
+        pairs = zip(front.engines, front.steps, strict=True)
+        bare = _files(found, [_steps_table(_Picked(own, steps)) for own, steps in pairs], {})
+        files = clock.spare(DETAILS, partial(_front_files, asked, found), bare)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
     if asked.out and not asked.pick:
@@ -231,12 +233,6 @@ def _chosen(asked: Pareto, name: str, found: Found) -> tuple[int, dict[str, obje
     values = shown_table(found.front.table).iloc[chosen]
     row = ", ".join(f"{name} {value_text(str(name), v)}" for name, v in values.items())
     return chosen, {"point": chosen + 1, **values}, row
-
-
-def _bare_files(found: Found) -> dict[str, bytes | str]:
-    """Return a Pareto set without what takes time: its points, and the steps of their plans."""
-    pairs = zip(found.front.engines, found.front.steps, strict=True)
-    return _files(found, [_steps_table(_Picked(own, steps)) for own, steps in pairs], {})
 
 
 def _files(

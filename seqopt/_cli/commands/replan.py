@@ -20,7 +20,6 @@ from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
 from seqopt.exchange._measured import read_measured
 from seqopt.plan._studies.replan import compared, without
-from seqopt.plan.plan import Plan
 from seqopt.responses._tolerance import is_tolerance, value_text
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
 from seqopt.scene.scenarios import as_built
@@ -134,8 +133,14 @@ def answered(asked: Replan, found: Found) -> Answer:
     old = [step for step in steps if step.number > int(asked.at)]
 
     def differs() -> dict[str, object]:
-        off = {} if asked.measured is None else _off(scene, new.plan)
-        return compared(new.plan, old) | off
+        changes = compared(new.plan, old)
+        if asked.measured is None:
+            return changes
+        planned = {brick.name: brick.position for brick in scene.bricks}
+        built = new.plan.engine.network.scene.bricks
+        off, brick = max((math.dist(b.position, planned[b.name]), b.name) for b in built)
+        left = float(new.plan.tolerances()["tolerance_mm"].min() / 1000)
+        return changes | {"off_m": off, "off_brick": brick, "tolerance_left_m": left}
 
     facts = new.clock.spare("what the new plan changes", differs, None)
     answer = optimize.answered(base, new)
@@ -146,15 +151,6 @@ def answered(asked: Replan, found: Found) -> Answer:
         facts={**answer.facts, "replanned": facts},
         text="\n".join([*map(wrapped, _in_words(facts)), answer.text]),
     )
-
-
-def _off(scene: Scene, plan: Plan) -> dict[str, object]:
-    """Return how far bricks are off at most, m, and how far grips of the rest may be."""
-    planned = {brick.name: brick.position for brick in scene.bricks}
-    built = plan.engine.network.scene.bricks
-    off, brick = max((math.dist(each.position, planned[each.name]), each.name) for each in built)
-    left = plan.tolerances()["tolerance_mm"].min() / 1000
-    return {"off_m": off, "off_brick": brick, "tolerance_left_m": float(left)}
 
 
 def _as_optimize(asked: Replan, folder: Path) -> optimize.Optimize:
@@ -172,18 +168,20 @@ def _as_optimize(asked: Replan, folder: Path) -> optimize.Optimize:
 
 
 def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
-    """Return what was asked of a plan, as words, as far as words say it.
-
-    ``lost``: whether fewer robots take part from now on, for which the default is another one.
-    """
+    """Return the options of a plan from its summary; ``lost``: with the default of fewer robots."""
     try:
         told = parse_json(read_text(folder / "summary.json"), "summary")
     except FileError:
         return {}
     if not isinstance(told, dict) or told.get("schedule") != FREE:
         return {}
-    rules, limits = (_texts(told.get(name)) for name in ("rules", "limits"))
-    if lost and rules.get("least_grips") == _usual_of(told.get("rules")):
+    given = [each if isinstance(each, dict) else {} for each in map(told.get, ("rules", "limits"))]
+    rules, limits = (
+        {name: str(value) for name, value in each.items() if isinstance(value, str | int | float)}
+        for each in given
+    )
+    team = given[0].get("robots")
+    if lost and isinstance(team, list) and rules.get("least_grips") == str(_usual_grips(len(team))):
         del rules["least_grips"]
     names = ("least_grips", "newest", "payload", "regrips", "ending", "candidates")
     criterion, aims = told.get("criterion"), told.get("aims")
@@ -200,42 +198,20 @@ def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
     }
 
 
-def _usual_of(rules: object) -> str:
-    """Return how many nodes as many robots as took part hold at least by default."""
-    team = rules.get("robots") if isinstance(rules, dict) else None
-    return str(_usual_grips(len(team))) if isinstance(team, list) else ""
-
-
-def _texts(told: object) -> dict[str, str]:
-    """Return the words and numbers of an object, by name; nothing of what is none."""
-    pairs = told.items() if isinstance(told, dict) else ()
-    return {name: str(value) for name, value in pairs if isinstance(value, str | int | float)}
-
-
 def _changed(asked: Replan, scene: Scene, begin: Place) -> tuple[Scene, Place, str]:
     """Return scene and place after what has changed, and the robots that take part, by name."""
     assert begin.site is not None
-    bricks = [_brick(text) for text in asked.missing]
+    if wrong := [text for text in asked.missing if not text.isdecimal()]:
+        raise StepError(f"--missing {wrong[0]}: give the number of a brick")
     if asked.measured is not None:
-        scene = _built(scene, begin.site.bricks, asked.measured)
-    scene, site = without(scene, begin.site, asked.lost, bricks)
+        found, stand = read_measured(scene, asked.measured), scene.build_order[: begin.site.bricks]
+        if early := [name for name in found if name in scene.build_order and name not in stand]:
+            why = f"brick {early[0]} does not stand yet; leave it out"
+            raise StepError(f"--measured {asked.measured}: {why}")
+        scene = as_built(scene, found)
+    scene, site = without(scene, begin.site, asked.lost, [*map(int, asked.missing)])
     left = [robot.name for robot in scene.robots if robot.name not in asked.lost]
     return scene, Place(site, None), ",".join(left) if asked.lost else ""
-
-
-def _built(scene: Scene, bricks: int, path: Path) -> Scene:
-    """Return a scene whose bricks stand where they were measured."""
-    found, stand = read_measured(scene, path), scene.build_order[:bricks]
-    early = [name for name in found if name in scene.build_order and name not in stand]
-    if early:
-        raise StepError(f"--measured {path}: brick {early[0]} does not stand yet; leave it out")
-    return as_built(scene, found)
-
-
-def _brick(text: str) -> int:
-    if not text.isdecimal():
-        raise StepError(f"--missing {text}: give the number of a brick")
-    return int(text)
 
 
 def _with_another(base: optimize.Optimize, count: int, change: Change) -> str:

@@ -115,13 +115,6 @@ def _list(asked: SceneAsked) -> Answer:
     return Answer(facts=facts, text="\n".join(lines))
 
 
-def _bears(prop: Prop) -> str:
-    out = _grip(prop).replace(", grip of", ":", 1) or ": rigid"
-    if prop.direction is not None:
-        out += ", pushes along ({:g}, {:g}, {:g}) only".format(*prop.direction)
-    return out + ("" if prop.capacity is None else f", up to {prop.capacity:g} N")
-
-
 def _grip(robot: Robot | Prop) -> str:
     """Return how stiff a robot's grip is, in words; nothing where it is rigid."""
 
@@ -144,7 +137,11 @@ def _described(scene: Scene, facts: dict[str, Any]) -> Iterator[str]:
         at = "" if robot.arm is None else ", arm at ({:g}, {:g}, {:g})".format(*robot.arm.position)
         yield f"{robot.name}: payload {robot.payload:g} N, reach {robot.reach}{at}{_grip(robot)}"
     for prop in scene.props:
-        yield f"{prop.label}{_bears(prop)}"
+        bears = _grip(prop).replace(", grip of", ":", 1) or ": rigid"
+        if prop.direction is not None:
+            bears += ", pushes along ({:g}, {:g}, {:g}) only".format(*prop.direction)
+        most = "" if prop.capacity is None else f", up to {prop.capacity:g} N"
+        yield f"{prop.label}{bears}{most}"
     yield f"weight: {facts['weight_N']:.1f} N"
     if scene.loading:
         yield f"beside the weight: {scene.loading}"

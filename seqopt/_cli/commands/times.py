@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import pandas as pd
@@ -11,15 +10,14 @@ from seqopt._cli.answer import Answer
 from seqopt._cli.asked import (
     arm_notes,
     asked_scene,
-    asked_steps,
     carrying_notes,
     exceeded,
-    idle_notes,
     in_seconds,
     posture_trouble,
     scene_facts,
     waits_said,
 )
+from seqopt._cli.given import asked_steps
 from seqopt._cli.options import Cured, Fixed, Postures, Timed
 from seqopt._cli.outputs import figure_notes, require_out, time_files, write_outputs
 from seqopt._cli.terminal import wrapped
@@ -30,10 +28,8 @@ from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.plan.build import GivenSequence
-from seqopt.problem.standing import Standing
-from seqopt.scene.scene import Scene
 from seqopt.sequence._durations import has_durations
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import _idle_note
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
 from seqopt.times._tables import aged_table, busy_table, softer_lines, spent_lines, total_lines
@@ -91,7 +87,9 @@ def run(asked: Times) -> Answer:
     scene = in_seconds(asked, scene)
     network = build_network(scene)
     steps = asked_steps(asked, network).steps
-    standing = _standing(asked)
+    standing = asked_standing(asked)
+    if standing is not None and not asked.curing:
+        raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
     build = GivenSequence(make_engine(USUAL, network), steps, standing=standing)
     try:
         given = build.times()["end_s"].iloc[-1]
@@ -116,7 +114,8 @@ def run(asked: Times) -> Answer:
         lines += softer_lines(scene, build.responses(), aged, exceeded(scene, aged))
     kept = f"written to {asked.out}: {', '.join(('plan.csv', 'times.csv', *files))}"
     lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
-    cannot = _arms_cannot(asked, scene, build.steps)
+    trouble = posture_trouble(asked, scene)
+    cannot = (f"not checked; {trouble}",) if trouble else arm_notes(scene, {"": build.steps})
     facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": build.times()}
     facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
@@ -125,25 +124,11 @@ def run(asked: Times) -> Answer:
         written=written,
         notes=(
             *carrying_notes(scene, build.steps),
-            *idle_notes(scene, build.steps),
+            *_idle_note(scene, "robots", build.steps),
             *(f"arms: {each}" for each in cannot),
             *(figure_notes() if written else ()),
         ),
     )
-
-
-def _standing(asked: Times) -> Standing | None:
-    """Return with what states must stand; mortar that does not cure says nothing of time."""
-    standing = asked_standing(asked)
-    if standing is not None and not asked.curing:
-        raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
-    return standing
-
-
-def _arms_cannot(asked: Times, scene: Scene, steps: Sequence[Step]) -> tuple[str, ...]:
-    """Return which steps arms cannot be in, or why that is not known."""
-    trouble = posture_trouble(asked, scene)
-    return (f"not checked; {trouble}",) if trouble else arm_notes(scene, {"": steps})
 
 
 def _aged(asked: Times, build: GivenSequence) -> pd.DataFrame | None:
