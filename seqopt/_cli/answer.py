@@ -89,7 +89,7 @@ class Answer:
 
 
 def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) -> Status:
-    """Print an answer as text, paths or JSON; where files are written, a closed output is no error."""
+    """Print an answer as text, paths or JSON; a closed output is no error if files are written."""
     if as_json:
         show(json.dumps(answer.document(command), indent=2, allow_nan=False) + "\n")
     elif quiet:

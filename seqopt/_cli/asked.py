@@ -55,7 +55,7 @@ def size_line(scene: Scene) -> str:
 
 
 def asked_scene(asked: Built, *, ranged: bool = False) -> Scene:
-    """Return the scene with order, robots, props and grips of the options; ``ranged``: a range is none."""
+    """Return the scene that options describe; ``ranged``: a range of --grips leaves its own."""
     if asked.order == "search":
         raise ProblemError(
             "--order search: only the free schedule has it; give optimize --schedule free"

@@ -194,7 +194,7 @@ def asked_standing(asked: Stands) -> Standing | None:
 
 
 def asked_criterion(asked: Cost | Posed, usual: Criterion) -> Criterion | None:
-    """Return the criterion of the options, if any; ``usual``: that which options of ranks refine."""
+    """Return the criterion of the options; ``usual``: the one that options of ranks refine."""
     said = {"crown": asked.crown, "ranked": asked.ranked, "among": asked.among}
     given = {name: text for name, text in said.items() if text is not None}
     if asked.criteria is None and not given:
