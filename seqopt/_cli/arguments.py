@@ -190,11 +190,10 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
 def request(words: Sequence[str], tell: Any = None) -> tuple[str, Any]:
     """Return the command that words name, and its options; a wrong word ends the program."""
     options = vars(parser(asked_command(words)).parse_args(words))
-    from seqopt._cli.signatures import parsed  # noqa: PLC0415  # of which help needs nothing
-
     name = options.pop("command")
+    options = {n: tuple(v) if isinstance(v, list) else v for n, v in options.items()}
     more = {"words": (*words,)} | ({} if tell is None else {"tell": tell})
-    return name, parsed(COMMANDS[name].asked, options, **more)
+    return name, COMMANDS[name].asked(**options, **more)
 
 
 def first_screen(command: argparse.ArgumentParser) -> str:

@@ -26,10 +26,9 @@ from seqopt.graph.states.states import States
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
-from seqopt.stability._builds import BuildProver
 
 if TYPE_CHECKING:
-    from seqopt.report.comparison import Comparison
+    pass
 
 ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
 
@@ -39,30 +38,6 @@ def figure_notes() -> tuple[str, ...]:
     if find_spec("matplotlib") is not None:
         return ()
     return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
-
-
-def comparison_files(result: Comparison, softly: pd.DataFrame) -> dict[str, bytes | str]:
-    """Return tables and figures of a comparison by file name; ``softly``: by stiffness of grips."""
-    loop, speed = result.loop, result.speed
-    files: dict[str, bytes | str] = {
-        "comparison.csv": result.table.to_csv(float_format="%.6g"),
-        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
-    }
-    files |= {} if softly.empty else {"grips.csv": csv_text(softly)}
-    files |= {} if speed is None else {"speed.csv": csv_text(speed.table)}
-    if loop is not None and loop.ranks is not None:
-        files["published_ranks.csv"] = loop.ranks.to_csv(index=False)
-    if figure_notes():
-        return files
-    from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
-    from seqopt.report.charts import _softness_chart, comparison_figures  # noqa: PLC0415
-
-    drawn = {} if loop is None else comparison_figures(result)
-    drawn |= {} if softly.empty else {"grips": _softness_chart(softly, [*softly["build"].unique()])}
-    drawn |= {} if speed is None else {"speed": speed.plot()}
-    for name, figure in drawn.items():
-        files |= picture_files(name, figure)
-    return files
 
 
 def _steps_table(plan: ShownBuild) -> pd.DataFrame:
@@ -103,23 +78,6 @@ def _plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
     return {**files, **_task_files(plan), **_time_files(plan)}
 
 
-def _picked_files(
-    plan: ShownBuild, report: Mapping[str, object], prover: BuildProver
-) -> dict[str, bytes | str]:
-    """Return the files of a plan of a Pareto set, as those of any plan, by file name."""
-    from seqopt.report._pages import plan_page  # noqa: PLC0415  # only where files are written
-    from seqopt.report.page import _task_texts  # noqa: PLC0415
-
-    scene, table = plan.engine.network.scene, plan.responses()
-    tasks = _task_texts(scene, plan.steps)
-    return {
-        **_bare_files(plan, table, report),
-        **{f"tasks.{kind}": text for kind, text in tasks.items()},
-        **_time_files(plan),
-        PAGE: plan_page(plan, prover, table=table, tasks=tasks),
-    }
-
-
 def _time_files(plan: ShownBuild) -> dict[str, bytes]:
     """Return the chart of a build over seconds, where it is known how long robots take."""
     if plan.makespan is None or figure_notes():
@@ -127,12 +85,6 @@ def _time_files(plan: ShownBuild) -> dict[str, bytes]:
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
 
     return picture_files("times", plan.gantt())
-
-
-def time_files(build: ShownBuild) -> dict[str, bytes | str]:
-    """Return steps of a build, when they happen, and a chart of it, by file name."""
-    tables = {"plan": build.responses(), "times": build.times()}
-    return {**{f"{name}.csv": csv_text(t) for name, t in tables.items()}, **_time_files(build)}
 
 
 def _task_files(plan: Plan) -> dict[str, str]:

@@ -121,12 +121,6 @@ def _add(takes: Any, known: Field[Any], value: str, text: str) -> None:
     takes.add_argument(flag, dest=known.name, required=default is MISSING, **how)
 
 
-def parsed(kind: type[_Asked], options: Mapping[str, Any], **more: Any) -> _Asked:
-    """Return what a command is asked, from what a parser found."""
-    told: dict[str, Any] = {n: tuple(v) if isinstance(v, list) else v for n, v in options.items()}
-    return kind(**told, **more)
-
-
 def given(kind: type[_Asked], values: Mapping[str, Any], **more: Any) -> _Asked:
     """Return what a command is asked, from values of Python; numbers and lists become words.
 

@@ -68,21 +68,6 @@ def parse_payload(text: str, scene: Scene) -> Scene:
     return scene.with_robots(*said)
 
 
-def _parse_grip_range(text: str | None) -> tuple[float, ...]:
-    """Return the stiffnesses of a range, as ``1e5..1e9``, N/m; none of one stiffness."""
-    if ".." not in (text or ""):
-        return ()
-    assert text is not None
-    ends = [number_word(end, f"--grips {short(text)[1:-1]}") for end in text.split("..")]
-    if len(ends) != 2 or not ends[0] < ends[1]:
-        raise SceneError(
-            f"--grips {short(text)[1:-1]}: give the softest and the stiffest, 1e5..1e9"
-        )
-    from seqopt.report.softness import _grip_range  # noqa: PLC0415  # compare alone needs it
-
-    return _grip_range(*ends)
-
-
 def parse_grips(text: str, scene: Scene) -> Scene:
     """Return a scene with grips as stiff as a word says, ``rigid``, ``1e6`` or ``1e6x1e6x5e5``.
 

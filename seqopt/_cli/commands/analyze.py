@@ -37,7 +37,7 @@ from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
 from seqopt.problem._limit_words import length_word
 from seqopt.problem.requirements import _prop_faults, overloads
-from seqopt.responses._enough import what_was_enough
+from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
 from seqopt.responses.quantities import _plain, _steps_in_words, length_text
@@ -142,22 +142,30 @@ def run(asked: Analyze) -> Answer:
     facts = {"scene": scene_facts(scene), "units": UNITS, "steps": whole, **provenance(engine)}
     answer = Answer(
         facts={**facts, "enough": None if enough is None else enough.facts()},
-        notes=(
-            *off,
-            *level_notes(asked, engine),
-            *within.unchecked,
-            *(() if enough is None else enough.lines),
-            *(f"payload exceeded: {excess}" for excess in overloads(scene, table)),
-            *(f"props: {fault}" for fault in _prop_faults(scene, table)),
-            *_idle_note(scene, "robots", steps),
-            *_not_done(clock),
-        ),
+        notes=(*off, *_notes(asked, within, steps, table, enough), *_not_done(clock)),
         failures=(*failures, *([INTERRUPTED] if clock.interrupted else ())),
         status=Status.INTERRUPTED if clock.interrupted else status,
         **said,
     )
     unreached = arm_notes(scene, {"": computed})
     return strictly(answer, asked, exceeded(scene, table), outside, unreached=unreached)
+
+
+def _notes(
+    asked: Analyze,
+    within: LinearRange,
+    steps: Sequence[Step],
+    table: pd.DataFrame,
+    enough: Enough | None,
+) -> Iterator[str]:
+    """Yield levels, what is unchecked or enough, payloads and props exceeded, idle robots."""
+    scene = within.engine.network.scene
+    yield from level_notes(asked, within.engine)
+    yield from within.unchecked
+    yield from () if enough is None else enough.lines
+    yield from (f"payload exceeded: {excess}" for excess in overloads(scene, table))
+    yield from (f"props: {fault}" for fault in _prop_faults(scene, table))
+    yield from _idle_note(scene, "robots", steps)
 
 
 def _solved(

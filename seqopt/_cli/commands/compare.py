@@ -21,20 +21,24 @@ from seqopt._cli.asked import (
     strictly,
 )
 from seqopt._cli.options import Cost, Judged, Postures, Strict, Team, word
-from seqopt._cli.outputs import comparison_files, figure_notes, require_out, write_outputs
+from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import columns, wrapped
-from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots, speed_seconds
+from seqopt._cli.values import asked_criterion, parse_robots, speed_seconds
+from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance, simplest
+from seqopt.errors import SceneError
 from seqopt.network.build import build_network
+from seqopt.problem._limit_words import number_word
 from seqopt.problem.requirements import Criterion
 from seqopt.report._compared import comparison_blocks, format_details, printed_largest, shown_tables
 from seqopt.report._pages import comparison_page
 from seqopt.report.comparison import CLOSED, Comparison, compare
-from seqopt.report.softness import _softness_lines, held_softly, turning_points
+from seqopt.report.softness import _grip_range, _softness_lines, held_softly, turning_points
 from seqopt.responses.table import builds_in_words
+from seqopt.scene._checks import short
 from seqopt.stability._builds import BuildProver
 from seqopt.workflow import DEFAULTS
 
@@ -134,7 +138,7 @@ def answered(asked: Compare, found: Found) -> Answer:
     written: tuple[Path, ...] = ()
     if asked.out is not None:
         asked.tell("drawing figures")
-        files = comparison_files(result, softly) | {PAGE: comparison_page(engine, result)}
+        files = _files(result, softly) | {PAGE: comparison_page(engine, result)}
         files["summary.json"] = json.dumps(about, indent=2) + "\n"
         written = write_outputs(asked, lambda: files)
         speed = result.speed is not None
@@ -194,3 +198,40 @@ def _facts(result: Comparison) -> dict[str, object]:
         "enough": result.enough.facts(),
         "findings": list(result.notes),
     }
+
+
+def _parse_grip_range(text: str | None) -> tuple[float, ...]:
+    """Return the stiffnesses of a range, as ``1e5..1e9``, N/m; none of one stiffness."""
+    if ".." not in (text or ""):
+        return ()
+    assert text is not None
+    ends = [number_word(end, f"--grips {short(text)[1:-1]}") for end in text.split("..")]
+    if len(ends) != 2 or not ends[0] < ends[1]:
+        raise SceneError(
+            f"--grips {short(text)[1:-1]}: give the softest and the stiffest, 1e5..1e9"
+        )
+    return _grip_range(*ends)
+
+
+def _files(result: Comparison, softly: pd.DataFrame) -> dict[str, bytes | str]:
+    """Return tables and figures of a comparison by file name; ``softly``: by stiffness of grips."""
+    loop, speed = result.loop, result.speed
+    files: dict[str, bytes | str] = {
+        "comparison.csv": result.table.to_csv(float_format="%.6g"),
+        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
+    }
+    files |= {} if softly.empty else {"grips.csv": csv_text(softly)}
+    files |= {} if speed is None else {"speed.csv": csv_text(speed.table)}
+    if loop is not None and loop.ranks is not None:
+        files["published_ranks.csv"] = loop.ranks.to_csv(index=False)
+    if figure_notes():
+        return files
+    from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.charts import _softness_chart, comparison_figures  # noqa: PLC0415
+
+    drawn = {} if loop is None else comparison_figures(result)
+    drawn |= {} if softly.empty else {"grips": _softness_chart(softly, [*softly["build"].unique()])}
+    drawn |= {} if speed is None else {"speed": speed.plot()}
+    for name, figure in drawn.items():
+        files |= picture_files(name, figure)
+    return files

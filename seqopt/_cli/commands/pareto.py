@@ -25,7 +25,14 @@ from seqopt._cli.asked import (
     scene_facts,
 )
 from seqopt._cli.options import Posed
-from seqopt._cli.outputs import _picked_files, _steps_table, figure_notes, write_outputs, written_to
+from seqopt._cli.outputs import (
+    _bare_files,
+    _steps_table,
+    _time_files,
+    figure_notes,
+    write_outputs,
+    written_to,
+)
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.values import parse_numbers
 from seqopt._files import csv_text, write_folder
@@ -39,8 +46,9 @@ from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem, judged_by
 from seqopt.problem.requirements import _said_limits
-from seqopt.report._pages import front_page
+from seqopt.report._pages import front_page, plan_page
 from seqopt.report.comparison import _worst_of, fixed_methods, shown_table
+from seqopt.report.page import _task_texts
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import Departure, LinearRange, _analyze_builds, builds_in_words
 from seqopt.scene.scene_file import dump_scene
@@ -259,7 +267,14 @@ def _write_picked(
     result = f"one of {len(found.front.steps)} plans"
     plan = _Picked(own, found.front.steps[chosen], f"plan with the least {name}", result=result)
     report = {"scene": own.network.scene.name, "picked": picked, **provenance(own)}
-    write_folder(folder, _picked_files(plan, report, found.provers[own]))
+    table, tasks = plan.responses(), _task_texts(own.network.scene, plan.steps)
+    files = {
+        **_bare_files(plan, table, report),
+        **{f"tasks.{kind}": text for kind, text in tasks.items()},
+        **_time_files(plan),
+        PAGE: plan_page(plan, found.provers[own], table=table, tasks=tasks),
+    }
+    write_folder(folder, files)
 
 
 def _front_files(asked: Pareto, found: Found) -> dict[str, bytes | str]:

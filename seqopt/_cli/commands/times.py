@@ -19,7 +19,7 @@ from seqopt._cli.asked import (
 )
 from seqopt._cli.given import asked_steps
 from seqopt._cli.options import Cured, Fixed, Postures, Timed
-from seqopt._cli.outputs import figure_notes, require_out, time_files, write_outputs
+from seqopt._cli.outputs import _time_files, figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing
 from seqopt._files import csv_text
@@ -102,8 +102,13 @@ def run(asked: Times) -> Answer:
         build = GivenSequence(build.engine, build.reassigned(), standing=standing)
     least = build.times()["end_s"].iloc[-1] if asked.reassign else None
     aged = _aged(asked, build)
-    files = {} if aged is None else {"aged.csv": csv_text(aged)}
-    written = write_outputs(asked, lambda: time_files(build) | files)
+    tables = {"plan.csv": build.responses, "times.csv": build.times}
+    tables |= {} if aged is None else {"aged.csv": lambda: aged}
+
+    def files() -> dict[str, bytes | str]:
+        return {**{name: csv_text(table()) for name, table in tables.items()}, **_time_files(build)}
+
+    written = write_outputs(asked, files)
     busy = busy_table(scene, build.steps, build._waits)
     if build.standing is not None:
         starts = build.times()["start_s"].tolist()
@@ -112,7 +117,7 @@ def run(asked: Times) -> Answer:
     lines = [*total, *waits_said(build), *spent_lines(busy)]
     if aged is not None:
         lines += softer_lines(scene, build.responses(), aged, exceeded(scene, aged))
-    kept = f"written to {asked.out}: {', '.join(('plan.csv', 'times.csv', *files))}"
+    kept = f"written to {asked.out}: {', '.join(tables)}"
     lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
     trouble = posture_trouble(asked, scene)
     cannot = (f"not checked; {trouble}",) if trouble else arm_notes(scene, {"": build.steps})
