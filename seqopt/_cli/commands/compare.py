@@ -141,15 +141,7 @@ def answered(asked: Compare, found: Found) -> Answer:
         files = _files(result, softly) | {PAGE: comparison_page(engine, result)}
         files["summary.json"] = json.dumps(about, indent=2) + "\n"
         written = write_outputs(asked, lambda: files)
-        speed = result.speed is not None
-        blocks.append(
-            f"written to {asked.out}\n"
-            f"  {PAGE}: every build step by step; open it in a browser\n"
-            "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
-            "  summary.json: the criteria with their numbers, the engine, and versions of packages"
-            + "\n  speed.csv: a row per engine and formulation" * speed
-            + "\n  *.png, *.svg: the figures" * (not figure_notes())
-        )
+        blocks.append(_where(asked.out, speed=result.speed is not None))
     else:
         more = "" if asked.details else "; --details shows more here"
         blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
@@ -172,6 +164,17 @@ def answered(asked: Compare, found: Found) -> Answer:
     over = exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)
     return strictly(answer, asked, over, left, result.verdicts)
+
+
+def _where(folder: Path, *, speed: bool) -> str:
+    timed = "\n  speed.csv: a row per engine and formulation" * speed
+    return (
+        f"written to {folder}\n"
+        f"  {PAGE}: every build step by step; open it in a browser\n"
+        "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
+        "  summary.json: the criteria with their numbers, the engine, and versions of packages"
+        f"{timed}"
+    ) + ("" if figure_notes() else "\n  *.png, *.svg: the figures")
 
 
 def _facts(result: Comparison) -> dict[str, object]:

@@ -28,6 +28,7 @@ from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.plan.build import GivenSequence
+from seqopt.scene.scene import Scene
 from seqopt.sequence._durations import has_durations
 from seqopt.sequence.steps import _idle_note
 from seqopt.times._step_check import check_cured
@@ -85,22 +86,7 @@ def run(asked: Times) -> Answer:
         said = f"durations: not known, taken as {USUAL_SECONDS}; --durations says others"
         asked.taken.append(said)
     scene = in_seconds(asked, scene)
-    network = build_network(scene)
-    steps = asked_steps(asked, network).steps
-    standing = asked_standing(asked)
-    if standing is not None and not asked.curing:
-        raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
-    build = GivenSequence(make_engine(USUAL, network), steps, standing=standing)
-    try:
-        given = build.times()["end_s"].iloc[-1]
-    except StepError as error:
-        if standing is None and "durations" not in str(error):
-            raise
-        where = "--durations" if "durations" in str(error) else "--curing"
-        raise ProblemError(f"{where}: {error}") from None
-    if asked.reassign:
-        build = GivenSequence(build.engine, build.reassigned(), standing=standing)
-    least = build.times()["end_s"].iloc[-1] if asked.reassign else None
+    build, given, least = _asked_build(asked, scene)
     aged = _aged(asked, build)
     tables = {"plan.csv": build.responses, "times.csv": build.times}
     tables |= {} if aged is None else {"aged.csv": lambda: aged}
@@ -113,7 +99,7 @@ def run(asked: Times) -> Answer:
     if build.standing is not None:
         starts = build.times()["start_s"].tolist()
         check_cured(build.engine.network, build.steps, build.standing, starts)
-    total = total_lines(scene.name, len(steps), float(given), least)
+    total = total_lines(scene.name, len(build.steps), given, least)
     lines = [*total, *waits_said(build), *spent_lines(busy)]
     if aged is not None:
         lines += softer_lines(scene, build.responses(), aged, exceeded(scene, aged))
@@ -134,6 +120,26 @@ def run(asked: Times) -> Answer:
             *(figure_notes() if written else ()),
         ),
     )
+
+
+def _asked_build(asked: Times, scene: Scene) -> tuple[GivenSequence, float, float | None]:
+    """Return a build, when it ends, s, and when it ends reassigned, if that is asked."""
+    network = build_network(scene)
+    steps, standing = asked_steps(asked, network).steps, asked_standing(asked)
+    if standing is not None and not asked.curing:
+        raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
+    build = GivenSequence(make_engine(USUAL, network), steps, standing=standing)
+    try:
+        given = float(build.times()["end_s"].iloc[-1])
+    except StepError as error:
+        if standing is None and "durations" not in str(error):
+            raise
+        where = "--durations" if "durations" in str(error) else "--curing"
+        raise ProblemError(f"{where}: {error}") from None
+    if not asked.reassign:
+        return build, given, None
+    build = GivenSequence(build.engine, build.reassigned(), standing=standing)
+    return build, given, build.times()["end_s"].iloc[-1]
 
 
 def _aged(asked: Times, build: GivenSequence) -> pd.DataFrame | None:
