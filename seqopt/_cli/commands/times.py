@@ -107,7 +107,12 @@ def run(asked: Times) -> Answer:
     lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
     trouble = posture_trouble(asked, scene)
     cannot = (f"not checked; {trouble}",) if trouble else arm_notes(scene, {"": build.steps})
-    facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": build.times()}
+    facts: dict[str, object] = {
+        "makespan_s": given,
+        "reassigned_s": least,
+        "robots": busy,
+        "steps": build.times(),
+    }
     facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
         facts={"scene": scene_facts(scene), **facts},
