@@ -1,4 +1,4 @@
-"""Choose the states of a build, whatever the schedule, or a path through an instance."""
+"""Choose the states of a build, or a path through an instance."""
 
 from __future__ import annotations
 

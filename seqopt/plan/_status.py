@@ -59,7 +59,7 @@ class FoundOrder:
     """The build order of a plan, and what is known of all others.
 
     ``problem``: among which orders it was sought; ``selection``: what the formulation claims;
-    ``proven``: whether it is proven that no order stays below the bound; else it is claimed.
+    ``proven``: whether the lower bound of all orders is proven; else it is claimed.
     """
 
     problem: AllOrders
@@ -97,7 +97,7 @@ class FoundOrder:
 
     @property
     def bound_said(self) -> str:
-        """What no order stays below, and whether that is proven, in words."""
+        """The lower bound of all orders, and whether it is proven, in words."""
         if not isfinite(self.selection.bound):
             return "others are not looked at yet"
         claimed = "" if self.proven else " (claimed, not proven)"
@@ -120,9 +120,8 @@ class KeptPostures(Terse):
     """The postures of a plan, and what is known of plans with others.
 
     ``asked``, ``most``: how many postures at each node were looked at, and with how many the plan
-    was made. ``floor``: what no plan stays below with any of those that were looked at, by goal;
-    empty where that is not known, as without proof. ``bounds``: the same in the units of goals.
-    ``best``: whether it is proven that none is better.
+    was made. ``floor``: lower bounds with any posture looked at, by goal, in display units; empty
+    without proof. ``bounds``: the same in SI units. ``best``: whether it is proven optimal.
     """
 
     postures: PlanPostures
@@ -134,14 +133,15 @@ class KeptPostures(Terse):
 
     def described(self) -> dict[str, object]:
         """Return what the summary of a plan says of arms, ready for JSON."""
-        cannot = faults_in_words(self.postures)
         found = {
+            "said": str(self),
+            "cannot": [*faults_in_words(self.postures)],
             "postures_at_a_node": self.most,
             "of": self.asked,
             "bound": self.floor,
             "best_of_table": self.best,
         }
-        return {"arms": {"said": str(self), "cannot": list(cannot), **found}}
+        return {"arms": found}
 
     def __str__(self) -> str:
         faults = faults_in_words(self.postures)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -12,26 +13,22 @@ from seqopt._registry import offered
 from seqopt._showing import Page, Shown, display
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
+from seqopt.errors import SceneError
+from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._props import props_table
 from seqopt.responses._tolerance import tolerance_table
-from seqopt.responses.table import Departure, LinearRange, grips_table
+from seqopt.responses.table import Departure, LinearRange, _Columns, analyze, grips_table
 from seqopt.sequence._durations import has_durations
 from seqopt.sequence.site import Site
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, _check_part
 from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
 from seqopt.stability.steps import assess_steps, stability_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-from dataclasses import dataclass, field
-
-from seqopt.errors import SceneError
-from seqopt.network.network import Network
-from seqopt.responses.table import _Columns, analyze
-from seqopt.sequence.steps import _check_part
 
 
 class ShownBuild(Shown):
@@ -215,13 +212,9 @@ class ShownBuild(Shown):
         """
         scene, responses = self.engine.network.scene, self.responses()
         timed = self._timed if seconds is None else seconds
-        shown = (first, last)
-        if timed:
-            drawn: Figure = display("seconds_picture")(
-                scene, self.steps, responses, shown, self._waits, self._begin
-            )
-            return drawn
-        figure: Figure = display("gantt_picture")(scene, self.steps, responses, shown)
+        name = "seconds_picture" if timed else "gantt_picture"
+        clock = (self._waits, self._begin) if timed else ()
+        figure: Figure = display(name)(scene, self.steps, responses, (first, last), *clock)
         return figure
 
     def animate(self, *, forces: bool = False, magnify: float = 0.0, seconds: float = 0.4) -> Any:
@@ -306,15 +299,9 @@ class GivenSequence(ShownBuild):
         return "given, not optimized"
 
     def table(self) -> pd.DataFrame:
-        """Return every grip.
-
-        Result: as of `grips`.
-        """
+        """Return every grip, as of `grips`."""
         return self.grips()
 
     def responses(self) -> pd.DataFrame:
-        """Return the responses of every step.
-
-        Result: as of `seqopt.analyze`.
-        """
+        """Return the responses of every step, as of `seqopt.analyze`."""
         return analyze(self.engine, self.steps)

@@ -33,6 +33,8 @@ from seqopt.sequence.site import Site
 from seqopt.sequence.steps import StepKind
 
 FILE = "policy.npz"
+FACTS = ("goals", "robots", "kinds", "checked", "keeps_range")
+ARRAYS = ("order", "nodes", "bricks", "held", "values", "following")
 
 
 class Advice(NamedTuple):
@@ -66,7 +68,7 @@ class Advice(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Policy(FrozenValue):
-    """What is best from every state that a free schedule reaches, whatever happened before.
+    """Optimal policy over all reachable states of a free schedule.
 
     Attributes
     ----------
@@ -138,8 +140,8 @@ class Policy(FrozenValue):
             ) from None
 
     def _move(self, site: Site, row: int, after: int, values: Mapping[str, float]) -> Advice:
-        grips = list(site.grips or (None,) * len(self.robots))
-        stays = list(site.stays or (None,) * len(self.robots))
+        nobody = (None,) * len(self.robots)
+        grips, stays = list(site.grips or nobody), list(site.stays or nobody)
         moved: list[tuple[int, int]] = []
         taken = False
         for kind, column in zip(self.kinds, self._columns, strict=True):
@@ -192,8 +194,8 @@ class Policy(FrozenValue):
         return {int(node): i for i, node in enumerate(self.nodes, start=1)}
 
     def _row_of(self, site: Site) -> int:
-        grips = site.grips or (None,) * len(self.robots)
-        stays = site.stays or (None,) * len(self.robots)
+        nobody = (None,) * len(self.robots)
+        grips, stays = site.grips or nobody, site.stays or nobody
         key, parks = [site.bricks], (self.held < 0).any()  # whether it counts where they held last
         for kind in self.kinds:
             places = [
@@ -218,8 +220,7 @@ class Policy(FrozenValue):
 
     def content(self) -> bytes:
         """Return what `save` writes."""
-        names = ("goals", "robots", "kinds", "checked", "keeps_range")
-        told = {name: getattr(self, name) for name in names}
+        told = {name: getattr(self, name) for name in FACTS}
         arrays = {name: getattr(self, name) for name in ARRAYS}
         least = min(int(self.held.min(initial=0)), -int(self.held.max()) - 1)
         arrays["held"] = self.held.astype(np.min_scalar_type(least))
@@ -241,10 +242,9 @@ class Policy(FrozenValue):
 
 def _checked(told: Any, archive: Archive, where: str) -> Policy:
     """Return a policy whose arrays go together; a `FileError` names one that does not."""
-    names = ("goals", "robots", "kinds", "checked", "keeps_range")
-    if not isinstance(told, dict) or {*told} != {*names}:
-        raise FileError(f"{where}: told is {short(told)}; {', '.join(names)} belong there")
-    goals, robots, kinds = (told[name] for name in names[:3])
+    if not isinstance(told, dict) or {*told} != {*FACTS}:
+        raise FileError(f"{where}: told is {short(told)}; {', '.join(FACTS)} belong there")
+    goals, robots, kinds = (told[name] for name in FACTS[:3])
     words = [*goals, *robots] if isinstance(goals, list) and isinstance(robots, list) else [None]
     lists = isinstance(kinds, list) and all(isinstance(kind, list) for kind in kinds)
     every = [*chain.from_iterable(kinds)] if lists else []
@@ -274,13 +274,10 @@ def _checked(told: Any, archive: Archive, where: str) -> Policy:
     return Policy(*named, *arrays, told["checked"], told["keeps_range"])
 
 
-ARRAYS = ("order", "nodes", "bricks", "held", "values", "following")
-
-
 def find_policy(
     problem: Problem, tell: Callable[[object], object] = lambda _: None, *, proof: bool = True
 ) -> Policy:
-    """Return what is best from every state that the builds of a free schedule reach.
+    """Return the optimal policy over all reachable states of a free schedule.
 
     The aims of ``problem`` have at most one worst step, which totals may precede and follow. States
     are within the linear range if any build is, unless a limit on it says otherwise. With
@@ -319,14 +316,10 @@ def find_policy(
 
 
 def _explored(problem: Problem) -> tuple[States, Explorer | None]:
-    """Return the states of a problem, and those that builds reach; None where none ends."""
-    states = _states_with_policy(problem)
-    found = None if barred(states) is not None else explore(states)
-    return states, found if found is not None and found.whole else None
+    """Return the states of a problem, and those that builds reach; None where none ends.
 
-
-def _states_with_policy(problem: Problem) -> States:
-    """Return the states of a problem, if what is best does not depend on what was before."""
+    Raises a `ProblemError` where what is best depends on what was before.
+    """
     states = states_of(problem)
     why = {
         "budgets": states.budgets,
@@ -337,7 +330,8 @@ def _states_with_policy(problem: Problem) -> States:
     for name in (name for name, asked in why.items() if asked):
         raise ProblemError(f"a policy has no {name}: what is best depends on what was before")
     _ = states.free_rules  # a schedule has no policy, and says so
-    return states
+    found = None if barred(states) is not None else explore(states)
+    return states, found if found is not None and found.whole else None
 
 
 def _of_graph(states: States, visited: Visited) -> Policy:

@@ -44,10 +44,7 @@ class Tried:
         return not (self._over or any(is_below(bound, self._best) for bound in self._left))
 
     def _in_time(self, outcome: Callable[[], _Outcome]) -> _Outcome | None:
-        """Return what became of a problem; None if somebody ended it, and a plan is there by then.
-
-        What is ended is the rest too.
-        """
+        """Return what became of a problem; None if it is interrupted and an incumbent exists."""
         try:
             return outcome()
         except (TimeUpError, KeyboardInterrupt):

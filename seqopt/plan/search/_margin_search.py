@@ -29,14 +29,12 @@ STEPS = (Goal(Measure.STEPS),)
 def best_margin(
     problem: States, tell: Callable[[Explorer], object] = lambda _: None
 ) -> tuple[float, float, States, list[State]]:
-    """Return the best value of the first goal, a margin, and what is left to choose at it.
+    """Return objective and lower bound of the first goal, a margin, and what is left at it.
 
-    ``tell``: called with the states that are reached; may raise to end the search. Results:
-    ``value``: with which plans exist in which every state is proven to stand; ``bound``: with which
-    none does; ``rest``: of the goals after it, with the demand that all stand with that value;
-    ``states``: of a plan that does, level and state, one of few steps.
-    Raises `InfeasibleError` if there is no plan, whatever the margin; `NothingFoundError` if it is
-    open whether there is one within several budgets.
+    ``tell``: called with the states that are reached; may raise to end the search. Third, the
+    problem of the goals after it, all states standing with that margin; fourth, levels and states
+    of a plan that does. Raises `InfeasibleError` if no plan stands with any margin;
+    `NothingFoundError` if it is open whether there is one within several budgets.
     """
     name, look = problem.goals[0].response, StandingLook(problem, tell)
     if problem.demands and not look.exists(look.demanding(WORST[name])):
@@ -80,8 +78,7 @@ class StandingLook:
         known[0] = PASSES
 
         def ask(part: int, rows: Ints) -> Ints:
-            level, states = self._part(part, rows)
-            return np.where(asked.stand(level, states), PASSES, FAILS)
+            return np.where(asked.stand(*self._part(part, rows)), PASSES, FAILS)
 
         def recall(part: int, rows: Ints) -> Ints:
             return asked.recalled(*self._part(part, rows))
@@ -122,9 +119,9 @@ class StandingLook:
 
 
 def bisected(name: str, exists: Callable[[float], bool]) -> tuple[float, float]:
-    """Return two values of a margin, as close as is promised: no plan exists with the first.
+    """Return the bracket of a margin, as close as is promised: no plan exists at its lower end.
 
-    ``exists``: whether one does with a value. Raises `InfeasibleError` if none does with any.
+    Raises `InfeasibleError` if none does with any value.
     """
     if name != "tilt" and exists(0.0):
         return 0.0, 0.0

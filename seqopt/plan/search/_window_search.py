@@ -188,10 +188,7 @@ def alone_steps(problem: Layers) -> Layers:
 
 
 def shared_steps(problem: Layers, move: int, nodes: Sequence[int] | Mapping[int, int]) -> Layers:
-    """Return the problem of the steps that a move shares with the one before, whose node is chosen.
-
-    ``nodes``: chosen for the moves before.
-    """
+    """Return the problem of the steps shared with the move before, after the ``nodes`` chosen."""
     few = replace(problem.evaluation, resources=problem.evaluation.resources.alone())
     return posed_anew(replace(problem, evaluation=few), window(problem.schedule, move, nodes))
 
@@ -300,7 +297,10 @@ class _Pairs:
         self._problem, self._schedule, self._aim = problem, problem.schedule, aim
         self._each = isinstance(problem.criterion, WeightedSum | WorstRatio)  # pair by pair
         sizes = [len(move.candidates) for move in self._schedule.moves]
-        rows = [self._free(k, sizes) for k in range(len(sizes))]
+        rows = [dict[int, Floats]() for _ in sizes]
+        for k in range(1, len(sizes)):
+            if (k - 1, k) not in self._schedule.steps_of:  # no step is shared: nothing to pay
+                rows[k] = {before: np.zeros(sizes[k]) for before in range(sizes[k - 1])}
         try:
             first = search_windows(problem)
         except NothingFoundError:  # move by move it is a dead end; other choices may lead on
@@ -314,12 +314,6 @@ class _Pairs:
         for cost in problem.given_costs.tolist():
             single[0] = (np.add if aim is Aim.SUM else np.maximum)(single[0], cost)
         self.costs = PartialCosts(tuple(single), tuple(rows), floor, aim)
-
-    def _free(self, move: int, sizes: Sequence[int]) -> dict[int, Floats]:
-        """Return the rows of a move that shares no step with the one before: nothing."""
-        if not move or (move - 1, move) in self._schedule.steps_of:
-            return {}
-        return {before: np.zeros(sizes[move]) for before in range(sizes[move - 1])}
 
     def look_until_proven(self, watch: Watch) -> None:
         """Look at more and more pairs until none could be better, or time is over."""
@@ -336,7 +330,7 @@ class _Pairs:
             watch.tell(self.costs.best, self.costs.bound)
 
     def _everywhere(self, most: int) -> list[tuple[int, int]]:
-        """Return the rows of every move that promise most."""
+        """Return the rows of every move with the lowest bounds."""
         out = []
         for k in range(1, len(self._schedule.moves)):
             promise = self.costs.promise(k)
