@@ -27,7 +27,7 @@ from seqopt.judge._budget_proof import case_of, is_kept, least_within
 from seqopt.judge._proof import Proof
 from seqopt.judge._twin import twin_of
 from seqopt.plan._softer import HARD, _ground_moves, _softer, _whole_load
-from seqopt.plan.search._margin_search import WORST, StandingLook, bisected, with_margin
+from seqopt.plan.search._margin_search import STEPS, WORST, StandingLook, bisected, with_margin
 from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
@@ -102,7 +102,6 @@ def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
 
 
 ALLOWED = "says that no plan is allowed, and some are"
-STEPS = (Goal(Measure.STEPS),)
 IGNORED = "payload=ignored"
 PAYLOADS = "robots that carry more"  # where states must stand, held by what robots carry
 LARGE = 1e6  # N
@@ -184,10 +183,7 @@ def confirmed(
 
 
 def without_order(problem: AllOrders, name: str, seconds: float = np.inf) -> InfeasibleError:
-    """Return the error that no order has a plan, with why the scene's own has none.
-
-    ``name``, ``seconds``: as of `confirmed`; that no order has a plan is proven.
-    """
+    """Return the error that no order has a plan, which is proven, and why the scene's has none."""
     why = confirmed(problem.planned(problem.scene.build_order), name, seconds)
     return InfeasibleError(f"no order of the bricks has a plan; in the scene's own, {why}")
 

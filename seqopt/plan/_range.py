@@ -1,4 +1,4 @@
-"""Plans within the linear range, wherever any keeps it.
+"""Plans within the linear range wherever any keeps it, by a model that is enough for their steps.
 
 A plan that is the best of all and keeps the range is the best that keeps it: so the range is asked
 of the plan's own steps first, and becomes a limit of the problem only where they leave it.
@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any, ClassVar, Protocol, TypeVar
 
 from seqopt.engines.interface import Engine
+from seqopt.engines.registry import _chooser_of
 from seqopt.errors import InfeasibleError, SeqoptError, message_of
 from seqopt.graph.formulation import End
 from seqopt.graph.scenarios import ScenarioLayers, engine_for
@@ -23,6 +24,8 @@ from seqopt.responses._range import Moved, most_moved
 from seqopt.work._clock import INTERRUPT, Clock
 
 RANGE = "how far it leaves the linear range"  # what it is called where there was no time for it
+JOINT_LIMITS = "whether joints stay within their elastic limits"
+MOST_MODELS = 250  # up to which a problem is solved again: one may take a second where joints open
 NONE_KEEPS = "no plan keeps it"
 UNKNOWN = "whether any plan keeps it is not known"
 INTERRUPTED = f"{UNKNOWN} (interrupted)"
@@ -120,3 +123,24 @@ def best_of_several(problem: Problem, found: Callable[[Problem], FoundPlan]) -> 
         best, why = replace(first, plan=interrupted(first.plan)), INTERRUPTED
     own = replace(best.problem, limits=problem.limits)
     return replace(best, plan=replace(best.plan, problem=own, beyond=why), problem=own)
+
+
+def at_sufficient_level(plan: Plan, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:
+    """Return a plan, or the one of the next engine where steps leave the elastic limits of joints.
+
+    Candidates are compared by joints that never fail; within these limits a more detailed engine
+    would answer the same. The plan stays where solving again is much work, or fails: it says itself
+    which limits its steps leave.
+    """
+    chooser, problem = _chooser_of(plan.engine), plan.problem
+    if chooser is None or not isinstance(problem, Problem) or plan.ended is End.INTERRUPTED:
+        return plan
+
+    def found() -> Plan:
+        kept = plan.models > MOST_MODELS or plan._within.keeps_limits(plan.steps)
+        return plan if kept else solved(problem.but(engine=chooser))
+
+    try:
+        return clock.spare(JOINT_LIMITS, found, plan)
+    except SeqoptError:
+        return plan

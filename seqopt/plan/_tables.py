@@ -45,11 +45,7 @@ def chosen_table(
 
 
 def split_objectives(problem: Layers, choice: tuple[int, ...], *, heuristic: bool) -> Objectives:
-    """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
-
-    Result: ``objectives`` as of `seqopt.graph.layers.ranking.under_both`; ``gap_parts`` as of
-    `split_gap`; None where there are no ranks.
-    """
+    """Return `under_both` and of heuristics `split_gap`; None where there are no ranks."""
     values = under_both(problem, choice)
     known = None not in values.values()
     parts = split_gap(problem, choice) if known and heuristic else None
@@ -58,12 +54,9 @@ def split_objectives(problem: Layers, choice: tuple[int, ...], *, heuristic: boo
 
 
 def moves_table(problem: Layers, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:
-    """Return what was chosen for every move, for how long, and with which force.
+    """Return the choice, a row per move, as of `seqopt.plan.plan.Plan.table` without costs.
 
-    ``choice``: the candidate that is taken for every move; ``grips``: of the plan, as of
-    `seqopt.responses.table.grips_table`. Result: a row per move. Columns: ``move``, ``step``,
-    ``to_step`` (the last in which the node is held), ``bricks``, ``robot``, ``brick``, ``node``,
-    ``largest_force_N`` and ``candidates`` (how many there were).
+    ``grips``: of the plan, as of `seqopt.responses.table.grips_table`.
     """
     moves, nodes = problem.schedule.moves, problem.nodes(choice)
     brick_of = problem.schedule.scene.brick_of_node
@@ -97,11 +90,9 @@ def choice_table(problem: Layers, choices: StepChoices) -> pd.DataFrame:
 def alternatives(
     problem: Layers, choice: tuple[int, ...], search: WindowSearch | None
 ) -> pd.DataFrame:
-    """Return raw responses and cost of every choice that was looked at.
+    """Return responses and cost of every evaluated choice, as of `Plan.alternatives`.
 
-    ``choice``: the candidate that a plan takes for every move; ``search``: what was looked at along
-    the choice, where not all models were solved. Result: as of
-    `seqopt.plan.plan.Plan.alternatives`.
+    ``search``: what was looked at along the choice, where not all models were solved.
     """
     parts = []
     for posed, choices, before in _looked_at(problem, choice, search):

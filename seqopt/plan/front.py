@@ -431,12 +431,10 @@ def _require_complete(problem: _StateFront, points: Floats, progress: Tell) -> N
 
 
 def upper_bounds(points: Floats) -> Floats:
-    """Return the corners below which lies all that no point dominates.
+    """Return the corners (m, k) below which lies all that no point (n, k) dominates.
 
     Points are taken by their last number, ascending; up to the next one only those before it
     count, so that the corners are those of sets with one number less.
-
-    ``points`` (n, k). Result (m, k).
     """
     if points.shape[1] == 1:
         return np.array([[points.min(initial=np.inf)]])
@@ -444,10 +442,8 @@ def upper_bounds(points: Floats) -> Floats:
     out = []
     for low, high in zip([-np.inf, *levels], [*levels, np.inf], strict=True):
         before = points[points[:, -1] <= low, :-1]
-        if not len(before):
-            corners = np.full((1, points.shape[1] - 1), np.inf)
-        else:
-            corners = upper_bounds(before)
+        free = np.full((1, points.shape[1] - 1), np.inf)
+        corners = upper_bounds(before) if len(before) else free
         out.append(np.column_stack([corners, np.full(len(corners), high)]))
     found = np.unique(np.concatenate(out), axis=0)
     kept: list[Floats] = []

@@ -100,8 +100,7 @@ def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
     free = replace(graph, limits=(), standing=None, settled=(), budgets=())
     alone = replace(free, goals=goals, scenarios=(), over=WORST_PEAK)
     judged = over_scenarios(alone, scenes, graph.over)
-    values = plan_values(judged, plan.steps)
-    return dict(zip(judged.names, values, strict=True))
+    return dict(zip(judged.names, plan_values(judged, plan.steps), strict=True))
 
 
 def _row(

@@ -49,8 +49,6 @@ from seqopt.sequence.schedule import Schedule
 if TYPE_CHECKING:
     from seqopt.graph.instance import Instance
     from seqopt.graph.orders import AllOrders
-    from seqopt.sequence._rule_space import FreeSpace
-    from seqopt.sequence._schedule_space import ScheduleSpace
 
     Graph = Layers | ScenarioLayers | States | AllOrders
 
@@ -299,11 +297,16 @@ def _require_candidates(problem: Problem) -> None:
 
 def _states(problem: Problem) -> States:
     """Return the states of a problem, with all that is asked of them."""
+    from seqopt.sequence._rule_space import FreeSpace  # noqa: PLC0415  # of states alone
+
     over = problem.over if problem.scenarios else WORST_PEAK
     goals = problem.goals or (AIMS[over.aim],)
     asked = problem.engine, problem.moves, problem.criterion, goals, problem.limits
     found = replace(build_states(*asked, problem.stands), resources=problem.resources)
-    _require_moves_left(found.space)
+    space = found.space
+    ends = isinstance(space, FreeSpace) and space.first == space.levels
+    if ends and space.ended(space.start()).all():
+        raise ProblemError("nothing is left to plan: the build begins as it may end")
     if problem.is_timed and found.free_rules.takes_down:
         raise ProblemError(
             "aim makespan: how long it takes to take bricks away is not modeled; leave "
@@ -316,14 +319,6 @@ def _states(problem: Problem) -> States:
             "curing: it says how long steps wait; add makespan to the aims, as makespan,steps"
         )
     return over_scenarios(found, problem.scenarios, over) if problem.scenarios else found
-
-
-def _require_moves_left(space: FreeSpace | ScheduleSpace) -> None:
-    from seqopt.sequence._rule_space import FreeSpace  # noqa: PLC0415  # of states alone
-
-    ends = isinstance(space, FreeSpace) and space.first == space.levels
-    if ends and space.ended(space.start()).all():
-        raise ProblemError("nothing is left to plan: the build begins as it may end")
 
 
 def _in_own_order(problem: Problem) -> States:

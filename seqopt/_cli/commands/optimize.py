@@ -47,7 +47,7 @@ from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, Time
 from seqopt.graph.formulation import End, Formulation, On, Run, as_formulation, trace_rows
 from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE
-from seqopt.plan._levels import at_sufficient_level
+from seqopt.plan._range import at_sufficient_level
 from seqopt.plan._softer import _payload_advice
 from seqopt.plan._status import faults_in_words
 from seqopt.plan.plan import Plan

@@ -57,8 +57,7 @@ def _while_missing(
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return which bricks ground or joints tie to what stands, and which wait for those missing."""
     beside: dict[int, set[int]] = {name: set() for name in scene.build_order}
-    for joint in scene.joints:
-        first, second = joint.bricks
+    for first, second in (joint.bricks for joint in scene.joints):
         beside[first].add(second)
         beside[second].add(first)
     grounded = {ground.brick for ground in scene.grounds if ground.closes_with is None}
