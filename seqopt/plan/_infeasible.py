@@ -292,7 +292,7 @@ def _heaviest(problem: States) -> float:
 
 
 def _barred_said(problem: States, level: int, state: Ints) -> str:
-    """Return which state that every plan passes is not allowed, and why, in words."""
+    """Return which state that every plan passes is infeasible, and why, in words."""
     bricks, each = problem.space.bricks_at(level), problem.each or (problem,)
     what = f"step {level} of {problem.space.levels}, in which no grip is open,"
     if _is_bare_end(problem, level, state):
@@ -432,7 +432,7 @@ def _loosened(problem: States) -> Iterator[tuple[str, FreeRules]]:
 
 
 def _enough(problem: States, way: str, look: Look) -> str:
-    """Return how far a limit has to be raised, or a payload, where it is that is loosened."""
+    """Return how far a limit or a payload has to be raised, where one is loosened."""
     if way == STANDING and not any(demand.tilt for demand in problem.demands):
         own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=STEPS)
         states = look.standing(bare)

@@ -58,10 +58,7 @@ def _ground_moves(scene: Scene) -> bool:
 
 
 def _softer(engine: Engine, exists: Callable[[Scene], bool]) -> str:
-    """Return with how soft grips something exists, in words; empty if with none that is tried.
-
-    ``exists``: whether it does in a scene, which is the same save for its grips.
-    """
+    """Return the stiffest softer grips of a scene with which something exists, in words; or ""."""
     scene = engine.network.scene
     own = [float(np.min(robot.stiffness)) for robot in scene.robots if robot.stiffness]
     if recipe_of(engine) is None or scene.has_arms:

@@ -98,13 +98,7 @@ def fewest_props(
     """
     if problem.orders is not None:
         raise ProblemError("aim props: they are chosen for one order; leave out the search of it")
-    scene = problem.scene
-    since = {prop: scene.since[scene.brick_of_node[prop.node].name] for prop in candidates}
-    order = sorted(candidates, key=lambda prop: since[prop])
-    bricks = [since[prop] for prop in order]
-    return best_of_several(
-        problem, lambda asked: _Search(asked, order, bricks, solved, tell).found()
-    )
+    return best_of_several(problem, lambda asked: _Search(asked, candidates, solved, tell).found())
 
 
 class _Search(Tried):
@@ -114,12 +108,14 @@ class _Search(Tried):
         self,
         problem: Problem,
         candidates: Sequence[Prop],
-        since: Sequence[int],
         solved: Callable[[Problem], Plan],
         tell: Tell,
     ) -> None:
         super().__init__(problem, solved, tell)
-        self._candidates, self._since = candidates, since
+        scene = problem.scene
+        since = {prop: scene.since[scene.brick_of_node[prop.node].name] for prop in candidates}
+        self._candidates = sorted(candidates, key=lambda prop: since[prop])
+        self._since = [since[prop] for prop in self._candidates]  # bricks that stand by then
         self._cuts: dict[int, set[_Set]] = {}  # first props of sets without a better plan
         self._farthest: tuple[int, _Set] = (0, ())  # at how many bricks plans end, of which set
 
@@ -143,9 +139,9 @@ class _Search(Tried):
 
     def _cause(self) -> str:
         """Return why the set with which plans come farthest allows none, in words."""
-        nodes = [self._candidates[i].node for i in self._farthest[1]]
-        which = f"with those at nodes {', '.join(map(str, nodes))}" if nodes else "without any"
-        props = (self._candidates[i] for i in self._farthest[1])
+        props = [self._candidates[i] for i in self._farthest[1]]
+        nodes = ", ".join(str(prop.node) for prop in props)
+        which = f"with those at nodes {nodes}" if nodes else "without any"
         try:
             self._solved(_moved(self._problem, self._problem.scene.with_props(*props)))
         except (InfeasibleError, NothingFoundError, StepError) as error:

@@ -96,10 +96,7 @@ class StandingLook:
     def _within(
         self, known: Ints, ask: Callable[[int, Ints], Ints], tell: Callable[[], object]
     ) -> tuple[int, ...] | None:
-        """Return a path within the budgets of states that stand; None if there is none.
-
-        ``known``, ``ask``, ``tell``: as of `_lazy_path`.
-        """
+        """Return a path within budgets of states that stand, or None; arguments of `_lazy_path`."""
         while True:
             tell()
             left = self._graph.only(known[self._graph.target] != FAILS)
