@@ -191,7 +191,7 @@ class Plan(ShownBuild):
 
     @property
     def goals(self) -> tuple[str, ...]:
-        """The names of what was made small, the most important first, then of what has budgets."""
+        """Names of goals, the most important first, then of budgets."""
         return self.graph.names_of(self.formulation.aim)
 
     @property
@@ -456,7 +456,7 @@ class Plan(ShownBuild):
 
 
 def _summarized(plan: Plan) -> dict[str, object]:
-    """Return the summary of a plan, with the same keys whatever it was chosen from."""
+    """Return the summary of a plan, with a fixed set of keys."""
     graph, proof, scene = plan.graph, plan.certificate, plan.engine.network.scene
     asked = _states_asked(plan, graph) if isinstance(graph, States) else _layers_asked(plan)
     narrowed = plan.among and "optimal" in plan.status
@@ -530,7 +530,7 @@ def _states_asked(plan: Plan, graph: States) -> dict[str, object]:
 
 
 def _bounds(plan: Plan) -> dict[str, float | None]:
-    """Return what no plan stays below, by aim; also claimed of a search that ended early."""
+    """Return the lower bound of each goal; the claimed one if the search stopped early."""
     proof, chosen = plan.certificate, plan.selection
     bounds: tuple[float, ...] = () if proof is None else proof.bounds
     if proof is None and plan.objective:  # of a search without models nothing is known

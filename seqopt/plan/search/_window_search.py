@@ -43,7 +43,6 @@ from seqopt.graph.solution import StatePath
 from seqopt.plan._paths import find_path
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
-from seqopt.responses._choices import StepChoices
 from seqopt.responses.table import step_fields
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step
@@ -96,7 +95,8 @@ def search_windows(
             for steps in levels:
                 if watch is not None and watch.over:
                     raise TimeUpError(f"{watch.seconds:.3g} s: {walk.so_far()}; give more")
-                walk.look(steps)
+                for choices in steps:  # with one open move
+                    walk.own.add(choices.moves, walk.alone.step_costs(choices))
                 walk.choose(known=steps[-1].step.bricks)
                 if fields:
                     walk.note()
@@ -118,16 +118,11 @@ class _Walk:
                 "the responses of steps with one open grip do not fit into the memory that may be "
                 "used; take near candidates only, or raise max_memory"
             )
-        self._own = Joined([len(move.candidates) for move in self._schedule.moves], np.add)
+        self.own = Joined([len(move.candidates) for move in self._schedule.moves], np.add)
         self.shared: list[Layers] = []
         self.choice: list[int] = []
         self.fields: dict[int, Fields] = {}
         self._noted = 0  # steps
-
-    def look(self, steps: Sequence[StepChoices]) -> None:
-        """Take what steps with one open move cost."""
-        for choices in steps:
-            self._own.add(choices.moves, self.alone.step_costs(choices))
 
     def choose(self, known: float) -> None:
         """Choose the moves whose steps have at most so many bricks."""
@@ -162,7 +157,7 @@ class _Walk:
 
     def _choose(self, k: int) -> None:
         move = self._schedule.moves[k]
-        costs = self._own.single(k) + self.shared[k].sums.single[0]
+        costs = self.own.single(k) + self.shared[k].sums.single[0]
         if k:
             costs = np.where(_possible_after(self._schedule, k, self.choice[-1]), costs, np.inf)
         if not np.isfinite(costs).any():
