@@ -14,7 +14,7 @@ from formulations.states._totals import LeastTotal, StopError, cheapest_by, leas
 from seqopt._interrupts import answered
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph._budgets import Within, within_budgets
-from seqopt.graph._explore import Explorer, Key, Visited
+from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Watch, find_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.orders import (
@@ -289,30 +289,27 @@ def narrow(
 
 
 def best_standing(problem: States, found: Explorer) -> StatePath:
-    """Return the best path through visited states that stand as is demanded.
-
-    Those on the best path are asked, once; where one falls, it is left out.
-    """
-    known: set[tuple[int, ...]] = set()
+    """Return the best path through visited states that stand as is demanded."""
     while True:
         visited, best = exact_best(found, problem.budgets)
-        fallen = False
-        for level, part, state in visited.of(best.path) if problem.demands else ():
-            row = (level, *state.tolist())
-            if row not in known and not problem.stand(level, state[None])[0]:
-                found.close((level, part), state[None])
-                _close_alike(problem, found, visited, (level, part))
-                fallen = True
-            known.add(row)
-        if not fallen:
+        if not close_fallen(problem, found, visited, best.path):
             return _selection(visited, best)
 
 
-def _close_alike(problem: States, found: Explorer, visited: Visited, part: tuple[int, Key]) -> None:
-    """Leave out the visited states of a part that are known to fall, without asking any."""
-    for *which, states in visited.states:
-        if tuple(which) == part:
-            found.close(part, states[problem.recalled(part[0], states) < 0])
+def close_fallen(problem: States, found: Explorer, visited: Visited, path: Sequence[int]) -> bool:
+    """Exclude states of a path that are not proven to stand; return whether there are any.
+
+    With each go those of its part that are known to fall: none of these is asked.
+    """
+    fallen = False
+    for level, key, state in visited.of(path) if problem.demands else ():
+        if not problem.stand(level, state[None])[0]:
+            fallen = True
+            found.close((level, key), state[None])
+            for *part, states in visited.states:
+                if part == [level, key]:
+                    found.close((level, key), states[problem.recalled(level, states) < 0])
+    return fallen
 
 
 def exact_best(found: Explorer, budgets: Sequence[float] = ()) -> tuple[Visited, Best | Within]:

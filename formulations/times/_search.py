@@ -17,6 +17,7 @@ from formulations.states._search import (
     WIDTH,
     Watching,
     after_margins,
+    close_fallen,
     narrow,
     plan_by_then,
     watched,
@@ -186,7 +187,7 @@ def _searched(
             wide.refine()
             progress("makespan")
             visited, stages, found = _staged(problem, wide, choose, watch, waits)
-            if _fell(problem, wide, visited, found.path):
+            if close_fallen(problem, wide, visited, found.path):
                 continue
             plan = _plan(problem, visited, stages, found, waits)
             best += [] if plan is None else [plan]
@@ -231,16 +232,6 @@ def _staged(
         return visited, stages, stages.run()
     except InfeasibleError as error:
         raise wide.without_plan(str(error)) from None
-
-
-def _fell(problem: States, wide: Explorer, visited: Visited, path: Sequence[int]) -> bool:
-    """Leave out states of a path that are not proven to stand; return whether there are any."""
-    fell = False
-    for level, part, state in visited.of(path) if problem.demands else ():
-        if not problem.stand(level, state[None])[0]:
-            wide.close((level, part), state[None])
-            fell = True
-    return fell
 
 
 def _least_of(plans: Sequence[StatePath], bound: tuple[float, ...], stopped: str = "") -> StatePath:

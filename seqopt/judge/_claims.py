@@ -168,7 +168,7 @@ def budget_bounds(
     first, out = len(graph.peaks) - len(caps), list[float]()
     stage = Stage(graph, tuple(("", c, cap) for c, cap in enumerate(caps, start=first)))
     for k in range(first):
-        own = [max(0.0, price) for price in multipliers[k]]
+        own = np.maximum(multipliers[k], 0.0).tolist()
         if len(own) != len(stage.limited) or not np.isfinite(own).all():
             raise SolverError(f"{len(own)} prices where {len(stage.limited)} numbers belong")
         limited = [(price, c, most) for price, (_, c, most) in zip(own, stage.limited, strict=True)]
