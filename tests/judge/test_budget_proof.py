@@ -13,10 +13,12 @@ from hypothesis import strategies as st
 
 from seqopt.errors import InfeasibleError, SolverError, TimeUpError
 from seqopt.graph.formulation import End, FormulationKind, On, formulations
+from seqopt.graph.graph import Graph
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.judge import _budget_proof as budget_proof
 from seqopt.judge._budget_proof import case_of, least_within
+from seqopt.judge._claims import budget_bounds
 from seqopt.plan._infeasible import smallest_conflict
 from seqopt.plan.solving import solve
 from tests.layered import Costs, answer
@@ -150,6 +152,21 @@ def test_what_rounding_puts_above_a_bound_is_not_proven_to_exceed_it():
     assert smallest_conflict(replace(problem, budgets=(only,)).compiled().instance) == ()
     for name in ("labels", "overlap_mip"):
         assert answer(problem, name).choice == (0, 0)
+
+
+@pytest.mark.parametrize("peak", [True, False])
+def test_multipliers_bound_what_is_capped_and_others_are_refused(peak):
+    """The cheap way takes two of a cap of one, the dear one nothing."""
+    rows, amounts = np.array([[0, 0], [1, 1]], dtype=np.int32), np.array([[1.0, 2.0], [4.0, 0.0]])
+    graph = Graph(*rows, amounts, (peak, False), np.array([False, True]))
+    assert budget_bounds(graph, (4.0,), (4.0,), ((1.0,), ((2.0,),))) == pytest.approx(
+        (4.0 if peak else 2.0,)
+    )
+    (proven,) = budget_bounds(graph, (4.0,), (4.0,), ((1.0,), ((0.0,),)))
+    assert proven == (-np.inf if peak else 1.0)
+    for none in ((np.nan,), (np.inf,), (1.0, 1.0), ()):
+        with pytest.raises(SolverError, match="where 1 numbers belong"):
+            budget_bounds(graph, (4.0,), (4.0,), ((1.0,), (none,)))
 
 
 def test_budgets_that_conflict_are_named(problem25):

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue
-from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.costs import LayeredCosts, _to_go
 from seqopt.problem.criteria import Among, Ranked, RankSum, StepCost, WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion
@@ -62,11 +62,8 @@ class PartialCosts(FrozenValue):
     @cached_property
     def to_go(self) -> tuple[Floats, ...]:
         """What the rest of the build costs at least, from every candidate on, (C_k,) each."""
-        out = [self.single[-1]]
-        for k in range(len(self.single) - 1, 0, -1):
-            onward = self.join(self._pairs(k, self.floor), out[0]).min(axis=1)
-            out.insert(0, self.join(self.single[k - 1], onward))
-        return tuple(out)
+        pairs = [self._pairs(k, self.floor) for k in range(1, len(self.single))]
+        return tuple(_to_go(self.single, [self.single[0], *pairs], self.join))
 
     @cached_property
     def reached(self) -> tuple[Floats, ...]:

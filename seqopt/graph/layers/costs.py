@@ -213,6 +213,14 @@ class Joined:
         return np.broadcast_to(0.0 if nothing else self._least, shape)
 
 
+def _to_go(single: Sequence[Floats], shared: Sequence[Floats], join: np.ufunc) -> list[Floats]:
+    """Return the least cost from each candidate (C_k,) to the end, its own single cost included."""
+    out = [single[-1]]
+    for own, pairs in zip(single[-2::-1], shared[:0:-1], strict=True):
+        out.insert(0, join(own, join(pairs, out[0]).min(axis=1)))
+    return out
+
+
 def _least_to_go(arcs: Sequence[Floats]) -> list[Floats]:
     """Return the least sum of arcs to the end, from the source, (1,), and every candidate (C_k,).
 

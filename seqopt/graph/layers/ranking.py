@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Bools, Floats
-from seqopt.graph.layers.costs import TINY, LayeredCosts, _least_to_go
+from seqopt.graph.layers.costs import TINY, LayeredCosts, _least_to_go, _to_go
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.criteria import Ranked, RankSum, WeightedSum, WorstRatio
 from seqopt.problem.requirements import Criterion
@@ -226,8 +226,8 @@ def rank_choice(problem: Layers, choice: Sequence[int]) -> pd.DataFrame:
     with the least sum of costs to the end of the build added, ``rank_peak`` with the least worst
     cost to the end.
     """
-    sums = _to_go(problem.sums, np.add)
-    peaks = _to_go(problem.peaks, np.maximum)
+    sums = _to_go(problem.sums.single, problem.sums.shared, np.add)
+    peaks = _to_go(problem.peaks.single, problem.peaks.shared, np.maximum)
     rows = []
     for k, (before, now) in enumerate(pairwise((0, *choice))):
         window, candidates = move_costs(problem, k, before), problem.schedule.moves[k].candidates
@@ -241,11 +241,3 @@ def rank_choice(problem: Layers, choice: Sequence[int]) -> pd.DataFrame:
         }
         rows.append(_chosen(problem, choice, k) | ranks)
     return pd.DataFrame(rows)
-
-
-def _to_go(costs: LayeredCosts, join: np.ufunc) -> list[Floats]:
-    """Return the least cost from each candidate to the end, its own single cost included."""
-    out = [costs.single[-1]]
-    for single, shared in zip(costs.single[-2::-1], costs.shared[:0:-1], strict=True):
-        out.insert(0, join(single, join(shared, out[0]).min(axis=1)))
-    return out
