@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from seqopt._cli.terminal import columns, harmless, is_terminal
 from seqopt.work.progress import Stage, duration
@@ -82,7 +82,13 @@ class Watcher:
         if self._over.is_set() or now - self._start < PATIENCE:
             return
         if self._bar is None:
-            self._bar = _bar()
+            # of a command that is done within a second nobody needs it
+            from tqdm import tqdm  # noqa: PLC0415
+
+            tqdm.monitor_interval = 0  # its own clock leaves the bar alone
+            tqdm.set_lock(threading.RLock())  # its own would start a process
+            how: dict[str, Any] = {"leave": False, "dynamic_ncols": True, "bar_format": "{desc}"}
+            self._bar = tqdm(total=1.0, file=sys.stderr, **how)
         stage, bar = self._stage, self._bar
         what, left = harmless(stage.what), self._left(now)
         if stage.share > 0 and left > 0:
@@ -101,12 +107,3 @@ class Watcher:
             return stage.left - (now - self._told)
         took = now - self._began[stage.what][0] if stage.share > 0 else 0.0
         return took * (1 - stage.share) / max(stage.share, 1e-9)
-
-
-def _bar() -> tqdm[None]:
-    """Return an empty bar of tqdm on standard error, which its own clock leaves alone."""
-    from tqdm import tqdm  # noqa: PLC0415  # of a command that is done within a second nobody needs
-
-    tqdm.monitor_interval = 0
-    tqdm.set_lock(threading.RLock())  # its own would start a process
-    return tqdm(total=1.0, leave=False, file=sys.stderr, dynamic_ncols=True, bar_format="{desc}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
@@ -14,7 +15,6 @@ from seqopt._cli.commands import optimize
 from seqopt._cli.given import Place, plan_folder
 from seqopt._cli.options import Aimed, Cost, Cured, Judged, Postures, Rules, Strict, Timed, word
 from seqopt._cli.outputs import ALWAYS, require_out
-from seqopt._cli.posing import Change
 from seqopt._cli.terminal import wrapped
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
@@ -120,9 +120,13 @@ def find(asked: Replan) -> Found:
     try:
         return Found(folder, base, optimize.find(base, change))
     except InfeasibleError as error:
-        robots = load_scene(folder / "scene.json").robots
-        count = max(len(robots), int(asked.robots or 0)) + 1
-        raise InfeasibleError(f"{error}{_with_another(base, count, change)}") from None
+        more, scene = "", load_scene(folder / "scene.json")
+        count = max(len(scene.robots), int(asked.robots or 0)) + 1
+        with suppress(InfeasibleError, NothingFoundError, StepError):
+            with_robots(scene, count)
+            another = optimize.find(replace(base, robots=str(count)), change).plan
+            more = f"; or with one more robot that reaches every node: {another.result}"
+        raise InfeasibleError(f"{error}{more}") from None
 
 
 def answered(asked: Replan, found: Found) -> Answer:
@@ -212,16 +216,6 @@ def _changed(asked: Replan, scene: Scene, begin: Place) -> tuple[Scene, Place, s
     scene, site = without(scene, begin.site, asked.lost, [*map(int, asked.missing)])
     left = [robot.name for robot in scene.robots if robot.name not in asked.lost]
     return scene, Place(site, None), ",".join(left) if asked.lost else ""
-
-
-def _with_another(base: optimize.Optimize, count: int, change: Change) -> str:
-    """Return whether one more robot opens a way, as the end of a line."""
-    try:
-        with_robots(load_scene(str(base.scene)), count)
-        found = optimize.find(replace(base, robots=str(count)), change)
-    except (InfeasibleError, NothingFoundError, StepError):
-        return ""
-    return f"; or with one more robot that reaches every node: {found.plan.result}"
 
 
 def _in_words(facts: Mapping[str, Any]) -> Sequence[str]:
