@@ -203,7 +203,7 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
 def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
     plan = solve(problem25, ALL[name], time_limit=0)
     assert plan.ended is End.STOPPED
-    assert plan.certificate.gap < 0.3
+    assert plan.certificate.gap < (0.3 if ALL[name].looks_at_all else 1.0)
     assert plan.selection.bound[0] <= plan.certificate.bound + 1e-6
 
 

@@ -11,7 +11,10 @@ BUILDS = {
     "own arch": ("arch:span=2,rise=0.8", {}),
     "own arch, free": ("arch:span=2,rise=0.8", {"schedule": "free"}),
     "own wall": ("wall:columns=3,courses=2", {}),
-    "two robots": ("arch:span=2,rise=0.8", {"schedule": "free", "robots": 2, "least_grips": 1}),
+    "two robots": (
+        "arch:span=2,rise=0.8",
+        {"schedule": "free", "robots": 2, "rules": "least_grips=1"},
+    ),
     "from both sides": ("arch:span=2,rise=0.8", {"schedule": "free", "order": "ends"}),
 }
 
