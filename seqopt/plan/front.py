@@ -308,6 +308,12 @@ class Front(Terse):
 _NONE_YET = "no plan was found yet; give more"
 
 
+def _moved(front: Front) -> tuple[Moved, ...]:
+    """Return how far the steps of every plan move nodes, over what the linear range allows."""
+    pairs = zip(front.engines, front.steps, strict=True)
+    return tuple(most_moved((engine,), steps) for engine, steps in pairs)
+
+
 def find_front(
     problem: Problem | _StateFront,
     formulation: Formulation | str = "pareto_zones",
@@ -343,12 +349,7 @@ def find_front(
                 raise ProblemError("a Pareto set of take-downs is of one order; give an order")
         left = max(0.0, end - time.perf_counter())
         front = _front_of(posed, formulation, left, progress, watch)
-
-        def measure() -> tuple[Moved, ...]:
-            pairs = zip(front.engines, front.steps, strict=True)
-            return tuple(most_moved((own,), steps) for own, steps in pairs)
-
-        return replace(front, moved=watch.spare(RANGE, measure, ()))
+        return replace(front, moved=watch.spare(RANGE, partial(_moved, front), ()))
 
     front = measured(problem)
     if problem.says_range or not front.moved:
