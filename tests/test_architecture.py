@@ -62,14 +62,15 @@ SHARED = {  # what formulations may import
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame
 LINES = 450  # of code: no thought is split for a limit; imports, docstrings and comments aside
-LINES_OF_A_FUNCTION = 48  # of code: what it takes and its docstring aside
+LINES_OF_A_FUNCTION = 50  # with signature and docstring, but where it documents its parameters
+LINES_OF_A_BODY = 46  # without both, of every function
 IMPORT = r"(?m)^ *((?:from .*)?\bimport (?:\([^)]*\)|.*))$"  # on one line, or in brackets
 NO_CODE = {COMMENT, NL, NEWLINE, INDENT, DEDENT, ENDMARKER}
 SAID = (ast.Module, ast.ClassDef, ast.FunctionDef)  # what may have a docstring
 PARAMETERS = 8  # of an experiment's function
 DRAWS_ON_ALL = "study"  # the topic that sets every other one beside the paper
 MOST_ROOMS = 20  # thirteen inner and six outer ones, and data
-MOST_NAMES = 470  # functions and classes without an underscore
+MOST_NAMES = 450  # functions and classes without an underscore
 
 
 def sources(folder: str) -> list[Path]:
@@ -317,8 +318,10 @@ def test_modules_and_functions_stay_small(folder):
         for node in ast.walk(parsed(path)):
             if isinstance(node, ast.FunctionDef):
                 body = node.body[1:] if ast.get_docstring(node) else node.body
-                length = (node.end_lineno or 0) - body[0].lineno if body else 0
-                assert length < LINES_OF_A_FUNCTION, f"{path}: {node.name}"
+                end = node.end_lineno or 0
+                assert not body or end - body[0].lineno < LINES_OF_A_BODY, f"{path}: {node.name}"
+                if "Parameters\n" not in (ast.get_docstring(node) or ""):
+                    assert end - node.lineno < LINES_OF_A_FUNCTION, f"{path}: {node.name}"
 
 
 def imported_tests(path: Path) -> set[str]:

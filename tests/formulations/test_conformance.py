@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from dataclasses import replace
+from importlib.metadata import entry_points
 from itertools import cycle, pairwise
 
 import numpy as np
@@ -16,6 +17,7 @@ from formulations.on_graph import on_graph
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.formulation import (
+    GROUP,
     End,
     FormulationKind,
     On,
@@ -49,6 +51,10 @@ HEURISTICS = [n for n, f in SHOWN.items() if f.kind is FormulationKind.HEURISTIC
 AIMED = [(n, aim) for n, f in ALL.items() for aim in ([f.aim] if f.aim else Aim)]
 every = pytest.mark.parametrize("name", ALL)
 every_aim = pytest.mark.parametrize(("name", "aim"), AIMED)
+OURS = {  # others, as those of the pages, promise no gap
+    *exhibits(),
+    *(e.name for e in entry_points(group=GROUP) if e.value.startswith("formulations.")),
+}
 timely = pytest.mark.parametrize("name", [n for n in [*SHOWN, *exhibits()] if ALL[n].watched])
 takers = pytest.mark.parametrize("name", [n for n, f in ALL.items() if f.takes_budgets])
 
@@ -203,7 +209,8 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
 def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
     plan = solve(problem25, ALL[name], time_limit=0)
     assert plan.ended is End.STOPPED
-    assert plan.certificate.gap < (0.3 if ALL[name].looks_at_all else 1.0)
+    if name in OURS:
+        assert plan.certificate.gap < 0.3
     assert plan.selection.bound[0] <= plan.certificate.bound + 1e-6
 
 
