@@ -321,7 +321,6 @@ class Posed(Judged, Stands, Rules, Team):
     keep: str | None = None
     # what optimize alone has
     durations: tuple[str, ...] = ()
-    bases: str | None = None
     aim: str | None = None
     props_among: str | None = None
     criteria: Any = None

@@ -87,12 +87,6 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
     asked = replace(asked, order=None) if sought else asked
     criterion = asked_criterion(asked, DEFAULTS[FREE if of_states else "any other"].criterion)
     scene = asked_scene(asked)
-    if asked.bases is not None:
-        if asked.schedule != FREE or asked.order is not None or sought:
-            raise ProblemError(f"--bases: it goes with --schedule {FREE} in the scene's own order")
-        from seqopt.arms._bases import without_arms  # noqa: PLC0415  # few ask for bases
-
-        scene = without_arms(scene)  # bases are chosen afterwards
     scene, begin, end, robots = _asked_ends(asked, scene, change)
     fewest, goals = _fewest_asked(asked, scene)
     scene = scene if fewest is None else scene.with_props(*fewest)
@@ -131,10 +125,10 @@ def _fewest_asked(asked: Posed, scene: Scene) -> tuple[tuple[Prop, ...] | None, 
         if asked.props_among is not None:
             raise ProblemError("--props-among: it goes with --aim props,minmax")
         return None, asked.aim
-    if aims[0] != "props" or not asked.counts_props or scene.props or asked.bases is not None:
+    if aims[0] != "props" or not asked.counts_props or scene.props:
         raise ProblemError(
-            "aim props: it comes first, and goes with optimize, without --bases or props that are "
-            "given (--props none leaves out those of a scene)"
+            "aim props: it comes first, and goes with optimize, without props that are given "
+            "(--props none leaves out those of a scene)"
         )
     found = parse_props(asked.props_among or "all", scene, "--props-among")
     return found, ",".join(aims[1:]) or "minmax"

@@ -110,14 +110,6 @@ def test_commands_say_which_links_have_no_shapes_in_one_line(tmp_path, shown, ca
     assert "&lt;collision" not in scene_page(twin)
 
 
-def test_sets_of_bases_repeat_no_warning(tmp_path, shown, capsys):
-    seqopt.save_scene(beside_a_wall(shown, faces=("thickness",)), tmp_path / "s.json")
-    (tmp_path / "bases.csv").write_text("robot,x,y\narm,0.3,-0.9\narm,0.3,0.9\narm,0.3,0\n")
-    words = ["optimize", str(tmp_path / "s.json"), *FREE, "--aim", "steps"]
-    assert main([*words, "--bases", str(tmp_path / "bases.csv")]) == 0
-    assert capsys.readouterr().err.count(EVERY) == 1
-
-
 def test_a_page_says_that_it_is_not_known_what_an_arm_reaches(tmp_path):
     page = scene_page(beside_a_wall(boxes(tmp_path / "twin.urdf"), INSIDE))
     assert "What arms reach is not known: robot arm: the base of its arm hits brick 2" in page

@@ -67,7 +67,7 @@ def test_props_are_said_in_words(cli, arch, tmp_path):
         (("--props", "3,3"), "prop at node 3: another one holds it"),
         (("--props-among", "3"), "--props-among: it goes with --aim props,minmax"),
         (("--aim", "minmax,props"), "aim props: it comes first"),
-        (("--aim", "props", "--props", "3"), "without --bases or props that are given"),
+        (("--aim", "props", "--props", "3"), "without props that are given"),
         (("--aim", "props", "--order", "search"), "aim props: they are chosen for one order"),
         (("--aim", "props", "--no-proof"), "--no-proof: props are compared by proven plans"),
     ],

@@ -21,7 +21,6 @@ import numpy as np
 import seqopt
 from seqopt._cli.commands.assess import Rows
 from seqopt._cli.commands.replan import _told
-from seqopt.arms._base_words import asked_places
 from seqopt.arms._postures import PostureTable
 from seqopt.arms._reached import Site as ArmSite
 from seqopt.arms._tables import _read as read_postures
@@ -175,8 +174,6 @@ def _of_caches() -> Iterator[tuple[str, File]]:
     }
     assert {*table} == {each.name for each in fields(PostureTable)}
     yield "postures", ("postures.npz", _npz(**table), lambda path: read_postures(path, site))
-    places = b"robot,x,y,z,heading_deg\nnorth,0,1,0,10\nsouth,0,-1,,\n"
-    yield "bases", ("bases.csv", places, lambda path: asked_places(arms, str(path)))
 
     def rows(path: Path) -> object:
         return Rows(path.with_name("out.csv"), "asked").rows

@@ -75,8 +75,6 @@ def find(asked: Instance) -> Graph:
     path = asked.out
     if path and path.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
-    if asked.bases is not None:
-        raise ProblemError("--bases: an instance is of one scene; leave it out")
     below = number_word(asked.below, "--below") if asked.below is not None else float("inf")
     clock = Clock(parse_time_limit(asked.time_limit))
     with clock.needed("posing the problem"):

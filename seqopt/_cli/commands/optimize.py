@@ -17,9 +17,7 @@ from seqopt._cli.asked import (
     WHY,
     _not_done,
     asked_prover,
-    asked_scene,
     exceeded,
-    in_seconds,
     kept_range,
     level_notes,
     refused,
@@ -82,13 +80,6 @@ class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
     [SCENE] --robust AIM [--out DIR] [other options]
 
     What is built, and by whom?
-    --bases goes with --schedule free and not with --order.
-
-    bases : grid|FILE
-        with --schedule free: where the bases of arms stand is chosen too, by the best plan that
-        they allow: among places of a grid around the bricks (grid:METERS for its spacing), or those
-        of a CSV file with the columns robot, x, y, z, heading_deg
-
     Which steps may a build have?
     schedule : NAME|FILE
         free: any robot may release, hold or place next, or a sequence with open grips: {schedules}
@@ -98,7 +89,7 @@ class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
     What counts as best?
     With --aim, --stands, --order search or --schedule free states of the build are chosen:
     --ranked, --among and criteria of ranks do not go with these. --props-among goes with --aim
-    props alone, and that with neither --bases nor --props.
+    props alone, and that without --props.
 
     props_among : NODES
         with --aim props: at which nodes props may be, and what they bear, as --props; all of them
@@ -199,7 +190,7 @@ class Found:
     plan: Plan
     assemble: float
     prover: BuildProver
-    outer: Mapping[str, Any] = field(default_factory=dict)  # bases or props that were compared
+    outer: Mapping[str, Any] = field(default_factory=dict)  # props that were compared
     whole: str = ""
     clock: Clock = field(default_factory=Clock)
 
@@ -256,7 +247,7 @@ class Found:
             "stability": {v.mortar: v.facts() for v in self.verdicts.get(plan.title, ())},
         }
         out |= {"left_out": dict(self.clock.left_out)} if self.clock.left_out else {}
-        out |= {name: each.described() for name, each in self.outer.items() if name != "bases"}
+        out |= {name: each.described() for name, each in self.outer.items()}
         known, unseen = self.posed.known, self.posed.unseen
         if known is None:
             return out
@@ -381,22 +372,14 @@ def _values(plan: Plan) -> str:
 def _outer(
     asked: Optimize, posed: PosedProblem, choose: Callable[[Problem], Plan]
 ) -> Mapping[str, Any]:
-    """Return the best plan over bases, or of the fewest props, by that name, if it is asked for."""
-    if asked.bases is None and posed.fewest is None:
+    """Return the plan of the fewest props by that name, if it is asked for."""
+    if posed.fewest is None:
         return {}
     if asked.no_proof:
-        what = "props" if asked.bases is None else "bases"
-        raise ProblemError(f"--no-proof: {what} are compared by proven plans; leave it out")
-    if posed.fewest is not None:
-        from seqopt.plan._studies.fewest_props import fewest_props  # noqa: PLC0415  # few ask for it
+        raise ProblemError("--no-proof: props are compared by proven plans; leave it out")
+    from seqopt.plan._studies.fewest_props import fewest_props  # noqa: PLC0415  # few ask for it
 
-        return {"fewest_props": fewest_props(posed.problem, posed.fewest, choose, asked.tell)}
-    from seqopt.arms._base_words import asked_places  # noqa: PLC0415  # few ask for it
-    from seqopt.arms._bases import choose_bases  # noqa: PLC0415
-
-    scene = in_seconds(asked, asked_scene(asked))
-    places = asked_places(scene, asked.bases or "")
-    return {"bases": choose_bases(posed.problem, scene, places, choose, asked.tell)}
+    return {"fewest_props": fewest_props(posed.problem, posed.fewest, choose, asked.tell)}
 
 
 def _how(asked: Optimize, formulation: Formulation) -> Run:
