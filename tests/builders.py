@@ -14,7 +14,6 @@ from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
-from seqopt.sequence.site import Site
 
 ROOT = Path(__file__).parents[1]
 HERE = np.zeros((1, 0), dtype=int)  # one set of no grips
@@ -295,20 +294,3 @@ def first(scene, count):
         grounds=tuple(ground for ground in scene.grounds if ground.brick in names),
         build_order=scene.build_order[:count],
     )
-
-
-# policies
-
-
-def site_of(policy, row, count):
-    """A state of a policy, by its row, as a site for so many robots."""
-    grips, stays = [None] * count, [None] * count
-    for kind, columns in zip(policy.kinds, policy._columns, strict=True):
-        for robot, place in zip(kind, policy.held[row, columns], strict=True):
-            if place > 0:
-                grips[robot] = int(policy.nodes[place - 1])
-            elif place < 0:
-                stays[robot] = int(policy.nodes[-place - 1])
-    limited = policy.held.shape[1] > sum(map(len, policy.kinds))
-    regrips = int(policy.held[row, -1]) if limited else 0
-    return Site(int(policy.bricks[row]), tuple(grips), tuple(stays), regrips)

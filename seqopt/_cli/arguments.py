@@ -99,7 +99,6 @@ COMMANDS = {
     "compare": _Command("show all ways to build a scene side by side", "compare:Compare"),
     "optimize": _Command("choose where robots hold, and write the plan", "optimize:Optimize"),
     "replan": _Command("plan the rest of a build after a change", "replan:Replan"),
-    "next": _Command("look up the best next move of a build", "next:Next"),
     "pareto": _Command("find all plans that no other one beats in every aim", "pareto:Pareto"),
     "analyze": _Command("compute forces and displacements in every step", "analyze:Analyze"),
     "times": _Command("say how long a build takes, and who does what when", "times:Times"),

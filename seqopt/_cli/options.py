@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import MISSING, dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from seqopt.engines.registry import DEFAULT, ENGINES
 from seqopt.graph.formulation import formulation_names
@@ -312,8 +312,6 @@ class Posed(Judged, Stands, Rules, Team):
         with --direction take-down: bricks that stay, as 1..12
     """
 
-    counts_props: ClassVar[bool] = False
-
     schedule: Any = None
     begin: str | None = word(None, flag="--from")
     to: str | None = None
@@ -322,7 +320,6 @@ class Posed(Judged, Stands, Rules, Team):
     # what optimize alone has
     durations: tuple[str, ...] = ()
     aim: str | None = None
-    props_among: str | None = None
     criteria: Any = None
     crown: str | None = None
     ranked: str | None = None

@@ -16,7 +16,6 @@ from seqopt._cli.values import (
     asked_standing,
     count_word,
     parse_numbers,
-    parse_props,
     parse_robots,
 )
 from seqopt.arms.reach import find_postures
@@ -34,7 +33,6 @@ from seqopt.problem.problem import (
     parse_caps,
     parse_robust,
 )
-from seqopt.scene._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, Direction, FreeRules
@@ -72,7 +70,6 @@ class PosedProblem:
     aim: RobustAim | None = None
     known: Scenarios | None = None
     unseen: Scenarios | None = None
-    fewest: tuple[Prop, ...] | None = None  # candidates, where as few props as can be are asked
 
 
 def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
@@ -88,8 +85,6 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
     criterion = asked_criterion(asked, DEFAULTS[FREE if of_states else "any other"].criterion)
     scene = asked_scene(asked)
     scene, begin, end, robots = _asked_ends(asked, scene, change)
-    fewest, goals = _fewest_asked(asked, scene)
-    scene = scene if fewest is None else scene.with_props(*fewest)
     scene = in_seconds(asked, scene) if asked.durations else scene
     find_postures(scene, asked.cache, asked.tell)
     words: dict[str, Any] = {"limits": parse_limits(asked.limit, scene, "--limit")}
@@ -106,32 +101,16 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
         every = replace(every, direction=asked.direction)
     words |= {"stands": asked_standing(asked), "budgets": asked.budget}
     words |= {"orders": Orders.TIED} if sought else {}
-    others = (goals, words["stands"], sought)
+    others = (asked.aim, words["stands"], sought)
 
     def posed(begin: Place) -> Problem:
         moves = between(every, begin, end)
         states = _chooses_states(moves, asked.formulation, others)
-        what = _with_defaults(criterion, goals, aim or WORST_PEAK, states=states)
+        what = _with_defaults(criterion, asked.aim, aim or WORST_PEAK, states=states)
         return pose(engine, moves, *what, **words)
 
     whole = posed(Place()) if begin.site is not None and change is None else None
-    return PosedProblem(posed(begin), whole, aim, known, unseen, fewest)
-
-
-def _fewest_asked(asked: Posed, scene: Scene) -> tuple[tuple[Prop, ...] | None, str | None]:
-    """Return the candidates where as few props as can be are asked, and the aims after that."""
-    aims = [word.strip() for word in (asked.aim or "").split(",")]
-    if "props" not in aims:
-        if asked.props_among is not None:
-            raise ProblemError("--props-among: it goes with --aim props,minmax")
-        return None, asked.aim
-    if aims[0] != "props" or not asked.counts_props or scene.props:
-        raise ProblemError(
-            "aim props: it comes first, and goes with optimize, without props that are given "
-            "(--props none leaves out those of a scene)"
-        )
-    found = parse_props(asked.props_among or "all", scene, "--props-among")
-    return found, ",".join(aims[1:]) or "minmax"
+    return PosedProblem(posed(begin), whole, aim, known, unseen)
 
 
 def _aged(asked: Posed, scene: Scene, begin: Place) -> Place:

@@ -229,20 +229,6 @@ class Proof:
         self.states = max(self.states, graph.states)
         return is_beyond(graph, caps) if caps else not graph.ends[reached(graph)].any()
 
-    def stops_at(self, values: Sequence[float] = ()) -> int | None:
-        """Return with how many bricks every plan ends that is as good, at the latest, unfinished.
-
-        ``values``: of goals; of the first alone, if it is about a worst step, or of none. States
-        with fewer bricks are all that this depends on. Result: None where a plan may be as good.
-        """
-        rebuilt, tables = self.rebuilt(Filter(values, ()), hinted=False), self.evaluator.tables
-        graph = rebuilt.graph()
-        seen = reached(graph)
-        if graph.ends[seen].any():
-            return None
-        level = int(np.array(rebuilt.parts)[rebuilt.part_of()][seen].max())
-        return tables.bricks_at(min(level + 1, tables.last))
-
     def _falls_everywhere(self, margins: Sequence[float]) -> bool:
         """Return whether states that are proven to fall, or to lack margins, leave no path.
 

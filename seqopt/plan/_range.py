@@ -6,10 +6,9 @@ of the plan's own steps first, and becomes a limit of the problem only where the
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import TypeVar
 
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import _chooser_of
@@ -30,20 +29,6 @@ NONE_KEEPS = "no plan keeps it"
 UNKNOWN = "whether any plan keeps it is not known"
 INTERRUPTED = f"{UNKNOWN} (interrupted)"
 Found = TypeVar("Found")
-
-
-class _WithPlan(Protocol):
-    """The best plan of several problems, with the problem that it is of."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    @property
-    def plan(self) -> Plan: ...
-    @property
-    def problem(self) -> Problem: ...
-
-
-FoundPlan = TypeVar("FoundPlan", bound=_WithPlan)
 
 
 def leaves(moved: Moved) -> bool:
@@ -108,21 +93,6 @@ def best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Cloc
     except KeyboardInterrupt:
         found, why = interrupted(plan), INTERRUPTED
     return replace(found, beyond=why)
-
-
-def best_of_several(problem: Problem, found: Callable[[Problem], FoundPlan]) -> FoundPlan:
-    """Return the same of a search through problems that are alike, each solved with one limit."""
-    if problem.says_range:
-        return found(problem)
-    first = found(problem.within_range(math.inf))
-    if first.plan.moved is None or first.plan.ended is End.INTERRUPTED:  # there is no more time
-        return first
-    try:
-        best, why = keeping(first, first.plan.moved, lambda: found(problem.within_range(1.0)))
-    except KeyboardInterrupt:
-        best, why = replace(first, plan=interrupted(first.plan)), INTERRUPTED
-    own = replace(best.problem, limits=problem.limits)
-    return replace(best, plan=replace(best.plan, problem=own, beyond=why), problem=own)
 
 
 def at_sufficient_level(plan: Plan, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:

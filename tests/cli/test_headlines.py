@@ -11,10 +11,8 @@ import pytest
 import seqopt
 from seqopt.errors import InfeasibleError
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
-from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.report.text import _headline
 from seqopt.responses.quantities import _payload_text, _rounded_up
-from seqopt.scene._props import Prop
 from seqopt.sequence.rules import FreeRules, with_robots
 from tests.commands import command as run
 
@@ -83,20 +81,6 @@ def test_who_is_lost_changes_the_usual_rule(capsys, tmp_path):
     status, _, err = run(capsys, *again, "--rule", "least_grips=2")
     assert status == 3
     assert "it becomes possible with least_grips=1" in err
-
-
-def test_what_no_set_of_props_helps_has_the_cause_of_one_run():
-    scene = with_robots(seqopt.load_scene(WALL), 2)
-    weak = scene.with_robots(*(replace(robot, payload=20.0) for robot in scene.robots))
-    engine, worst = seqopt.make_engine("auto", weak), seqopt.CRITERIA["worst-ratio"]
-    problem = seqopt.pose(engine, FreeRules(), worst, "minmax")
-    with pytest.raises(InfeasibleError) as alone:
-        seqopt.solve(problem)
-    with pytest.raises(InfeasibleError) as every:
-        fewest_props(problem, [Prop(node=node) for node in weak.placed[1].nodes], seqopt.solve)
-    assert "brick 1 weighs 23.5 N, more than the payload of rob1 (20 N)" in str(alone.value)
-    assert str(every.value).startswith("props: none of 4 sets of up to 2 props allows a plan; ")
-    assert str(alone.value) in str(every.value)
 
 
 def test_gaps_below_the_tolerance_of_proofs_are_none(capsys):

@@ -11,14 +11,12 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt import Prop
 from seqopt._cli.arguments import request
 from seqopt._cli.commands import analyze, optimize, pareto, replan
 from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
 from seqopt.graph.formulation import End
 from seqopt.plan import _paths, _states
-from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.plan.front import find_front
 from seqopt.plan.plan import Status
 from seqopt.sequence.schedule_file import read_plan
@@ -200,32 +198,6 @@ def test_a_pareto_set_whose_proof_is_ended_is_not_complete(monkeypatch):
     in_the_midst(monkeypatch, seqopt.plan.front, "_require_complete", KeyboardInterrupt)
     found = find_front(problem)
     assert (found.complete, found.stopped) == (False, INTERRUPT)
-
-
-@pytest.mark.parametrize("how", [KeyboardInterrupt, TimeUpError("no plan was found yet")])
-def test_props_that_were_found_are_not_lost(how):
-    """The set that is best by then is kept, and nothing is said of those that are left."""
-    scene = small_arch(5)
-    weak = scene.with_robots(*(seqopt.Robot(name=r.name, payload=75.0) for r in scene.robots[:2]))
-    engine = seqopt.make_engine("compliance", weak)
-    rules, worst = seqopt.FreeRules(least_grips=1), seqopt.CRITERIA["worst-ratio"]
-    problem = seqopt.pose(engine, rules, worst, "minmax,steps")
-    nodes = [n for b in weak.placed for n in b.nodes if n not in weak.blocked_nodes]
-    plans = []
-
-    def solve(problem):
-        if plans:
-            raise how
-        plans.append(seqopt.solve(problem))
-        return plans[0]
-
-    pick = partial(fewest_props, problem, [Prop(node=n) for n in nodes])
-    whole = pick(seqopt.solve)
-    found = pick(solve)
-    assert found.plan.steps == plans[0].steps
-    assert whole.proven
-    assert not found.proven
-    assert found.count == whole.count
 
 
 def test_the_comparison_of_a_new_plan_is_left_out(tmp_path, monkeypatch):

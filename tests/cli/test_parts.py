@@ -17,10 +17,10 @@ from tests.commands import command as run
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The folder of a plan, with its policy."""
+    """The folder of a plan."""
     here = tmp_path_factory.mktemp("parts")
     save_scene(small_arch(5), here / "arch.json")
-    words = ["--schedule", "free", "--aim", "minmax,steps", "--no-stability", "--policy", "--quiet"]
+    words = ["--schedule", "free", "--aim", "minmax,steps", "--no-stability", "--quiet"]
     out = here / "plan"
     assert main(["optimize", str(here / "arch.json"), *words, "--out", str(out)]) == 0
     return out
@@ -117,25 +117,6 @@ def test_a_wrong_place_is_one_line(capsys, folder, words, said):
     assert status == 2
     assert said in err
     assert err.count("\n") == 1
-
-
-def test_the_next_move_is_looked_up(capsys, folder, tmp_path):
-    status, said, _ = run(capsys, "next", "0", "--policy", str(folder))
-    assert status == 0
-    assert re.match(r"rob\d places brick 1 and holds it at node \d+\n", said)
-    assert "moves prove that nothing has a lower minmax" in said
-    last = read_plan(load_scene(folder / "scene.json"), folder / "plan.csv")[-1].number
-    status, said, _ = run(capsys, "next", f"{folder}:{last}", "--policy", str(folder))
-    assert said.startswith("the build has ended")
-    status, said, _ = run(capsys, "next", f"{folder}:2", "--policy", str(folder), "--json")
-    assert {"move", "rest", "then", "proven"} <= {*json.loads(said)}
-    status, _, err = run(capsys, "next", "3", "--policy", str(folder))
-    assert status == 2
-    assert "no build by these rules and limits reaches it" in err
-    status, _, err = run(capsys, "next", "0", "--policy", str(tmp_path))
-    assert status == 2
-    status, _, err = run(capsys, "optimize", "arch25", *FREE, "--policy")
-    assert (status, "--policy: it is written to a folder; give --out DIR" in err) == (2, True)
 
 
 def test_the_rest_is_planned_anew(capsys, folder, tmp_path):

@@ -1,11 +1,10 @@
-"""Props on the command line: words for them, how few are needed, and what is written."""
+"""Props on the command line: words for them, and what is written."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
 
-import pandas as pd
 import pytest
 
 from seqopt._cli.main import main
@@ -65,38 +64,9 @@ def test_props_are_said_in_words(cli, arch, tmp_path):
         (("--props", "99"), "prop at node 99: there is no such node"),
         (("--props", "3:soft"), "'soft' is not a positive number"),
         (("--props", "3,3"), "prop at node 3: another one holds it"),
-        (("--props-among", "3"), "--props-among: it goes with --aim props,minmax"),
-        (("--aim", "minmax,props"), "aim props: it comes first"),
-        (("--aim", "props", "--props", "3"), "without props that are given"),
-        (("--aim", "props", "--order", "search"), "aim props: they are chosen for one order"),
-        (("--aim", "props", "--no-proof"), "--no-proof: props are compared by proven plans"),
     ],
 )
 def test_what_does_not_fit_is_said_in_a_line(cli, arch, words, said):
     found = cli("optimize", arch, *FREE, *words)
     assert found.status == 2
     assert said in found.err
-
-
-def test_as_few_props_as_can_be_are_found(cli, arch, tmp_path):
-    few = (
-        "--robots",
-        "2",
-        "--rule",
-        "least_grips=1",
-        "--aim",
-        "props,minmax",
-        "--props-among",
-        "4,6,8,10",
-    )
-    found = cli("optimize", arch, *FREE, *few, "--out", str(tmp_path / "out"))
-    assert found.status == 0
-    assert "props: " in found.out
-    assert "no set of as many or fewer is better" in " ".join(found.out.split())
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
-    tried = pd.read_csv(tmp_path / "out" / "fewest_props.csv")
-    assert summary["fewest_props"]["solved"] == tried["outcome"].str.startswith("solved").sum() > 0
-    own = load_scene(tmp_path / "out" / "scene.json").props
-    assert [prop.node for prop in own] == summary["fewest_props"]["nodes"]
-    if own:
-        assert pd.read_csv(tmp_path / "out" / "props.csv")["node"].tolist() == [p.node for p in own]

@@ -11,7 +11,7 @@ from seqopt.scene.scene_file import save_scene
 from tests.builders import small_arch
 from tests.commands import command
 
-OF_OTHERS = {"next", "import", "judge", "completion"}  # of a policy, files, a shell
+OF_OTHERS = {"import", "judge", "completion"}  # of files, a shell
 ALONE = sorted(COMMANDS.keys() - OF_OTHERS)
 
 
@@ -51,7 +51,6 @@ def required(name):
 @pytest.mark.parametrize("name", ALONE)
 def test_no_option_must_be_given(name):
     assert required(name) == []
-    assert required("next") == ["policy"]
 
 
 def test_what_is_taken_is_said_in_one_line(capsys, here):

@@ -191,8 +191,6 @@ def test_values_of_python_are_the_same_words():
         ("--rule least_grips=1", "give --schedule free"),
         ("--direction take-down", "--schedule free"),
         ("--keep 1..3", "--direction take-down"),
-        ("--props-among all", "--aim props"),
-        ("--aim props --props 3", "without props that are given"),
         ("--friction 0.5", "--stands"),
         ("--schedule free --tilt 1", "--stands"),
         ("--curing 15min", "--stands"),

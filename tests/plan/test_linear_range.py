@@ -16,9 +16,7 @@ from seqopt.judge._step_checks import check_shape
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._range import NONE_KEEPS, UNKNOWN, keeping
 from seqopt.plan._status import Status
-from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.plan.front import find_front
-from seqopt.plan.policy import Policy, find_policy
 from seqopt.plan.solving import states_of
 from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.criteria import WeightedSum, WorstRatio
@@ -198,29 +196,6 @@ def test_the_judge_finds_by_itself_that_steps_leave_the_range():
         judge_schedule(states_of(problem.but(limits=[HARD])), free.selection, free.steps)
 
 
-def test_props_are_as_few_as_a_plan_within_the_range_needs():
-    rules = seqopt.FreeRules(least_grips=0, newest="free", robots=("rob1",))
-    scene = scaled(small_arch(4), stiffness=3e-4)
-    candidates = [seqopt.Prop(node=node) for node in (3, 5, 7)]
-    engine = seqopt.make_engine("compliance", scene)
-
-    def fewest(problem, among=candidates):
-        return fewest_props(problem, among, seqopt.solve)
-
-    problem = seqopt.pose(engine, rules, FORCES, "minmax")
-    lifted, found = fewest(problem.but(limits=[LIFTED])), fewest(problem)
-    assert lifted.count == 0
-    assert lifted.plan.is_far
-    assert found.count > 0
-    assert not found.plan.is_far
-    hard = fewest(problem.but(limits=[HARD]))
-    assert (hard.count, hard.plan.objective) == (found.count, found.plan.objective)
-    assert found.problem.limits == found.plan.problem.limits == ()
-    none = fewest(problem, candidates[:0])
-    assert (none.count, none.plan.beyond) == (0, NONE_KEEPS)
-    assert "no set of as many or fewer is better, by a model outside" in none.said
-
-
 def test_a_pareto_set_keeps_it():
     words = KINDS["free"][0]
     problem = posed(between(words, None), goals="F_largest,T_max", ending="held")
@@ -232,20 +207,6 @@ def test_a_pareto_set_keeps_it():
     assert front.table.equals(hard.table)
     soft = find_front(posed(scaled(small_arch(4), stiffness=SOFT), goals="F_largest,steps"))
     assert soft.beyond == NONE_KEEPS
-
-
-def test_a_policy_keeps_it_and_says_where_none_can(tmp_path):
-    words = KINDS["free"][0]
-    problem = posed(between(words, None), **words)
-    policy, plan = find_policy(problem), seqopt.solve(problem)
-    assert policy.keeps_range
-    assert policy.checked
-    advice = policy.best(seqopt.Site(0))
-    assert advice.values["minmax"] == pytest.approx(plan.objective["minmax"])
-    soft = find_policy(posed(scaled(small_arch(3), stiffness=SOFT), **words))
-    assert not Policy.load(soft.save(tmp_path / "policy.npz")).keeps_range
-    assert repr(soft).startswith("<Policy: outside the linear range: ")
-    assert find_policy(problem.but(limits=[LIFTED])).keeps_range
 
 
 def test_words_are_the_same_in_python_and_on_the_command_line():

@@ -1,10 +1,8 @@
-"""Plans with props: by brute force, judged, and with as few props as any needs."""
+"""Plans with props: by brute force, and judged."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
-from itertools import combinations
 
 import numpy as np
 import pytest
@@ -12,11 +10,9 @@ import pytest
 import seqopt
 from seqopt import Prop
 from seqopt.errors import InfeasibleError, SolverError, StepError
-from seqopt.judge._proof import Proof
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._step_checks import check_props, props_that_hold
 from seqopt.judge.schedules import judge_schedule
-from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.plan.solving import states_of
 from seqopt.responses.quantities import PROP_EXCESS
 from tests.brute_force import ONES, best_values
@@ -24,11 +20,6 @@ from tests.builders import small_arch
 
 UP = (0.0, 0.0, 1.0)
 LOOSE = seqopt.FreeRules(least_grips=1)
-
-
-def free_nodes(scene):
-    nodes = (node for brick in scene.placed for node in brick.nodes)
-    return [node for node in nodes if node not in scene.blocked_nodes]
 
 
 def posed(scene, rules=LOOSE, aim="minmax,steps", **words):
@@ -55,60 +46,6 @@ def test_the_best_plan_with_props_is_that_of_brute_force(rules, nodes):
     plan = seqopt.solve(posed(scene, rules))
     assert plan.certificate.values == pytest.approx(best)
     assert plan.certificate.gap == 0
-
-
-@cache
-def fewest(payload):
-    """The fewest props of an arch whose robots carry little, found once."""
-    nodes = free_nodes(weak(5, payload))
-    return fewest_props(posed(weak(5, payload)), [Prop(node=n) for n in nodes], seqopt.solve)
-
-
-once = pytest.mark.xdist_group("fewest props")
-
-
-@once
-@pytest.mark.parametrize("payload", [45.0, pytest.param(75.0, marks=pytest.mark.slow), 120.0])
-def test_the_fewest_props_are_those_of_brute_force(payload):
-    scene = weak(5, payload)
-    nodes, found = free_nodes(scene), fewest(payload)
-    values = None
-    for count in range(3):
-        each = []
-        for chosen in combinations(nodes, count):
-            with_props = scene.with_props(*(Prop(node=n) for n in chosen))
-            each.append(best_values(seqopt.make_engine("compliance", with_props), LOOSE, "minmax"))
-        if any(each):
-            values = min(value for value in each if value is not None)
-            break
-    assert values is not None
-    assert found.count == count
-    assert found.plan.certificate.values[0] == pytest.approx(values[0])
-    assert found.proven
-    cut = found.described()
-    assert cut["solved"] + cut["cut"] == len(found.tried) <= cut["sets"]
-
-
-@once
-def test_the_tested_builds_need_props():
-    """The control of the test above: different numbers of props are needed."""
-    assert fewest(45.0).count > fewest(120.0).count
-
-
-def test_no_props_of_any_number_help_a_robot_too_weak():
-    scene = weak(3, 1.0)
-    with pytest.raises(InfeasibleError, match=r"none of 4 sets .* brick 1 weighs 35\.9 N, more"):
-        fewest_props(posed(scene), [Prop(node=3), Prop(node=4)], seqopt.solve)
-
-
-def test_what_stops_all_plans_is_the_same_for_sets_with_the_same_first_props():
-    """The claim that rules out sets together, for a later prop that could change nothing."""
-    scene = weak(5, 45.0)
-    stop = Proof(states_of(posed(scene))).stops_at()
-    assert stop is not None
-    for node in [n for brick in scene.placed[stop:] for n in brick.nodes]:
-        again = Proof(states_of(posed(scene.with_props(Prop(node=node))))).stops_at()
-        assert again == stop
 
 
 def test_one_robot_builds_on_centering():

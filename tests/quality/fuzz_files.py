@@ -28,7 +28,6 @@ from seqopt.errors import SeqoptError
 from seqopt.exchange._measured import read_measured
 from seqopt.exchange.exports import export_plan
 from seqopt.exchange.imports import import_scene, read_content
-from seqopt.plan.policy import Policy, find_policy
 from seqopt.responses._blocks import Answers, Block, Store
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence._parts import read_site
@@ -142,16 +141,7 @@ def _of_imports() -> Iterator[tuple[str, File]]:
 
 
 def _of_caches() -> Iterator[tuple[str, File]]:
-    scene = small_arch(3)
-    engine = seqopt.make_engine("compliance", scene)
-    problem = seqopt.pose(
-        engine, seqopt.FreeRules(least_grips=1), seqopt.CRITERIA["worst-ratio"], "minmax"
-    )
-
-    def advised(path: Path) -> object:
-        return Policy.load(path).best(seqopt.Site(0))
-
-    yield "policy", ("policy.npz", find_policy(problem, proof=False).content(), advised)
+    engine = seqopt.make_engine("compliance", small_arch(3))
     arms = two_arms(3)
     site = ArmSite.of(arms)
     p, r, n, b = 4, len(site.robots), len(site.nodes), len(site.bricks)

@@ -20,7 +20,6 @@ from seqopt.judge._rule_moves import check_free
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
-from seqopt.plan.policy import find_policy
 from seqopt.responses import analyze_staged
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.site import Site
@@ -210,20 +209,6 @@ def test_best_order_is_that_of_all():
     assert found.order.status == found.status == Status.OPTIMAL
     assert found.steps[-1].bricks == 0
     assert max(values) > min(values) * 1.01  # orders differ
-
-
-def test_policy_leads_to_the_optimum():
-    engine = arch()
-    problem = posed(engine, "minmax,steps")
-    policy, best = find_policy(problem), seqopt.solve(problem)
-    site, count = Site.after(best.steps, 0), 0
-    while (advice := policy.best(site)).kind is not None:
-        site, count = advice.site, count + 1
-    assert policy.checked
-    assert (site.bricks, count) == (0, len(best.steps))
-    last = policy.best(Site.after(best.steps, len(best.steps) - 1))
-    assert (last.kind, last.brick) == (StepKind.REMOVE, 1)
-    assert "takes brick 1 away" in str(last)
 
 
 def test_judge_refuses_what_is_no_take_down():

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import isfinite
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -88,12 +88,7 @@ class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
 
     What counts as best?
     With --aim, --stands, --order search or --schedule free states of the build are chosen:
-    --ranked, --among and criteria of ranks do not go with these. --props-among goes with --aim
-    props alone, and that without --props.
-
-    props_among : NODES
-        with --aim props: at which nodes props may be, and what they bear, as --props; all of them
-        by default, as all:1e6,push
+    --ranked, --among and criteria of ranks do not go with these.
 
     What must hold?
     --friction, --tilt and --curing go with --stands. Budgets on steps, regrips, makespan and sums
@@ -161,9 +156,6 @@ class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
     tables : plan|all
         which tables are written: those of the plan, or all, with every choice of every open step
         beside: megabytes (default: plan)
-    policy :
-        write policy.npz too: the best next move from every state that builds reach (needs --out;
-        seqopt next looks it up)
 
     Examples
     --------
@@ -173,13 +165,10 @@ class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
     seqopt optimize my.json --criteria worst-ratio --limit payload --out mine
     """
 
-    counts_props: ClassVar[bool] = True
-
     option: tuple[str, ...] = ()
     no_proof: bool = False
     lazy: bool = False
     tables: str = word("plan", choices=("plan", "all"))
-    policy: bool = False
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -190,7 +179,6 @@ class Found:
     plan: Plan
     assemble: float
     prover: BuildProver
-    outer: Mapping[str, Any] = field(default_factory=dict)  # props that were compared
     whole: str = ""
     clock: Clock = field(default_factory=Clock)
 
@@ -247,7 +235,6 @@ class Found:
             "stability": {v.mortar: v.facts() for v in self.verdicts.get(plan.title, ())},
         }
         out |= {"left_out": dict(self.clock.left_out)} if self.clock.left_out else {}
-        out |= {name: each.described() for name, each in self.outer.items()}
         known, unseen = self.posed.known, self.posed.unseen
         if known is None:
             return out
@@ -274,8 +261,6 @@ def run(asked: Optimize) -> Answer:
 def find(asked: Optimize, change: Change | None = None) -> Found:
     """Choose every open grip of a build, or every step; ``change``: what has changed before."""
     clock = Clock(parse_time_limit(asked.time_limit))
-    if asked.policy and asked.out is None:
-        raise ProblemError("--policy: it is written to a folder; give --out DIR")
     require_out(asked, *ALWAYS)
     start = time.perf_counter()
     with clock.needed("posing the problem"):
@@ -299,12 +284,10 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
         clock.interrupted |= plan.ended is End.INTERRUPTED
         return plan
 
-    outer = _outer(asked, posed, choose)
-    plan = next(iter(outer.values())).plan if outer else choose(posed.problem)
-    plan = at_sufficient_level(plan, choose, clock)
+    plan = at_sufficient_level(choose(posed.problem), choose, clock)
     prover = asked_prover(asked, plan.engine.network)
     whole = _from_empty(posed.whole, plan, choose)
-    return Found(posed, plan, assemble, prover, outer, whole, clock)
+    return Found(posed, plan, assemble, prover, whole, clock)
 
 
 def answered(asked: Optimize, found: Found) -> Answer:
@@ -314,28 +297,19 @@ def answered(asked: Optimize, found: Found) -> Answer:
         tables = partial(_plan_files, found.plan, choices=asked.tables == "all")
         made = found.clock.spare("its tables", tables, made)
     _ = found.verdicts, found.trial
-    return _answer(asked, found, write_outputs(asked, lambda: _files(asked, found, made)))
+    return _answer(asked, found, write_outputs(asked, lambda: _files(found, made)))
 
 
-def _files(
-    asked: Optimize, found: Found, tables: Mapping[str, bytes | str]
-) -> dict[str, bytes | str]:
+def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes | str]:
     """Return the files of a plan by name, with its tables and tasks; at least what it is alone."""
     plan, made = found.plan, dict[str, bytes | str]()
     tasks = {kind: str(tables[f"tasks.{kind}"]) for kind in ("csv", "json") if tables}
-    others: dict[str, Callable[[], str | bytes]] = {}
-    if asked.policy:
-        from seqopt.plan.policy import FILE, find_policy  # noqa: PLC0415  # few ask for one
-
-        others[FILE] = lambda: find_policy(found.posed.problem, asked.tell).content()
     if found.analyzed:
         from seqopt.report._pages import plan_page  # noqa: PLC0415  # only where files are written
 
-        others[PAGE] = lambda: plan_page(plan, found.prover, tasks=tasks)
-    for name, make in others.items():
-        content = found.clock.spare(name, make, None)
-        made |= {} if content is None else {name: content}
-    made |= {f"{name}.csv": csv_text(each.tried) for name, each in found.outer.items()}
+        shown = partial(plan_page, plan, found.prover, tasks=tasks)
+        content = found.clock.spare(PAGE, shown, None)
+        made |= {} if content is None else {PAGE: content}
     if found.trial is not None:
         made["scenarios.csv"] = csv_text(found.trial.table)
     if rows := trace_rows(plan.trace):
@@ -369,19 +343,6 @@ def _values(plan: Plan) -> str:
     return f"{OUTSIDE}: " * plan.is_far + ", ".join([*values, *steps])
 
 
-def _outer(
-    asked: Optimize, posed: PosedProblem, choose: Callable[[Problem], Plan]
-) -> Mapping[str, Any]:
-    """Return the plan of the fewest props by that name, if it is asked for."""
-    if posed.fewest is None:
-        return {}
-    if asked.no_proof:
-        raise ProblemError("--no-proof: props are compared by proven plans; leave it out")
-    from seqopt.plan._studies.fewest_props import fewest_props  # noqa: PLC0415  # few ask for it
-
-    return {"fewest_props": fewest_props(posed.problem, posed.fewest, choose, asked.tell)}
-
-
 def _how(asked: Optimize, formulation: Formulation) -> Run:
     """Return how a formulation is to be run, its own options among it."""
     how: dict[str, Any] = parse_options(formulation, asked.option)
@@ -403,7 +364,6 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
         "scene": scene_facts(scene),
         "summary": lambda: found.report,
         "proof": _proof(plan),
-        **{name: each.tried for name, each in found.outer.items()},
         **({} if plan.order is None else {"order": plan.order.selection.order}),
     }
     ended = INTERRUPTED if early else "seqopt: interrupted; the plan was chosen by then"
@@ -440,7 +400,6 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
     yield f"{search}; {written_to(asked.out, page=page)}"
     yield from map(wrapped, waits_said(plan) if plan.certificate is not None else ())
     yield from (f"stability, {each}" for each in found.verdicts.get(plan.title, ()))
-    yield from (wrapped(each.said) for each in found.outer.values())
     yield from [wrapped(found.whole)] if found.whole else []
     if plan.order is not None:
         yield wrapped(", ".join(map(str, plan.order.selection.order)), first="order: ")

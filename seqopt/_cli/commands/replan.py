@@ -19,7 +19,7 @@ from seqopt._cli.terminal import wrapped
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
 from seqopt.exchange._measured import read_measured
-from seqopt.plan._studies.replan import compared, without
+from seqopt.plan.replan import compared, without
 from seqopt.responses._tolerance import is_tolerance, value_text
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
 from seqopt.scene.scenarios import as_built

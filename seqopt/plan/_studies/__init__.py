@@ -1,1 +1,0 @@
-"""Plans of other scenes: other bases of robots, fewer props, a build that goes otherwise."""
