@@ -140,51 +140,12 @@ def problem():
     return {"dtype": "compas_dem.problem/Problem", "data": data}
 
 
-def timber():
-    """As compas_timber 2: a sill on the ground, and a post that runs into it."""
-
-    def beam(guid, origin, axes, size):
-        frame = {"point": origin, "xaxis": axes[0], "yaxis": axes[1]}
-        held = {"frame": {"dtype": "compas.geometry/Frame", "data": frame}, "features": []}
-        held |= dict(zip(("length", "width", "height"), size, strict=True))
-        return {"dtype": "compas_timber.elements/Beam", "data": held, "guid": guid}
-
-    sill = beam("s", [0, 0, 50], [[1, 0, 0], [0, 1, 0]], (2000, 100, 100))
-    post = beam("p", [1000, 0, 50], [[0, 0, 1], [1, 0, 0]], (1500, 100, 100))
-    joint = {"dtype": "compas_timber.connections/TButtJoint", "data": {"element_guids": ["p", "s"]}}
-    graph = {"node": {"0": {"element": "s"}, "1": {"element": "p"}}, "edge": {}}
-    data = {"elements": {"s": sill, "p": post}, "graph": graph, "joints": {"j": joint}}
-    return {"dtype": "compas_timber.model/TimberModel", "data": data}
-
-
-def frame():
-    """As conmech: two bars from the ground to a ridge; density is a weight."""
-    nodes = [
-        {"point": [-1.0, 0.0, 0.0], "is_grounded": True},
-        {"point": [0.0, 0.0, 1.0], "is_grounded": False},
-        {"point": [1.0, 0.0, 0.0], "is_grounded": True},
-    ]
-    section = {"A": 1.0, "A_unit": "cm2", "Iy": 0.08, "Iz": 0.08, "Jx": 0.14, "elem_tags": []}
-    section |= {f"{name}_unit": "cm4" for name in ("Iy", "Iz", "Jx")}
-    steel = {"E": 2.1e8, "G12": 8e7, "density": 78.5}
-    return {
-        "unit": "meter",
-        "nodes": nodes,
-        "elements": [{"end_node_inds": [0, 1]}, {"end_node_inds": [1, 2]}],
-        "cross_secs": [section],
-        "materials": [steel],
-        "supports": [{"node_ind": 0, "condition": [True] * 6}],
-    }
-
-
 DOCUMENTS = {
     "assembly": assembly(),
     "legacy": legacy(),
     "model": model(),
     "nested": nested(),
     "problem": problem(),
-    "timber": timber(),
-    "frame": frame(),
     "meshes": [mesh(LOW), [mesh(HIGH, "value")], mesh(TOP)],
 }
 BOXES = "x,y,z,length,width,height,yaw,support\n1,.5,.25,2,1,.5,0,1\n.75,.5,.75,1,1,.5,90,\n"

@@ -1,25 +1,19 @@
 """Assemblies and models of COMPAS's packages: what blocks they have, and where these touch.
 
 Assemblies of compas_assembly and compas_cra are graphs, with meshes in or beside them.
-Models of compas_model and compas_dem are elements with transformations. Beams of compas_timber are
-their blanks; the model's own joints say which run into each other.
+Models of compas_model and compas_dem are elements with transformations.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import Any
-
-import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.exchange._building import carried, own_density
 from seqopt.exchange._compas_shapes import (
-    frame_of,
     held_by,
     kind,
     payload,
@@ -32,7 +26,6 @@ from seqopt.exchange._content import (
     Entry,
     FileBlock,
     FileFace,
-    FileJoint,
     entry,
     listing,
     mapping,
@@ -42,7 +35,6 @@ from seqopt.exchange._content import (
 )
 from seqopt.exchange._meshes import object_content
 from seqopt.scene._checks import short
-from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.library.common import JointLaw
 
 
@@ -114,7 +106,6 @@ def read_assembly(document: Any, source: str) -> Content:
     nodes = mapping(f"{source}: node", entry(source, graph, "node", "vertex"))
     common = held_by(source, graph.get("node_attributes") or graph.get("dva") or {})
     keys = [key for key in nodes if meshes is None or key in meshes]
-    own = carried(graph, source)
     blocks = []
     for key in keys:
         node = common | mapping(source, nodes[key])
@@ -127,7 +118,7 @@ def read_assembly(document: Any, source: str) -> Content:
         if a in place and b in place
     ]
     said = [f"{len(nodes) - len(keys)} nodes have no block"] if len(keys) < len(nodes) else []
-    return Content(tuple(blocks), tuple(faces), said=tuple(said), own=own)
+    return Content(tuple(blocks), tuple(faces), said=tuple(said))
 
 
 def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
@@ -152,7 +143,6 @@ def _node_block(where: str, key: str, node: Entry, meshes: dict[str, Any] | None
         vertices,
         faces,
         support=node.get("is_support") is True,
-        density=own_density(where, node),
         course=None if course is None else number(f"{where}: course", course),
     )
 
@@ -258,73 +248,6 @@ def _law(source: str, held: Any) -> JointLaw | None:
     return JointLaw(translational=(number(f"{source}: kn", normal), across, across))
 
 
-def read_timber(document: Any, source: str) -> Content:
-    """Return the beams of a model, which must have some."""
-    elements = _elements(source, held := held_by(source, document))
-    beams = [element for element in elements if element.kind == "beam"]
-    if not beams:
-        raise SceneError(f"{source}: it has no beams; give a model with some")
-    blocks = tuple(_beam(f"{source}: beam {i}", str(i), beam) for i, beam in enumerate(beams))
-    place = {beam.guid: i for i, beam in enumerate(beams)}
-    joints = tuple(_joint(blocks, pair) for pair in _pairs(source, held, place))
-    said = ["beams are their blanks: cuts and fasteners are left out"]
-    if len(beams) < len(elements):
-        said.append(f"{len(elements) - len(beams)} elements that are not beams are left out")
-    return Content(blocks, joints=joints, said=tuple(said))
-
-
-def _beam(where: str, key: str, beam: _Element) -> FileBlock:
-    """Return a beam; its frame, where it has one, is that in the model, not that in its group."""
-    held = beam.held
-    names = ("length", "width", "height")
-    size = np.array([number(f"{where}: {name}", entry(where, held, name)) for name in names])
-    if not size.min() > 0:
-        raise SceneError(f"{where}: its sizes are {size.tolist()}; give positive ones")
-    local: Floats = 0.5 * (BOX_CORNERS + np.array([1.0, 0.0, 0.0])) * size
-    if held.get("frame") is not None:
-        origin, axes = frame_of(where, held["frame"])
-        return FileBlock(key, np.asarray(origin + local @ axes), BOX_FACES)
-    return FileBlock(key, moved(local, beam.matrix), BOX_FACES)
-
-
-def _pairs(source: str, held: Entry, place: dict[str, int]) -> Iterable[tuple[int, int]]:
-    """Return the places of beams that the model's own joints hold together, each pair once."""
-    items = by_guid(f"{source}: joints", held.get("joints") or [])
-    ends = [listing(source, held_by(source, item).get("element_guids") or []) for _, item in items]
-    known = [sorted(place[str(x)] for x in found if str(x) in place) for found in ends]
-    return dict.fromkeys(pair for found in known for pair in combinations(found, 2))
-
-
-def _joint(blocks: tuple[FileBlock, ...], pair: tuple[int, int]) -> FileJoint:
-    """Return a joint halfway between the center lines of two beams, where these are nearest."""
-    (start, step, side), (other, reach, width) = (_center_line(blocks[i].vertices) for i in pair)
-    at, to = _nearest((start, step), (other, reach))
-    middle = 0.5 * (start + at * step + other + to * reach)
-    first, last = (blocks[i].vertices.mean(axis=0) for i in pair)
-    size = float(np.linalg.norm(last - first))
-    along = (last - first) / size if size > 0 else np.array([0.0, 0.0, 1.0])
-    return FileJoint(pair, middle, along, min(side, width))
-
-
-def _center_line(corners: Floats) -> tuple[Floats, Floats, float]:
-    """Return the start of a beam's center line, the step to its end, and its smaller side."""
-    start, end = corners[:4].mean(axis=0), corners[4:].mean(axis=0)
-    sides = np.linalg.norm(corners[[1, 2]] - corners[0], axis=1)
-    return start, end - start, float(sides.min())
-
-
-def _nearest(first: tuple[Floats, Floats], second: tuple[Floats, Floats]) -> tuple[float, float]:
-    """Return at which shares of two lines, starts and steps, they are nearest to each other."""
-    (start, step), (other, reach) = first, second
-    gap = start - other
-    a, b, c = float(step @ step), float(step @ reach), float(reach @ reach)
-    d, e = float(step @ gap), float(reach @ gap)
-    apart = a * c - b * b
-    at = 0.5 if apart <= 1e-12 * a * c else float(np.clip((b * e - c * d) / apart, 0.0, 1.0))
-    to = float(np.clip((b * at + e) / c, 0.0, 1.0))
-    return float(np.clip((b * to - d) / a, 0.0, 1.0)), to
-
-
 _SOLIDS = ("mesh", "box", "polyhedron")
 _THIN = (  # of COMPAS, without a volume
     *("line", "polyline", "polygon", "point", "pointcloud", "vector", "frame", "plane", "circle"),
@@ -365,7 +288,7 @@ def read_meshes(document: Any, source: str) -> Content:
     if left and not solids:
         raise SceneError(
             f"{source}: {'; '.join(said)}. Lines, points and curves are no blocks: give meshes, "
-            "boxes or polyhedra, or bars as a frame (nodes, elements, materials, cross_secs)"
+            "boxes or polyhedra"
         )
     found = object_content(solids, source)
     return replace(found, said=("a list of meshes: no supports, faces or order", *said))
@@ -392,49 +315,3 @@ def _listed(
         own = value.get("name") if isinstance(value, dict) else None
         key = name or (own if isinstance(own, str) else "")
         yield FileBlock(key, *solid_of(where, value), group=group)
-
-
-@dataclass(frozen=True)
-class _Node:
-    """A node of the tree of a scene."""
-
-    entry: Entry
-    group: str  # the names of the nodes above it
-    matrix: Floats  # (4, 4); of the node above it, to the world
-
-
-def read_scene(document: Any, source: str) -> Content:
-    """Return the meshes and boxes that a scene shows, each where COMPAS places it."""
-    held = mapping(source, payload(document))
-    items = dict(by_guid(f"{source}: items", listing(source, entry(source, held, "items"))))
-    left = Counter[str]()
-    found = object_content(_shown(source, held, items, left), source)
-    said = (f"{count} objects are left out: {what}" for what, count in left.items())
-    return replace(found, said=("a scene: no supports, faces or order", *said))
-
-
-def _shown(
-    source: str, held: Entry, items: dict[str, Entry], left: Counter[str]
-) -> Iterator[FileBlock]:
-    """Yield the solids of a scene. ``left``: gets what is left out, and how often."""
-    root = mapping(f"{source}: root", entry(source, held, "root"))
-    waiting = [_Node(root, "", np.eye(4))]
-    while waiting:
-        node = waiting.pop()
-        settings = mapping(source, node.entry.get("settings") or {})
-        name = str(settings.get("name") or "")
-        where = f"{source}: object {name}"
-        matrix = node.matrix @ transformation_of(where, settings.get("transformation"))
-        item = items.get(str(node.entry.get("item")))
-        if settings.get("show") is False:
-            left["hidden"] += item is not None
-        elif item is not None and kind(item) == "brep":
-            raise SceneError(f"{where} is a Brep; save its mesh (Brep.to_tesselation)")
-        elif item is not None and not _is_solid(item):
-            left[kind(item)] += 1
-        elif item is not None:
-            vertices, faces = solid_of(where, item)
-            yield FileBlock(name, moved(vertices, matrix), faces, group=node.group)
-        inner = "" if node.entry is root else f"{node.group}::{name}".removeprefix("::")
-        children = listing(f"{where}: children", node.entry.get("children") or [])
-        waiting += [_Node(mapping(where, child), inner, matrix) for child in reversed(children)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -49,60 +49,23 @@ class FileFace:
 
 
 @dataclass(frozen=True)
-class FileJoint:
-    """A joint that has a place and no face. Where its blocks touch over faces, these count.
-
-    ``blocks``: -1 first for the ground. ``side``: of the square over which the law of joints is
-    taken, in the file's unit, unless ``translational``, N/m, and ``rotational``, N m/rad, are
-    given.
-    """
-
-    blocks: tuple[int, int]
-    position: Floats
-    along: Floats
-    side: float
-    translational: tuple[float, float, float] | None = None
-    rotational: tuple[float, float, float] | None = None
-
-
-@dataclass(frozen=True)
-class Carried:
-    """A scene that an assembly carries, as a document, and its bricks by the keys of blocks."""
-
-    document: Entry
-    bricks: Mapping[str, int]
-    unit: str | None = None  # of the file's lengths, if it was written of the scene alone
-
-
-@dataclass(frozen=True)
 class Content:
     """What a file says about an assembly."""
 
     blocks: tuple[FileBlock, ...]
     faces: tuple[FileFace, ...] = ()  # empty where the file has none
-    joints: tuple[FileJoint, ...] = ()  # of frames and of beams that run into each other
     unit: str | None = None  # unit of length, one of `UNITS`, if the file says it
     usual_unit: str | None = None  # if the format has one, which not all who write it respect
     up: str = "z"  # which axis the format has up, one of `UPS`
     law: JointLaw | None = None  # if the file has stiffnesses
     said: tuple[str, ...] = ()  # what was read, left out or assumed
-    own: Carried | None = None  # the scene that seqopt wrote into it
 
     def placed(self, unit: float, up: str) -> Content:
         """Return the content in m, with z up. ``unit``: of its lengths, m; ``up``: one of `UPS`."""
         turn = _Y_TO_Z if up == "y" else np.eye(3)
         blocks = (replace(b, vertices=unit * b.vertices @ turn) for b in self.blocks)
         faces = (replace(f, corners=unit * f.corners @ turn) for f in self.faces)
-        joints = (
-            replace(
-                joint,
-                position=unit * joint.position @ turn,
-                side=unit * joint.side,
-                along=joint.along @ turn,
-            )
-            for joint in self.joints
-        )
-        return replace(self, blocks=tuple(blocks), faces=tuple(faces), joints=tuple(joints))
+        return replace(self, blocks=tuple(blocks), faces=tuple(faces))
 
 
 @dataclass(frozen=True, kw_only=True)

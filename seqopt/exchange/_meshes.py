@@ -184,10 +184,10 @@ def _compact(points: Floats, faces: _Polygons) -> tuple[Floats, tuple[tuple[int,
 def without_repeats(content: Content) -> Content:
     """Return a content without blocks that repeat earlier ones, which are named.
 
-    Blocks all stay where faces or joints of the file refer to them.
+    Blocks all stay where faces of the file refer to them.
     """
     blocks = [block for block in content.blocks if len(block.vertices)]
-    if content.faces or content.joints or content.own or len(blocks) < 2:
+    if content.faces or len(blocks) < 2:
         return content
     from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
 

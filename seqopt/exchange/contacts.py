@@ -15,7 +15,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SceneError
-from seqopt.exchange._content import GROUND, Content, FileJoint, Given
+from seqopt.exchange._content import GROUND, Content, Given
 from seqopt.exchange._meshes import Repaired
 from seqopt.scene._checks import positive, short, units
 from seqopt.scene._overlaps import TOLERATED, bounds_of, near_pairs
@@ -311,19 +311,13 @@ _Held = tuple[tuple[int, int], _FlatFace]
 
 @dataclass(frozen=True)
 class Contacts:
-    """Where blocks touch: faces whose normals point into the second, and joints without a face.
+    """Where blocks touch: faces whose normals point into the second.
 
     Places are those of the file; the ground is -1 and comes first.
     """
 
     faces: tuple[_Held, ...]
-    joints: tuple[FileJoint, ...]
     said: tuple[str, ...]
-
-    @property
-    def pairs(self) -> list[tuple[int, int]]:
-        """Which touch each other."""
-        return [*(pair for pair, _ in self.faces), *(joint.blocks for joint in self.joints)]
 
 
 def _find_contacts(
@@ -337,22 +331,15 @@ def _find_contacts(
         off = _off_blocks(content, facets, gap)
         found = [*_file_faces(content, solids)]
         said = [f"faces are those of the file: {len(content.faces)}", *off]
-    elif content.joints and all(joint.translational for joint in content.joints):
-        found, said = [], ["joints are those of a frame; none has a face"]
     else:
         touching = touching_faces(facets, gap, given.progress)
         found = [(f.blocks, flat_face(f.corners, f.normal)) for f in touching]
         said = [f"faces are found where blocks are no more than {1e3 * gap:.3g} mm apart"]
     faces = [held for pair, face in found for held in _on_ground(pair, face, bricks)]
-    known = {frozenset(pair) for pair, _ in faces}
-    joints = [joint for joint in content.joints if frozenset(joint.blocks) not in known]
-    if joints and found:
-        said.append(f"joints of the file between blocks without a face: {len(joints)}")
-    everywhere = len(bricks) == len(solids)
-    if everywhere and not any(GROUND in joint.blocks for joint in joints):
+    if len(bricks) == len(solids):
         faces += _standing(bricks, facets, gap)
         said.append("no supports are named: blocks with a face at the lowest level stand there")
-    return Contacts(tuple(faces), tuple(joints), tuple(said))
+    return Contacts(tuple(faces), tuple(said))
 
 
 def _widest_gap(given: Given, bricks: Mapping[int, Brick]) -> float:

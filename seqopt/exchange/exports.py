@@ -9,9 +9,7 @@ import csv
 import io
 import json
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, partial
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -21,30 +19,27 @@ import numpy as np
 from seqopt._files import read_text
 from seqopt.arrays import Floats
 from seqopt.errors import FileError, StepError
-from seqopt.exchange._building import block_numbers, carry
-from seqopt.exchange._compas_models import assembly_graph, by_guid
-from seqopt.exchange._compas_shapes import kind, payload
+from seqopt.exchange._building import block_numbers
+from seqopt.exchange._compas_models import assembly_graph
 from seqopt.exchange._content import assembly_json, entry
 from seqopt.exchange._grip_frames import (
     Document,
     Frame,
-    Held,
     brick_frame,
     compas_frame,
-    hold,
     mesh_data,
     typed,
 )
-from seqopt.exchange._tables import StepStates, plan_csv, plan_json, sequencer_json, step_states
+from seqopt.exchange._tables import plan_csv, plan_json, sequencer_json, step_states
 from seqopt.exchange._tasks import Postures, Task, _known_tasks, tasks_csv, tasks_json
-from seqopt.exchange.imports import read_content, sniffed
+from seqopt.exchange.imports import read_content
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule_file import read_plan
-from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.steps import Step
 
 
 def _boxes_csv(scene: Scene) -> str:
@@ -80,6 +75,7 @@ def _blocks_obj(scene: Scene) -> str:
     return "\n".join(lines) + "\n"
 
 
+_ASSEMBLY = "compas_assembly"
 _WORLD = Frame((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 _REVOLUTE = 0  # the type of a joint that turns
 
@@ -188,122 +184,40 @@ def _configuration(said: str, posture: tuple[float, ...] | None) -> Document | N
     return typed("compas_fab.robots/ConfigurationTarget", data)
 
 
-@dataclass(frozen=True)
-class _Source:
-    """A file from which a scene was imported."""
-
-    names: Mapping[int, str]  # of bricks: identifiers of elements of a COMPAS model, else keys
-    graph: Any = None  # its document if it is a graph of compas_assembly
-
-
-def _read_source(scene: Scene, source: str | Path | None) -> _Source | None:
-    """Return the file from which a scene was imported, in any format that ``import`` knows."""
-    if source is None:
-        return None
-    path, graph = Path(source), None
-    content = read_content(path)
-    keys = names = [block.key for block in content.blocks]
-    if path.suffix.lower() == ".json":
-        document = assembly_json(read_text(path), str(path))
-        form = sniffed(document, str(path))
-        graph = document if form == "compas_assembly" and isinstance(document, dict) else None
-        if form in ("compas_model", "compas_dem", "compas_timber"):
-            held = payload(document)
-            held = payload(held["model"]) if "model" in held else held
-            rows = by_guid(f"{path}: element", held["elements"])
-            beams = form == "compas_timber"  # its blocks are counted among its beams
-            guids = [guid for guid, item in rows if not beams or kind(item) == "beam"]
-            names = [guids[int(key)] for key in keys]
-    found = dict(zip(block_numbers(keys), names, strict=True))
+def _read_source(scene: Scene, path: Path) -> tuple[Document, dict[int, str]]:
+    """Return the assembly from which a scene was imported, and the keys of its nodes by brick."""
+    keys = [block.key for block in read_content(path, _ASSEMBLY).blocks]
+    found = dict(zip(block_numbers(keys), keys, strict=True))
     lost = [brick.name for brick in scene.bricks if brick.name not in found]
     if lost:
         raise StepError(f"the source has no block {lost[0]}; give the file that was imported")
-    return _Source(found, graph)
+    return assembly_json(read_text(path), str(path)), found
 
 
-def _timber_plan(scene: Scene, steps: Sequence[Step], source: _Source | None = None) -> str:
-    """Return a plan as a ``BuildingPlan`` of compas_timber, JSON, in names of the source if any."""
-    names = source.names if source else {b.name: str(b.name) for b in scene.bricks}
-    robots, frames = {robot.name: robot for robot in scene.robots}, cache(partial(hold, scene))
-    rows, before = [], _Holds()
-    for row in step_states(scene, steps):
-        grips = {
-            robot: (f"{robot} holds {names[brick]} at node {node}", frames(robots[robot], node))
-            for robot, (node, brick) in row.holds.items()
-        }
-        frame = Frame((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-        if row.new:
-            frame = brick_frame(scene.placed[row.step.bricks - len(row.new)])
-        data = {
-            "location": compas_frame(frame),
-            "geometry": "box",
-            "priority": row.step.number - 1,
-            "element_ids": [names[name] for name in row.new],
-            "instructions": [_text(robot, *said) for robot, said in grips.items()],
-            "is_built": False,
-            "is_planned": True,
-            "elements_held": sorted({names[brick] for _, brick in row.holds.values()}),
-            "actor": "ROBOT",
-        }
-        said = ", ".join(_told(row, names, before))
-        rows.append(typed("compas_timber.planning/Step", data, name=said))
-        before = row.holds
-    return json.dumps(typed("compas_timber.planning/BuildingPlan", {"steps": rows})) + "\n"
-
-
-_Holds = dict[str, tuple[int, int]]
-
-
-def _told(row: StepStates, names: Mapping[int, str], before: _Holds) -> Iterator[str]:
-    """Yield what robots do in a step, in words, whose grips it changes."""
-    for robot, (node, brick) in row.holds.items():
-        if before.get(robot) != (node, brick):
-            does = "places" if brick in row.new else "takes"
-            yield f"{robot} {does} {names[brick]}"
-    for robot, (_, brick) in before.items():
-        if robot not in row.holds:
-            does = "removes" if row.step.kind is StepKind.REMOVE else "lets go of"
-            yield f"{robot} {does} {names[brick]}"
-
-
-def _text(robot: str, said: str, held: Held) -> Document:
-    """Return what a robot holds as an instruction: text where its tool is."""
-    data = {"id": robot, "location": compas_frame(held.grip), "text": said, "size": held.depth}
-    return typed("compas_timber.planning/Text3d", data)
-
-
-def _assembly_with_plan(scene: Scene, steps: Sequence[Step], source: _Source | None = None) -> str:
+def _assembly_with_plan(scene: Scene, steps: Sequence[Step], source: Path | None = None) -> str:
     """Return an assembly of compas_assembly with the plan as attributes, JSON.
 
-    A source that is an assembly stays as it is, with attributes added; otherwise blocks and faces
-    are those of the scene, and ``name`` what the source calls them. Every node of a block that is
-    built has ``order``, its place in the build, ``place_step`` and ``held``, a list of step, robot
-    and node; the graph has ``plan``, a list of steps.
+    A source stays as it is, with attributes added; otherwise blocks and faces are those of the
+    scene. Every node of a block that is built has ``order``, its place in the build, ``place_step``
+    and ``held``, a list of step, robot and node; the graph has ``plan``, a list of steps.
     """
-    kept = None if source is None else source.graph
-    whole = _assembly(scene) if kept is None else kept
+    keys = {brick.name: str(brick.name) for brick in scene.bricks}
+    whole, keys = (_assembly(scene), keys) if source is None else _read_source(scene, source)
     graph = assembly_graph(whole, "source")[0]
     found = entry("source", graph, "node", "vertex")
-    names = source.names if source else {}
-    nodes = {
-        brick.name: found[names[brick.name] if kept is not None else str(brick.name)]
-        for brick in scene.bricks
-    }
+    nodes = {brick.name: found[keys[brick.name]] for brick in scene.bricks}
     for i, brick in enumerate(scene.placed):
         nodes[brick.name].update(order=i, place_step=None, held=[])
-        if source and kept is None:
-            nodes[brick.name]["name"] = names[brick.name]
     plan = graph.setdefault("attributes", {})["plan"] = []
     for row in step_states(scene, steps):
-        number, kind_of = row.step.number, row.step.kind.value
+        number = row.step.number
         for name in row.new:
             nodes[name]["place_step"] = number
         for robot, (node, name) in row.holds.items():
             nodes[name]["held"].append([number, robot, node])
         holds = {robot: list(held) for robot, held in row.holds.items()}
-        plan.append({"step": number, "type": kind_of, "placed": list(row.new), "holds": holds})
-    keys = {name: names[name] if kept is not None else str(name) for name in nodes}
-    carry(graph, keys, scene, "m" if kept is None else None)
+        kind = row.step.kind.value
+        plan.append({"step": number, "type": kind, "placed": list(row.new), "holds": holds})
     return json.dumps(whole) + "\n"
 
 
@@ -355,10 +269,6 @@ _PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {
     "json": plan_json,
     "sequencer": sequencer_json,
 }
-_WITH_SOURCE: dict[str, Callable[[Scene, Sequence[Step], _Source | None], str]] = {
-    "compas_timber": _timber_plan,
-    "compas_assembly": _assembly_with_plan,
-}
 _TASKS: dict[str, Callable[[Scene, Iterable[Task]], str]] = {
     "tasks": tasks_json,
     "tasks_csv": lambda _, tasks: tasks_csv(tasks),
@@ -367,12 +277,12 @@ _TASKS: dict[str, Callable[[Scene, Iterable[Task]], str]] = {
 _BLOCKS: dict[str, Callable[[Scene], str]] = {"boxes": _boxes_csv, "obj": _blocks_obj}
 TASKS = tuple(_TASKS)
 """Formats of what robots do, with postures where they have arms."""
-EXPORTS = (*_PLAIN, *_TASKS, *_WITH_SOURCE, *_BLOCKS)
-_BOXES = ("nodes", "joints", "ground ends", "robots", "loads", "steps")
+EXPORTS = (*_PLAIN, *_TASKS, _ASSEMBLY, *_BLOCKS)
+_NEVER = ("nodes", "joints", "ground ends", "robots", "loads", "steps")
 LOST: dict[str, tuple[str, ...]] = {
-    "compas_assembly": (),
-    "boxes": ("shapes other than boxes", *_BOXES),
-    "obj": ("densities", "the order", *_BOXES),
+    _ASSEMBLY: ("densities", *_NEVER),
+    "boxes": ("shapes other than boxes", *_NEVER),
+    "obj": ("densities", "the order", *_NEVER),
 }
 """What a scene is without, once it was exported and imported again; other formats are no scenes."""
 
@@ -394,7 +304,7 @@ def export_plan(  # what is written, and what some formats take beside
     form
         One of `EXPORTS`.
     source
-        The imported file, for formats of COMPAS: its elements are named, and an assembly completed.
+        The assembly that was imported, for ``compas_assembly``: the plan is added to it.
     distance, postures
         For formats of tasks, see `plan_tasks`; by default postures that the arms can have.
 
@@ -420,10 +330,10 @@ def export_plan(  # what is written, and what some formats take beside
         raise StepError(f"format is {short(form)}; give one of {', '.join(EXPORTS)}")
     if form not in _TASKS and (distance is not None or postures):
         raise StepError(f"format {form} takes no distance or postures; {', '.join(TASKS)} do")
-    if source is not None and form not in _WITH_SOURCE:
+    if source is not None and form != _ASSEMBLY:
         raise StepError(f"format {form} takes no source; leave it out")
-    if form in _WITH_SOURCE:
-        return _WITH_SOURCE[form](scene, steps, _read_source(scene, source))
+    if form == _ASSEMBLY:
+        return _assembly_with_plan(scene, steps, None if source is None else Path(source))
     if form in _TASKS:
         return _TASKS[form](scene, _known_tasks(scene, steps, distance, postures))
     return _BLOCKS[form](scene) if form in _BLOCKS else _PLAIN[form](scene, steps)

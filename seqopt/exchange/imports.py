@@ -15,17 +15,9 @@ import numpy as np
 from seqopt._files import read_bytes, read_table, read_text
 from seqopt.errors import FileError, SceneError, SceneWarning
 from seqopt.exchange._building import build_scene
-from seqopt.exchange._compas_models import (
-    is_meshes,
-    read_assembly,
-    read_meshes,
-    read_model,
-    read_scene,
-    read_timber,
-)
+from seqopt.exchange._compas_models import is_meshes, read_assembly, read_meshes, read_model
 from seqopt.exchange._compas_shapes import kind, payload
 from seqopt.exchange._content import LARGEST, MOST_BLOCKS, Content, FileBlock, Given, assembly_json
-from seqopt.exchange._frames import read_frame
 from seqopt.exchange._mesh_files import (
     counted,
     read_3dm,
@@ -44,10 +36,7 @@ _DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
     "compas_assembly": read_assembly,
     "compas_model": read_model,
     "compas_dem": read_model,
-    "compas_timber": read_timber,
-    "compas_scene": read_scene,
     "compas_meshes": read_meshes,
-    "frame": read_frame,
 }
 _BYTES: dict[str, Callable[[bytes, str], Content]] = {
     "3dm": read_3dm,
@@ -67,6 +56,10 @@ _INSTEAD = {  # what to save in place of what is not read
     ".obj",
     "skp blend fbx dae max c4d usd usdz": f"export {_MESHED}",
     "gltf": "export .glb, which is one file",
+}
+_REFUSED = {  # kinds of COMPAS, and what to save in their place
+    "scene": "save its meshes as a list (compas.json_dump)",
+    "timbermodel": "save the meshes of its beams as a list (compas.json_dump)",
 }
 _LYING = 3  # blocks on the ground from which on it is odd if most are there
 FORMATS = (*_DOCUMENTS, "boxes", "obj", "off", *_BYTES)
@@ -119,7 +112,7 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     name = where.resolve().name if where.is_dir() else where.stem
     scene = build_scene(content, given or Given(), printable("file", name or "file"))
     warn_of(scene, scene.name)
-    if content.own is None and (given is None or (given.supports is None and given.up is None)):
+    if given is None or (given.supports is None and given.up is None):
         _warn_of_lying(scene, "z" if content.up == "y" else "y")
     return scene
 
@@ -172,14 +165,10 @@ def _not_read(source: str, suffix: str, form: str | None) -> str:
 
 def sniffed(document: Any, source: str) -> str:
     """Return which of `_DOCUMENTS` a JSON document is."""
-    known = {
-        "blockmodel": "compas_dem",
-        "problem": "compas_dem",
-        "timbermodel": "compas_timber",
-        "scene": "compas_scene",
-    }
-    if kind(document) in known:
-        return known[kind(document)]
+    if kind(document) in ("blockmodel", "problem"):
+        return "compas_dem"
+    if kind(document) in _REFUSED:
+        raise SceneError(f"{source}: a {kind(document)} cannot be read; {_REFUSED[kind(document)]}")
     held = payload(document)
     inner = {*held} if isinstance(held, dict) else {*()}
     if {"elements", "tree"} <= inner:
@@ -187,8 +176,6 @@ def sniffed(document: Any, source: str) -> str:
     keys = {*document} if isinstance(document, dict) else {*()}
     if document and isinstance(document, dict) and document.get("format") == "seqopt-scene":
         raise SceneError(f"{source}: it is a scene of seqopt already; give it as such")
-    if {"nodes", "elements"} <= keys:
-        return "frame"
     if is_meshes(document):
         return "compas_meshes"
     if keys & {"graph", "node", "blocks", "assembly", "data"}:

@@ -1,4 +1,4 @@
-"""Tasks and plans opened by those who read them: COMPAS, compas_fab, compas_timber, pandas."""
+"""Tasks and plans opened by those who read them: COMPAS, compas_fab, pandas."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from experiments.harness.scenes import running_bond
 from seqopt._cli.main import main
-from seqopt.exchange._tasks import FRAMES, Action, plan_tasks
+from seqopt.exchange._content import Given
+from seqopt.exchange._tasks import FRAMES, plan_tasks
 from seqopt.exchange.exports import export_plan
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
 from seqopt.sequence.two_robots import METHODS
+from tests.blocks import with_shapes
 from tests.builders import ROOT, six_bricks
 
 compas = pytest.importorskip("compas")
@@ -77,35 +80,6 @@ def test_pandas_has_a_row_for_every_task():
                 np.testing.assert_allclose(turned, frame.axes, atol=1e-7)
 
 
-def test_compas_timber_names_who_acts_and_who_holds_where():
-    planning = pytest.importorskip("compas_timber.planning")
-    plan = opened("compas_timber")
-    assert isinstance(plan, planning.BuildingPlan)
-    assert len(plan) == len(STEPS)
-    for step, mine in zip(plan, STEPS, strict=True):
-        changed = [
-            task for task in TASKS if task.step == mine.number and task.action is not Action.HOLD
-        ]
-        assert all(task.robot in step.name for task in changed)
-        holds = {
-            (robot.name, node)
-            for robot, node in zip(SCENE.robots, mine.grips, strict=True)
-            if node is not None
-        }
-        assert {(text.id, int(text.text.split()[-1])) for text in step.instructions} == holds
-        for text in step.instructions:
-            mine_too = next(
-                t
-                for t in TASKS
-                if t.robot == text.id and str(t.node) == text.text.split()[-1] and t.grip
-            )
-            assert same(text.location, mine_too.grip)
-        assert step.actor == "ROBOT"
-        step.transform(compas.geometry.Translation.from_vector([1.0, 0.0, 0.0]))
-    again = compas.json_loads(compas.json_dumps(plan))
-    assert [step.name for step in again] == [step.name for step in plan]
-
-
 def test_compas_fab_has_a_cell_states_and_targets():
     robots = pytest.importorskip("compas_fab.robots")
     found = opened("compas_fab", postures=POSTURES)
@@ -133,17 +107,21 @@ def test_compas_fab_has_a_cell_states_and_targets():
         assert np.allclose(body.centroid(), 0.0, atol=1e-9)
 
 
-def test_compas_opens_an_assembly_writes_it_again_and_it_is_the_scene(tmp_path):
-    """Its own datastructures carry joints, ground ends, robots and order."""
-    theirs = opened("compas_assembly")
-    path = tmp_path / "again.json"
+def test_compas_opens_an_assembly_and_writes_it_again(tmp_path):
+    """Its own datastructures keep blocks, faces, supports and the order of the build."""
+    wall, path = with_shapes(running_bond(2, 3)), tmp_path / "again.json"
+    steps = METHODS["sequential"](build_network(wall), ())
+    theirs = compas.json_loads(export_plan(wall, steps, "compas_assembly"))
     compas.json_dump(theirs, path)
-    assert import_scene(path) == SCENE
-    theirs.graph.delete_node(6)
+    again = import_scene(path, given=Given(unit="m", density=2000.0))
+    assert again.build_order == wall.build_order
+    assert {joint.bricks for joint in again.joints} == {joint.bricks for joint in wall.joints}
+    for mine, other in zip(wall.bricks, again.bricks, strict=True):
+        assert np.allclose(mine.position, other.position)
+    theirs.graph.delete_node(wall.build_order[-1])
     compas.json_dump(theirs, path)
-    shorter = import_scene(path)
-    assert shorter.build_order == SCENE.build_order[:-1]
-    assert shorter.joints == SCENE.joints[:-1]
+    shorter = import_scene(path, given=Given(unit="m", density=2000.0))
+    assert shorter.build_order == wall.build_order[:-1]
 
 
 @pytest.mark.slow

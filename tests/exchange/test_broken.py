@@ -7,7 +7,6 @@ import json
 
 import compas
 from compas.geometry import Box
-from compas.scene import Scene as CompasScene
 from compas_model.elements import BeamElement, PlateElement
 from compas_model.models import Model
 from hypothesis import given
@@ -41,17 +40,16 @@ STEPS = METHODS["sequential"](build_network(WALL), ())
 
 
 def by_compas():
-    """Documents that COMPAS writes: a scene, a dictionary of shapes, a model of elements."""
-    scene, model = CompasScene(), Model()
-    scene.add(Box(1), name="stone", parent=scene.add_group("stones"))
+    """Documents that COMPAS writes: a dictionary of shapes, a model of elements."""
+    model = Model()
     for element in (PlateElement(), BeamElement()):
         model.add_element(element)
-    written = {"scene": scene, "meshes": {"a": Box(1), "b": [Box(1)]}, "generic": model}
+    written = {"meshes": {"a": Box(1), "b": [Box(1)]}, "generic": model}
     return {f"{name} of compas": json.loads(compas.json_dumps(it)) for name, it in written.items()}
 
 
-CARRIED = {"carried": json.loads(export_plan(WALL, STEPS, "compas_assembly"))}
-DOCUMENTS = OTHERS | by_compas() | CARRIED
+OURS = {"ours": json.loads(export_plan(WALL, STEPS, "compas_assembly"))}
+DOCUMENTS = OTHERS | by_compas() | OURS
 PLACES = {name: sorted(places(held), key=repr) for name, held in DOCUMENTS.items()}
 REMOVED = "removed"
 
@@ -78,8 +76,7 @@ def test_a_scene_or_one_line(document):
     said = ""
     try:
         form = sniffed(document, "file")
-        unit = None if form == "frame" else "m"
-        build_scene(READERS[form](document, "file"), Given(unit=unit, density=2000.0), "file")
+        build_scene(READERS[form](document, "file"), Given(unit="m", density=2000.0), "file")
     except SeqoptError as error:
         said = str(error)
     assert "\n" not in said

@@ -8,8 +8,7 @@ import pytest
 import rhino3dm as rhino
 import trimesh
 from compas.datastructures import Mesh
-from compas.geometry import Box, Frame, Point, Polygon, Translation
-from compas.scene import Scene as CompasScene
+from compas.geometry import Box, Frame, Polygon, Translation
 from compas_model.elements import BeamElement, ColumnElement, PlateElement
 from compas_model.models import Model
 
@@ -379,29 +378,6 @@ def test_lists_and_dictionaries_of_compas_meshes(tmp_path):
     assert [block.key for block in read_content(path).blocks] == ["FOOT", "LEFT", "LID"]
     compas.json_dump(meshes["foot"], path)
     assert [*placed(import_scene(path, given=GIVEN)).values()] == [TOWER[1]]
-
-
-def test_a_compas_scene_shows_what_it_shows(tmp_path):
-    scene = CompasScene()
-    group = scene.add_group("stones")
-    for name, box in boxes().items():
-        low = Mesh.from_shape(box.translated([0, 0, -1]))
-        item = scene.add(low, parent=group, name=name)
-        item.transformation = Translation.from_vector([0, 0, 1 - 0.5])
-    group.transformation = Translation.from_vector([0, 0, 0.5])
-    scene.add(Point(0, 0, 0))
-    scene.add(Box(9), name="away", show=False)
-    path = tmp_path / "scene.json"
-    compas.json_dump(scene, path)
-    content = read_content(path)
-    assert [(block.key, block.group) for block in content.blocks] == [(n, "stones") for n in WHERE]
-    assert content.said[1:] == ("1 objects are left out: point", "1 objects are left out: hidden")
-    shown = {item.name: item for item in compas.json_load(path).objects}
-    for block in content.blocks:  # where COMPAS itself has them
-        item = shown[block.key]
-        own = item.item.transformed(item.worldtransformation).vertices_attributes("xyz")
-        np.testing.assert_allclose(block.vertices, own, atol=1e-12)
-    assert placed(import_scene(path, given=GIVEN)) == TOWER
 
 
 def test_elements_of_a_compas_model(tmp_path):

@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from seqopt._cli.main import main
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.exchange._compas_models import read_model, read_timber
+from seqopt.exchange._compas_models import read_model
 from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene
 from tests.blocks import box
-from tests.documents import element, matrix, model, nested, timber
+from tests.documents import element, matrix, model, nested
 
 LYING = matrix([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0]])
 # of `nested`, as ``modelgeometry.aabb()`` of compas_model 0.9.3 gives them: lowest and highest
@@ -77,17 +77,6 @@ def test_transformations_are_composed_from_the_model_down(drawn):
     local = np.array(box((1.0, 2.0, 3.0)).vertices)
     for block, at in zip(read_model(document, "tree").blocks, placed, strict=True):
         np.testing.assert_allclose(block.vertices, local @ at[:3, :3].T + at[:3, 3], atol=1e-12)
-
-
-def test_beams_of_a_group_move_with_it():
-    document = timber()
-    frame = document["data"]["elements"]["p"]["data"].pop("frame")
-    rows = [[0, 1, 0, 1000], [0, 0, 1, 0], [1, 0, 0, 50]]
-    document["data"]["elements"]["p"]["data"]["transformation"] = matrix(rows)
-    assert frame["data"]["point"] == [1000, 0, 50]
-    document["data"]["transformation"] = matrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 7]])
-    before, after = read_timber(timber(), "t").blocks[1], read_timber(document, "t").blocks[1]
-    np.testing.assert_allclose(after.vertices - before.vertices, [[0, 0, 7]] * 8)
 
 
 def turned(**more):

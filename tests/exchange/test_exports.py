@@ -9,7 +9,7 @@ import json
 import pytest
 
 from seqopt._files import write_text
-from seqopt.errors import FileError, StepError
+from seqopt.errors import FileError, SceneError, StepError
 from seqopt.exchange._content import Given
 from seqopt.exchange._tables import BlockState, step_states
 from seqopt.exchange.exports import EXPORTS, export_plan, read_folder
@@ -20,21 +20,10 @@ from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import METHODS
 from tests.builders import six_bricks
-from tests.documents import BOXES, DOCUMENTS, HIGH, LOW, TOP, obj
+from tests.documents import DOCUMENTS
 
 SCENE = six_bricks()
 STEPS = METHODS["cantilever"](build_network(SCENE), ())
-BY_SOURCE = {  # what the source calls its bricks, in build order
-    "assembly": ["4", "7"],
-    "legacy": ["0", "1", "2"],
-    "model": ["b", "c"],
-    "problem": ["b", "c"],
-    "timber": ["s", "p"],
-    "frame": ["0", "1"],
-    "meshes": ["0", "1", "2"],
-    "boxes.csv": ["2"],
-    "wall.obj": ["block_0", "block_1", "block_2"],
-}
 
 
 def test_states_follow_from_what_stands_and_who_holds():
@@ -83,21 +72,9 @@ def sources(tmp_path):
     def write(name):
         path = tmp_path / f"{name}.json"
         write_text(path, json.dumps(DOCUMENTS[name]))
-        unit = "mm" if name == "timber" else "m"
-        return path, import_scene(path, given=Given(unit=unit, density=2000.0))
+        return path, import_scene(path, given=Given(unit="m", density=2000.0))
 
     return write
-
-
-def test_a_building_plan_names_the_elements_of_its_source(sources):
-    path, scene = sources("timber")
-    steps = METHODS["sequential"](build_network(scene), ())
-    rows = json.loads(export_plan(scene, steps, "compas_timber", path))["data"]["steps"]
-    placed = [row["data"]["element_ids"] for row in rows]
-    assert [names for names in placed if names] == [["s"], ["p"]]
-    assert {name for row in rows for name in row["data"]["elements_held"]} <= {"s", "p"}
-    own = json.loads(export_plan(scene, steps, "compas_timber"))["data"]["steps"]
-    assert own[0]["data"]["element_ids"] == ["0"]
 
 
 def test_an_assembly_keeps_all_and_gains_the_plan(sources):
@@ -137,25 +114,6 @@ def test_what_does_not_fit_is_refused(sources, tmp_path):
         export_plan(SCENE, STEPS, "csv", path)
     with pytest.raises(StepError, match="the source has no block 1"):
         export_plan(SCENE, STEPS, "compas_assembly", path)
-    timber, _ = sources("timber")
-    with pytest.raises(StepError, match="the source has no block 2; give the file that was"):
-        export_plan(SCENE, STEPS, "compas_timber", timber)
-
-
-TEXTS = {"boxes.csv": BOXES, "wall.obj": obj(LOW, HIGH, TOP)}
-
-
-@pytest.mark.parametrize("name", BY_SOURCE)
-def test_a_source_is_whatever_import_took(name, tmp_path):
-    """Where it is no assembly, one of the scene's blocks says what the source calls them."""
-    path = tmp_path / (name if name in TEXTS else f"{name}.json")
-    path.write_text(TEXTS.get(name) or json.dumps(DOCUMENTS[name]), encoding="utf-8")
-    unit = {"timber": "mm", "frame": None}.get(name, "m")
-    given = Given(unit=unit, density=2000.0)
-    scene = import_scene(path, given=given)
-    steps = METHODS["sequential"](build_network(scene), ())
-    assembly = json.loads(export_plan(scene, steps, "compas_assembly", path))
-    assert '"place_step": 1' in json.dumps(assembly)
-    rows = json.loads(export_plan(scene, steps, "compas_timber", path))["data"]["steps"]
-    placed = [name for row in rows for name in row["data"]["element_ids"]]
-    assert placed == BY_SOURCE[name]
+    meshes, _ = sources("meshes")
+    with pytest.raises(SceneError, match="an object is expected"):
+        export_plan(SCENE, STEPS, "compas_assembly", meshes)

@@ -11,7 +11,6 @@ import trimesh
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene
-from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import _parse_scene, dump_scene
 from tests.blocks import box
@@ -108,33 +107,6 @@ def test_a_problem_brings_the_stiffness_of_its_joints(read):
     assert read("p.json", DOCUMENTS["problem"], own).joints[0].translational_stiffness[0] == 2e9
 
 
-def test_beams_start_at_their_frames(read):
-    """A post of 1.5 m on the center line of a sill: it stands 0.05 m over the ground."""
-    scene = read("t.json", DOCUMENTS["timber"], Given(unit="mm", density=450.0))
-    sill, post = scene.bricks
-    assert sill.position == pytest.approx((1.0, 0.0, 0.05))
-    assert post.position == pytest.approx((1.0, 0.0, 0.05 + 0.75))
-    assert post.mass == pytest.approx(450 * 1.5 * 0.1 * 0.1)
-    (joint,) = scene.joints  # the post runs into the sill: no face, but the model has a joint
-    assert joint.face is None
-    assert joint.position == pytest.approx((1.0, 0.0, 0.05))
-    assert joint.translational_stiffness[0] == pytest.approx(1.5e9 * 0.01)
-
-
-def test_bars_of_a_frame(read):
-    """Two bars of 1 cm² and sqrt(2) m: weight per volume, half of each bar's flexibility."""
-    scene = read("f.json", DOCUMENTS["frame"], Given())
-    length = np.sqrt(2)
-    weight = [brick.mass * STANDARD_GRAVITY for brick in scene.bricks]
-    assert weight == pytest.approx([78.5e3 * 1e-4 * length] * 2)
-    (joint,) = scene.joints
-    assert joint.translational_stiffness[0] == pytest.approx(2.1e11 * 1e-4 / length)
-    assert [ground.brick for ground in scene.grounds] == [0, 1]
-    end, half = scene.grounds[0], length / 2
-    assert end.translational_stiffness[0] == pytest.approx(2.1e11 * 1e-4 / half)
-    assert end.rotational_stiffness[1] == pytest.approx(2.1e11 * 0.08e-8 / half)
-
-
 def test_meshes_of_every_kind(read):
     parts = [LOW, HIGH, TOP]
     scene = read("wall.obj", obj(*parts))
@@ -210,8 +182,6 @@ def test_units(read):
     document = DOCUMENTS["meshes"]
     small = read("a.json", document, Given(unit="cm", density=2400.0))
     assert small.bricks[0].mass == pytest.approx(2400e-6)
-    with pytest.raises(SceneError, match="lengths are known in m; give no other unit"):
-        read("f.json", DOCUMENTS["frame"], Given(unit="mm"))
 
 
 def bent(index=4, by=0.01):
@@ -302,6 +272,9 @@ def test_what_can_be_mended_is_mended_and_said(read):
         ("a.json", '{"node": ' + "9" * 5000 + "}", METERS, "too many digits"),
         ("a.json", {"format": "seqopt-scene"}, METERS, "a scene of seqopt already"),
         ("a.json", {"stones": 3}, METERS, "no assembly that is known"),
+        ("a.json", {"unit": "meter", "nodes": []}, METERS, "no assembly that is known"),
+        ("a.json", {"dtype": "compas.scene/Scene", "data": {}}, METERS, "a scene cannot be read"),
+        ("a.json", {"dtype": "compas_timber.model/TimberModel"}, METERS, "save the meshes of"),
         ("a.json", {"dtype": "compas_dem.problem/Problem", "data": {}}, METERS, "give the model"),
         ("a.json", {"node": {}, "edge": {}}, METERS, "it has no blocks"),
         ("a.json", {"node": {"0": {"block": None}}}, METERS, "block 0 is None"),

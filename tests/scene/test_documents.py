@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 
 import pytest
+from hypothesis import HealthCheck, given, settings
 
 from seqopt.contact.faces import bare_assembly
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Joint, Robot
-from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene
+from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene, save_scene
 from tests.blocks import with_shapes
 from tests.builders import six_bricks
+from tests.strategies import scenes_with_all
 
 TEXT = dump_scene(six_bricks())
 
@@ -118,3 +121,27 @@ def test_a_malformed_shape_gets_one_clear_line(change, named):
     with pytest.raises(SceneError, match=named) as caught:
         _parse_scene(reshaped(change), "broken.json")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.filterwarnings("ignore::seqopt.errors.SceneWarning")  # bricks in one place, say
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(scene=scenes_with_all())
+def test_a_scene_comes_back_from_its_file(tmp_path, scene):
+    save_scene(scene, tmp_path / "scene.json")
+    assert load_scene(tmp_path / "scene.json") == scene
+
+
+def test_every_part_of_a_scene_is_drawn():
+    """The control: the strategy leaves nothing at its default, so a new field must be drawn too."""
+    seen = {}
+
+    @settings(max_examples=60, database=None)
+    @given(scene=scenes_with_all())
+    def collect(scene):
+        for part in (scene, *scene.bricks, *scene.joints, *scene.grounds, *scene.loads):
+            kind = type(part).__name__
+            for each in fields(part):
+                seen.setdefault((kind, each.name), set()).add(repr(getattr(part, each.name)))
+
+    collect()
+    assert [name for name, values in seen.items() if len(values) == 1] == []

@@ -23,7 +23,7 @@ class Export(options.Postures):
     """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
 
     It says which block is absent, placed or held in which step, what each robot does and where, or
-    is the scene with its plan.
+    is the assembly with its plan.
 
     Which plan, and in which format?
     folder : PLAN_DIR|SCENE
@@ -31,8 +31,7 @@ class Export(options.Postures):
     format : NAME
         what to write: {choices} (default: {default})
     source : FILE
-        with a format of COMPAS: the file that was imported, to name its elements or to write the
-        plan into
+        with compas_assembly: the assembly that was imported, to write the plan into
     distance : M
         with tasks, tasks_csv or compas_fab: from a grip to where the tool comes from and goes to, m
         (default: the longest side of each block)
