@@ -60,8 +60,9 @@ from formulations.solvers import anatomy, minimize_whole
 from seqopt import Network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.formulation import On, Watch, find_formulation, formulations, trace_rows
+from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.plan._layers import best_choice, compiled
+from seqopt.plan._layers import best_choice
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
@@ -85,7 +86,7 @@ def compared(net: Network, criterion: Criterion, rounds: int) -> dict[str, float
     row["models"] = float(problem.evaluation.models)
     for name, formulation in formulations(On.LAYERS).items():
         if formulation.aim is Aim.SUM:
-            graph = compiled(problem, Aim.SUM, alone=formulation.alone).instance
+            graph = compile_layers(problem, Aim.SUM, alone=formulation.alone).instance
             row[name] = best(partial(formulation.solve, graph), rounds)
             row[f"gap_{name}"] = solve(problem, formulation).certificate.gap
     return row
@@ -225,7 +226,7 @@ def written(
     """Return size, bound, nodes and time of a program, and what was found at which time."""
     costs = aim.costs(problem)
     optimum = aim.value_of(costs, best_choice(name, costs, aim))
-    graph = compiled(problem, aim, alone=find_formulation(name).alone).instance.asked
+    graph = compile_layers(problem, aim, alone=find_formulation(name).alone).instance.asked
     written = SHAPES[aim][name](graph)
     size, relaxed = anatomy(written.program)
     watch, start = Watch(limit), time.perf_counter()

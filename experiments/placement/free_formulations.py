@@ -40,7 +40,7 @@ from seqopt.graph.formulation import (
     find_formulation,
     formulations,
 )
-from seqopt.plan._layers import compiled
+from seqopt.graph.layers.compiled import compile_layers
 from seqopt.plan.solving import graph_of
 from seqopt.problem.problem import Aim
 
@@ -68,7 +68,7 @@ def run(part: str, scene: str, aim: str, formulation: Formulation) -> tuple[Plan
     start = time.process_time()
     graph = graph_of(problem, formulation.on)
     if formulation.on is On.LAYERS:
-        graph = compiled(graph, formulation.aim, alone=formulation.alone).instance
+        graph = compile_layers(graph, formulation.aim, alone=formulation.alone).instance
     found = formulation.solve(graph, seconds=PATIENCE)
     seconds = time.process_time() - start
     layers, bricks = formulation.on is On.LAYERS, len(engine.network.scene.bricks)

@@ -22,6 +22,7 @@ Inputs: the shipped scene. Command: ``python -m experiments.placement.robust_pla
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,10 +36,10 @@ from experiments.harness.scenes import half_circle
 from experiments.placement.parts.in_order import least_quantile, solve_in_order
 from formulations.scenario_program import solve_program
 from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
+from seqopt.arrays import Floats
 from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.compiled import compile_totals
-from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.scenarios import Choice, ScenarioLayers, in_scenarios
+from seqopt.graph.layers.layers import Layers, candidate_layers, in_scenarios
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
@@ -52,6 +53,7 @@ AIMS: dict[RobustAim, Criterion] = {
     cvar(0.9): WEIGHTED,
     cvar(0.5): WEIGHTED,
 }
+Choice = tuple[int, ...]
 UNSEEN_SEED = 1000  # no plan is made with it
 TAIL = cvar(0.9)
 
@@ -70,12 +72,16 @@ def posed(scene: Scene, criterion: Criterion) -> Layers:
     return candidate_layers(engine, three_robot_loop(engine.network), criterion)
 
 
-def over_draws(problem: Layers, count: int, seed: int) -> ScenarioLayers:
+def over_draws(problem: Layers, count: int, seed: int) -> Layers:
     """Return the problem over so many scenarios, costs computed."""
     scene = problem.schedule.scene
     found = in_scenarios(problem, scenarios(scene, count=count, seed=seed).scenes, WORST_PEAK)
-    assert found.costs
-    return found
+    return replace(found, known=found.costs_in_scenarios)
+
+
+def values(problem: Layers, aim: Aim, choice: Choice) -> Floats:
+    """Return the value of a choice in every scenario, infinite where it exceeds a limit."""
+    return np.array([aim.value_of(costs, choice) for costs in problem.layered(aim)])
 
 
 def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
@@ -86,12 +92,13 @@ def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
             most = over_draws(problem, max(effort.counts), seed)
             for aim in (aim for aim, own in AIMS.items() if own is criterion):
                 for count in effort.counts:
-                    plan = solve(most.under(aim).first(count))
+                    some, known = most.scenes[:count], most.known[:count]
+                    plan = solve(replace(most, over=aim, scenes=some, known=known))
                     row = {"aim": str(aim), "criterion": criterion.name, "seed": seed}
                     yield row | {"scenarios": count} | measured(plan, unseen)
 
 
-def measured(plan: Plan, unseen: ScenarioLayers) -> dict[str, object]:
+def measured(plan: Plan, unseen: Layers) -> dict[str, object]:
     """Return what a plan is worth where it was made and elsewhere."""
     trial, proof = judge_unseen(plan, unseen).summary(), plan.certificate
     assert proof is not None
@@ -104,7 +111,7 @@ def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
     """Return the integer programs beside the cuts: values, bounds and times."""
     found, most = [], over_draws(posed(scene, WEIGHTED), count, 0)
     for aim in (WORST_TOTAL, TAIL):
-        plan = solve(most.under(aim))
+        plan = solve(replace(most, over=aim))
         start = time.perf_counter()
         compiled = compile_totals("totals", most.layered(Aim.SUM), aim)
         told, value = solve_program(
@@ -128,8 +135,8 @@ def plans(scene: Scene, count: int) -> dict[str, Choice]:
         "worst, then sum": solve_in_order([(worst.peaks, Aim.PEAK), (total.sums, Aim.SUM)]).choice,
         "all but a tenth of the steps": least_quantile(worst, 0.1).choice,
         "robust, worst peak": solve(peaks).choice,
-        "robust, worst total": solve(totals.under(WORST_TOTAL)).choice,
-        "robust, cvar=0.9": solve(totals.under(TAIL)).choice,
+        "robust, worst total": solve(replace(totals, over=WORST_TOTAL)).choice,
+        "robust, cvar=0.9": solve(replace(totals, over=TAIL)).choice,
     }
 
 
@@ -144,7 +151,7 @@ def judged(scene: Scene, count: int, unseen: int) -> pd.DataFrame:
 
     rows = []
     for name, choice in plans(scene, count).items():
-        high, sums = peaks.values(choice, Aim.PEAK), totals.values(choice, Aim.SUM)
+        high, sums = values(peaks, Aim.PEAK, choice), values(totals, Aim.SUM, choice)
         row = {"plan": name, "ranks": ranks.sums.cost(choice), "sum": total.sums.cost(choice)}
         row |= {"worst": worst.peaks.worst(choice), "tenth": tenth(choice)}
         row |= {"unseen_peak": WORST_PEAK.value(high), "unseen_peak_median": float(np.median(high))}

@@ -68,7 +68,7 @@ def _plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
         tables["selection"] = plan.table()
     elif plan.graph.standing is not None:
         tables["stability"] = plan.stability()
-    if choices and isinstance(plan.graph, Layers):
+    if choices and isinstance(plan.graph, Layers) and not plan.graph.scenes:
         tables["responses"] = plan.alternatives()
     if plan.engine.network.scene.props:
         tables["props"] = plan.props()

@@ -23,10 +23,10 @@ from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines._kinds import ChoosingEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import SceneError
+from seqopt.errors import ProblemError, SceneError
 from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network
-from seqopt.scene._armed import held_postures
+from seqopt.scene._armed import held_postures, hold_alike
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import scene_to_dict
 
@@ -114,6 +114,26 @@ def recipe_of(engine: object) -> Recipe | None:
     """Return how an engine was made, if by name, or what one of one's own has as ``recipe``."""
     found = getattr(engine, "recipe", None)
     return found if isinstance(found, Recipe) else None
+
+
+def recipe_for(engine: Engine, scene: Scene) -> Recipe:
+    """Return how to make an engine of the same kind and settings for another scene.
+
+    Arms hold in it in the postures of the engine's own scene. Raises `ProblemError` if the engine
+    was not made by name.
+    """
+    recipe = recipe_of(engine)
+    if recipe is None:
+        raise ProblemError(
+            f"engine {type(engine).__name__}: scenarios need engines of their own; take "
+            "one of seqopt.make_engine"
+        )
+    return replace(recipe, scene=hold_alike(engine.network.scene, scene))
+
+
+def engine_for(engine: Engine, scene: Scene) -> Engine:
+    """Return an engine of the same kind and settings for another scene."""
+    return recipe_for(engine, scene).make()
 
 
 def _loaded(name: str, network: Network | Scene, **options: Any) -> Engine:

@@ -120,6 +120,8 @@ class Instance(FrozenValue, Shown):
 
     models = 0  # that were solved: none, all is given
     among = ""
+    title = ""
+    scenarios = ()
 
     def names_of(self, _: object) -> tuple[str, ...]:
         """Return what every goal is called."""

@@ -17,11 +17,11 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Moves
 from seqopt.graph.paths import keep_best
-from seqopt.graph.scenarios import _pickled
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore, move_amounts
 from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
 from seqopt.problem.problem import LARGEST, Measure, Orders
+from seqopt.problem.requirements import pickled
 from seqopt.responses._blocks import packed, unpacked
 from seqopt.scene._armed import can_hold
 from seqopt.scene.scene import Order, Scene
@@ -389,7 +389,7 @@ def trying(problem: AllOrders, *, elsewhere: bool) -> Callable[[Trial], float]:
     sent = ("engine", "scenarios")
     rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name not in sent}
     others = tuple(map(packed, free.scenarios))
-    content = _pickled((rest, others, problem.among), free.criterion)
+    content = pickled((rest, others, problem.among), free.criterion)
     return partial(_sent, packed(free.engine), content)
 
 

@@ -17,13 +17,11 @@ from seqopt.graph._timed import TimedGraph
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
-from seqopt.graph.layers.compiled import on_paths
+from seqopt.graph.layers.compiled import compile_layers, on_paths
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
-from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states._visits import FreeStates, ScenarioSums
 from seqopt.graph.states.states import States
-from seqopt.plan._layers import compiled
 from seqopt.plan.solving import graph_of, natural, usual
 from seqopt.problem.problem import Aim, Measure, Problem, RobustAim
 from seqopt.sequence._robot_kinds import node_numbers
@@ -80,7 +78,7 @@ def compile_instance(
 
 def _made(problem: Problem, name: str, aim: Aim | None, below: float) -> Instance:
     graph = graph_of(problem, natural(problem))
-    if not isinstance(graph, Layers | ScenarioLayers):
+    if not isinstance(graph, Layers):
         return _of_states(name, graph, below)
     if below < np.inf:
         raise ProblemError("below: it is about states; name aims, or leave it out")
@@ -92,11 +90,10 @@ def _usual_aim(problem: Problem) -> Aim | None:
     return found.aim
 
 
-def _of_layers(name: str, graph: Layers | ScenarioLayers, aim: Aim | None) -> Instance:
+def _of_layers(name: str, graph: Layers, aim: Aim | None) -> Instance:
     """Return the instance of candidates: a level for every move."""
-    nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
-    nominal.require_possible()
-    found = compiled(graph, aim, name)
+    graph.require_possible()
+    found = compile_layers(graph, aim, name)
     if found.offset:
         raise ProblemError(
             f"instance {name}: a cost is below zero; ask for a criterion that is never negative"

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seqopt.arrays import Ints
-from seqopt.engines.registry import recipe_of
+from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
 from seqopt.graph.duality import least_sum
 from seqopt.graph.instance import Instance, _Cap
 from seqopt.graph.paths import distances, least_peak, tied
-from seqopt.graph.scenarios import engine_for
 from seqopt.graph.states._visits import barred, explore
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import case_of, is_kept, least_within

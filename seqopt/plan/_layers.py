@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,10 +19,9 @@ from seqopt.graph.formulation import (
     formulations,
     timed,
 )
-from seqopt.graph.layers.compiled import Compiled, compile_costs, compile_totals
+from seqopt.graph.layers.compiled import compile_costs, compile_layers
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.layers import Layers, _require_carried, steps_over, travel
-from seqopt.graph.scenarios import ScenarioLayers, engine_for, largest_of
+from seqopt.graph.layers.layers import Layers, steps_over, travel
 from seqopt.graph.solution import StatePath
 from seqopt.judge._step_checks import check_shape
 from seqopt.judge.certificate import _require_anew, certify_partial
@@ -39,7 +38,6 @@ from seqopt.work._clock import INTERRUPT
 
 CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
 EFFORT = ("seconds", "max_memory")  # of any formulation; responses have a memory of their own
-Choices = Layers | ScenarioLayers
 
 
 def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
@@ -60,7 +58,7 @@ def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
     return replace(problem, budgets=tuple(budgets)) if budgets else problem
 
 
-def solve_layers(graph: Choices, formulation: Formulation, run: Run) -> Plan:
+def solve_layers(graph: Layers, formulation: Formulation, run: Run) -> Plan:
     """Return the plan of a formulation of candidates, of one scene or over scenarios.
 
     Raises `InfeasibleError` if no choice is allowed; `ProblemError` if graph, formulation and
@@ -72,37 +70,11 @@ def solve_layers(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     limit = min(run.time_limit, run.options.get("seconds", math.inf))
     own = {name: value for name, value in run.options.items() if name not in EFFORT}
     run = replace(run, options=own, time_limit=limit)
-    if isinstance(graph, Layers):
-        graph.require_possible()
-    else:
-        _require_carried(graph.nominal.schedule, (graph.nominal.schedule.scene, *graph.scenes))
+    graph.require_possible()
     if run.lazy:
         require_proof(run.proof)
         return _solve_lazily(graph, formulation, run)
     return (_solve_all if run.proof else _solve_windows)(graph, formulation, run)
-
-
-def compiled(graph: Choices, aim: Aim | None, name: str = "", *, alone: bool = False) -> Compiled:
-    """Return the graph of choices, of one scene or over scenarios, whose sums or peaks count.
-
-    ``alone``: whether with what a search of one move alone is charged; of peaks, with their parts.
-    """
-    nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
-    name, nodes = name or nominal.schedule.scene.name, nominal.candidates
-    if isinstance(graph, ScenarioLayers) and graph.aim.aim is Aim.SUM:
-        layers = graph.layered(Aim.SUM)
-        largest_of(layers)  # says if no choice is allowed in all scenarios
-        return compile_totals(name, layers, graph.aim, nodes)
-    aim = aim or Aim.SUM
-    costs = charged = aim.costs(graph)
-    if aim is Aim.SUM and alone and isinstance(graph, Layers):
-        charged = graph.alone
-    found = compile_costs(name, costs, aim, graph.budgets, charged if alone else None, nodes)
-    if isinstance(graph, Layers):
-        return found
-    (goal,) = found.instance.goals
-    named = goal._replace(name=f"{goal.name} ({graph.aim})")
-    return found._replace(instance=replace(found.instance, goals=(named,)))
 
 
 def best_choice(name: str, costs: LayeredCosts, aim: Aim) -> tuple[int, ...]:
@@ -127,20 +99,20 @@ def on_the_way(plan: Plan) -> Plan:
     return plan
 
 
-def _solve_all(graph: Choices, formulation: Formulation, run: Run) -> Plan:
+def _solve_all(graph: Layers, formulation: Formulation, run: Run) -> Plan:
     """Return the certified plan of a formulation that is given the costs of all choices."""
     seconds: dict[str, float] = {}
     with run.clock.needed("computing the responses of all choices"):
         stages = graph.seconds(formulation.aim or Aim.SUM)  # of costs: solving is timed alone
         with timed(seconds, "compile"):
-            found = compiled(graph, formulation.aim, alone=formulation.alone)
+            found = compile_layers(graph, formulation.aim, alone=formulation.alone)
     path = find_path(found.instance, formulation, run, found.offset)
     choice = found.choice([node for (node,) in path.selection.states])
     seconds |= path.seconds | {"compile": seconds["compile"] + path.seconds["compile"]}
     proof = path.certificate
     with timed(seconds, "verify"):
         if proof is not None:
-            for layers in _from_cache(graph):
+            for layers in graph.from_cache:
                 _require_anew(layers, choice)
             spent = {budget.name: budget.spent(choice) for budget in graph.budgets}
             proof = replace(proof, spent=spent)  # amounts below zero and without a bound as well
@@ -151,7 +123,7 @@ def _solve_all(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     return Plan(graph, graph, formulation, selection, proof, steps, {**stages, **seconds})
 
 
-def _solve_windows(graph: Choices, formulation: Formulation, run: Run) -> Plan:
+def _solve_windows(graph: Layers, formulation: Formulation, run: Run) -> Plan:
     """Return the plan of a search that solves only the models it meets."""
     alone = formulation.window_options
     if alone is None or run.options not in ({}, alone):
@@ -162,7 +134,7 @@ def _solve_windows(graph: Choices, formulation: Formulation, run: Run) -> Plan:
             f"{formulation.name}{options} looks beyond the window of a move and needs all models: "
             f"use {' or '.join(able)} without options, or ask for the proof"
         )
-    if not isinstance(graph, Layers):
+    if graph.scenes:
         raise ProblemError("the costs of all choices are needed; ask for the proof")
     if getattr(graph.criterion, "among", Among.ALL) is not Among.ALL:
         raise ProblemError(
@@ -182,9 +154,9 @@ def _solve_windows(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     return Plan(graph, graph, formulation, chosen, None, steps, stages, found)
 
 
-def _solve_lazily(graph: Choices, formulation: Formulation, run: Run) -> Plan:
+def _solve_lazily(graph: Layers, formulation: Formulation, run: Run) -> Plan:
     """Return the certified plan of a search that solves only the models that the proof needs."""
-    if not isinstance(graph, Layers):
+    if graph.scenes:
         raise ProblemError("the costs of all choices are needed; leave out lazy")
     if run.options:
         raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
@@ -202,31 +174,15 @@ def _solve_lazily(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     return Plan(graph, graph, formulation, chosen, certificate, steps, seconds, along, found.models)
 
 
-def _checked(steps: tuple[Step, ...], graph: Choices) -> tuple[Step, ...]:
+def _checked(steps: tuple[Step, ...], graph: Layers) -> tuple[Step, ...]:
     """Return steps in which arms can be, and robots bear bricks; else a `SolverError` says why."""
-    nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
-    worlds = graph.scenes if isinstance(graph, ScenarioLayers) else ()
+    engine, schedule = graph.engine, graph.schedule
     try:
-        if isinstance(nominal, Layers):
-            check_postures(nominal.schedule.scene, steps)
-            _check_shape(graph, nominal, steps)
-            check_carried(nominal.engine.network.scene, nominal.schedule, steps, worlds)
+        check_postures(schedule.scene, steps)
+        if any(limit.label == LINEAR_RANGE for limit in graph.limits):
+            for each in graph.scenarios or (engine,):
+                check_shape(each, steps, graph.limits)
+        check_carried(engine.network.scene, schedule, steps, graph.scenes)
     except StepError as error:
         raise SolverError(f"a choice is not allowed: {error}") from error
     return steps
-
-
-def _check_shape(graph: Choices, nominal: Layers, steps: Sequence[Step]) -> None:
-    """Raise a `SolverError` if steps leave the linear range in any scenario and may not."""
-    if any(limit.label == LINEAR_RANGE for limit in nominal.limits):
-        scenes = graph.scenes if isinstance(graph, ScenarioLayers) else ()
-        own = (engine_for(nominal.engine, scene) for scene in scenes)
-        for engine in own if scenes else (nominal.engine,):
-            check_shape(engine, steps, nominal.limits)
-
-
-def _from_cache(graph: Choices) -> Iterator[Layers]:
-    """Return the layers whose responses may come from files."""
-    if isinstance(graph, ScenarioLayers):
-        return graph.from_cache
-    return iter((graph,) if isinstance(graph, Layers) else ())

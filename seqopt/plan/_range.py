@@ -14,8 +14,6 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import _chooser_of
 from seqopt.errors import InfeasibleError, SeqoptError, message_of
 from seqopt.graph.formulation import End
-from seqopt.graph.scenarios import ScenarioLayers, engine_for
-from seqopt.graph.states.states import States
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE
@@ -54,12 +52,7 @@ def keeping(found: Found, moved: Moved, again: Callable[[], Found]) -> tuple[Fou
 
 def engines_of(plan: Plan) -> Sequence[Engine]:
     """Return what computes responses where limits hold: of all scenarios, or of the scene."""
-    graph = plan.graph
-    if isinstance(graph, States) and graph.scenarios:
-        return graph.scenarios
-    if isinstance(graph, ScenarioLayers):
-        return [engine_for(plan.engine, scene) for scene in graph.scenes]
-    return (plan.engine,)
+    return plan.graph.scenarios or (plan.engine,)
 
 
 def measured(plan: Plan, clock: Clock) -> Plan:

@@ -11,8 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import recipe_of
-from seqopt.graph.scenarios import engine_for
+from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.network.network import Network
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses.quantities import _payload_text, _plain

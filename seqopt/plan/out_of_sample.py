@@ -15,7 +15,8 @@ import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.scenarios import Choice, ScenarioCosts, ScenarioLayers, in_scenarios
+from seqopt.graph.layers.costs import ScenarioCosts
+from seqopt.graph.layers.layers import Layers, in_scenarios
 from seqopt.graph.states.states import over_scenarios
 from seqopt.judge.schedules import plan_values
 from seqopt.plan._layers import best_choice
@@ -40,8 +41,8 @@ class Trial(Terse):
     """
 
     plan: Plan
-    layers: ScenarioLayers
-    nominal: Choice
+    layers: Layers
+    nominal: tuple[int, ...]
     table: pd.DataFrame
 
     def __repr__(self) -> str:
@@ -56,7 +57,7 @@ class Trial(Terse):
 
     def summary(self) -> dict[str, dict[str, float]]:
         """Return what the aim makes of every set of scenarios, by plan; some may be infinite."""
-        aim = self.layers.aim
+        aim = self.layers.over
         column = "peak" if aim.aim is Aim.PEAK else "total"
         return {
             str(name): {plan: aim.value(rows[f"{plan}_{column}"].to_numpy()) for plan in PLANS}
@@ -64,7 +65,7 @@ class Trial(Terse):
         }
 
 
-def judge_unseen(plan: Plan, scenes: ScenarioLayers | Scenarios | Sequence[Scene]) -> Trial:
+def judge_unseen(plan: Plan, scenes: Layers | Scenarios | Sequence[Scene]) -> Trial:
     """Return the value of a plan in other scenarios, beside two plans for comparison.
 
     ``plan``: of candidates over scenarios; ``scenes``: not those it was made for: drawn with
@@ -73,17 +74,18 @@ def judge_unseen(plan: Plan, scenes: ScenarioLayers | Scenarios | Sequence[Scene
     bricks or nodes.
     """
     problem = plan.graph
-    if not isinstance(problem, ScenarioLayers):
+    if not isinstance(problem, Layers) or not problem.scenes:
         raise ProblemError("the plan was not chosen over scenarios; pose with scenarios")
-    nominal, aim = problem.nominal, problem.aim.aim
+    nominal, aim = problem.alone_in_scene, problem.over.aim
     known = ScenarioCosts(nominal.sums, nominal.peaks, 0, 0.0)
     chosen = best_choice(nominal.schedule.scene.name, aim.costs(nominal), aim)
-    if not isinstance(scenes, ScenarioLayers):
+    if not isinstance(scenes, Layers):
         some = scenes.scenes if isinstance(scenes, Scenarios) else scenes
-        scenes = in_scenarios(nominal, some, problem.aim)
-    sets = {"nominal": (known,), "optimized": problem.costs, "unseen": scenes.costs}
+        scenes = in_scenarios(nominal, some, problem.over)
+    sets = {"nominal": (known,), "optimized": problem.costs_in_scenarios}
+    sets["unseen"] = scenes.costs_in_scenarios
     rows: list[dict[str, object]] = [
-        {"set": name, "scenario": i, **_row(costs, problem, (plan.choice, chosen))}
+        {"set": name, "scenario": i, **_row(costs, aim, (plan.choice, chosen))}
         for name, found in sets.items()
         for i, costs in enumerate(found, start=1)
     ]
@@ -103,11 +105,8 @@ def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
     return dict(zip(judged.names, plan_values(judged, plan.steps), strict=True))
 
 
-def _row(
-    costs: ScenarioCosts, problem: ScenarioLayers, choices: tuple[Choice, Choice]
-) -> dict[str, float]:
+def _row(costs: ScenarioCosts, aim: Aim, choices: Sequence[tuple[int, ...]]) -> dict[str, float]:
     """Return what three plans cost in a scenario."""
-    aim = problem.aim.aim
     try:
         best = best_choice("scenario", aim.costs(costs), aim)
     except InfeasibleError:

@@ -18,7 +18,6 @@ from seqopt.errors import ProblemError
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind
 from seqopt.graph.instance import Instance
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
@@ -62,7 +61,7 @@ class Plan(ShownBuild):
     ----------
     problem : Problem
         What was asked; or the graph of choices, where that was given.
-    graph : Layers, ScenarioLayers, States or Instance
+    graph : Layers, States or Instance
         What was chosen from.
     formulation : Formulation
         The formulation that solved it.
@@ -98,8 +97,8 @@ class Plan(ShownBuild):
     (<Status.OPTIMAL: 'optimal'>, 0)
     """
 
-    problem: Problem | Layers | ScenarioLayers | States | AllOrders | Instance
-    graph: Layers | ScenarioLayers | States | Instance
+    problem: Problem | Layers | States | AllOrders | Instance
+    graph: Layers | States | Instance
     formulation: Formulation
     selection: StatePath
     certificate: Certificate | None
@@ -185,9 +184,7 @@ class Plan(ShownBuild):
         """The name of the plan where it is shown next to others."""
         if self.order is not None:
             return "best order"
-        if isinstance(self.graph, ScenarioLayers):
-            return str(self.graph.aim)
-        return self.graph.title if isinstance(self.graph, States) else self.formulation.name
+        return self.graph.title or self.formulation.name
 
     @property
     def goals(self) -> tuple[str, ...]:
@@ -283,9 +280,8 @@ class Plan(ShownBuild):
         if self.certificate is None:
             values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
             return f"{values} (claimed), {self.status}" if values else _UNCOMPARED
-        among = self.among if isinstance(self.graph, Layers | ScenarioLayers) else ""
         gap = f"gap {100 * _known_gap(self.certificate.gap):.3g} %"
-        proven = f"heuristic: {among}" if among else gap
+        proven = f"heuristic: {self.among}" if self.among else gap
         return f"objective {self.certificate.objective:.6g}, {proven}"
 
     @property
@@ -374,7 +370,7 @@ class Plan(ShownBuild):
         from seqopt.plan import _tables  # noqa: PLC0415  # only where files are written
 
         aim = self.formulation.aim
-        if aim is None or isinstance(self.graph, ScenarioLayers):
+        if aim is None or self.graph.scenarios:
             return _tables.moves_table(self.layers, self.choice, self.grips())
         return _tables.chosen_table(self.layers, self.choice, aim, self.search, self.grips())
 
@@ -399,6 +395,7 @@ class Plan(ShownBuild):
             self.certificate is None
             or self.search is not None
             or not isinstance(self.graph, Layers)
+            or self.graph.scenarios
         ):
             return {"objectives": None, "gap_parts": None}
         from seqopt.plan._tables import split_objectives  # noqa: PLC0415  # only in summaries
@@ -500,7 +497,7 @@ def _layers_asked(plan: Plan) -> dict[str, object]:
         "aims": list(plan.goals),
         "criterion": layers.criterion.name,
         **layers.criterion.settings,
-        "scenarios": len(graph.scenes) if isinstance(graph, ScenarioLayers) else 0,
+        "scenarios": len(graph.scenarios),
         "limits": _limits_asked(plan),
         "rules": {},
         "stands": None,

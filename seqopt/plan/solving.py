@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import recipe_of, simplest
+from seqopt.engines.registry import engine_for, recipe_of, simplest
 from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph.formulation import Formulation, On, Run, as_formulation
-from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.scenarios import ScenarioLayers, engine_for, in_scenarios
+from seqopt.graph.layers.layers import Layers, candidate_layers, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._range import best_within
@@ -50,7 +49,7 @@ if TYPE_CHECKING:
     from seqopt.graph.instance import Instance
     from seqopt.graph.orders import AllOrders
 
-    Graph = Layers | ScenarioLayers | States | AllOrders
+    Graph = Layers | States | AllOrders
 
 _FEWER = (4, 2, 1)  # postures at each node, where plans with more of them do not keep theirs
 _SAME = 1e-9  # over the size of a value
@@ -247,8 +246,7 @@ def _scaled_criterion(problem: Problem) -> Criterion:
     if natural(problem) in (On.STATES, On.ORDERS, On.TIMES):
         return states_of(problem).criterion
     parse_budgets(problem.budgets)
-    layers = _scenarios(problem).nominal if problem.scenarios else _plain_layers(problem)
-    return layers.criterion
+    return (_scenarios(problem) if problem.scenarios else _plain_layers(problem)).criterion
 
 
 def _plain_layers(problem: Problem) -> Layers:
@@ -262,7 +260,7 @@ def _plain_layers(problem: Problem) -> Layers:
     return found
 
 
-def _layers(problem: Problem) -> Layers | ScenarioLayers:
+def _layers(problem: Problem) -> Layers:
     """Return the layers of a problem; with scenarios the largest costs in any."""
     _require_candidates(problem)
     if problem.scenarios:
@@ -270,7 +268,7 @@ def _layers(problem: Problem) -> Layers | ScenarioLayers:
     return with_budgets(_plain_layers(problem), parse_budgets(problem.budgets))
 
 
-def _scenarios(problem: Problem) -> ScenarioLayers:
+def _scenarios(problem: Problem) -> Layers:
     _require_candidates(problem)
     if problem.budgets:
         raise ProblemError(
@@ -359,7 +357,7 @@ def _solver(on: On) -> Callable[[Any, Formulation, Run], Plan]:
 
 
 def solve(
-    problem: Problem | Layers | ScenarioLayers | States | AllOrders | Instance,
+    problem: Problem | Layers | States | AllOrders | Instance,
     formulation: Formulation | str | None = None,
     *,
     proof: bool = True,
@@ -461,18 +459,18 @@ def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> 
 
     if isinstance(problem, Instance):
         return solve_instance(problem, formulation, run)
+    robust = capped = False
     match problem:
         case States():
             on = On.TIMES if problem.is_timed else On.STATES
         case AllOrders():
             on = On.ORDERS
-        case ScenarioLayers():
-            on = On.LAYERS if problem.aim.aim is Aim.PEAK else On.SCENARIOS
         case Layers():
-            on = On.LAYERS
+            totals = problem.scenes and problem.over.aim is Aim.SUM
+            on = On.SCENARIOS if totals else On.LAYERS
+            robust, capped = bool(problem.scenes), bool(problem.budgets)
         case _:
             kind = type(problem).__name__
             raise ProblemError(f"a {kind} is not a problem; give one that seqopt.pose made")
-    capped = on is On.LAYERS and bool(problem.budgets)
-    name = formulation or _usual_on(on, robust=isinstance(problem, ScenarioLayers), capped=capped)
+    name = formulation or _usual_on(on, robust=robust, capped=capped)
     return _solver(on)(problem, as_formulation(name, on), run)

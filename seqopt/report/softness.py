@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 
 from seqopt.engines.interface import Engine
+from seqopt.engines.registry import engine_for
 from seqopt.errors import SceneError
-from seqopt.graph.scenarios import engine_for
 from seqopt.report.comparison import LARGEST
 from seqopt.report.text import IN_UNITS, QUANTITIES
 from seqopt.responses._blocks import Block

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.errors import SceneError
+from seqopt.errors import ProblemError, SceneError
 from seqopt.scene._checks import short, whole_between
 from seqopt.scene.boxes import as_vector
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
@@ -284,3 +284,24 @@ def _from_zero(name: str, given: float, most: float) -> float:
         limit = f" to below {most:g}" if math.isfinite(most) else ""
         raise SceneError(f"{name} is {short(given)}; give a number from 0{limit}")
     return float(given)
+
+
+def require_alike(nominal: Scene, scene: Scene, number: int) -> None:
+    """Raise a `ProblemError` if a scenario differs in more than stiffness, density, position."""
+    if not isinstance(scene, Scene):
+        raise ProblemError(f"scenario {number}: {short(scene)} is not a scene")
+
+    def meant(it: Scene) -> tuple[object, ...]:
+        joints = tuple(joint.bricks for joint in it.joints)
+        ends = tuple((ground.brick, ground.closes_with) for ground in it.grounds)
+        nodes = tuple((brick.name, brick.nodes) for brick in it.placed)
+        robots = tuple(robot.name for robot in it.robots)
+        props = tuple(prop.node for prop in it.props)
+        return joints, ends, nodes, robots, props, it.blocked_nodes, (*it.grip_kinds.of_robot,)
+
+    if meant(nominal) != meant(scene):
+        raise ProblemError(
+            f"scenario {number}: it has other bricks, nodes, joints, robots or props, or another "
+            f"build order than {nominal.name}, or other robots give way alike; vary stiffnesses, "
+            "densities and positions alone"
+        )

@@ -11,10 +11,9 @@ import pytest
 import seqopt
 from seqopt.arms import _held
 from seqopt.engines.interface import Want
-from seqopt.engines.registry import Recipe, make_engine
+from seqopt.engines.registry import Recipe, engine_for, make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError
-from seqopt.graph.scenarios import engine_for
 from seqopt.network.build import build_network
 from seqopt.responses._tolerance import misfits
 from seqopt.scene._armed import can_hold, held_postures

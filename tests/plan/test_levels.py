@@ -13,9 +13,15 @@ from seqopt.contact.mortar import bond_mortar
 from seqopt.engines._auto import AutoEngine, find_level
 from seqopt.engines._kinds import FlatEngine, Level
 from seqopt.engines.interface import Want
-from seqopt.engines.registry import _chooser_of, make_engine, provenance, recipe_of, simplest
+from seqopt.engines.registry import (
+    _chooser_of,
+    engine_for,
+    make_engine,
+    provenance,
+    recipe_of,
+    simplest,
+)
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.scenarios import engine_for
 from seqopt.responses._blocks import packed, unpacked
 from seqopt.responses.table import OUTSIDE, LinearRange
 from seqopt.scene.scene_file import load_scene, save_scene

@@ -20,11 +20,11 @@ from seqopt.errors import (
 )
 from seqopt.graph import formulation as registry
 from seqopt.graph.formulation import FormulationKind, find_formulation, formulations
+from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.solution import StatePath
 from seqopt.network.build import build_network
-from seqopt.plan._layers import compiled
 from seqopt.plan.solving import solve
 from seqopt.responses import _blocks as batches
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -120,7 +120,7 @@ def test_a_formulation_that_returns_nonsense_has_failed(problem, what):
 
 def test_whole_numbers_of_any_kind_are_a_choice(problem):
     exact = find_formulation("overlap_dp")
-    true = exact.solve(compiled(problem, exact.aim).instance)
+    true = exact.solve(compile_layers(problem, exact.aim).instance)
     odd = replace(true, states=np.array(true.states), objective=np.array(true.objective))
     plan = solve(problem, replace(exact, solve=lambda _: odd))
     assert plan.selection == solve(problem, exact).selection

@@ -20,9 +20,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Run, Watch, as_formulation
 from seqopt.graph.layers.compiled import compile_costs, compile_totals
-from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.scenarios import ScenarioCosts, ScenarioLayers, in_scenarios, largest_of
+from seqopt.graph.layers.costs import LayeredCosts, largest_of
+from seqopt.graph.layers.layers import candidate_layers, in_scenarios
 from seqopt.plan._paths import find_path
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.solving import graph_of, layers_of
@@ -270,14 +269,15 @@ def test_costs_of_a_scenario_are_those_of_its_own_problem():
     problem = posed()
     some = scenarios(problem.schedule.scene, count=2, seed=3)
     found = graph_of(robust(problem, some, WORST_PEAK))
-    for scene, costs in zip(found.scenes, found.costs, strict=True):
+    for scene, costs in zip(found.scenes, found.costs_in_scenarios, strict=True):
         engine = ComplianceEngine(seqopt.build_network(scene))
         own = candidate_layers(engine, problem.schedule, problem.criterion)
         for mine, found_costs in ((own.sums, costs.sums), (own.peaks, costs.peaks)):
             for part in ("single", "shared"):
                 pairs = zip(getattr(mine, part), getattr(found_costs, part), strict=True)
                 assert all(np.allclose(a, b, rtol=1e-9, atol=0) for a, b in pairs)
-    assert found.costs[0] != found.costs[1]
+    first, second = found.costs_in_scenarios
+    assert first != second
 
 
 @pytest.mark.slow
@@ -286,7 +286,8 @@ def test_workers_change_nothing():
     drawn = scenarios(scene, count=3, seed=1)
     one, two = (seqopt.solve(robust(posed(workers=n), drawn, WORST_TOTAL)) for n in (1, 2))
     assert one.choice == two.choice
-    assert one.graph.costs[0].sums == two.graph.costs[0].sums
+    first, second = (plan.graph.costs_in_scenarios[0] for plan in (one, two))
+    assert first.sums == second.sums
 
 
 def test_limits_hold_in_every_scenario():
@@ -321,8 +322,7 @@ def test_peaks_of_scenarios_join_into_one():
     joined = largest_of(layers)
     choice = seqopt.solve(problem, "overlap_dp").choice
     assert joined.worst(choice) == max(costs.worst(choice) for costs in layers)
-    assert isinstance(found, ScenarioLayers)
-    assert isinstance(found.costs[0], ScenarioCosts)
+    assert found.peaks == joined
 
 
 # bad input

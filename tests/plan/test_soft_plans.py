@@ -10,10 +10,10 @@ import pytest
 import seqopt
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
-from seqopt.graph.scenarios import require_alike
 from seqopt.network.build import build_network
 from seqopt.responses._staged import analyze_staged
 from seqopt.responses.table import analyze, force_column
+from seqopt.scene.scenarios import require_alike
 from seqopt.sequence.rules import with_robots
 from tests.builders import small_arch
 from tests.soft_bodies import SoftBodies

@@ -21,10 +21,10 @@ from seqopt import CRITERIA, build_network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SeqoptError
 from seqopt.graph.formulation import End, Formulation, Watch, find_formulation
+from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.layers import Layers, candidate_layers, steps_over, travel
 from seqopt.graph.solution import StatePath
-from seqopt.plan._layers import compiled
 
 COUNTED = ("F_largest", "M_sup")
 COMPARED = ("equations-2-3", "weighted")
@@ -80,7 +80,7 @@ def timed(
     while not took or (took[0] < SHORT and len(took) < ROUNDS):
         start = time.process_time()
         try:
-            graph = compiled(problem, formulation.aim, alone=formulation.alone).instance
+            graph = compile_layers(problem, formulation.aim, alone=formulation.alone).instance
             found: StatePath | SeqoptError = formulation.solve(graph, watch=Watch(limit))
         except SeqoptError as error:
             found = error

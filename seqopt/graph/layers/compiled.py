@@ -12,7 +12,8 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Cap, _Target
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.costs import Budget, LayeredCosts, largest_of
+from seqopt.graph.layers.layers import Layers
 from seqopt.graph.paths import distances, reached
 from seqopt.problem.problem import Aim, RobustAim
 
@@ -34,6 +35,29 @@ class Compiled(NamedTuple):
     def choice(self, nodes: Sequence[int]) -> tuple[int, ...]:
         """Return the candidates on a path."""
         return tuple(self.candidates[list(nodes)].tolist())
+
+
+def compile_layers(
+    problem: Layers, aim: Aim | None, name: str = "", *, alone: bool = False
+) -> Compiled:
+    """Return the graph of choices, of one scene or over scenarios, whose sums or peaks count.
+
+    ``alone``: whether with what a search of one move alone is charged; of peaks, with their parts.
+    """
+    name, nodes = name or problem.schedule.scene.name, problem.candidates
+    if problem.scenes and problem.over.aim is Aim.SUM:
+        layers = problem.layered(Aim.SUM)
+        largest_of(layers)  # says if no choice is allowed in all scenarios
+        return compile_totals(name, layers, problem.over, nodes)
+    aim = aim or Aim.SUM
+    costs = aim.costs(problem)
+    charged = problem.alone if aim is Aim.SUM else costs
+    found = compile_costs(name, costs, aim, problem.budgets, charged if alone else None, nodes)
+    if not problem.scenes:
+        return found
+    (goal,) = found.instance.goals
+    named = goal._replace(name=f"{goal.name} ({problem.over})")
+    return found._replace(instance=replace(found.instance, goals=(named,)))
 
 
 def compile_costs(

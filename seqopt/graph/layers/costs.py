@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -171,6 +172,41 @@ class Budget(FrozenValue):
         if left in (0, np.inf):
             return min(left, 1.0)
         return left / max(abs(self.bound), sum(map(abs, taken)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScenarioCosts(FrozenValue):
+    """What the choices of a schedule cost in one scenario.
+
+    ``sums``, ``peaks``: as of `seqopt.graph.layers.layers.Layers`; infinite where a limit is
+    exceeded; ``models``: how many different models were solved; ``seconds``: that solving them
+    took, s.
+    """
+
+    sums: LayeredCosts
+    peaks: LayeredCosts
+    models: int
+    seconds: float
+
+
+def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
+    """Return the largest of several costs, choice by choice and pair by pair.
+
+    The largest cost that a choice meets in any of them is the largest that it meets in this one.
+
+    ``layers``: of the same moves. Raises `InfeasibleError` if no choice is allowed in all of them.
+    """
+    # one after the other: all in one array would be a large one
+    single, shared = (
+        tuple(reduce(np.maximum, each) for each in zip(*arrays, strict=True))
+        for arrays in ([own.single for own in layers], [own.shared for own in layers])
+    )
+    out = LayeredCosts(single, shared)
+    try:
+        out.continuable()
+    except InfeasibleError as error:
+        raise InfeasibleError(f"over all {len(layers)} scenarios, {error}") from error
+    return out
 
 
 class Joined:

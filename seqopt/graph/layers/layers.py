@@ -6,7 +6,8 @@ import math
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import closing
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, pairwise
 
@@ -16,10 +17,11 @@ import pandas as pd
 from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine
-from seqopt.errors import InfeasibleError, ProblemError, did_you_mean
-from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts
+from seqopt.engines.registry import Recipe, engine_for, recipe_for
+from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
+from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts, ScenarioCosts, largest_of
 from seqopt.problem.criteria import Among, Ranked, RankSum, _counts_every_step
-from seqopt.problem.problem import Aim
+from seqopt.problem.problem import WORST_PEAK, Aim, RobustAim
 from seqopt.problem.requirements import (
     Criterion,
     Excess,
@@ -30,16 +32,20 @@ from seqopt.problem.requirements import (
     _excesses,
     _response_along,
     _step_limits,
+    pickled,
     robots_of,
 )
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, robot_response
 from seqopt.responses.resources import HERE, Resources
+from seqopt.scene.scenarios import require_alike
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.site import _begin_step
 from seqopt.sequence.steps import Step
+from seqopt.work._workers import hire, map_ordered
+from seqopt.work.progress import Progress
 
 
 def window(
@@ -117,19 +123,26 @@ class Layers(Shown):
 
     ``criterion``: what a step costs; ``limits``: bounds that no step may exceed, whether or not a
     grip is open in it; ``evaluation``: raw responses of every open step; ``budgets``: caps on
-    totals over the build.
+    totals over the build, without scenarios; ``scenes``: scenarios, in all of which limits hold;
+    the criterion has the numbers of the nominal scene in them; ``over``: what counts of the values
+    in all of them; ``known``: costs in scenarios, where they were computed before.
     """
 
     criterion: Criterion
     limits: tuple[Limit, ...]
     evaluation: Evaluation
     budgets: tuple[Budget, ...] = ()
+    scenes: tuple[Scene, ...] = ()
+    over: RobustAim = WORST_PEAK
+    known: tuple[ScenarioCosts, ...] = field(default=(), compare=False)
 
     def __repr__(self) -> str:
         schedule = self.schedule
         counts = f"{len(schedule.steps)} steps, {len(schedule.moves)} moves"
         extras = f"{len(self.limits)} limits, {len(self.budgets)} budgets"
         what = f"{schedule.scene.name!r}, {schedule.method!r}: {counts}"
+        if self.scenes:
+            extras = f"{len(self.scenes)} scenarios, {self.over}"
         return f"Layers({what}, criterion {self.criterion.name!r}, {extras})"
 
     @property
@@ -153,28 +166,80 @@ class Layers(Shown):
         return self.schedule.left_out
 
     @property
+    def title(self) -> str:
+        """What counts over scenarios; empty without."""
+        return str(self.over) if self.scenes else ""
+
+    @cached_property
     def alone_in_scene(self) -> Layers:
-        """The same problem, in its own scene."""
-        return self
+        """The same problem in the nominal scene."""
+        return replace(self, scenes=(), known=()) if self.scenes else self
+
+    @cached_property
+    def scenarios(self) -> tuple[Engine, ...]:
+        """What computes the responses of every scenario."""
+        return tuple(engine_for(self.engine, scene) for scene in self.scenes)
 
     @property
     def models(self) -> int:
-        """How many different models were solved."""
+        """How many different models were solved, in all scenarios."""
+        if self.scenes:
+            return sum(costs.models for costs in self.costs_in_scenarios)
         return self.evaluation.models
 
     def names_of(self, aim: Aim | None) -> tuple[str, ...]:
         """Return what the goal of an aim is called."""
-        return ("minmax" if aim is Aim.PEAK else "sum",)
+        return (self.title or ("minmax" if aim is Aim.PEAK else "sum"),)
 
     @property
     def sums(self) -> LayeredCosts:
         """The costs whose sum over the build is minimized."""
+        if self.scenes:
+            raise ProblemError(
+                f"{self.over}: totals over scenarios are no sum of one cost; take scenario_search, "
+                "or minimax with worst-peak"
+            )
         return self._sums[0]
 
-    @property
+    @cached_property
     def peaks(self) -> LayeredCosts:
-        """The costs whose largest over the build is minimized."""
+        """The costs whose largest over the build is minimized, of scenarios the largest in any."""
+        if self.scenes:
+            return largest_of(self.layered(Aim.PEAK))
         return self._peaks[0]
+
+    def layered(self, aim: Aim) -> tuple[LayeredCosts, ...]:
+        """Return the costs whose sums or peaks an aim is about, scenario by scenario."""
+        return tuple(map(aim.costs, self.costs_in_scenarios))
+
+    @property
+    def costs_in_scenarios(self) -> tuple[ScenarioCosts, ...]:
+        """What choices cost, scenario by scenario.
+
+        Raises `InfeasibleError` if a step without an open grip exceeds a limit in a scenario;
+        `MechanismError`, `SolverError`, `WorkerError` as engines and workers do.
+        """
+        return self.known or self._in_scenarios[0]
+
+    @cached_property
+    def _in_scenarios(self) -> tuple[tuple[ScenarioCosts, ...], float]:
+        """The costs in every scenario, and what they took from the first to the last, s."""
+        start, resources = time.perf_counter(), self.evaluation.resources
+        tasks = _scenarios_of(self)
+        progress = Progress("scenarios", len(tasks), resources.progress)
+        with hire(resources.executor, resources.workers) as crew:
+            if crew is not None:
+                pickled(tasks[0], self.criterion)  # says if tasks cannot be sent
+            done = map_ordered(_Scenario.costs, tasks, crew, done=lambda *_: progress.add(1))
+            with closing(done) as found:
+                return tuple(found), time.perf_counter() - start
+
+    @property
+    def from_cache(self) -> Iterator[Layers]:
+        """The problems whose responses may come from files, one for every scenario."""
+        if self.evaluation.resources.cache is None:
+            return iter(())
+        return (each.problem for each in _scenarios_of(self)) if self.scenes else iter((self,))
 
     @cached_property
     def _sums(self) -> tuple[LayeredCosts, float]:
@@ -248,7 +313,12 @@ class Layers(Shown):
         return replace(choices, moves=(move - 1, move), responses=responses)
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return how long responses (``respond``) and costs (``rank``) of an aim took, s."""
+        """Return how long responses (``respond``) and costs (``rank``) of an aim took, s.
+
+        Of scenarios responses and costs of both aims are one.
+        """
+        if self.scenes:
+            return {"respond": 0.0 if self.known else self._in_scenarios[1]}
         ranked = self._sums[1] if aim is Aim.SUM else self._peaks[1]
         return {"respond": self.evaluation.seconds, "rank": ranked}
 
@@ -279,7 +349,7 @@ class Layers(Shown):
     @property
     def alone(self) -> LayeredCosts:
         """The costs that a search of one move alone is charged: ranks among its candidates."""
-        if not isinstance(self.criterion, RankSum):
+        if self.scenes or not isinstance(self.criterion, RankSum):
             return self.sums
         conditional = replace(self.criterion, ranked=Ranked.CONDITIONAL)
         if conditional == self.criterion:
@@ -312,10 +382,11 @@ class Layers(Shown):
     def require_possible(self) -> None:
         """Raise an error if no choice can keep a limit: of a grip that is given, or of a carrier.
 
-        Raises `InfeasibleError`, naming the limit, the value and the steps.
+        Raises `InfeasibleError`, naming the limit, the value and the steps; of scenarios, given
+        grips are looked at when costs are computed.
         """
-        _require_carried(self.schedule, [self.engine.network.scene])
-        if not (self.limits and self.given):
+        _require_carried(self.schedule, [self.engine.network.scene, *self.scenes])
+        if self.scenes or not (self.limits and self.given):
             return
         table = self.evaluation.given.table(limit.response for limit in self.limits)
         for excess in _excesses(self.schedule.scene, table, self.limits):
@@ -343,6 +414,64 @@ class Layers(Shown):
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked steps of a choice; a `StepError` says which one is impossible."""
         return self.schedule.fill(self.nodes(choice))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Scenario:
+    """One scenario, as it is sent to a worker.
+
+    ``schedule``: the nominal one, whose steps and candidates hold in every scenario; ``asked``: by
+    a criterion with the numbers of the nominal scene, by limits, and beside these.
+    """
+
+    number: int
+    recipe: Recipe
+    schedule: Schedule
+    asked: ResponsesAsked
+    resources: Resources
+
+    @property
+    def problem(self) -> Layers:
+        """The placement problem of this scenario."""
+        evaluation = Evaluation(self.recipe.make(), self.schedule, self.asked, self.resources)
+        return Layers(self.asked.criterion, self.asked.limits, evaluation)
+
+    def costs(self) -> ScenarioCosts:
+        """Return what choices cost in it."""
+        problem = self.problem
+        evaluation = problem.evaluation
+        try:
+            problem.require_possible()
+            return ScenarioCosts(problem.sums, problem.peaks, evaluation.models, evaluation.seconds)
+        except MechanismError as error:
+            raise MechanismError(f"scenario {self.number}: {error}", error.mode) from error
+        except SolverError as error:
+            raise SolverError(f"scenario {self.number}: {error}") from error
+
+
+def _scenarios_of(problem: Layers) -> tuple[_Scenario, ...]:
+    also = getattr(problem.evaluation.wanted, "also", ())
+    asked = ResponsesAsked(problem.criterion, problem.limits, also)
+    alone = problem.evaluation.resources.alone()
+    recipes = (recipe_for(problem.engine, scene) for scene in problem.scenes)
+    return tuple(
+        _Scenario(number, recipe, problem.schedule, asked, alone)
+        for number, recipe in enumerate(recipes, start=1)
+    )
+
+
+def in_scenarios(nominal: Layers, scenes: Sequence[Scene], over: RobustAim) -> Layers:
+    """Return a problem over scenarios; nothing is computed yet.
+
+    ``nominal``: with an engine of `seqopt.make_engine`; ``scenes``: with the same bricks and nodes.
+    Raises `ProblemError` if there is no scenario, or one has other bricks or nodes.
+    """
+    if not scenes:
+        raise ProblemError("there is no scenario; give at least one")
+    for i, scene in enumerate(scenes, start=1):
+        require_alike(nominal.schedule.scene, scene, i)
+    recipe_for(nominal.engine, scenes[0])  # says if engines for other scenes cannot be made
+    return replace(nominal, scenes=tuple(scenes), over=over)
 
 
 def _require_carried(schedule: Schedule, scenes: Sequence[Scene]) -> None:

@@ -13,8 +13,8 @@ from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
+from seqopt.engines.registry import engine_for
 from seqopt.errors import ProblemError
-from seqopt.graph.scenarios import engine_for, require_alike
 from seqopt.graph.states._checks import checked_limits, of_states
 from seqopt.network.network import Network
 from seqopt.problem.problem import (
@@ -35,6 +35,7 @@ from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
+from seqopt.scene.scenarios import require_alike
 from seqopt.scene.scene import Scene
 from seqopt.sequence._durations import has_speeds, require_for_makespan
 from seqopt.sequence.rules import FREE, FreeRules
