@@ -17,7 +17,7 @@ from seqopt.graph.states.states import build_states
 from seqopt.plan.front import _StateFront, find_front
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.report.comparison import compare
-from seqopt.scene.library import ArchForm, DomeShape, VaultShape
+from seqopt.scene.library import ArchForm, DomeShape
 from seqopt.stability.steps import assess_steps
 
 MOST = 300  # letters
@@ -61,7 +61,7 @@ def met(problem25):
     values += [compare(posed.engine, posed.criterion), travel(problem25, 20.0)]
     values += assess_steps(network, plan.steps[:1], seqopt.DRY)
     values += [seqopt.DRY, seqopt.CRITERIA, seqopt.formulations(), seqopt.Limit("F_largest", 300.0)]
-    values += [ArchForm(span=2.0, rise=0.8), DomeShape(courses=4, around=12), VaultShape(bricks=9)]
+    values += [ArchForm(span=2.0, rise=0.8), DomeShape(courses=4, around=12)]
     values += [seqopt.StepCost("own", ("F_largest",), max), free.animate()]
     values += [network, seqopt.Sphere(center=(0.0, 0.0, 0.0), radius=1.0)]
     values += [seqopt.Site.after(free.steps, 3), seqopt.Prop(node=3)]

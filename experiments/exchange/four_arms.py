@@ -25,6 +25,7 @@ from matplotlib.figure import Figure
 import seqopt
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, Options, none_of
+from experiments.harness.herringbone import VaultShape, herringbone_vault
 from experiments.harness.results import FIGURES
 from seqopt._cli.main import main
 from seqopt.arms._model import PosedArm, idle_arm
@@ -36,7 +37,7 @@ from seqopt.report._robots import Arms, Cell
 from seqopt.report._style import styled
 from seqopt.report.draw import _draw_robots, draw_bricks
 from seqopt.scene.arm import Arm
-from seqopt.scene.library import ArchForm, VaultShape, WallShape, arch, herringbone_vault, wall
+from seqopt.scene.library import ArchForm, WallShape, arch, wall
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step

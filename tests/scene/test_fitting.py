@@ -86,9 +86,3 @@ def test_a_vault_closes_from_both_springings():
     bent = [brick.position[2] for brick in scene.bricks]
     assert max(bent) == pytest.approx(0.5, rel=0.02)
     assert bent == pytest.approx(bent[::-1])  # it is symmetric
-
-
-def test_a_vault_in_herringbone_grows_around_the_arch():
-    scene = load_scene("herringbone:bricks=40")
-    assert len(scene.bricks) == 40
-    assert scene.build_order[:25] == load_scene("arch25").build_order

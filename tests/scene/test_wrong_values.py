@@ -11,7 +11,7 @@ from seqopt.errors import SceneError
 from seqopt.exchange import Given, import_scene
 from seqopt.scene import Load
 from seqopt.scene.arch import ArchShape
-from seqopt.scene.library import ArchForm, DomeShape, JointLaw, VaultShape, WallShape
+from seqopt.scene.library import ArchForm, DomeShape, JointLaw, WallShape
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import Polyhedron
@@ -24,7 +24,6 @@ VALUES = {
     "arch form": ArchForm(span=2.0, rise=0.7),
     "dome": DomeShape(courses=6, around=20),
     "wall": WallShape(columns=3, courses=2),
-    "vault": VaultShape(bricks=100),
     "joint law": JointLaw(translational=(1.0, 1.0, 1.0)),
     "mortar": Mortar(friction=0.5),
     "shape": Polyhedron(CORNERS, ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))),

@@ -1,4 +1,4 @@
-"""Scenes from numbers: arches, walls, domes and vaults of any size.
+"""Scenes from numbers: arches, barrel vaults, walls and domes of any size.
 
 Each generator takes the numbers that shape what it builds and returns a checked scene in which no
 two bricks are in one place and every joint lies between the faces of its bricks:
@@ -19,16 +19,10 @@ An arch by its span and rise stands on level supports; a wall may be corbelled:
 >>> wall(WallShape(columns=6, courses=4, corbel=0.02)).placed[-1].position[1]
 0.06
 
-A vault grows in herringbone from an arch that stands in its middle:
-
->>> from seqopt.scene import load_scene
->>> from seqopt.scene.library import VaultShape, herringbone_vault
->>> herringbone_vault(load_scene("arch25"), VaultShape(bricks=100))
-<Scene vault 100: 100 bricks, 241 joints, 6 ground ends, 3 robots>
-
 `barrel_vault` has the eight tested vaults of the paper's calibration. Arches of other shapes come
 from `seqopt.scene.arch_scene`. The same in words, wherever a scene is named:
 
+>>> from seqopt.scene import load_scene
 >>> load_scene("dome:courses=4,around=12")
 <Scene dome 39: 39 bricks, 82 joints, 12 ground ends, 3 robots>
 """
@@ -36,19 +30,16 @@ from `seqopt.scene.arch_scene`. The same in words, wherever a scene is named:
 from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.library.dome import DomeShape, dome
-from seqopt.scene.library.vault import VaultShape, herringbone_vault
 from seqopt.scene.library.wall import WallShape, wall
 
 __all__ = [
     "ArchForm",
     "DomeShape",
     "JointLaw",
-    "VaultShape",
     "WallShape",
     "arch",
     "barrel_vault",
     "chain",
     "dome",
-    "herringbone_vault",
     "wall",
 ]

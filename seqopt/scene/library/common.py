@@ -230,17 +230,6 @@ def tiles(rows: int, columns: Iterable[int]) -> list[Tile]:
     return out
 
 
-def neighbors(chosen: Sequence[Tile]) -> list[tuple[int, int]]:
-    """Return which tiles share an edge of a cell: their places, each pair once, ascending."""
-    owner = {cell: i for i, tile in enumerate(chosen) for cell in tile.cells}
-    beside = [
-        (i, owner.get(cell, i))
-        for (row, column), i in owner.items()
-        for cell in ((row + 1, column), (row, column + 1))
-    ]
-    return sorted({(min(pair), max(pair)) for pair in beside if pair[0] != pair[1]})
-
-
 _ON_EDGE = 1e-12  # distance treated as zero, over the size of the faces
 _PARALLEL = 1e-12  # sine of an angle between edges treated as zero
 

@@ -149,7 +149,7 @@ def test_scenes_in_words_are_those_of_the_library(words, made):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("tower:a=1", "'tower' is not known; give one of arch, barrel, chain, dome, herringbone"),
+        ("tower:a=1", "'tower' is not known; give one of arch, barrel, chain, dome, vault"),
         ("arch:spn=2", "'spn' is none of its numbers (did you mean span?); give span, rise"),
         ("arch:span=2,span=2", "'span' is given twice; give span, rise"),
         ("arch:span=x", "span is 'x'; give it as 0.5"),

@@ -15,32 +15,15 @@ from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
-from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import _separations
-from seqopt.scene.library import (
-    ArchForm,
-    DomeShape,
-    JointLaw,
-    VaultShape,
-    WallShape,
-    arch,
-    chain,
-    dome,
-    herringbone_vault,
-    wall,
-)
+from seqopt.scene.library import ArchForm, DomeShape, JointLaw, WallShape, arch, chain, dome, wall
 from seqopt.scene.library.common import _joints_between
-from seqopt.scene.scene_file import _find_warnings, _scene_by_words, load_scene
+from seqopt.scene.scene_file import _find_warnings, _scene_by_words
 from seqopt.sequence.schedule import islands
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever, sequential
-from tests.builders import largest_difference, small_arch
+from tests.builders import largest_difference
 from tests.direct_solve import solve_dense
-
-
-def even_arch(count):
-    """A closed arch in the pattern VLR that ends with a brick along it."""
-    return arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, count).tolist()))
 
 
 @st.composite
@@ -91,35 +74,23 @@ def small_domes(draw):
     return dome(shape)
 
 
-@st.composite
-def small_vaults(draw):
-    arch = even_arch(draw(st.sampled_from([10, 13, 16])))
-    shape = VaultShape(
-        bricks=draw(st.integers(len(arch.bricks), 70)),
-        spacing=draw(st.floats(0.131, 0.14)),
-        plan_angle=draw(st.floats(-0.03, 0.03)),
-        skew=draw(st.floats(-0.5, 0.5)),
-        widening=draw(st.floats(0.0, 0.03)),
-    )
-    return herringbone_vault(arch, shape)
-
-
 chains = st.builds(chain, st.integers(7, 40), pattern=st.sampled_from(["VLR", "V", "LR", "VL"]))
-GENERATED = st.one_of(chains, small_arches(), small_walls(), small_domes(), small_vaults())
+GENERATED = st.one_of(chains, small_arches(), small_walls(), small_domes())
 
 
 @given(scene=GENERATED)
 def test_no_two_bricks_are_in_one_place(scene):
     assume(len(scene.bricks) > 1)
-    pairs, distance = _separations(scene.bricks)
+    _, distance = _separations(scene.bricks)
     thin = min(min(brick.dimensions) for brick in scene.bricks)
     assert distance.min(initial=0.0) >= -1e-6 * thin
     assert _find_warnings(scene) == ()
     joined = {frozenset(joint.bricks) for joint in scene.joints}
     assert len(joined) == len(scene.joints)
-    names = [brick.name for brick in scene.bricks]
-    near = {frozenset((names[i], names[j])) for i, j in pairs.tolist()}
-    assert joined <= near
+    place = {brick.name: brick.position for brick in scene.bricks}
+    longest = max(math.hypot(*brick.dimensions) for brick in scene.bricks)
+    far = 1.1 * longest  # rings of few bricks leave wedges between them
+    assert all(math.dist(*(place[name] for name in pair)) < far for pair in joined)
 
 
 @settings(max_examples=20)
@@ -235,31 +206,6 @@ def test_compliance_agrees_with_independent_routes(scene, share):
         (lambda: DomeShape(courses=300, around=100), "dome: 30000 bricks; give numbers that make"),
         (lambda: arch(ArchForm(span=1e9, rise=7.0)), "arch: .* bricks; give numbers that make at"),
         (lambda: _scene_by_words("arch:span=1e300,rise=7"), "numbers are too large; give smaller"),
-        (lambda: VaultShape(bricks=0), "vault: bricks is 0; give a whole number from 1"),
-        (lambda: VaultShape(bricks=30, skew=math.inf), "vault: skew is inf; give a finite number"),
-        (lambda: VaultShape(bricks=30, plan_angle=5.1), "vault: plan_angle is 5.1 rad; give at"),
-        (lambda: VaultShape(bricks=30, spacing=0.0), "vault: spacing is 0.0; give a positive"),
-        (
-            lambda: herringbone_vault(even_arch(13), VaultShape(bricks=12)),
-            "vault: bricks is 12, and its arch has 13; give at least as many",
-        ),
-        (
-            lambda: herringbone_vault(even_arch(13), VaultShape(bricks=40, spacing=0.11)),
-            "vault: bricks .* interpenetrate by .* mm; give a wider spacing",
-        ),
-        (
-            lambda: herringbone_vault(small_arch(12), VaultShape(bricks=40)),
-            "vault: scene arch is not an arch to start from; give a closed chain of equal bricks",
-        ),
-        (
-            lambda: herringbone_vault(wall(WallShape(columns=7, courses=1)), VaultShape(bricks=40)),
-            "vault: scene wall 7 x 1 is not an arch to start from",
-        ),
-        (
-            lambda: herringbone_vault(chain(13, pattern="V"), VaultShape(bricks=40)),
-            "vault: brick 2 of chain 13 does not lie as L in the pattern VLR",
-        ),
-        (lambda: herringbone_vault("arch25", VaultShape(bricks=40)), "vault: a str is not an arch"),
         (
             lambda: JointLaw(translational=(1.0, -1.0, 1.0)),
             "joint law: translational is .*at least",
@@ -278,13 +224,3 @@ def test_bricks_that_are_apart_have_no_joint(arch25):
         SceneError, match=r"joint \(1, 13\): the faces of its bricks do not overlap"
     ):
         _joints_between(arch25.bricks, [(0, 12)], law)
-
-
-def test_a_vault_is_as_large_as_asked_and_a_skew_of_either_sign_builds_from_its_foot():
-    arch = load_scene("arch25")
-    for skew in (-1.0, 0.0, 1.0):
-        scene = herringbone_vault(arch, VaultShape(bricks=150, skew=skew))
-        assert len(scene.bricks) == 150
-        left = [brick for brick in scene.bricks[25:] if brick.position[1] > 0.1]
-        foot = left[0].position[0] < 1.0
-        assert foot == (skew < 0)
