@@ -53,7 +53,6 @@ SHARED = {  # what formulations may import
     "formulations.labels",
     "formulations.path_dp",
     "formulations.overlap_flow",
-    "formulations._weights",
     "formulations.states._search",
     "formulations.times._search",
     "formulations.times._labels",

@@ -1,8 +1,8 @@
 r"""The path of least worst or tail total over scenarios: weights, then labels that they bound.
 
 A path :math:`p` has a total :math:`c_s(p)` in every scenario, and the aim makes
-:math:`\max_{w \in W} \sum_s w_s \, c_s(p)` of them, with the weights of
-`formulations._weights`. At fixed weights the cheapest path is what a formulation
+:math:`\max_{w \in W} \sum_s w_s \, c_s(p)` of them, over weights from 0 up
+to the largest of one that add up to one. At fixed weights the cheapest path is what a formulation
 finds for a single sum, and a bound on all. What the best weights leave open is closed by labels,
 vectors of totals: with the least from every state on, under each of some weights, a label has a
 bound, and the one with the lowest is continued first. Labels whose bound is not below the best path
@@ -12,21 +12,22 @@ are left out, and so is one that another one of its state dominates.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import NamedTuple
 
 import numpy as np
 
-from formulations._weights import CLOSE, Weighed, best_weights, provers
 from formulations.choice import Choose
 from seqopt.arrays import Floats, Ints
+from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, moves_along
 from seqopt.problem.problem import RobustAim
 
 _Cheapest = Callable[[Graph], tuple[tuple[int, ...], float]]
+STEPS = 400  # weights that are tried at most
+CLOSE = 1e-9  # differences that are none, over the size of the values
 LABELS = 50_000  # that are continued at most
 
 
@@ -61,60 +62,61 @@ def least_total(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch)
     ``graph``: with a sum for every scenario, all of it on paths from the start to ends;
     ``cheapest``: an oracle of the shortest path through a graph with one goal, and its bound.
     """
-    paths = _Paths(graph, aim, cheapest)
-    weighed = best_weights(paths, watch)
-    if watch.over or weighed.bound >= _below(weighed.value):
-        bound = min(weighed.bound, weighed.value)
-        return LeastTotal(weighed.choice, weighed.value, bound, weighed.weights)
-    return _labeled(paths, weighed, watch)
+    best = by_weights(graph, aim, cheapest, watch)
+    if watch.over or best.bound >= _below(best.value):
+        return best._replace(bound=min(best.bound, best.value))
+    return _by_labels(graph, aim, best, watch)
 
 
-@dataclass(frozen=True)
-class _Paths:
-    """The paths of a graph as choices with totals."""
+def by_weights(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) -> LeastTotal:
+    """Return the best path that is met on the way to the weights with the highest bound."""
+    count, best = len(graph.peaks), LeastTotal((), np.inf, -np.inf, np.zeros(0))
 
-    graph: Graph
-    aim: RobustAim
-    best: _Cheapest
-
-    @property
-    def scenarios(self) -> int:
-        return len(self.graph.peaks)
-
-    def cheapest(self, weights: Floats) -> tuple[tuple[int, ...], float]:
-        graph = self.graph
+    def met(weights: Floats) -> Plane:
+        nonlocal best
         sums = (graph.amounts @ weights)[:, None]
-        return self.best(Graph(graph.source, graph.target, sums, (False,), graph.ends))
+        path, bound = cheapest(Graph(graph.source, graph.target, sums, (False,), graph.ends))
+        totals = graph.amounts[moves_along(graph, path)].sum(axis=0)
+        if aim.value(totals) < best.value:
+            best = best._replace(path=path, value=aim.value(totals))
+        return Plane(0.0, totals, bound)
 
-    def totals(self, choice: tuple[int, ...]) -> Floats:
-        return np.asarray(self.graph.amounts[moves_along(self.graph, choice)].sum(axis=0))
+    def ended(bound: float) -> bool:
+        watch.tell(best.value, bound)
+        return watch.over
+
+    region = Polyhedron(aim.most(count), counts=np.ones(count))
+    start = np.full(count, 1.0 / count)
+    weights, bound = highest_bound(met, start, region, ended, rounds=STEPS, closed=CLOSE)
+    return best._replace(bound=bound, weights=weights)
 
 
 def _below(value: float) -> float:
     return value - CLOSE * abs(value)
 
 
-def _labeled(paths: _Paths, weighed: Weighed, watch: Watch) -> LeastTotal:
+def _by_labels(graph: Graph, aim: RobustAim, known: LeastTotal, watch: Watch) -> LeastTotal:
     """Return the best path, by labels continued in the order of what they come to at least."""
-    graph, best, path = paths.graph, weighed.value, weighed.choice
-    proving = provers(paths, weighed)
+    scenarios, best, path = len(graph.peaks), known.value, known.path
+    single = np.eye(scenarios) if aim.most(scenarios) >= 1 else np.zeros((0, scenarios))
+    proving = np.vstack([known.weights, single])
     left = np.array([distances(graph, graph.amounts @ w, back=True) for w in proving])
     starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
-    heap = [(weighed.bound, 0, 0, -1, np.zeros(paths.scenarios))]
+    heap = [(known.bound, 0, 0, -1, np.zeros(scenarios))]
     kept: dict[int, Floats] = {}
     popped: list[tuple[int, int]] = []  # state, and which label it continues
     count = 0
     while heap and heap[0][0] < _below(best):
         if len(popped) == LABELS or (len(popped) % 1000 == 0 and watch.over):
-            return LeastTotal(path, best, max(weighed.bound, heap[0][0]), weighed.weights)
+            return LeastTotal(path, best, max(known.bound, heap[0][0]), known.weights)
         _, _, state, before, totals = heappop(heap)
-        others = kept.get(state, np.zeros((0, paths.scenarios)))
+        others = kept.get(state, np.zeros((0, scenarios)))
         if (others <= totals).all(axis=1).any():
             continue
         kept[state] = np.vstack([others, totals])
         popped.append((state, before))
-        if graph.ends[state] and paths.aim.value(totals) < best:
-            path, best = path_of(popped, len(popped) - 1), paths.aim.value(totals)
+        if graph.ends[state] and aim.value(totals) < best:
+            path, best = path_of(popped, len(popped) - 1), aim.value(totals)
         moves: Ints = np.arange(starts[state], starts[state + 1])
         then = totals + graph.amounts[moves]
         bounds = (then @ proving.T + left[:, graph.target[moves]].T).max(axis=1)
@@ -122,7 +124,7 @@ def _labeled(paths: _Paths, weighed: Weighed, watch: Watch) -> LeastTotal:
             count += 1
             row = (float(bounds[k]), -count, int(graph.target[moves[k]]), len(popped) - 1, then[k])
             heappush(heap, row)
-    return LeastTotal(path, best, best, weighed.weights)
+    return LeastTotal(path, best, best, known.weights)
 
 
 def path_of(popped: Sequence[tuple[int, int]], last: int) -> tuple[int, ...]:

@@ -7,7 +7,7 @@ which multipliers or potentials say that it ends beyond the caps.
 Whatever a build does, it takes no less than the time of all that its steps take one after the
 other, and no less than the time of any robot: preparing, acting, and holding while others act. With
 multipliers from 0 that add up to one over these, the weighted time of moves is a sum along a path,
-and the shortest path bounds every build. The best multipliers are found by cutting planes.
+and the shortest path bounds every build (`seqopt.graph._multipliers`).
 """
 
 from __future__ import annotations
@@ -17,12 +17,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
 from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, fewest_moves, moves_along
 
 ROUNDS = 25  # of cutting planes
@@ -36,15 +35,13 @@ class Prices:
     """Prices, and what they say.
 
     ``each`` (L, 1 + k): of the time of all, and of a robot of every kind; ``left`` (L, n): priced
-    time from states to ends at least; ``kinds`` (c,): of columns; ``bound``: of any build, s;
-    ``paths``: shortest ones, of states.
+    time from states to ends at least; ``kinds`` (c,): of columns; ``bound``: of any build, s.
     """
 
     each: Floats
     left: Floats
     kinds: Ints
     bound: float
-    paths: tuple[tuple[int, ...], ...]
 
     def ends(self, state: Ints, end: Floats, since: Floats) -> Floats:
         """Return when builds end at least, (N,).
@@ -60,56 +57,24 @@ class Prices:
 
 
 def best_prices(timed: TimedGraph, kept: Bools, watch: Watch) -> Prices:
-    """Return the prices whose bound on all builds by some moves, (m,) bool, is highest."""
-    graph, work = timed.graph.only(kept), timed.work[kept]
-    sizes = timed.sizes.astype(float)
-    planes, tried = list[Floats](), list[tuple[float, Floats, Floats]]()
-    paths = dict[tuple[int, ...], None]()
-    ask, best, roof = np.full(len(sizes), 1 / len(sizes)) / sizes, -np.inf, np.inf
-    for step in range(ROUNDS):
-        left, path, taken = _cheapest(graph, work, ask)
-        tried.append((float(left[0]), ask, left))
-        tried = sorted(tried, key=lambda each: -each[0])[:KEPT]
-        best = tried[0][0]
-        planes.append(taken)
-        paths[path] = None
-        highest, roof = _highest(np.array(planes), sizes)
-        if roof <= best + CLOSED * abs(best) or watch.over:
-            break
-        ask = highest if step % 2 == 0 else 0.5 * (highest + tried[0][1])
-    each, lefts = np.array([e for _, e, _ in tried]), np.array([e for *_, e in tried])
-    return Prices(each, lefts, timed.kinds, best, tuple(paths))
+    """Return the multipliers whose bound on builds by some moves, (m,) bool, is highest."""
+    graph, work, sizes = timed.graph.only(kept), timed.work[kept], timed.sizes.astype(float)
+    tried = list[tuple[float, Floats, Floats]]()
 
+    def cheapest(prices: Floats) -> Plane:
+        costs = work @ prices
+        left = distances(graph, costs, back=True)
+        with np.errstate(invalid="ignore"):
+            tight = costs + left[graph.target] <= left[graph.source] + TIGHT * (1 + left[0])
+        path = fewest_moves(graph.only(tight & np.isfinite(left[graph.target])))
+        tried.append((float(left[0]), prices, left))
+        return Plane(0.0, work[moves_along(graph, path)].sum(axis=0), float(left[0]))
 
-def _cheapest(graph: Graph, work: Floats, prices: Floats) -> tuple[Floats, tuple[int, ...], Floats]:
-    """Return the priced time from states to ends, a shortest path, and the work of that."""
-    costs = work @ prices
-    left = distances(graph, costs, back=True)
-    slack = TIGHT * (1 + left[0])
-    with np.errstate(invalid="ignore"):
-        tight = costs + left[graph.target] <= left[graph.source] + slack
-    tight &= np.isfinite(left[graph.target])
-    path = fewest_moves(graph.only(tight))
-    return left, path, work[moves_along(graph, path)].sum(axis=0)
-
-
-def _highest(planes: Floats, sizes: Floats) -> tuple[Floats, float]:
-    """Return the prices at which the least of planes (p, 1 + k) is highest, and how high."""
-    count, dims = planes.shape
-    matrix = np.column_stack([-planes, np.ones(count)])
-    found = linprog(
-        [0.0] * dims + [-1.0],
-        A_ub=matrix,
-        b_ub=np.zeros(count),
-        A_eq=[[*sizes, 0.0]],
-        b_eq=[1.0],
-        bounds=[(0.0, None)] * dims + [(None, None)],
-        method="highs",
-    )
-    if found.x is None or found.fun is None:
-        return 1 / (dims * sizes), np.inf
-    prices = np.maximum(found.x[:-1], 0.0)
-    return prices / (prices @ sizes), float(-found.fun)
+    start, region = np.full(len(sizes), 1 / len(sizes)) / sizes, Polyhedron(np.inf, counts=sizes)
+    highest_bound(cheapest, start, region, lambda _: watch.over, rounds=ROUNDS, closed=CLOSED)
+    best = sorted(tried, key=lambda each: -each[0])[:KEPT]
+    each, lefts = np.array([own for _, own, _ in best]), np.array([own for *_, own in best])
+    return Prices(each, lefts, timed.kinds, best[0][0])
 
 
 def useful(timed: TimedGraph, prices: Prices, kept: Bools, most: float) -> Bools:

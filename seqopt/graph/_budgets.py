@@ -22,6 +22,7 @@ from scipy.sparse.csgraph import dijkstra
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
 from seqopt.graph._labels import LabelSearch, cheapest_within, ground
+from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
 from seqopt.graph.duality import ROUNDING, least_sum
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
@@ -188,67 +189,33 @@ def _least_worst(
 def _least_sum(
     graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]], watch: Watch | None = None
 ) -> _Found:
-    """Return the cheapest path within caps that prices lead to, and what they prove.
+    """Return the cheapest path within caps that multipliers lead to, and what they prove.
 
     Where no path is within them, a bound above that of any path says so: infinite, or positive
     where costs are zero.
     """
     columns, caps = [c for c, _ in limited], np.array([tied(cap) for _, cap in limited])
-    amounts = graph.amounts[:, columns]
-    prices, best, proven = np.zeros(len(caps)), np.inf, _Found(None, -np.inf, np.zeros(len(caps)))
-    planes: list[tuple[float, Floats]] = []
-    moves: Ints | None = None
-    for _ in range(ROUNDS):
-        way = _cheapest(graph, costs + amounts @ prices)
-        if way is None:
-            return _Found(None, np.inf, prices)
-        cost, over = float(costs[way].sum()), amounts[way].sum(axis=0) - caps
-        bound = cost + float(prices @ over)
-        if bound > proven.bound:
-            proven = proven._replace(bound=bound, prices=prices)
+    amounts, watch = graph.amounts[:, columns], watch or Watch()
+    best, moves = np.inf, None
+
+    def cheapest(prices: Floats) -> Plane | None:
+        nonlocal best, moves
+        path = _cheapest(graph, costs + amounts @ prices)
+        if path is None:
+            return None
+        cost, over = float(costs[path].sum()), amounts[path].sum(axis=0) - caps
         if (over <= 0).all() and cost < best:
-            best, moves = cost, way
-        planes.append((cost, over))
-        if watch is not None:
-            watch.tell(best, proven.bound)
-            if watch.over:
-                break
-        prices, highest = _next_prices(planes, caps)
-        if highest <= proven.bound + CLOSED * abs(proven.bound) or best <= tied(proven.bound):
-            break
-    return proven._replace(moves=moves)
+            best, moves = cost, path
+        return Plane(cost, over, cost + float(prices @ over))
 
+    def ended(bound: float) -> bool:
+        watch.tell(best, bound)
+        return watch.over or best <= tied(bound)
 
-def _next_prices(planes: Sequence[tuple[float, Floats]], caps: Floats) -> tuple[Floats, float]:
-    """Return the multipliers that maximize the least of the planes, and that maximum."""
-    costs, over = map(np.array, zip(*planes, strict=True))
-    if len(caps) == 1:
-        return _highest_of_lines(costs, over[:, 0], caps)
-    size = np.maximum(np.abs(caps), np.abs(over).max(axis=0, initial=0.0))
-    size[size == 0] = 1.0
-    largest = DEAREST * (np.abs(costs).max(initial=0.0) or 1.0)
-    matrix = np.column_stack([-over / size, np.ones(len(costs))])
-    free = [(0.0, largest)] * len(caps) + [(None, None)]
-    objective = np.array([0.0] * len(caps) + [-1.0])
-    from scipy.optimize import linprog  # noqa: PLC0415  # slow to import, for budgets only
-
-    found = linprog(objective, A_ub=matrix, b_ub=costs, bounds=free, method="highs")
-    if found.x is None or found.fun is None:
-        return np.zeros(len(caps)), -np.inf
-    return np.maximum(found.x[:-1], 0.0) / size, float(-found.fun)
-
-
-def _highest_of_lines(costs: Floats, over: Floats, caps: Floats) -> tuple[Floats, float]:
-    """Return the same for one budget: where two lines meet, or at an end."""
-    size = max(float(np.abs(caps).max()), float(np.abs(over).max())) or 1.0
-    most = DEAREST * (float(np.abs(costs).max(initial=0.0)) or 1.0) / size
-    with np.errstate(divide="ignore", invalid="ignore"):
-        meet = (costs[:, None] - costs) / (over - over[:, None])
-    inside = np.isfinite(meet) & (meet > 0) & (meet < most)
-    at = np.concatenate([[0.0, most], np.unique(meet[inside])])
-    lowest = (costs[:, None] + over[:, None] * at).min(axis=0)
-    best = int(np.argmax(lowest))
-    return at[best : best + 1], float(lowest[best])
+    region = Polyhedron(DEAREST, units=np.abs(caps))
+    start = np.zeros(len(caps))
+    found = highest_bound(cheapest, start, region, ended, rounds=ROUNDS, closed=CLOSED)
+    return _Found(None if found.bound == np.inf else moves, found.bound, found.multipliers)
 
 
 def _cheapest(graph: Graph, costs: Floats) -> Ints | None:

@@ -12,10 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from formulations._weights import best_weights
 from formulations.path_dp import SCENARIO_SEARCH
 from formulations.scenario_program import solve_program
-from formulations.states._totals import _Paths, cheapest_by, least_total
+from formulations.states._totals import by_weights, cheapest_by, least_total
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Run, Watch, as_formulation
@@ -226,7 +225,7 @@ def test_the_gap_that_weights_leave_is_real_here():
     """Half of either scenario proves 2; no choice is better than 3."""
     graph = compile_totals("two", LAYERS, WORST_TOTAL).instance.asked
     cheapest = cheapest_by(SCENARIO_SEARCH.solve.choose, Watch())
-    weighed = best_weights(_Paths(graph, WORST_TOTAL, cheapest), Watch())
+    weighed = by_weights(graph, WORST_TOTAL, cheapest, Watch())
     assert weighed.bound == pytest.approx(2.0)
     assert least_total(graph, WORST_TOTAL, cheapest, Watch()).bound == pytest.approx(3.0)
 
