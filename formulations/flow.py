@@ -9,19 +9,19 @@ With moves :math:`a = (u, v)` that take :math:`c_a`, for a goal that is a sum,
    \sum_{a \text{ from } s} y_a - \sum_{a \text{ to } s} y_a =
    \begin{cases} 1 & s \text{ the start} \\ 0 & \text{else, but at ends} \end{cases}
    \quad\text{and}\quad
-   y \ge 0 \;\text{ or }\; y \in \{0, 1\} .
+   y \ge 0 \;\text{ or }\; y \in \{0, 1\} ,
 
-``flow_lp`` takes :math:`y \ge 0`. The matrix is totally unimodular: the optimum is a path. With the
-multipliers :math:`\pi_s` of its rows, paths of moves with :math:`c_a = \pi_u - \pi_v` that end
-where :math:`\pi_s = 0` are the best ones, and only these are left for the next goal. The largest
-amount on a path is no linear function of :math:`y`. Of a peak therefore the least :math:`t` is
-found by bisection for which
+the flow of `formulations.overlap_flow`, solved by HiGHS. ``flow_lp`` takes :math:`y \ge 0`. The
+matrix is totally unimodular: the optimum is a path. With the multipliers :math:`\pi_s` of its rows,
+0 at ends, paths of moves with :math:`c_a = \pi_u - \pi_v` are the best ones, and only these are
+left for the next goal. The largest amount on a path is no linear function of :math:`y`. Of a peak
+therefore the least :math:`t` is found by bisection for which
 
 .. math::
 
    y \ge 0, \qquad \text{the rows above}, \qquad y_a = 0 \; \text{ where } \; c_a > t
 
-has a solution. Where it has none, the multipliers that prove this are a cut.
+has a solution.
 
 ``flow_mip`` takes :math:`y \in \{0, 1\}`, and for a peak
 
@@ -37,37 +37,26 @@ spreads over many states has a small peak. It is here to show that.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
+import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
 from formulations.choice import Choice
 from formulations.on_graph import on_graph
-from formulations.solvers import STOPS, Point, minimize_rows
+from formulations.overlap_flow import Flow, unit_flow
+from formulations.solvers import EXACTLY, minimize_by_highs
 from seqopt.arrays import Floats
+from seqopt.errors import InfeasibleError
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED, fewest_moves, path_values, tied
 
 
-def _rows(graph: Graph) -> tuple[sparse.csc_array, Floats]:
-    """Return what leaves states (n,) by a flow, and what does: one from the start, at an end.
-
-    Results: ``matrix`` (n, m + e): by move, then by state in which a build may end; ``right`` (n,).
-    """
-    ends, moves = np.flatnonzero(graph.ends), np.arange(len(graph.source))
-    ones = np.ones(len(moves) + len(ends))
-    rows = np.concatenate([graph.source, ends, graph.target])
-    columns = np.concatenate([np.arange(len(ones)), moves])
-    values = np.concatenate([ones, -np.ones(len(moves))])
-    matrix = sparse.csc_array((values, (rows, columns)), shape=(graph.states, len(ones)))
-    return matrix, np.eye(1, graph.states)[0]
-
-
 def _linear(graph: Graph, watch: Watch) -> Choice:
     """Return the best path; where time is over, one that is best in the first goals."""
-    bounds = list[float]()
+    if graph.ends[0]:
+        return Choice((), (0.0,) * len(graph.peaks))
+    graph, bounds = graph.only(~graph.ends[graph.source]), list[float]()
     for goal, peak in enumerate(graph.peaks):
         graph, bound, stopped = (_least_peak if peak else _least_sum)(graph, goal, watch)
         bounds.append(bound)
@@ -78,17 +67,15 @@ def _linear(graph: Graph, watch: Watch) -> Choice:
 
 def _least_sum(graph: Graph, goal: int, watch: Watch) -> tuple[Graph, float, bool]:
     """Return the moves on paths of least sum, that sum, and whether time was over before."""
-    rows, right = _rows(graph)
-    scale = path_values(graph, fewest_moves(graph))[goal] or 1.0
-    costs = np.pad(graph.amounts[:, goal] / scale, (0, rows.shape[1] - len(graph.source)))
-    found = minimize_rows(costs, rows, right, watch=watch)
-    if found.end in STOPS:
+    flow = unit_flow(graph, graph.amounts[:, goal])
+    arcs = cp.Variable(len(flow.cost), nonneg=True)
+    conserve = cp.Zero(flow.balance @ arcs - flow.source)
+    program = cp.Problem(cp.Minimize(flow.cost @ arcs), [conserve])
+    found = minimize_by_highs(program, feasible=True, watch=watch, tolerance=EXACTLY)
+    if found.stopped:
         return graph, -np.inf, True
-    best = costs - rows.T @ found.multipliers <= TIED
-    moves, ends = np.split(best, [len(graph.source)])
-    kept = graph.ends.copy()
-    kept[graph.ends] = ends  # a build that ends elsewhere takes more
-    return replace(graph.only(moves), ends=kept), scale * found.bound, False
+    reduced = flow.cost + flow.balance.T @ np.asarray(conserve.dual_value)
+    return flow.graph.only(reduced <= TIED * max(found.value, 1.0)), flow.scale * found.value, False
 
 
 def _least_peak(graph: Graph, goal: int, watch: Watch) -> tuple[Graph, float, bool]:
@@ -98,58 +85,59 @@ def _least_peak(graph: Graph, goal: int, watch: Watch) -> tuple[Graph, float, bo
     low, high = 0, len(levels) - 1
     while low < high:
         middle = (low + high) // 2
-        rows, right = _rows(graph.only(amounts <= levels[middle]))
-        end = minimize_rows(np.zeros(rows.shape[1]), rows, right, watch=watch).end
-        if end in STOPS:
+        flow = unit_flow(graph.only(amounts <= levels[middle]))
+        arcs = cp.Variable(len(flow.cost), nonneg=True)
+        program = cp.Problem(cp.Minimize(0), [cp.Zero(flow.balance @ arcs - flow.source)])
+        try:
+            found = minimize_by_highs(program, feasible=False, watch=watch, tolerance=EXACTLY)
+        except InfeasibleError:
+            low = middle + 1
+            continue
+        if found.stopped:
             return graph.only(amounts <= levels[high]), float(levels[low]), True
-        low, high = (middle + 1, high) if end == "kInfeasible" else (low, middle)
+        high = middle
     return graph.only(amounts <= tied(levels[high])), float(levels[high]), False
 
 
 def _whole(graph: Graph, watch: Watch) -> Choice:
     """Return the best path; where time is over, the best one so far."""
+    if graph.ends[0]:
+        return Choice((), (0.0,) * len(graph.peaks))
     path, bounds = fewest_moves(graph), list[float]()
-    caps: list[tuple[Floats, float]] = []
+    caps: list[tuple[int, float]] = []
     for goal, peak in enumerate(graph.peaks):
-        scale = path_values(graph, path)[goal] or 1.0
-        costs = graph.amounts[:, goal] / scale
-        found = _minimize(graph, (costs, peak), caps, watch)
-        used = found.values[: len(costs)] > 0.5
-        if len(used):
-            path = fewest_moves(graph.only(used))
-        bounds.append(scale * found.bound)
-        if found.end in STOPS:
+        flow = unit_flow(graph, graph.amounts[:, goal])
+        graph, arcs = flow.graph, cp.Variable(len(flow.cost), boolean=True)
+        program = _written(flow, arcs, caps, peak=peak)
+        found = minimize_by_highs(program, feasible=True, watch=watch, tolerance=EXACTLY)
+        bounds.append(flow.scale * found.bound)
+        if np.isfinite(found.value):
+            path = fewest_moves(graph.only(np.asarray(arcs.value) > 0.5))
+        if found.stopped:
             return Choice(path, tuple(bounds), stopped=True)
+        most = tied(path_values(graph, path)[goal])
         if peak:
-            kept = costs <= tied(costs[used].max())
-            graph, caps = graph.only(kept), [(each[kept], most) for each, most in caps]
+            graph = graph.only(graph.amounts[:, goal] <= most)
         else:
-            caps.append((costs, tied(costs[used].sum())))
+            caps.append((goal, most))
     return Choice(path, tuple(bounds))
 
 
-def _minimize(
-    graph: Graph, goal: tuple[Floats, bool], caps: list[tuple[Floats, float]], watch: Watch
-) -> Point:
-    """Return the flow that is best in a goal: its costs (m,), and whether their peak counts."""
-    (costs, peak), (flow, right) = goal, _rows(graph)
-    ends, none = flow.shape[1] - len(costs), sparse.csc_array((graph.states, 1))
-    rows = [sparse.hstack([flow, none])]
-    rows += [sparse.csc_array(np.pad(each, (0, ends + 1))[None]) for each, _ in caps]
-    below = [most for _, most in caps]
-    if peak:
-        into = (costs, (graph.target, np.arange(len(costs))))
-        entered = sparse.csc_array(into, shape=(graph.states, flow.shape[1]))
-        rows.append(sparse.hstack([entered, sparse.csc_array(-np.ones((graph.states, 1)))]))
-        below += [0.0] * graph.states
-    return minimize_rows(
-        np.eye(1, flow.shape[1] + 1, flow.shape[1])[0] if peak else np.pad(costs, (0, ends + 1)),
-        sparse.vstack(rows, format="csc"),
-        np.concatenate([right, below]),
-        watch=watch,
-        whole=flow.shape[1],
-        equations=graph.states,
-    )
+def _written(
+    flow: Flow, arcs: cp.Variable, caps: list[tuple[int, float]], *, peak: bool
+) -> cp.Problem:
+    """Return the program of a goal, its costs those of the flow, and of sums that are capped."""
+    rules: list[cp.Constraint] = [cp.Zero(flow.balance @ arcs - flow.source)]
+    for column, most in caps:
+        amounts: Floats = flow.graph.amounts[:, column]
+        size = max(most, float(amounts.max())) or 1.0
+        rules.append(cp.NonNeg(most / size - amounts / size @ arcs))
+    if not peak:
+        return cp.Problem(cp.Minimize(flow.cost @ arcs), rules)
+    shape = (flow.graph.states, len(flow.cost))
+    rows = (flow.graph.target, np.arange(len(flow.cost)))
+    largest, entered = cp.Variable(nonneg=True), sparse.csr_array((flow.cost, rows), shape=shape)
+    return cp.Problem(cp.Minimize(largest), [*rules, cp.NonNeg(largest - entered @ arcs)])
 
 
 FLOW_LP = on_graph("flow_lp", "a unit flow of states, linear programs", _linear)

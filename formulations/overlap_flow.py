@@ -37,7 +37,7 @@ from scipy import sparse
 from formulations.cascade import at_hand
 from formulations.choice import Choice, Choose
 from formulations.on_graph import on_graph
-from formulations.solvers import minimize, minimize_whole
+from formulations.solvers import minimize, minimize_by_highs
 from seqopt.arrays import Floats
 from seqopt.errors import NothingFoundError, ProblemError
 from seqopt.graph.formulation import FormulationKind, On, Watch
@@ -170,7 +170,7 @@ def by_integers(write: Callable[[Graph], WholeProgram]) -> Choose:
 
     def choose(graph: Graph, watch: Watch) -> Choice:
         written = write(graph)
-        optimum = minimize_whole(
+        optimum = minimize_by_highs(
             written.program, feasible=not graph.caps, watch=watch, told=written.bound
         )
         seconds = optimum.compile_seconds

@@ -20,7 +20,7 @@ import numpy as np
 
 from formulations.choice import Choice
 from formulations.overlap_flow import unit_flow
-from formulations.solvers import minimize, minimize_whole
+from formulations.solvers import minimize, minimize_by_highs
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 
@@ -43,7 +43,7 @@ def solve_program(
     least = cp.Minimize(total + (most * np.ones(len(graph.peaks))) @ over)
     program = cp.Problem(least, [conserve, above])
     if whole:
-        optimum = minimize_whole(program, feasible=True, watch=watch)
+        optimum = minimize_by_highs(program, feasible=True, watch=watch)
     else:
         optimum = minimize(program, feasible=True, time_limit=watch.left)
     path = flow.path(np.asarray(arcs.value)) if np.isfinite(optimum.value) else ()

@@ -7,20 +7,18 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import cvxpy as cp
 import highspy
 import numpy as np
 
-from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.formulation import Watch
 
 GAPS = {"mip_rel_gap": 1e-9, "mip_abs_gap": 1e-9}  # of integer programs
 HIGHS_ENDS = {"kOptimal": cp.OPTIMAL, "kInfeasible": cp.INFEASIBLE}
-EXACTLY = 1e-10  # by how much programs given as arrays may be off
+EXACTLY = 1e-10  # by how much constraints may be off where ties are kept
 STOPS = ("kTimeLimit", "kInterrupt")
 
 
@@ -72,80 +70,48 @@ def minimize(program: cp.Problem, *, feasible: bool, time_limit: float = math.in
     return Optimum(value, seconds, value)
 
 
-def minimize_whole(
+def minimize_by_highs(
     program: cp.Problem,
     *,
     feasible: bool,
     watch: Watch | None = None,
     told: Callable[[float], float] = float,
+    tolerance: float | None = None,
 ) -> Optimum:
-    """Solve an integer program by HiGHS; its variables take the values of the best solution.
+    """Solve a linear or an integer program by HiGHS; its variables take the best values.
 
-    ``feasible``: whether it is known to have one; ``watch``: says when to stop, and is told values
-    and bounds as they are found, in the unit that ``told`` turns them into. Raises
-    `InfeasibleError`, `SolverError` as `minimize`.
+    ``feasible``: whether it is known to have a solution; ``watch``: says when to stop, and is told
+    values and bounds of integer programs as they are found, in the unit that ``told`` turns them
+    into; ``tolerance``: of constraints, by default that of HiGHS. Raises `InfeasibleError`,
+    `SolverError` as `minimize`.
     """
     watch = watch or Watch()
     start = time.perf_counter()
     try:
         data, chain, inverse = program.get_problem_data(cp.HIGHS)
-        solver = _loaded(data, whole=True)
+        whole = len(data["bool_vars_idx"]) > 0
+        solver = _loaded(data, whole=whole)
         seconds = time.perf_counter() - start
         offset = float(inverse[-1].get("offset", 0.0))
         _listen(solver, watch, lambda value: told(value + offset))
+        for name in ("primal", "dual", "mip") if tolerance is not None else ():
+            solver.setOptionValue(f"{name}_feasibility_tolerance", tolerance)
+        if not whole:
+            solver.setOptionValue("solver", "ipm")  # ends in a vertex, on large graphs far sooner
         status = _end(solver, watch.left)
     except cp.SolverError as error:
         raise SolverError(f"{cp.HIGHS} failed: {error}; rescale the costs") from error
-    info = solver.getInfo()
-    stopped = status in STOPS
-    bound = float(info.mip_dual_bound) + offset
-    if stopped and not math.isfinite(info.objective_function_value):
-        return Optimum(math.inf, seconds, bound, int(info.mip_node_count), stopped=True)
+    info, stopped = solver.getInfo(), status in STOPS
+    bound = float(info.mip_dual_bound) + offset if whole else -math.inf
+    nodes = int(info.mip_node_count)
+    if stopped and not (whole and math.isfinite(info.objective_function_value)):
+        return Optimum(math.inf, seconds, bound, nodes, stopped=True)
     if not stopped:
         _require_optimum(HIGHS_ENDS.get(status, status), cp.HIGHS, feasible=feasible)
     results = {"solution": solver.getSolution(), "info": info, "model_status": "kOptimal"}
     program.unpack_results(results | {"run_time": solver.getRunTime()}, chain, inverse)
-    return Optimum(float(program.value), seconds, bound, int(info.mip_node_count), stopped)
-
-
-class Point(NamedTuple):
-    """How HiGHS ended, in its words, and with what."""
-
-    end: str
-    values: Floats
-    multipliers: Floats
-    bound: float
-
-
-def minimize_rows(
-    cost: Floats, rows: Any, right: Floats, *, watch: Watch, whole: int = 0, equations: int = -1
-) -> Point:
-    """Solve a program whose arrays are given, by HiGHS.
-
-    ``cost`` (n,) of variables from 0 on; ``rows`` ((m, n) sparse float); ``right`` (m,): what
-    equations are equal to, and inequalities, which come after them, no more than; ``whole``: how
-    many of the first variables are 0 or 1; ``equations``: how many rows are; all by default.
-    Result: ended ``kInfeasible``, ``kOptimal`` or by one of `STOPS`; its values are none (0,) where
-    nothing was found. Raises `SolverError` if it ends in any other way.
-    """
-    dims = SimpleNamespace(zero=len(right) if equations < 0 else equations)
-    data = {"A": rows, "b": right, "c": cost, "dims": dims, "bool_vars_idx": range(whole)}
-    solver = _loaded(data | {"lower_bounds": np.zeros(len(cost))}, whole=whole > 0)
-    if not whole:
-        solver.setOptionValue("solver", "ipm")  # ends in a vertex, on large graphs far sooner
-    for name in ("primal_feasibility", "dual_feasibility", "mip_feasibility"):
-        solver.setOptionValue(f"{name}_tolerance", EXACTLY)
-    _listen(solver, watch, float)
-    end = _end(solver, watch.left)
-    if end not in (*HIGHS_ENDS, *STOPS):
-        _require_optimum(end, cp.HIGHS, feasible=True)
-    found, info = solver.getSolution(), solver.getInfo()
-    bound, known = float(info.mip_dual_bound), math.isfinite(info.objective_function_value)
-    if not whole:
-        known = end == "kOptimal"
-        bound = float(info.objective_function_value) if known else -math.inf
-    values = np.array(found.col_value if known and end != "kInfeasible" else [])
-    return Point(end, values, np.array(found.row_dual), bound)
+    value = float(program.value)
+    return Optimum(value, seconds, bound if whole else value, nodes, stopped)
 
 
 def anatomy(program: cp.Problem) -> tuple[Size, float]:

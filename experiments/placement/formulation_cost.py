@@ -56,7 +56,7 @@ from experiments.placement.parts.budget_cases import CASES, COMPARED, NO_BUDGET
 from experiments.placement.parts.formulation_charts import contest_chart, shape_chart
 from formulations.exhibits import _big_m, _epigraph, _loose, _tight
 from formulations.overlap_flow import _whole
-from formulations.solvers import anatomy, minimize_whole
+from formulations.solvers import anatomy, minimize_by_highs
 from seqopt import Network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.formulation import On, Watch, find_formulation, formulations, trace_rows
@@ -230,7 +230,7 @@ def written(
     written = SHAPES[aim][name](graph)
     size, relaxed = anatomy(written.program)
     watch, start = Watch(limit), time.perf_counter()
-    found = minimize_whole(written.program, feasible=True, watch=watch, told=written.bound)
+    found = minimize_by_highs(written.program, feasible=True, watch=watch, told=written.bound)
     seconds = time.perf_counter() - start
     row = {"formulation": name, "aim": aim.value, **asdict(size)}
     row |= {"optimum": optimum, "relaxed": written.bound(relaxed)}

@@ -18,13 +18,15 @@ the best of a first one and that of the flow.
 
 from __future__ import annotations
 
+import cvxpy as cp
 import numpy as np
-from scipy import sparse
 
-from formulations.solvers import STOPS, minimize_rows
+from formulations.overlap_flow import unit_flow
+from formulations.solvers import EXACTLY, minimize_by_highs
 from formulations.times._labels import useful
 from formulations.times._search import in_time
 from formulations.times._stages import Asked, Chosen
+from seqopt.errors import InfeasibleError
 from seqopt.graph.formulation import FormulationKind
 
 
@@ -33,32 +35,26 @@ def _bounded(asked: Asked) -> Chosen:
     first, watch = asked.first, asked.watch
     most = min(first.value, asked.caps.time)
     kept = useful(asked.timed, asked.prices, asked.kept, most) if np.isfinite(most) else asked.kept
-    graph, work = asked.timed.graph.only(kept), asked.timed.work[kept]
+    kept = kept & ~asked.timed.graph.ends[asked.timed.graph.source]
+    flow, work = unit_flow(asked.timed.graph.only(kept)), asked.timed.work[kept]
     scale = asked.prices.bound or 1.0
-    ends, moves = np.flatnonzero(graph.ends), np.arange(len(graph.source))
-    count = len(moves) + len(ends)
-    out = np.concatenate([graph.source, ends, graph.target])
-    columns = np.concatenate([np.arange(count), moves])
-    signs = np.concatenate([np.ones(count), -np.ones(len(moves))])
-    flow = sparse.csc_array((signs, (out, columns)), shape=(graph.states, count + 1))
-    shares = [np.pad(own / scale, (0, len(ends) + 1)) for own in work.T]
-    for share, size in zip(shares, asked.timed.sizes, strict=True):
-        share[-1] = -float(size)
-    sums = [np.pad(graph.amounts[:, c], (0, len(ends) + 1)) for c in asked.caps.columns]
-    rows = sparse.vstack([flow, sparse.csc_array(np.array([*shares, *sums]))], format="csc")
-    right = np.zeros(rows.shape[0])
-    right[0] = 1.0
-    right[graph.states + len(shares) :] = [cap for _, cap in asked.caps.sums]
-    cost = np.eye(1, count + 1, count)[0]
-    found = minimize_rows(cost, rows, right, watch=watch, whole=count, equations=graph.states)
-    least = np.inf if found.end == "kInfeasible" else scale * found.bound * (1 - 1e-9)
-    bound = max(asked.prices.bound, least)
-    taken = found.values[: len(moves)] > 0.5
-    if taken.any():
+    arcs, makespan = cp.Variable(len(flow.cost), boolean=True), cp.Variable(nonneg=True)
+    shared = cp.NonNeg(makespan * asked.timed.sizes - work.T / scale @ arcs)
+    sums = [
+        cp.NonNeg(cap - flow.graph.amounts[:, column] @ arcs) for column, cap in asked.caps.sums
+    ]
+    conserve = cp.Zero(flow.balance @ arcs - flow.source)
+    program = cp.Problem(cp.Minimize(makespan), [conserve, shared, *sums])
+    try:
+        found = minimize_by_highs(program, feasible=False, watch=watch, tolerance=EXACTLY)
+    except InfeasibleError:
+        return first._replace(bound=first.value)
+    bound = max(asked.prices.bound, scale * found.bound * (1 - 1e-9))
+    if np.isfinite(found.value):
         every = np.zeros(len(kept), dtype=bool)
-        every[np.flatnonzero(kept)[taken]] = True
+        every[np.flatnonzero(kept)[np.asarray(arcs.value) > 0.5]] = True
         first = min(first, asked.by(every), key=lambda each: each.value)
-    return Chosen(first.path, first.value, min(bound, first.value), late=found.end in STOPS)
+    return Chosen(first.path, first.value, min(bound, first.value), late=found.stopped)
 
 
 FORMULATION = in_time(

@@ -23,7 +23,7 @@ from formulations.contact.limit_analysis import (
     _solve_cones,
     compile_equilibrium,
 )
-from formulations.solvers import GAPS, minimize, minimize_whole
+from formulations.solvers import GAPS, minimize, minimize_by_highs
 from seqopt.stability.limit_analysis import CAP, Case, Claim, Sense, limits
 from tests.builders import held
 
@@ -226,7 +226,7 @@ def test_an_optimum_is_a_value_and_the_time_to_write_it_down(monkeypatch, second
 
 def test_an_integer_optimum_is_sought_to_nine_digits():
     x = cp.Variable(boolean=True)
-    found = minimize_whole(cp.Problem(cp.Minimize(3 - 2 * x)), feasible=True)
+    found = minimize_by_highs(cp.Problem(cp.Minimize(3 - 2 * x)), feasible=True)
     assert found.value == found.bound == 1
     assert all(0 < gap <= 1e-9 for gap in GAPS.values())
 

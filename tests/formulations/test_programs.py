@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formulations import beam, rank_search
-from formulations.solvers import anatomy, minimize, minimize_whole
+from formulations.solvers import anatomy, minimize, minimize_by_highs
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.formulation import formulations as registered
@@ -264,7 +264,7 @@ def boxed_program():
 
 
 def test_programs_keep_their_offset_bounds_and_equations(capfd):
-    found = minimize_whole(boxed_program(), feasible=True)
+    found = minimize_by_highs(boxed_program(), feasible=True)
     assert found.value == pytest.approx(3.5)
     assert found.bound == pytest.approx(3.5)
     assert not found.stopped
@@ -281,7 +281,7 @@ def test_a_relaxation_is_below_the_program():
     x = cp.Variable(2, boolean=True)
     program = cp.Problem(cp.Minimize(-x[0] - x[1]), [2 * x[0] + 2 * x[1] <= 3])
     assert anatomy(program)[1] == pytest.approx(-1.5)
-    assert minimize_whole(program, feasible=True).value == pytest.approx(-1.0)
+    assert minimize_by_highs(program, feasible=True).value == pytest.approx(-1.0)
 
 
 def test_a_program_without_time_is_stopped_and_claims_nothing():
@@ -291,5 +291,5 @@ def test_a_program_without_time_is_stopped_and_claims_nothing():
     found = minimize(program, feasible=True, time_limit=1e-9)
     assert found.stopped
     assert np.isinf(found.value)
-    whole = minimize_whole(boxed_program(), feasible=True, watch=Watch(time_limit=0.0))
+    whole = minimize_by_highs(boxed_program(), feasible=True, watch=Watch(time_limit=0.0))
     assert whole.stopped or whole.value == pytest.approx(3.5)  # presolve may be done at once
