@@ -2,48 +2,31 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
-from itertools import chain, combinations, islice
+from dataclasses import replace
+from itertools import chain, combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from seqopt.arrays import Ints
-from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
 from seqopt.graph.duality import least_sum
 from seqopt.graph.instance import Instance, _Cap
-from seqopt.graph.paths import distances, least_peak, tied
-from seqopt.graph.states._visits import barred, explore
+from seqopt.graph.paths import distances, tied
+from seqopt.graph.states._visits import barred
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import case_of, is_kept, least_within
 from seqopt.judge._proof import Proof
 from seqopt.judge._twin import twin_of
-from seqopt.plan._softer import HARD, _ground_moves, _softer, _whole_load
-from seqopt.plan.search._margin_search import STEPS, WORST, StandingLook, bisected, with_margin
-from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure
-from seqopt.problem.standing import Standing
-from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import (
-    PROP_EXCESS,
-    _payload_text,
-    _rounded_up,
-    length_text,
-    robot_response,
-)
-from seqopt.scene.arm import Arm
-from seqopt.scene.scene import Scene
-from seqopt.sequence._carrying import loads
-from seqopt.sequence._rule_check import RuleBook, unbearable
-from seqopt.sequence.rules import FreeRules, Payload
-from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.two_robots import _enough_reach
+from seqopt.plan._remedies import LateError, Look, Remedies
+from seqopt.plan._stops import stops_of
+from seqopt.plan.search._margin_search import STEPS, WORST, with_margin
+from seqopt.problem.problem import Goal, Measure
 
 if TYPE_CHECKING:
     from seqopt.graph.orders import AllOrders
@@ -101,47 +84,6 @@ def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
 
 
 ALLOWED = "says that no plan is allowed, and some are"
-IGNORED = "payload=ignored"
-PAYLOADS = "robots that carry more"  # where states must stand, held by what robots carry
-LARGE = 1e6  # N
-RULES = {field.name for field in fields(FreeRules)}
-BOTH = " together with "
-STANDING = "no requirement to stand"
-PROPS = "props that bear any force, both ways"
-CENTERING = "a prop at every brick, if not fewer"
-ARMS = "arms that reach more, or stand elsewhere"
-APART = "arms that are out of each other's way (slimmer, or elsewhere)"
-
-
-class _LateError(Exception):
-    """Time is over."""
-
-
-@dataclass(frozen=True)
-class Look:
-    """Explores the states that plans may pass, until a time of the clock."""
-
-    end: float = np.inf
-
-    def tell(self, _: Explorer) -> None:
-        """Raise an error once time is over."""
-        if time.perf_counter() > self.end:
-            raise _LateError
-
-    def __call__(self, problem: States) -> Explorer:
-        """Return the states that plans of a problem may pass."""
-        return explore(problem, tell=self.tell)
-
-    def exists(self, problem: States) -> bool:
-        """Return whether a problem has a plan; what stands is asked of few of its states."""
-        problem = replace(problem, goals=STEPS)
-        if not problem.demands:
-            return self(problem).whole
-        return barred(problem) is None and self.standing(problem).exists(problem)
-
-    def standing(self, problem: States) -> StandingLook:
-        """Return the states of a problem, whether they stand or not, of which that is asked."""
-        return StandingLook(replace(problem, goals=STEPS, standing=None, settled=()), self.tell)
 
 
 def confirmed(
@@ -167,7 +109,7 @@ def confirmed(
                 return SolverError(f"formulation {name} {ALLOWED}")
             hint = {level: rows for level, _, rows in found.graph().states}
         proven = Proof(steps, hint).is_impossible()
-    except _LateError:
+    except LateError:
         proven = False
     bare = replace(problem, goals=problem.aims, budgets=())
     why = "no plan is allowed"
@@ -241,53 +183,15 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
         steps = replace(problem, goals=STEPS)
         if _of_criterion(problem) and barred(steps) is None and look(steps).whole:
             return f"{problem.title}: criterion {problem.criterion.name} allows no plan"
-        where = _where(problem, look)
-        return f"{problem.title}: {where}{_what_helps(problem, look)}"
-    except _LateError:
+        state = barred(steps)
+        finished = state is not None and _is_bare_end(problem, *state)
+        if state is None:
+            where = stops_of(problem).where(look(steps).reached)
+        else:
+            where = _barred_said(problem, *state)
+        return f"{problem.title}: {where}{Remedies(problem, look).said(finished=finished)}"
+    except LateError:
         return f"{problem.title}: {where}; time was over before it was known what helps, give more"
-
-
-def _where(problem: States, look: Look) -> str:
-    """Return where all builds stop, and which brick there or later is too heavy to be carried."""
-    placed, rules, last = problem.network.scene.placed, problem.rules, problem.space.levels
-    if (state := barred(replace(problem, goals=STEPS))) is not None:
-        return _barred_said(problem, *state)
-    stops = look(replace(problem, goals=STEPS)).reached
-    if isinstance(rules, Schedule):
-        found = unbearable((problem.network.scene, *problem.worlds), rules.steps, rules.begin)
-        heavy = "".join(f": in step {n} {why}" for n, why in [*found.items()][:1])
-        return f"step {stops + 1} of {last} has no state that is allowed{heavy}"
-    if stops == last:
-        return f"after brick {placed[problem.space.bricks_at(last) - 1].name} the build cannot end"
-    end = problem.space.bricks_at(last)
-    at = problem.space.bricks_at(stops) + (not rules.takes_down)
-    left = range(at, end, -1) if rules.takes_down else range(at, end + 1)
-    done = "removed" if rules.takes_down else "placed"
-    where = f"brick {placed[at - 1].name} ({at} of {len(placed)}) is never {done}"
-    return f"{where}{_too_heavy(RuleBook(problem.network, rules, problem.worlds), left)}"
-
-
-def _too_heavy(book: RuleBook, left: Sequence[int]) -> str:
-    """Return which brick is too heavy, as the end of a line: the next, or a later no robot lifts.
-
-    ``left``: brick counts with each brick that is to be carried.
-    """
-    for bricks in left:
-        near = [r for r in book.team if book.named(r) and book.newest_nodes[r, bricks]]
-        heavy = book.too_heavy(bricks, near)
-        if heavy and (bricks == left[0] or not any(book.places(r, bricks) for r in near)):
-            return f": {heavy}"
-    return ""
-
-
-def _heaviest(problem: States) -> float:
-    """Return the most that a robot of a free schedule would have to carry, N: its tool as well."""
-    rules, scenes = problem.rules, (problem.network.scene, *problem.worlds)
-    assert isinstance(rules, FreeRules)
-    bricks = slice(*sorted(rules.span(scenes[0])))
-    team = rules.team(scenes[0])
-    pairs = ((scene, scene.robots[r]) for scene in scenes for r in team)
-    return max(float(loads(scene, robot)[bricks].max()) for scene, robot in pairs)
 
 
 def _barred_said(problem: States, level: int, state: Ints) -> str:
@@ -321,198 +225,3 @@ def _excess_said(problem: States, level: int, state: Ints) -> str:
         if each.exceeded(value).any()
     ]
     return f"has {' and '.join(over)}" if over else "asks more of robots than they carry"
-
-
-def _what_helps(problem: States, look: Look) -> str:
-    """Return what opens a way, as the end of a line."""
-    state = barred(replace(problem, goals=STEPS))
-    if state is not None and _is_bare_end(problem, *state):  # whatever robots do
-        ways = [*_supporting(problem, look), *_limiting(problem, look)]
-        if not ways:
-            return "; no robot helps: it needs more bond or friction, less load, or other limits"
-        return f"; it becomes possible with {' or '.join(_enough(problem, w, look) for w in ways)}"
-    ways = [*_opening(problem, look)]
-    if {*ways} <= {ARMS, APART}:  # of the same arms two rules may ask less
-        arms = (ARMS, APART) if ways else ()
-        pairs = (
-            f"{text}{BOTH}{other}"
-            for text, rules in _loosened(problem)
-            for other in _opening(replace(problem, rules=rules), look)
-            if not other.endswith(arms)
-        )
-        ways = [*ways, *islice(pairs, 1), *(() if ways else _propped(problem, look))]
-    if not ways:
-        return ", whatever two rules or limits are loosened; extend a reach or add a robot"
-    enough = dict.fromkeys(text for way in ways if (text := _enough(problem, way, look)))
-    if enough:
-        return f"; it becomes possible with {' or '.join(enough)}"
-    return f"; robots would have to carry more than all weights and loads; {HARD}"
-
-
-def _opening(problem: States, look: Look) -> Iterator[str]:
-    """Yield rules, each loosened as little as is enough alone, and limits that alone are enough."""
-    problem = replace(problem, goals=STEPS)
-    done: set[str] = set()
-    for text, rules in _loosened(problem):
-        rule = text.partition("=")[0]
-        if rule not in done and look.exists(replace(problem, rules=rules)):
-            done.add(rule)
-            yield text
-    yield from _supporting(problem, look)
-    scene = problem.network.scene  # robots without arms hold as others with joints that are rigid
-    able = scene.has_arms and not scene.grip_kinds.arms.any() and recipe_of(problem.engine)
-    if able and look.exists(_with_arms(problem, lambda _: None)):
-        alone = _with_arms(problem, lambda arm: arm and replace(arm, keeps_apart=False))
-        yield APART if look.exists(alone) else ARMS
-    if recipe_of(problem.engine) and not (scene.has_arms or problem.scenarios):
-        yield from _enough_reach(scene, lambda other: look.exists(_in_scene(problem, other)))
-    yield from _limiting(problem, look)
-    if _ground_moves(scene) and not problem.scenarios and (soft := _soft_enough(problem, look)):
-        yield soft
-
-
-def _soft_enough(problem: States, look: Look) -> str:
-    """Return with how soft grips there is a plan, in words; empty if with none."""
-    return _softer(problem.engine, lambda scene: look.exists(_in_scene(problem, scene)))
-
-
-def _limiting(problem: States, look: Look) -> Iterator[str]:
-    """Yield the limits without which alone there is a plan, by their names."""
-    for limit in problem.limits:
-        rest = tuple(other for other in problem.limits if other is not limit)
-        if look.exists(replace(problem, limits=rest)):
-            yield limit.label
-
-
-def _supporting(problem: States, look: Look) -> Iterator[str]:
-    """Yield what alone is enough for states to stand: no need to, or robots that carry more."""
-    if problem.demands and look.exists(replace(problem, standing=None, settled=())):
-        yield STANDING
-    rules, scenes = problem.rules, (problem.network.scene, *problem.worlds)
-    if isinstance(rules, Schedule):  # of which grips may hold up more than payloads
-        asked = bool(unbearable(scenes, rules.steps, rules.begin))
-    else:
-        asked = bool(problem.demands) and rules.payload is Payload.KEPT
-    if asked and recipe_of(problem.engine) and look.exists(_carrying(problem, LARGE)):
-        yield PAYLOADS
-
-
-def _propped(problem: States, look: Look) -> Iterator[str]:
-    """Yield that props help, if one at every brick does."""
-    scene, moves = problem.network.scene, problem.rules
-    if scene.props or recipe_of(problem.engine) is None or problem.scenarios:
-        return
-    sites = (moves.begin, moves.finish) if isinstance(moves, FreeRules) else ()
-    held = {node for site in sites if site is not None for node in site.holds(scene)}
-    props = (prop for prop in scene.with_centering().props if prop.node not in held)
-    if look.exists(_in_scene(problem, scene.with_props(*props))):
-        yield CENTERING
-
-
-def _with_arms(problem: States, changed: Callable[[Arm | None], Arm | None]) -> States:
-    """Return a problem of robots with other arms, or of what they reach without them."""
-    scene = problem.network.scene
-    other = scene.with_robots(*(replace(each, arm=changed(each.arm)) for each in scene.robots))
-    return _in_scene(replace(problem, scenarios=()), other)
-
-
-def _in_scene(problem: States, scene: Scene) -> States:
-    engine, rules = engine_for(problem.engine, scene), problem.rules
-    moves = replace(rules, scene=engine.network.scene) if isinstance(rules, Schedule) else rules
-    return replace(problem, engine=engine, rules=moves)
-
-
-def _loosened(problem: States) -> Iterator[tuple[str, FreeRules]]:
-    """Yield the rules that can be loosened: what stands is asked of robots with payloads."""
-    own, scene = problem.rules, problem.network.scene
-    for text, rules in own.loosened(scene) if isinstance(own, FreeRules) else ():
-        if not problem.demands or rules.payload is Payload.KEPT:
-            yield text, rules
-
-
-def _enough(problem: States, way: str, look: Look) -> str:
-    """Return how far a limit or a payload has to be raised, where one is loosened."""
-    if way == STANDING and not any(demand.tilt for demand in problem.demands):
-        own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=STEPS)
-        states = look.standing(bare)
-
-        def exists(bond: float) -> bool:
-            asked = states.proving(replace(bare, standing=own.demanding("bond", bond)))
-            return barred(asked) is None and states.exists(asked)
-
-        try:
-            enough = bisected("bond", exists)[1]
-        except InfeasibleError:
-            return way
-        return f"a bond of {_rounded_up(enough):.10g} Pa"
-    if way == PAYLOADS:
-        return _enough_payload(problem, lambda payload: look.exists(_carrying(problem, payload)))
-    if way == IGNORED and isinstance(problem.rules, FreeRules):
-        rules = replace(problem.rules, payload=Payload.IGNORED)
-        held = worst_least(replace(problem, rules=rules), LARGEST, look)
-        if held > _whole_load(problem.network):
-            return _soft_enough(problem, look)
-        newton = _payload_text(max(held, _heaviest(problem)))
-        return f"a payload of {newton} N (--payload {newton})"
-    return _enough_limit(problem, way, look)
-
-
-def _enough_limit(problem: States, way: str, look: Look) -> str:
-    """Return how far a limit has to be raised; other ways as they are."""
-    found = [limit for limit in problem.limits if limit.label == way]
-    if not found:  # with the words of the command line behind it, where it is rules alone
-        words = way.split(BOTH)
-        known = all(rule.partition("=")[0] in RULES for rule in words)
-        return f"{way} (--rule {' --rule '.join(words)})" if known else way
-    name = found[0].response
-    if not (name in STATE_RESPONSES or is_tolerance(name)):
-        return PROPS if way == PROP_EXCESS else f"no limit on {way}"
-    rest = tuple(limit for limit in problem.limits if limit not in found)
-    least = worst_least(replace(problem, limits=rest), name, look)
-    forces = (LARGEST, *(robot_response(r.name) for r in problem.network.scene.robots))
-    if name in forces and least > _whole_load(problem.network):
-        return _soft_enough(problem, look)
-    if is_tolerance(way):
-        return f"a tolerance of {length_text(1 / least)} instead of {length_text(found[0].bound)}"
-    most, bound = _rounded_up(found[0].shown(least)), found[0].shown(found[0].bound)
-    return f"{way}={most:.6g} instead of {bound:g}"
-
-
-def _carrying(problem: States, payload: float) -> States:
-    """Return a problem in which every robot may carry so much, N."""
-
-    def strong(scene: Scene) -> Scene:
-        return scene.with_robots(*(replace(r, payload=payload) for r in scene.robots))
-
-    worlds = tuple(engine_for(e, strong(e.network.scene)) for e in problem.scenarios)
-    return replace(_in_scene(problem, strong(problem.network.scene)), scenarios=worlds)
-
-
-def _enough_payload(problem: States, exists: Callable[[float], bool]) -> str:
-    """Return the least payload of all robots with which something exists, to three digits."""
-    low = min(robot.payload for robot in problem.network.scene.robots)
-    high = 2 * low
-    while not exists(high):
-        low, high = high, 2 * high
-    step = 10.0 ** max(0, math.floor(math.log10(high)) - 2)
-    least, most = math.floor(low / step), math.ceil(high / step)
-    while most - least > 1:
-        middle = (least + most) // 2
-        least, most = (least, middle) if exists(middle * step) else (middle, most)
-    free = isinstance(problem.rules, FreeRules)
-    if free and most * step > max(_whole_load(problem.network), _heaviest(problem)):
-        return ""
-    newton = _payload_text(most * step)
-    return f"a payload of {newton} N (--payload {newton})"
-
-
-LOOK = Look()
-
-
-def worst_least(problem: States, response: str, look: Look = LOOK) -> float:
-    """Return the least peak of a response among plans, SI units; infinite if there is no plan.
-
-    ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``.
-    """
-    found = look(replace(problem, goals=(Goal(Measure.PEAK, response),)))
-    return least_peak(found.graph().graph, 0) if found.whole else np.inf

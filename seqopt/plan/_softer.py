@@ -22,7 +22,7 @@ from seqopt.sequence.steps import Step
 STIFFNESSES = (1e8, 1e7, 1e6, 1e5, 1e4, 1e3)  # of grips, N/m, the stiffest that helps first
 
 
-def _whole_load(network: Network) -> float:
+def whole_load(network: Network) -> float:
     """Return the sizes of all weights, loads and wind in sum, N: no robot needs to carry more."""
     applied = network.applied(len(network.inner))[:, :3]
     return float(np.linalg.norm(np.concatenate([network.weight, applied]), axis=1).sum())
@@ -32,7 +32,7 @@ def _payload_advice(engine: Engine, steps: Sequence[Step], over: Sequence[Excess
     """Return what helps in a plan in which payloads are exceeded, as of `overloads`, in words."""
     network = engine.network
     held = max((each.largest for each in over if each.brick is None), default=0.0)
-    if held <= _whole_load(network):
+    if held <= whole_load(network):
         least = _payload_text(max(each.largest for each in over))
         how = f"--payload {least}, or payload of its robots in the scene file"
         return f"payload of {least} N is enough for this plan: {how}"
@@ -41,22 +41,22 @@ def _payload_advice(engine: Engine, steps: Sequence[Step], over: Sequence[Excess
         found = overloads(scene, analyze(engine_for(engine, scene), steps))
         return all(each.brick is not None for each in found)  # what is carried stays as heavy
 
-    still = " that hold nodes in place while the ground moves" * _ground_moves(network.scene)
+    still = " that hold nodes in place while the ground moves" * ground_moves(network.scene)
     why = f"stiff grips{still}"
-    what = f"{held:,.0f} N, {_plain(held / _whole_load(network), 3)} times all weights and loads,"
-    helps = _softer(engine, kept)
+    what = f"{held:,.0f} N, {_plain(held / whole_load(network), 3)} times all weights and loads,"
+    helps = softer_grips(engine, kept)
     return f"no payload helps: {what} come of {why}; {f'{helps} are enough' if helps else HARD}"
 
 
 HARD = "softer grips were not found to help; ground that moves less, or softer supports, may"
 
 
-def _ground_moves(scene: Scene) -> bool:
+def ground_moves(scene: Scene) -> bool:
     """Return whether some ground end moves."""
     return any(any(ground.movement or ()) for ground in scene.grounds)
 
 
-def _softer(engine: Engine, exists: Callable[[Scene], bool]) -> str:
+def softer_grips(engine: Engine, exists: Callable[[Scene], bool]) -> str:
     """Return the stiffest softer grips of a scene with which something exists, in words; or ""."""
     scene = engine.network.scene
     own = [float(np.min(robot.stiffness)) for robot in scene.robots if robot.stiffness]

@@ -109,9 +109,7 @@ def _moved(
     problem: Problem, scene: Scene, plan: Plan | None = None, scenarios: Sequence[Scene] = ()
 ) -> Problem:
     """Return a problem with other robots, and the criterion of a plan, scales included."""
-    engine, moves = engine_for(problem.engine, scene), problem.moves
-    if isinstance(moves, Schedule):
-        moves = replace(moves, scene=scene)
+    engine, moves = engine_for(problem.engine, scene), problem.moves.in_scene(scene)
     criterion = problem.criterion if plan is None else plan._of_scene.criterion
     return replace(
         problem, engine=engine, moves=moves, criterion=criterion, scenarios=tuple(scenarios)

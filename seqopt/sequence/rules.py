@@ -241,6 +241,10 @@ class FreeRules:
             **{name: site.described(scene) for name, site in sites.items() if site is not None},
         }
 
+    def in_scene(self, scene: Scene) -> FreeRules:
+        """Return the rules in another scene: they name no scene."""
+        return self
+
     def loosened(self, scene: Scene) -> Iterator[tuple[str, FreeRules]]:
         """Yield the rules with one of them loosened, and how a user says so."""
         for least in range(self.fewest_grips(scene) - 1, -1, -1):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from itertools import groupby
@@ -199,6 +199,14 @@ class Schedule(Shown):
                 f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
                 "for costs of moves at most two neighboring ones can be; give an aim"
             )
+
+    def in_scene(self, scene: Scene) -> Schedule:
+        """Return the same steps of another scene with the same bricks, nodes and robots."""
+        return replace(self, scene=scene)
+
+    def loosened(self, scene: Scene) -> Iterator[tuple[str, Schedule]]:
+        """Yield what can be loosened: of given steps nothing."""
+        yield from ()
 
     @property
     def has_pairs(self) -> bool:

@@ -350,7 +350,9 @@ def test_a_time_limit_holds_while_it_is_asked_what_helps(monkeypatch, limit, sai
     """What is known by then is said."""
     engine = ComplianceEngine(build_network(small_arch(5)))
     problem = build_states(engine, FreeRules(), ONES, "steps", [Limit("F_largest", 1.0)])
-    monkeypatch.setattr("seqopt.plan._infeasible.time", Clock())
+    clock = Clock()
+    for module in ("_infeasible", "_remedies"):
+        monkeypatch.setattr(f"seqopt.plan.{module}.time", clock)
     with pytest.raises(InfeasibleError, match=said):
         seqopt.solve(problem, "schedule_search", time_limit=limit)
 

@@ -11,7 +11,7 @@ import seqopt
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan._softer import _payload_advice, _whole_load
+from seqopt.plan._softer import _payload_advice, whole_load
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit, overloads
 from seqopt.responses.table import analyze
@@ -48,7 +48,7 @@ def test_grips_that_are_said_to_be_enough_are_and_ten_times_stiffer_ones_are_not
     """It was a payload of many times the weight of all bricks."""
     scene = settled()
     said, over = advice(scene)
-    assert max(each.largest for each in over) > _whole_load(build_network(scene))
+    assert max(each.largest for each in over) > whole_load(build_network(scene))
     assert said.startswith("no payload helps: ")
     assert "while the ground moves" in said
     for share, enough in ((1.0, True), (10.0, False)):
@@ -61,7 +61,7 @@ def test_a_payload_that_a_robot_could_have_is_still_said():
     scene = settled(0.0, payload=5.0)
     said, over = advice(scene)
     least = max(each.largest for each in over)
-    assert least < _whole_load(build_network(scene))
+    assert least < whole_load(build_network(scene))
     (newton,) = re.findall(r"^payload of (\S+) N is enough for this plan: --payload \1", said)
     assert least <= float(newton) < 1.1 * least
 
@@ -69,7 +69,7 @@ def test_a_payload_that_a_robot_could_have_is_still_said():
 def test_weights_loads_and_wind_are_the_most_that_robots_need_to_carry():
     scene = replace(small_arch(3), wind=(0.0, 0.25, 0.0), weight_factor=2.0)
     weight = sum(brick.mass for brick in scene.bricks) * 9.81
-    assert _whole_load(build_network(scene)) == pytest.approx((2.0 + 0.25) * weight, rel=1e-9)
+    assert whole_load(build_network(scene)) == pytest.approx((2.0 + 0.25) * weight, rel=1e-9)
 
 
 @pytest.mark.parametrize("limits", [(), (Limit("F_largest", 200.0),)])
@@ -79,6 +79,6 @@ def test_a_free_schedule_names_grips_with_which_there_is_a_plan(limits):
     with pytest.raises(InfeasibleError, match=r"becomes possible with .*grips of") as found:
         seqopt.solve(problem, "schedule_search")
     newtons = [int(n) for n in re.findall(r"--payload (\d+)", str(found.value))]
-    assert max(newtons, default=0) <= _whole_load(engine.network)
+    assert max(newtons, default=0) <= whole_load(engine.network)
     soft = seqopt.make_engine("compliance", settled(bricks=4).with_grips(grips(str(found.value))))
     assert seqopt.solve(build_states(soft, FreeRules(), ONES, "steps", limits)).steps
