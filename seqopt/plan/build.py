@@ -221,8 +221,7 @@ class ShownBuild(Shown):
         """Return the build as a film, with one picture per step.
 
         ``forces``, ``magnify``: as of `plot`; ``seconds``: how long a step is shown, s. Result: a
-        notebook plays the film; ``save("build.gif")`` writes it to a file, ``save("build.mp4")``
-        as a video of the size of a slide (needs ffmpeg). Raises `ExtraError` if
+        notebook plays the film; ``save("build.gif")`` writes it to a file. Raises `ExtraError` if
         matplotlib is not installed (extra ``plot``).
         """
         return display("Film")(self.engine, self.steps, forces, magnify, seconds)

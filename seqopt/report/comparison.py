@@ -18,7 +18,6 @@ from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
 from seqopt.graph.formulation import Formulation, On, find_formulation, formulations
 from seqopt.graph.layers.costs import TINY
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.layers.ranking import rank_choice, under_both
 from seqopt.plan._layers import on_the_way
 from seqopt.plan._range import keeping
 from seqopt.plan.plan import Plan
@@ -55,9 +54,8 @@ from seqopt.study.published import (
 from seqopt.work.progress import Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
-RANKS = ["pairs", "conditional", "short_sight", "change_of_objective"]
 MARKS, COST = ["overloaded", "outside"], ["models", "seconds", "solve_seconds"]
-COLUMNS = ["problem", "objective", "gap", *RANKS, *LARGEST, *MARKS, *COST]
+COLUMNS = ["problem", "objective", "gap", *LARGEST, *MARKS, *COST]
 CLOSED = "no choice"  # the problem of a sequence without open grips
 PATIENCE = 10.0  # s, after which the best plan so far is the row
 
@@ -69,7 +67,6 @@ class LoopFacts(Terse):
     method: str
     seconds: Mapping[str, float]  # to ``respond`` (computing responses) and to ``rank`` (costs)
     paper_models: tuple[int, int] | None  # of Bruun et al., cascading and with full overlap
-    ranks: pd.DataFrame | None  # of the published plan's nodes, see `rank_choice`
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,9 +82,7 @@ class Comparison(Terse):
         The same as the paper prints it, for its own arch only.
     table : pandas.DataFrame
         A row per method or formulation: the ``problem`` it solves (rows of different problems do
-        not compete), ``objective`` and ``gap`` to the exact optimum of its aim, for criteria of
-        ranks the sums over ``pairs`` and ``conditional`` on the choice before, and of heuristics
-        the two parts of the gap, ``short_sight`` and ``change_of_objective``; the largest
+        not compete), ``objective`` and ``gap`` to the exact optimum of its aim; the largest
         ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N] and ``D_max`` [1e-3 mm] of any step, whether a
         robot is ``overloaded`` and results are ``outside`` the linear range, how many ``models`` it
         looks at, and the ``seconds`` that it took alone, ``solve_seconds`` of them to choose.
@@ -223,7 +218,7 @@ def _table(
         name: {f"falls_{each.mortar}": each.count(Verdict.FALLS) for each in found}
         for name, found in verdicts.items()
     }
-    table = table.astype(dict.fromkeys(RANKS, float)).assign(outside=table.index.isin([*left]))
+    table = table.assign(outside=table.index.isin([*left]))
     return table.join(pd.DataFrame.from_dict(falls, orient="index"))
 
 
@@ -318,15 +313,10 @@ def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
 def _row(plan: Plan) -> dict[str, object]:
     """Return what a plan is worth, and the seconds that it alone took."""
     assert plan.certificate is not None  # asked for
-    found = plan.objectives()
-    parts = found["gap_parts"] or {}
     return {
         "problem": plan.method,
         "objective": plan.certificate.objective,
         "gap": plan.certificate.gap,
-        **(found["objectives"] or {}),
-        "short_sight": parts.get("short_sight"),
-        "change_of_objective": parts.get("objective"),
         "models": plan.models_needed,
         "seconds": sum(plan.seconds[stage] for stage in ("compile", "solve", "verify")),
         "solve_seconds": plan.seconds["solve"],
@@ -337,16 +327,14 @@ def _facts(
     problem: Layers, rows: Mapping[str, dict[str, object]], robots: Sequence[str]
 ) -> LoopFacts:
     """Return the facts of a loop, and add to the published plan's row what it is worth."""
-    method, ranks = problem.schedule.method, None
+    method = problem.schedule.method
     if PUBLISHED in rows and not robots:
         choice = published_choice(problem)
         value = problem.sums.cost(choice)
         gap = (value - problem.sums.least_sum()) / max(abs(value), TINY)
         rows[PUBLISHED] |= {"problem": method, "objective": value, "gap": gap}
-        rows[PUBLISHED] |= under_both(problem, choice)
-        ranks = rank_choice(problem, choice)
     counted = paper_models(problem.schedule) if method == "three-robot" else None
-    return LoopFacts(method, problem.seconds(Aim.SUM), counted, ranks)
+    return LoopFacts(method, problem.seconds(Aim.SUM), counted)
 
 
 def method_tables(

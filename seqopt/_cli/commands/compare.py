@@ -33,7 +33,7 @@ from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.problem._limit_words import number_word
 from seqopt.problem.requirements import Criterion
-from seqopt.report._compared import comparison_blocks, format_details, printed_largest, shown_tables
+from seqopt.report._compared import comparison_blocks, printed_largest, shown_tables
 from seqopt.report._pages import comparison_page
 from seqopt.report.comparison import CLOSED, Comparison, compare
 from seqopt.report.softness import _grip_range, _softness_lines, held_softly, turning_points
@@ -61,14 +61,11 @@ class Compare(Strict, Postures, Judged, Cost, Team):
     beside the figures that they print, with a list of the inconsistencies in print.
 
     Usage
-    [SCENE] [--out DIR] [--details] [other options]
+    [SCENE] [--out DIR] [other options]
 
     What is built, and by whom?
     out : DIR
         write tables, figures and a page with all builds
-    details :
-        also show the largest force of each robot, every formulation under both objectives of ranks,
-        and where the grips of the published plan rank
     speed : SECONDS
         also chart speed against accuracy: the loop by every engine and formulation, each within so
         many seconds (10); errors are those beside the engine that --engine names
@@ -82,7 +79,6 @@ class Compare(Strict, Postures, Judged, Cost, Team):
     seqopt compare arch25 --speed 20 --out speed
     """
 
-    details: bool = False
     speed: str | None = word(None, const="10")
 
 
@@ -124,7 +120,6 @@ def answered(asked: Compare, found: Found) -> Answer:
     about = {"scene": scene.name, "criteria": criteria, **provenance(engine)}
     blocks = comparison_blocks(result, scene, criterion, columns())
     headings = [block.partition("\n")[0] for block in blocks]
-    blocks += [format_details(result, scene)] if asked.details else []
     if result.speed is not None:
         blocks.append("\n".join([SPEED, *result.speed.describe(wrapped)]))
     softly = held_softly(engine, shown_tables(result), grips, asked.tell)
@@ -143,8 +138,7 @@ def answered(asked: Compare, found: Found) -> Answer:
         written = write_outputs(asked, lambda: files)
         blocks.append(_where(asked.out, speed=result.speed is not None))
     else:
-        more = "" if asked.details else "; --details shows more here"
-        blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
+        blocks.append(wrapped("--out DIR writes tables, figures and a step viewer."))
     answer = Answer(
         facts=about
         | {"scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)}
@@ -195,7 +189,6 @@ def _facts(result: Comparison) -> dict[str, object]:
             "method": loop.method,
             "seconds": dict(loop.seconds),
             "models_paper_count": loop.paper_models,
-            "published_ranks": loop.ranks,
         },
         "why_no_loop": result.refusal or None,
         "enough": result.enough.facts(),
@@ -225,8 +218,6 @@ def _files(result: Comparison, softly: pd.DataFrame) -> dict[str, bytes | str]:
     }
     files |= {} if softly.empty else {"grips.csv": csv_text(softly)}
     files |= {} if speed is None else {"speed.csv": csv_text(speed.table)}
-    if loop is not None and loop.ranks is not None:
-        files["published_ranks.csv"] = loop.ranks.to_csv(index=False)
     if figure_notes():
         return files
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra

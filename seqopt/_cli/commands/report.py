@@ -34,8 +34,7 @@ class Report(Postures, Judged, Built):
     out : FILE
         page to write (default: report.html in DIR, of a scene its name with .html)
     film : FILE
-        also write a film of the first plan: .gif, or .mp4 or .webm of 1920 x 1080, which need
-        ffmpeg (needs matplotlib)
+        also write a film of the first plan, a .gif (needs matplotlib)
     figures : FOLDER
         also write figures there as PNG and SVG: steps, who holds what when, and responses along the
         build (needs matplotlib)
@@ -45,7 +44,7 @@ class Report(Postures, Judged, Built):
     seqopt report best
     seqopt report my.json plans --out plans.html
     seqopt report best --figures pictures
-    seqopt report best --film build.mp4
+    seqopt report best --film build.gif
     """
 
     folder: Path = word(place=True)
