@@ -15,7 +15,7 @@ from typing import Any
 from seqopt.engines.registry import DEFAULT, ENGINES
 from seqopt.graph.formulation import formulation_names
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.criteria import Among, Ranked
+from seqopt.problem.criteria import Ranked
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.three_robots import SCHEDULES
@@ -176,15 +176,11 @@ class Cost(Asked):
     ranked : CHOICE
         for criteria of ranks: where two open grips meet in a step, rank all pairs of their nodes
         together, or only the pairs with the node chosen before (default: pairs)
-    among : CHOICE
-        for criteria of ranks: rank candidates of a move among all, or among those possible after
-        the choice before (default: all)
     """
 
     criteria: str | None = None
     crown: str | None = None
     ranked: str | None = word(None, choices=[each.value for each in Ranked])
-    among: str | None = word(None, choices=[each.value for each in Among])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -323,7 +319,6 @@ class Posed(Judged, Stands, Rules, Team):
     criteria: Any = None
     crown: str | None = None
     ranked: str | None = None
-    among: str | None = None
     budget: tuple[str, ...] = ()
     robust: str | None = None
     scenarios: str | None = None

@@ -48,8 +48,8 @@ _NOT_FREE = "the free schedule has no such; leave it out"
 _NOT_STATES = "aims and --stands have no such; leave it out"
 _MORE = f"it needs more; give --stands MORTAR, or --schedule {FREE}"
 _WRONG = {
-    "free": {"ranked": _NOT_FREE, "among": _NOT_FREE},
-    "states": {"ranked": _NOT_STATES, "among": _NOT_STATES, "rule": _NOT_STATES},
+    "free": {"ranked": _NOT_FREE},
+    "states": {"ranked": _NOT_STATES, "rule": _NOT_STATES},
     "candidates": {
         "rule": f"it needs more; give --schedule {FREE}",
         "tilt": _MORE,

@@ -15,7 +15,7 @@ from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.problem._limit_words import LARGEST, number_word, split_word
-from seqopt.problem.criteria import Among, Ranked, RankSum
+from seqopt.problem.criteria import Ranked, RankSum
 from seqopt.problem.requirements import NEVER, Criterion
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
@@ -180,7 +180,7 @@ def asked_standing(asked: Stands) -> Standing | None:
 
 def asked_criterion(asked: Cost | Posed, usual: Criterion) -> Criterion | None:
     """Return the criterion of the options; ``usual``: the one that options of ranks refine."""
-    said = {"crown": asked.crown, "ranked": asked.ranked, "among": asked.among}
+    said = {"crown": asked.crown, "ranked": asked.ranked}
     given = {name: text for name, text in said.items() if text is not None}
     if asked.criteria is None and not given:
         return None
@@ -188,7 +188,7 @@ def asked_criterion(asked: Cost | Posed, usual: Criterion) -> Criterion | None:
     for name, text in given.items():
         if not isinstance(criterion, RankSum) or (name == "crown" and asked.criteria not in NAMED):
             raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
-        kinds: dict[str, Any] = {"crown": _crown, "ranked": Ranked, "among": Among}
+        kinds: dict[str, Any] = {"crown": _crown, "ranked": Ranked}
         criterion = replace(criterion, **{name: kinds[name](text)})
     return criterion
 

@@ -28,7 +28,6 @@ from seqopt.judge.certificate import _require_anew, certify_partial
 from seqopt.plan._guard import require_fit, require_proof, require_time
 from seqopt.plan._paths import find_path
 from seqopt.plan.plan import Plan
-from seqopt.problem.criteria import Among
 from seqopt.problem.problem import Aim, AskedBudget
 from seqopt.problem.requirements import LINEAR_RANGE
 from seqopt.scene._armed import check_postures
@@ -136,10 +135,6 @@ def _solve_windows(graph: Layers, formulation: Formulation, run: Run) -> Plan:
         )
     if graph.scenes:
         raise ProblemError("the costs of all choices are needed; ask for the proof")
-    if getattr(graph.criterion, "among", Among.ALL) is not Among.ALL:
-        raise ProblemError(
-            "ranks among possible candidates need all models: rank among all, or ask for the proof"
-        )
     from seqopt.plan.search._window_search import search_windows  # noqa: PLC0415  # few ask for it
 
     seconds: dict[str, float] = {}

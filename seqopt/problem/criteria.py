@@ -39,13 +39,6 @@ class Ranked(Enum):
     CONDITIONAL = "conditional"  # the later move's candidates, the earlier choice being made
 
 
-class Among(Enum):
-    """Which candidates of a move are ranked in the steps in which it alone is open."""
-
-    ALL = "all"
-    POSSIBLE = "possible"  # without those that the choice before it makes impossible
-
-
 def _ranks_of(values: Floats, choices: int, ranked: Ranked) -> Floats:
     """Return mean ranks of the choices in a step, (C,) or (C, D), as `_scaled_ranks`."""
     if values.ndim == 2 and ranked is Ranked.CONDITIONAL:
@@ -179,17 +172,15 @@ class RankSum(Terse):
     delay: int = 0  # bricks after the scene's crown until ``after`` holds
     resolution: tuple[tuple[str, float], ...] | None = None  # by first letter: N, N m, m
     ranked: Ranked = Ranked.PAIRS
-    among: Among = Among.ALL  # whether nodes that the choice before rules out are ranked
 
     @property
     def settings(self) -> Mapping[str, object]:
-        """Its weights and crown, None if it has none, what it rounds to and what it ranks among."""
+        """Its weights and crown, None if it has none, what it rounds to, and how pairs rank."""
         return {
             "weights": {"before_crown": dict(self.before), "from_crown_on": dict(self.after)},
             "crown": None if self.crown == NEVER else self.crown,
             "resolution": dict(self.resolution or ()),
             "ranked": self.ranked.value,
-            "among": self.among.value,
         }
 
     def wanted(self, bricks: int) -> tuple[str, ...]:

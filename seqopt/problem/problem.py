@@ -65,6 +65,11 @@ class Aim(Enum):
     SUM = "sum"
     PEAK = "peak"
 
+    @property
+    def join(self) -> np.ufunc:
+        """How costs go together."""
+        return np.add if self is Aim.SUM else np.maximum
+
     def value_of(self, costs: _Costs, choice: Sequence[int]) -> float:
         """Return the value of a choice: its total, or its largest cost."""
         return costs.cost(choice) if self is Aim.SUM else costs.worst(choice)

@@ -23,7 +23,7 @@ from seqopt.judge.certificate import certify_partial
 from seqopt.network.build import build_network
 from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solving import solve
-from seqopt.problem.criteria import Among, Ranked, StepCost
+from seqopt.problem.criteria import Ranked, StepCost
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
@@ -210,7 +210,6 @@ def test_a_criterion_that_lies_about_its_least_cost_is_refused(engine25):
     ("criterion", "name", "options", "said"),
     [
         (EQUATIONS, "overlap_dp", {}, "nothing is known of a pair before all are solved"),
-        (replace(CONDITIONAL, among=Among.POSSIBLE), "overlap_dp", {}, "nothing is known"),
         (replace(OWN, least=None), "overlap_dp", {}, "state the least cost"),
         (WEIGHTED, "cascade", {}, "give an exact formulation"),
         (WEIGHTED, "overlap_dp", {"proof": False}, "a lazy search proves"),

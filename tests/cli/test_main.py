@@ -600,14 +600,14 @@ def test_the_command_line_says_why(capsys):
 
 def test_ranks_are_taken_as_asked(capsys):
     found = summary(capsys, "--formulation", "overlap_dp", "--ranked", "conditional")
-    assert (found["ranked"], found["among"]) == ("conditional", "all")
+    assert found["ranked"] == "conditional"
     assert found["objective"]["sum"] == found["objectives"]["conditional"] == pytest.approx(656.025)
 
 
 def test_ranks_are_not_asked_of_what_has_none(tmp_path, capsys):
-    words = ("--formulation", "overlap_dp", "--criteria", "weighted", "--among", "possible")
+    words = ("--formulation", "overlap_dp", "--criteria", "weighted", "--ranked", "pairs")
     assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
-    assert "--among possible: weighted has no ranks; leave it out" in capsys.readouterr().err
+    assert "--ranked pairs: weighted has no ranks; leave it out" in capsys.readouterr().err
 
 
 def test_budgets_are_kept_as_asked(capsys):

@@ -187,7 +187,7 @@ def test_values_of_python_are_the_same_words():
     [
         ("--schedule free --criteria equations-2-3", "it ranks the choices of a move"),
         ("--aim steps --ranked pairs", "leave it out"),
-        ("--stands dry --among all", "leave it out"),
+        ("--stands dry --ranked pairs", "leave it out"),
         ("--rule least_grips=1", "give --schedule free"),
         ("--direction take-down", "--schedule free"),
         ("--keep 1..3", "--direction take-down"),

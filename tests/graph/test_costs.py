@@ -12,7 +12,7 @@ from hypothesis import given
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.problem.problem import Aim
-from tests.layered import answer
+from tests.layered import Costs, answer
 from tests.strategies import problems
 
 INF = np.inf
@@ -58,27 +58,17 @@ def test_costs_are_copies_that_cannot_be_written_to():
             array[...] = 1
 
 
-def completions(costs, move, candidate):
-    """All ways from a candidate to the last move, and what they cost from it on."""
-    later = product(*(range(size) for size in costs.sizes[move + 1 :]))
-    for rest in later:
-        path = (candidate, *rest)
-        own = sum(costs.single[move + i][c] for i, c in enumerate(path))
-        pairs = zip(path[:-1], path[1:], costs.shared[move + 1 :], strict=True)
-        yield own + sum(shared[a, b] for a, b, shared in pairs)
-
-
 @given(problem=problems())
-def test_what_can_be_continued_is_what_enumeration_continues(problem):
-    costs = problem.sums
-    choices = [*product(*(range(size) for size in costs.sizes))]
-    if not np.isfinite([costs.cost(c) for c in choices]).any():
+def test_candidates_on_paths_are_those_of_allowed_choices(problem):
+    choices = product(*(range(size) for size in problem.sums.sizes))
+    allowed = [choice for choice in choices if np.isfinite(problem.sums.cost(choice))]
+    if not allowed:
         with pytest.raises(InfeasibleError):
-            costs.continuable()
+            problem.compiled()
         return
-    for move, good in enumerate(costs.continuable()):
-        ways = [any(map(np.isfinite, completions(costs, move, c))) for c in range(len(good))]
-        assert good.tolist() == ways
+    found = problem.compiled()
+    kept = {*zip(found.instance.levels.tolist(), found.candidates.tolist(), strict=True)}
+    assert kept == {(0, 0), *((k, c) for choice in allowed for k, c in enumerate(choice, start=1))}
 
 
 @pytest.mark.parametrize(
@@ -93,19 +83,7 @@ def test_what_can_be_continued_is_what_enumeration_continues(problem):
 )
 def test_the_move_that_ends_every_choice_is_named(part, move, value, named):
     with pytest.raises(InfeasibleError, match=named):
-        changed(part, move, np.array(value)).continuable()
-
-
-def test_a_dead_end_is_told_from_where_it_is_reached():
-    """The first of move 1 leads to the first of move 2 alone, which leads nowhere."""
-    single = (np.zeros(2), np.zeros(2), np.zeros(2))
-    shared = (
-        np.zeros((1, 2)),
-        np.array([[0.0, INF], [0.0, 0.0]]),
-        np.array([[INF, INF], [INF, 0.0]]),
-    )
-    good = LayeredCosts(single, shared).continuable()
-    assert [g.tolist() for g in good] == [[False, True], [False, True], [True, True]]
+        Costs(changed(part, move, np.array(value))).compiled()
 
 
 @pytest.mark.parametrize(

@@ -9,20 +9,12 @@ from hypothesis import strategies as st
 from scipy.stats import rankdata
 
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.layers.ranking import move_costs, rank_moves
 from seqopt.plan._tables import choice_table
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import _mean_ranks, _scaled_ranks
 from seqopt.problem.requirements import SceneFacts, payload_limits
 from seqopt.sequence.three_robots import modified_sequential
-from seqopt.study.published import (
-    CRITERIA,
-    EQUATIONS,
-    WEIGHTED,
-    WORST_RATIO,
-    paper_models,
-    published_choice,
-)
+from seqopt.study.published import CRITERIA, EQUATIONS, paper_models
 
 
 def test_a_third_support_ends_twisting(engine25):
@@ -82,30 +74,6 @@ def test_better_responses_never_cost_more(engine25, criterion):
     for name in names:
         better[name][5] *= 0.5
     assert criterion.costs(better, 20, 12)[5] <= before[5]
-
-
-def test_ranking_diagnostics(problem25):
-    choice = published_choice(problem25)
-    table = rank_moves(problem25, choice)
-    assert table["node"].tolist() == list(problem25.nodes(choice))
-    assert (table["rank"] == 1).sum() == (table["node"] == table["winner"]).sum()
-    assert (table["tied"] >= 1).all()
-    assert (table["margin"] >= 0).all()
-    unstable = table[table["turned_by_candidates"] != ""]
-    assert len(unstable) > 0  # a Borda count reverses when candidates drop out
-    row = unstable.iloc[0]
-    k, node = int(row["move"]) - 1, int(row["turned_by_candidates"].split()[0])
-    gone = problem25.schedule.moves[k].candidates.index(node)
-    before = choice[k - 1] if k else 0
-    without = move_costs(problem25, k, before, without=gone)
-    assert problem25.schedule.moves[k].candidates[int(without.argmin())] != row["winner"]
-
-
-def test_raw_values_do_not_reverse(engine25, loop25):
-    """A cost that does not depend on the other candidates keeps its winner when one drops out."""
-    for criterion in (WEIGHTED, WORST_RATIO):
-        table = rank_moves(candidate_layers(engine25, loop25, criterion), (0,) * 2 + (1,) * 20)
-        assert (table["turned_by_candidates"] == "").all()
 
 
 def test_tables_are_labeled(problem25):

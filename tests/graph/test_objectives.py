@@ -1,4 +1,4 @@
-"""Ranks over all pairs and given the choice before; among all candidates and the possible ones."""
+"""Ranks over all pairs, and given the choice before."""
 
 from __future__ import annotations
 
@@ -12,23 +12,16 @@ from hypothesis import strategies as st
 from scipy.stats import rankdata
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import ProblemError
+from seqopt.errors import InfeasibleError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.layers.ranking import (
-    _least_among_least,
-    move_costs,
-    rank_choice,
-    split_gap,
-    under,
-    under_both,
-)
+from seqopt.graph.layers.ranking import _least_among_least, move_costs, split_gap, under_both
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
-from seqopt.problem.criteria import Among, Ranked, _row_ranks, _scaled_ranks
+from seqopt.problem.criteria import Ranked, _row_ranks, _scaled_ranks
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.published import EQUATIONS, WEIGHTED, published_choice
+from seqopt.study.published import EQUATIONS, WEIGHTED
 from tests.builders import small_arch
 from tests.strategies import problems
 
@@ -49,14 +42,10 @@ def rank_again(problem, choice):
         later = step.moves[-1]
         move = schedule.moves[later]
         terms = criterion.before if move.bricks < criterion.crown else criterion.after
-        taken = schedule.moves[later - 1].candidates[choice[later - 1]] if later else None
-        meets = any(s.moves == (later - 1, later) for s in schedule.steps)
         for name, weight in terms:
             found = step.responses[name] / dict(criterion.resolution)[name[0]]
             row = found if found.ndim == 1 else found[choice[later - 1]]
             row = np.round(row.copy())
-            if criterion.among is Among.POSSIBLE and meets and len(step.moves) == 1:
-                row[[node == taken for node in move.candidates]] = np.nan
             known = np.isfinite(row)
             rank = 0.5 * (len(row) + 1)
             if np.isfinite(found).any():
@@ -78,11 +67,10 @@ def test_rows_are_ranked_as_if_alone(rows):
         np.testing.assert_array_equal(ranks, alone)
 
 
-@pytest.mark.parametrize("among", Among)
 @pytest.mark.parametrize("ranked", Ranked)
 @pytest.mark.parametrize("count", [5, 6, 7])
-def test_exact_ones_equal_brute_force_under_every_objective(count, ranked, among):
-    problem = posed(count, replace(EQUATIONS, ranked=ranked, among=among))
+def test_exact_ones_equal_brute_force_under_every_objective(count, ranked):
+    problem = posed(count, replace(EQUATIONS, ranked=ranked))
     sizes = problem.sums.sizes
     worths = {c: problem.sums.cost(c) for c in product(*map(range, sizes))}
     best = min(worths.values())
@@ -95,9 +83,8 @@ def test_exact_ones_equal_brute_force_under_every_objective(count, ranked, among
         assert some
 
 
-@pytest.mark.parametrize("among", Among)
-def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25, loop25, among):
-    problem = candidate_layers(engine25, loop25, replace(CONDITIONAL, among=among))
+def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25, loop25):
+    problem = candidate_layers(engine25, loop25, CONDITIONAL)
     choice = solve(problem, "cascade").choice
     for k in range(len(choice)):
         before = choice[k - 1] if k else 0
@@ -114,7 +101,7 @@ def test_the_reference_arch_under_both(problem25):
         "pairs": pytest.approx(663.81, abs=0.01),
         "conditional": pytest.approx(664.5),
     }
-    conditional = under(problem25, Ranked.CONDITIONAL)
+    conditional = problem25.ranked(Ranked.CONDITIONAL)
     exact = solve(conditional, "overlap_dp").certificate
     assert exact.objective == pytest.approx(656.025)
     assert solve(conditional, "cascade").certificate.gap == pytest.approx(0.01275, abs=1e-5)
@@ -135,24 +122,15 @@ def test_under_the_conditional_objective_sight_is_all_that_is_lost(engine25, loo
     parts = split_gap(problem, plan.choice)
     assert parts.objective == 0
     assert parts.short_sight == pytest.approx(plan.certificate.gap) != 0
-    assert under(problem, Ranked.CONDITIONAL) is problem
-    assert under(problem, Ranked.PAIRS) is under(problem, Ranked.PAIRS)
-
-
-def test_nodes_that_cannot_be_taken_change_ranks(engine25, loop25):
-    first = {}
-    for among in Among:
-        problem = candidate_layers(engine25, loop25, replace(EQUATIONS, among=among))
-        ranks = rank_choice(problem, published_choice(problem))["rank_in_window"]
-        first[among] = int((ranks == 1).sum())
-    assert first == {Among.ALL: 10, Among.POSSIBLE: 11}
+    assert problem.ranked(Ranked.CONDITIONAL) is problem
+    assert problem.ranked(Ranked.PAIRS) is problem.ranked(Ranked.PAIRS)
 
 
 def test_without_ranks_there_is_one_objective(engine25, loop25):
     problem = candidate_layers(engine25, loop25, WEIGHTED)
     choice = solve(problem, "cascade").choice
     assert under_both(problem, choice) == {"pairs": None, "conditional": None}
-    assert split_gap(problem, choice) is None
+    assert solve(problem, "cascade").summary()["gap_parts"] is None
 
 
 def test_limits_hold_under_both(engine25, loop25):
@@ -162,14 +140,8 @@ def test_limits_hold_under_both(engine25, loop25):
         choice = solve(problem, "overlap_dp").choice
         for step in problem.evaluation.steps:
             assert step.responses["F_largest"][tuple(choice[m] for m in step.moves)] <= 300.0
-        others = {r: np.isfinite(under(problem, r).sums.shared[5]) for r in Ranked}
+        others = {r: np.isfinite(problem.ranked(r).sums.shared[5]) for r in Ranked}
         np.testing.assert_array_equal(*others.values())
-
-
-def test_ranks_among_possible_candidates_need_all_models(engine25, loop25):
-    problem = candidate_layers(engine25, loop25, replace(EQUATIONS, among=Among.POSSIBLE))
-    with pytest.raises(ProblemError, match="rank among all, or ask for the proof"):
-        solve(problem, "cascade", proof=False)
 
 
 @given(first=problems(), data=st.data())
@@ -187,7 +159,8 @@ def test_of_the_best_choices_the_cheapest_by_the_other_costs(first, data):
     second = LayeredCosts(*parts)
     choices = [c for c in product(*map(range, costs.sizes)) if np.isfinite(costs.cost(c))]
     if not choices:
-        assert _least_among_least(costs, second) == np.inf
+        with pytest.raises(InfeasibleError):
+            _least_among_least(costs, second)
         return
     least = min(map(costs.cost, choices))
     wanted = min(second.cost(c) for c in choices if costs.cost(c) == least)

@@ -63,10 +63,9 @@ class Found(NamedTuple):
 
 def solved(layers, aim, formulation=None, time_limit=np.inf):
     """The judged answer for layers over scenarios that are given by their costs alone."""
-    largest = largest_of(layers)  # says if no choice is allowed in all scenarios
     made, name = compile_totals("drawn", layers, aim), "scenario_search"
     if aim == WORST_PEAK:
-        made, name = compile_costs("drawn", largest, Aim.PEAK), "minimax"
+        made, name = compile_costs("drawn", largest_of(layers), Aim.PEAK), "minimax"
     run = Run(time_limit)
     found = find_path(made.instance, as_formulation(formulation or name), run, made.offset)
     choice = made.choice([node for (node,) in found.selection.states])
@@ -104,7 +103,7 @@ def tail(each, aim):
 def test_plans_agree_with_brute_force(aim, layers):
     found = values(layers, aim)
     if not found:
-        with pytest.raises(InfeasibleError, match=f"over all {len(layers)} scenarios, move"):
+        with pytest.raises(InfeasibleError, match="move"):
             solved(layers, aim)
         return
     plan = solved(layers, aim)
@@ -299,8 +298,12 @@ def test_limits_hold_in_every_scenario():
     assert kept.certificate.objective >= free.certificate.objective
     assert all(largest_force(scene, kept) <= 0.9 * largest + 1e-6 for scene in drawn.scenes)
     nothing = posed([seqopt.Limit("F_largest", 1.0)])
-    with pytest.raises(InfeasibleError):
+    with pytest.raises(InfeasibleError, match="where no grip is left to choose"):
         seqopt.solve(robust(nothing, drawn, WORST_TOTAL))
+    little = posed([seqopt.Limit("F_largest", 45.0)])
+    for aim in (WORST_TOTAL, WORST_PEAK):
+        with pytest.raises(InfeasibleError, match="over all 5 scenarios, move"):
+            seqopt.solve(robust(little, drawn, aim))
     trial = judge_unseen(kept, scenarios(problem.schedule.scene, count=8, seed=9, density=0.5))
     assert not np.isnan(trial.table.drop(columns="set").to_numpy(float)).any()
 

@@ -1,8 +1,4 @@
-"""Aims in order of importance, and the least level that most steps keep, solved exactly.
-
-The choices that are best for the first aim are a part of the same layered graph: those pairs that
-lie on a best path. Among these the second aim is minimized, and so on.
-"""
+"""Aims in order of importance, and the least level that most steps keep, solved exactly."""
 
 from __future__ import annotations
 
@@ -15,11 +11,11 @@ from numbers import Real
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats
+from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
-from seqopt.graph.layers.costs import TINY, Joined, LayeredCosts
+from seqopt.graph.layers.compiled import best_in_order
+from seqopt.graph.layers.costs import Joined, LayeredCosts
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.ranking import _on_a_least_path
 from seqopt.problem.problem import Aim
 from seqopt.scene._checks import short
 
@@ -38,7 +34,7 @@ class InOrder:
 def solve_in_order(goals: Sequence[tuple[LayeredCosts, Aim]]) -> InOrder:
     """Return the choice that is best for the first aim; among these best for the second; and so on.
 
-    Exact, sums that differ by less than `seqopt.graph.layers.ranking.TIED_SUMS` counting as equal.
+    Exact, sums that differ by less than `seqopt.graph.paths.TIED` counting as equal.
 
     ``goals`` (sequence of (LayeredCosts, Aim)): costs of the same moves, each by its own criterion,
     and whether their sum or the largest is to be small; the most important first. Raises
@@ -57,14 +53,8 @@ def solve_in_order(goals: Sequence[tuple[LayeredCosts, Aim]]) -> InOrder:
     """
     layers = [costs for costs, _ in goals]
     _require_same(layers)
-    masks = _allowed(layers)
-    for costs, (_, aim) in zip(layers, goals, strict=True):
-        masks = _best(costs, aim, masks)
-    choice: list[int] = []
-    for mask in masks:  # pairs without a way on are left out of every mask
-        choice.append(int(np.argmax(mask[choice[-1] if choice else 0])))
-    pairs = zip(layers, goals, strict=True)
-    return InOrder(tuple(choice), tuple(aim.value_of(costs, choice) for costs, (_, aim) in pairs))
+    choice = best_in_order(goals)
+    return InOrder(choice, tuple(aim.value_of(costs, choice) for costs, aim in goals))
 
 
 def _require_same(layers: Sequence[LayeredCosts]) -> None:
@@ -74,28 +64,6 @@ def _require_same(layers: Sequence[LayeredCosts]) -> None:
         raise ProblemError(
             "the problems have other moves or candidates; pose them with one schedule"
         )
-
-
-def _allowed(layers: Sequence[LayeredCosts]) -> list[Bools]:
-    """Return the pairs that all problems allow and that lie on a path from first to last move."""
-    arcs = zip(*(costs.arcs() for costs in layers), strict=True)
-    shut = [np.where(np.isfinite(each).all(axis=0), 0.0, np.inf) for each in arcs]
-    LayeredCosts(tuple(np.zeros(len(s)) for s in layers[0].single), tuple(shut)).continuable()
-    return _on_a_least_path(shut)
-
-
-def _best(costs: LayeredCosts, aim: Aim, masks: Sequence[Bools]) -> list[Bools]:
-    """Return the pairs of masks that lie on a path of least sum, or of least peak."""
-    join = np.add if aim is Aim.SUM else np.maximum
-    parts = zip(masks, costs.shared, costs.single, strict=True)
-    arcs = [np.where(mask, join(a, b), np.inf) for mask, a, b in parts]
-    if aim is Aim.SUM:
-        size = sum(float(np.abs(arc[mask]).max()) for arc, mask in zip(arcs, masks, strict=True))
-        return _on_a_least_path(arcs, max(TINY, 1e-6 * size))
-    reached = np.full(1, -np.inf)
-    for arc in arcs:
-        reached = np.maximum(reached[:, None], arc).min(axis=0)
-    return _on_a_least_path([np.where(arc <= reached.min(), 0.0, np.inf) for arc in arcs])
 
 
 StepCosts = Sequence[tuple[tuple[int, ...], Floats]]
@@ -128,9 +96,9 @@ def least_quantile(problem: Layers, share: float = 0.1) -> StepQuantile:
         raise ProblemError(f"share is {short(share)}; give a number from 0 to below 1")
     if problem.budgets:
         raise ProblemError("quantiles over steps take no budgets; leave them out")
-    problem.sums.continuable()
+    best_in_order([(problem.sums, Aim.SUM)])  # says if no choice is allowed
     every = chain.from_iterable(problem.evaluation.levels())
-    steps = [(each.moves, problem.step_costs(each)) for each in map(problem.faced, every)]
+    steps = [(each.moves, problem.step_costs(each)) for each in every]
     sizes = problem.sums.sizes
     most = math.floor(share * len(steps) + 1e-9)
     levels = np.unique(np.concatenate([costs[np.isfinite(costs)] for _, costs in steps]))

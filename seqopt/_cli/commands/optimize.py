@@ -88,7 +88,7 @@ class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
 
     What counts as best?
     With --aim, --stands, --order search or --schedule free states of the build are chosen:
-    --ranked, --among and criteria of ranks do not go with these.
+    --ranked and criteria of ranks do not go with these.
 
     What must hold?
     --friction, --tilt and --curing go with --stands. Budgets on steps, regrips, makespan and sums

@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue
-from seqopt.graph.layers.costs import LayeredCosts, _to_go
-from seqopt.problem.criteria import Among, Ranked, RankSum, StepCost, WeightedSum, WorstRatio
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.problem.criteria import Ranked, RankSum, StepCost, WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion
 
@@ -26,7 +26,7 @@ def floor_of(criterion: Criterion) -> float | None:
     None where costs may be negative, depend on what else is looked at, or are not known.
     """
     match criterion:
-        case RankSum(ranked=Ranked.CONDITIONAL, among=Among.ALL):
+        case RankSum(ranked=Ranked.CONDITIONAL):
             weights = [weight for _, weight in (*criterion.before, *criterion.after)]
             return 1.0 if min(weights) >= 0 else None
         case WeightedSum():
@@ -63,7 +63,8 @@ class PartialCosts(FrozenValue):
     def to_go(self) -> tuple[Floats, ...]:
         """What the rest of the build costs at least, from every candidate on, (C_k,) each."""
         pairs = [self._pairs(k, self.floor) for k in range(1, len(self.single))]
-        return tuple(_to_go(self.single, [self.single[0], *pairs], self.join))
+        shared = (np.zeros((1, len(self.single[0]))), *pairs)
+        return tuple(LayeredCosts(self.single, shared).to_go(self.aim))
 
     @cached_property
     def reached(self) -> tuple[Floats, ...]:

@@ -10,11 +10,11 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import Graph, Rows
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Cap, _Target
-from seqopt.graph.layers.costs import Budget, LayeredCosts, largest_of
+from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.paths import distances, reached
+from seqopt.graph.paths import distances, lexicographic, reached
 from seqopt.problem.problem import Aim, RobustAim
 
 Blocks = Sequence[Floats]
@@ -45,16 +45,19 @@ def compile_layers(
     ``alone``: whether with what a search of one move alone is charged; of peaks, with their parts.
     """
     name, nodes = name or problem.schedule.scene.name, problem.candidates
-    if problem.scenes and problem.over.aim is Aim.SUM:
-        layers = problem.layered(Aim.SUM)
-        largest_of(layers)  # says if no choice is allowed in all scenarios
-        return compile_totals(name, layers, problem.over, nodes)
     aim = aim or Aim.SUM
-    costs = aim.costs(problem)
-    charged = problem.alone if aim is Aim.SUM else costs
-    found = compile_costs(name, costs, aim, problem.budgets, charged if alone else None, nodes)
     if not problem.scenes:
-        return found
+        costs = aim.costs(problem)
+        charged = problem.alone if aim is Aim.SUM else costs
+        return compile_costs(name, costs, aim, problem.budgets, charged if alone else None, nodes)
+    try:
+        if problem.over.aim is Aim.SUM:
+            return compile_totals(name, problem.layered(Aim.SUM), problem.over, nodes)
+        costs = aim.costs(problem)
+        found = compile_costs(name, costs, aim, (), costs if alone else None, nodes)
+    except InfeasibleError as error:
+        count = len(problem.scenes)
+        raise InfeasibleError(f"over all {count} scenarios, {error}") from error
     (goal,) = found.instance.goals
     named = goal._replace(name=f"{goal.name} ({problem.over})")
     return found._replace(instance=replace(found.instance, goals=(named,)))
@@ -77,12 +80,9 @@ def compile_costs(
     for budget in budgets:
         if budget.amounts.sizes != costs.sizes:
             raise ProblemError(f"budget {budget.name!r} is for other moves or candidates")
-    costs.continuable()
-    pairs = zip(costs.shared, costs.single, strict=True)
-    join = np.add if aim is Aim.SUM else np.maximum
     said, kind = ("minmax", PEAK) if aim is Aim.PEAK else ("least sum", SUM)
     capped = [budget for budget in budgets if np.isfinite(budget.bound)]
-    columns, offset = _raised([[join(shared, single) for shared, single in pairs]], kind)
+    columns, offset = _raised([costs.arcs(aim)], kind)
     caps = []
     for k, budget in enumerate(capped, start=1):
         (taken,), less = _raised([budget.amounts.arcs()], SUM)
@@ -114,6 +114,22 @@ def compile_totals(
     return _compiled(name, (names, (goal,), ()), columns, nodes, None, offset)
 
 
+def best_in_order(goals: Sequence[tuple[LayeredCosts, Aim]]) -> tuple[int, ...]:
+    """Return the choice that is best in the first goal, among these in the second, and so on.
+
+    ``goals``: costs of the same moves, and whether their sum or the largest is to be small. Raises
+    `InfeasibleError` if no choice is allowed by all.
+    """
+    columns, targets = list[Blocks](), list[_Target]()
+    for k, (costs, aim) in enumerate(goals):
+        kind = PEAK if aim is Aim.PEAK else SUM
+        columns += _raised([costs.arcs(aim)], kind)[0]
+        targets.append(_Target(f"goal {k + 1}", kind, (k,)))
+    asked = [goal.name for goal in targets], tuple(targets), ()
+    found = _compiled("goals in order", asked, columns, None, None, 0.0)
+    return found.choice(lexicographic(found.instance.graph).path)
+
+
 def _raised(columns: Sequence[Blocks], kind: str) -> tuple[list[list[Floats]], float]:
     """Return columns with no amount below zero, and what is thereby missing in all of them.
 
@@ -139,39 +155,43 @@ def _compiled(
 ) -> Compiled:
     names, goals, caps = asked
     sizes = [block.shape[1] for block in columns[0]]
-    firsts = np.cumsum([0, 1, *sizes])
-    sources, targets, amounts, alone = [], [], [], []
-    for k in range(len(sizes)):
-        every = np.stack([column[k] for column in columns])
-        before, now = np.nonzero(np.isfinite(every).all(axis=0))
-        sources.append(before + firsts[k])
-        targets.append(now + firsts[k + 1])
-        amounts.append(every[:, before, now].T)
-        if beside is not None:
-            alone.append(np.column_stack([each[k][before, now] for each in beside]))
-    source, target = (np.concatenate(each).astype(np.int32) for each in (sources, targets))
-    peaks = tuple(goals[0].kind == PEAK and k == 0 for k in range(len(columns)))
-    ends = np.arange(firsts[-1]) >= firsts[-2]
-    charged = np.concatenate(alone) if alone else None
-    whole = Graph(source, target, np.concatenate(amounts), peaks, ends, (), charged)
-    graph, kept = on_paths(whole)
+    source, target, amounts, alone = _arcs(columns, beside or ())
+    largest = {c for goal in goals if goal.kind == PEAK for c in goal.columns}
+    peaks = tuple(k in largest for k in range(len(columns)))
+    ends = np.arange(1 + sum(sizes)) >= 1 + sum(sizes[:-1])
+    charged = None if beside is None else alone
+    graph, kept = on_paths(Graph(source, target, amounts, peaks, ends, (), charged))
     candidates = np.concatenate([[0], *(np.arange(size) for size in sizes)])
     levels = np.repeat(np.arange(len(sizes) + 1), [1, *sizes])
     called = candidates if nodes is None else np.concatenate([[0], *nodes])
     rows = np.column_stack([levels, called]).astype(np.int64)[kept]
-    instance = Instance(
-        name,
-        graph.source,
-        graph.target,
-        graph.ends,
-        tuple(names),
-        graph.amounts,
-        goals,
-        caps,
-        rows,
-        alone=graph.alone,
-    )
+    arcs = graph.source, graph.target, graph.ends, tuple(names), graph.amounts
+    instance = Instance(name, *arcs, goals, caps, rows, alone=graph.alone)
     return Compiled(instance, candidates[kept], offset)
+
+
+def _arcs(columns: Sequence[Blocks], beside: Sequence[Blocks]) -> tuple[Rows, Rows, Floats, Floats]:
+    """Return the arcs of pairs that all columns allow: source, target, (m, c) and (m, b) amounts.
+
+    Raises `InfeasibleError`, naming the move at which the last allowed choice ends.
+    """
+    parts, firsts, reached = [], (0, 1), np.ones(1, dtype=bool)
+    for k, level in enumerate(zip(*columns, strict=True)):
+        every = np.stack(level)
+        allowed = np.isfinite(every).all(axis=0)
+        reached = allowed[reached].any(axis=0)
+        if not reached.any():
+            raise InfeasibleError(
+                f"move {k + 1}: none of its {len(reached)} candidates is allowed after any choice "
+                "before it; relax a limit or widen a reach (--aim F_largest without "
+                "limits finds the least that robots must hold)"
+            )
+        before, now = np.nonzero(allowed)
+        own = np.array([each[k][before, now] for each in beside]).reshape(-1, len(now))
+        parts.append((before + firsts[0], now + firsts[1], every[:, before, now].T, own.T))
+        firsts = firsts[1], firsts[1] + len(reached)
+    source, target, amounts, alone = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return source.astype(np.int32), target.astype(np.int32), amounts, alone
 
 
 def on_paths(graph: Graph) -> tuple[Graph, Ints]:

@@ -8,8 +8,9 @@ from functools import reduce
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, FrozenValue
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.arrays import Floats, FrozenValue
+from seqopt.errors import ProblemError
+from seqopt.problem.problem import Aim
 
 TINY = float(np.finfo(float).tiny)
 
@@ -67,9 +68,10 @@ class LayeredCosts(FrozenValue):
         """How many candidates every move has."""
         return tuple(len(single) for single in self.single)
 
-    def arcs(self) -> list[Floats]:
+    def arcs(self, aim: Aim = Aim.SUM) -> list[Floats]:
         """Return what a pair and its later choice cost together, (C_{k-1}, C_k) for every move."""
-        return [shared + single for shared, single in zip(self.shared, self.single, strict=True)]
+        pairs = zip(self.shared, self.single, strict=True)
+        return [aim.join(shared, single) for shared, single in pairs]
 
     def parts(self, choice: Sequence[int]) -> list[float]:
         """Return what a choice meets, by move: its cost, and that shared with the move before."""
@@ -87,29 +89,16 @@ class LayeredCosts(FrozenValue):
         """Return the largest cost that a choice meets; infinite if it is not allowed."""
         return max(self.parts(choice))
 
+    def to_go(self, aim: Aim) -> list[Floats]:
+        """Return the least cost from each candidate (C_k,) to the end, its own included."""
+        out, join = [self.single[-1]], aim.join
+        for own, pairs in zip(self.single[-2::-1], self.shared[:0:-1], strict=True):
+            out.insert(0, join(own, join(pairs, out[0]).min(axis=1)))
+        return out
+
     def least_sum(self) -> float:
         """Return the least total cost of any choice; infinite if none is allowed."""
-        return float(_least_to_go(self.arcs())[0][0])
-
-    def continuable(self) -> tuple[Bools, ...]:
-        """Return which candidates are allowed and can be continued to the last move.
-
-        Result (tuple of (C_k,) bool): an array for every move. Raises `InfeasibleError`, naming the
-        move at which the last possible choice ends.
-        """
-        reached = np.ones(1, dtype=bool)
-        for k, (single, shared) in enumerate(zip(self.single, self.shared, strict=True), start=1):
-            reached = np.isfinite(single) & np.isfinite(shared[reached]).any(axis=0)
-            if not reached.any():
-                raise InfeasibleError(
-                    f"move {k}: none of its {len(single)} candidates is allowed after any choice "
-                    "before it; relax a limit or widen a reach (--aim F_largest without "
-                    "limits finds the least that robots must hold)"
-                )
-        good = [np.isfinite(self.single[-1])]
-        for single, shared in zip(self.single[-2::-1], self.shared[:0:-1], strict=True):
-            good.insert(0, np.isfinite(single) & (np.isfinite(shared) & good[0]).any(axis=1))
-        return tuple(good)
+        return float((self.shared[0] + self.to_go(Aim.SUM)[0]).min())
 
 
 def _copied(costs: Floats) -> Floats:
@@ -190,23 +179,16 @@ class ScenarioCosts(FrozenValue):
 
 
 def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
-    """Return the largest of several costs, choice by choice and pair by pair.
+    """Return the largest of several costs of the same moves, choice by choice and pair by pair.
 
     The largest cost that a choice meets in any of them is the largest that it meets in this one.
-
-    ``layers``: of the same moves. Raises `InfeasibleError` if no choice is allowed in all of them.
     """
     # one after the other: all in one array would be a large one
     single, shared = (
         tuple(reduce(np.maximum, each) for each in zip(*arrays, strict=True))
         for arrays in ([own.single for own in layers], [own.shared for own in layers])
     )
-    out = LayeredCosts(single, shared)
-    try:
-        out.continuable()
-    except InfeasibleError as error:
-        raise InfeasibleError(f"over all {len(layers)} scenarios, {error}") from error
-    return out
+    return LayeredCosts(single, shared)
 
 
 class Joined:
@@ -247,22 +229,3 @@ class Joined:
             return self._found[moves]
         nothing = self._join is np.add or np.isinf(self._least)
         return np.broadcast_to(0.0 if nothing else self._least, shape)
-
-
-def _to_go(single: Sequence[Floats], shared: Sequence[Floats], join: np.ufunc) -> list[Floats]:
-    """Return the least cost from each candidate (C_k,) to the end, its own single cost included."""
-    out = [single[-1]]
-    for own, pairs in zip(single[-2::-1], shared[:0:-1], strict=True):
-        out.insert(0, join(own, join(pairs, out[0]).min(axis=1)))
-    return out
-
-
-def _least_to_go(arcs: Sequence[Floats]) -> list[Floats]:
-    """Return the least sum of arcs to the end, from the source, (1,), and every candidate (C_k,).
-
-    ``arcs`` (sequence of (C_{k-1}, C_k) float): as of `LayeredCosts.arcs`.
-    """
-    rest = [np.zeros(arcs[-1].shape[1])]
-    for arc in reversed(arcs):
-        rest.insert(0, (arc + rest[0]).min(axis=1))
-    return rest

@@ -20,7 +20,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, engine_for, recipe_for
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
 from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts, ScenarioCosts, largest_of
-from seqopt.problem.criteria import Among, Ranked, RankSum, _counts_every_step
+from seqopt.problem.criteria import Ranked, RankSum, _counts_every_step
 from seqopt.problem.problem import WORST_PEAK, Aim, RobustAim
 from seqopt.problem.requirements import (
     Criterion,
@@ -260,8 +260,8 @@ class Layers(Shown):
         seconds = 0.0
         for steps in self.evaluation.levels():
             start = time.perf_counter()
-            for faced in map(self.faced, steps):
-                joined.add(faced.moves, self.step_costs(faced))
+            for choices in steps:
+                joined.add(choices.moves, self.step_costs(choices))
             seconds += time.perf_counter() - start
         return joined.layered(), seconds
 
@@ -294,23 +294,6 @@ class Layers(Shown):
                     "to choose, is not allowed; change the criterion or the schedule"
                 )
         return costs
-
-    def faced(self, choices: StepChoices, before: int | None = None) -> StepChoices:
-        """Return a step as its choices are compared: for itself, or after every choice before.
-
-        ``choices``: with one open move, or two; ``before``: the candidate chosen for the move
-        before, where responses are (C_k,) of that choice. Result: the same, or over pairs with
-        responses (C_{k-1}, C_k), NaN where both would be one node; of one choice before (C_k,).
-        """
-        moves, move = self.schedule.moves, choices.moves[-1]
-        among_all = getattr(self.criterion, "among", Among.ALL) is Among.ALL
-        overlaps = (move - 1, move) in self.schedule.steps_of
-        if among_all or len(choices.moves) == 2 or not overlaps:
-            return choices
-        first, now = (np.array(moves[k].candidates) for k in (move - 1, move))
-        same = first[:, None] == now if before is None else first[before] == now
-        responses = {name: np.where(same, np.nan, v) for name, v in choices.responses.items()}
-        return replace(choices, moves=(move - 1, move), responses=responses)
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
         """Return how long responses (``respond``) and costs (``rank``) of an aim took, s.
@@ -349,25 +332,22 @@ class Layers(Shown):
     @property
     def alone(self) -> LayeredCosts:
         """The costs that a search of one move alone is charged: ranks among its candidates."""
-        if self.scenes or not isinstance(self.criterion, RankSum):
-            return self.sums
-        conditional = replace(self.criterion, ranked=Ranked.CONDITIONAL)
-        if conditional == self.criterion:
-            return self.sums
-        posed = replace(self, criterion=conditional)
-        return self.others.setdefault(conditional, posed).sums
+        return self.sums if self.scenes else self.ranked(Ranked.CONDITIONAL).sums
+
+    def ranked(self, ranked: Ranked) -> Layers:
+        """Return the same problem with its ranks taken in a way; itself if it has none."""
+        return self if getattr(self.criterion, "ranked", ranked) is ranked else self._ranked_else
 
     @cached_property
-    def others(self) -> dict[Criterion, Layers]:
-        """The same problem under other criteria that need the same responses, as they are met."""
-        return {}
+    def _ranked_else(self) -> Layers:
+        criterion = self.criterion
+        assert isinstance(criterion, RankSum)
+        (other,) = {*Ranked} - {criterion.ranked}
+        return replace(self, criterion=replace(criterion, ranked=other))
 
     def step_costs(self, choices: StepChoices) -> Floats:
         """Return the costs of a step's choices, (C,) or (C, D), infinite where not allowed."""
         move, criterion = self.schedule.moves[choices.moves[-1]], self.criterion
-        spread = len(choices.moves) > len(choices.step.moves)  # over pairs, to be ranked by rows
-        if spread and isinstance(criterion, RankSum):
-            criterion = replace(criterion, ranked=Ranked.CONDITIONAL)
         bricks = move.bricks  # of ranks, which are those of the move
         if _counts_every_step(criterion) and {*criterion.wanted(1)} <= {*choices.responses}:
             bricks = choices.step.bricks
