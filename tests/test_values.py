@@ -30,8 +30,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.exchange.contacts import flat_face, touching_faces
 from seqopt.network._mechanics import build_statics
 from seqopt.network.build import build_network
-from seqopt.scene._armed import HeldPostures
 from seqopt.scene._overlaps import _faces
+from seqopt.scene.arm import HeldPostures
 from seqopt.scene.boxes import boxes
 from seqopt.scene.library.common import _overlaps
 from seqopt.scene.shape import Surface

@@ -10,28 +10,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from seqopt.arms.reach import find_postures
-from seqopt.scene._armed import HeldPostures
-from seqopt.scene.arm import Arm
+from seqopt.scene.arm import Arm, HeldPostures
 from seqopt.scene.scene import Scene
 
-_KEY = "_held_postures"
 
+def compute_held_postures(scene: Scene) -> HeldPostures:
+    """Return the postures in which arms of a scene hold whose joints give way."""
+    from seqopt.arms._tables import held_by  # noqa: PLC0415  # few scenes have arms
 
-def held_postures(scene: Scene) -> HeldPostures | None:
-    """Return the postures in which arms hold whose joints give way; None if there are no such arms.
-
-    They are computed once, and go along with a scene to other processes.
-    """
-    if not scene.grip_kinds.arms.any():
-        return None
-    if _KEY not in vars(scene):
-        from seqopt.arms._tables import held_by  # noqa: PLC0415  # few scenes have arms
-
-        table = find_postures(scene)
-        assert table is not None
-        vars(scene)[_KEY] = held_by(scene, table)
-    found: HeldPostures = vars(scene)[_KEY]
-    return found
+    table = find_postures(scene)
+    assert table is not None
+    return held_by(scene, table)
 
 
 def hold_alike(nominal: Scene, scene: Scene) -> Scene:
@@ -40,12 +29,9 @@ def hold_alike(nominal: Scene, scene: Scene) -> Scene:
     It is as it was where it has other arms: joints may have other stiffnesses.
     """
     arms = [[_bare(robot.arm) for robot in each.robots] for each in (nominal, scene)]
-    if arms[0] == arms[1] and {*nominal.brick_of_node} == {*scene.brick_of_node}:
-        found = held_postures(nominal)
-        if found is not None:
-            scene = replace(scene)
-            vars(scene)[_KEY] = found
-    return scene
+    alike = arms[0] == arms[1] and {*nominal.brick_of_node} == {*scene.brick_of_node}
+    held = nominal.held_postures if alike else None
+    return scene if held is None else scene.holding(held)
 
 
 def _bare(arm: Arm | None) -> object:

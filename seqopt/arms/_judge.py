@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from seqopt.arms._held import held_postures
 from seqopt.arms._permits import find_table, permits
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
@@ -105,7 +104,7 @@ def _check_grips(scene: Scene) -> None:
 
     Or if an arm is not at its node. A proof uses all nodes, so all are looked at.
     """
-    held, table = held_postures(scene), find_table(scene)
+    held, table = scene.held_postures, find_table(scene)
     if held is None:
         return
     from seqopt.arms._model import ArmModel  # noqa: PLC0415  # few scenes have arms
@@ -113,7 +112,7 @@ def _check_grips(scene: Scene) -> None:
     for own, robot in enumerate(held.robots.tolist()):
         arm, name = scene.robots[robot].arm, scene.robots[robot].name
         assert arm is not None
-        model, given = ArmModel(arm), held.compliance(scene)[own]
+        model, given = ArmModel(arm), held.compliance(scene.arms)[own]
         for place in np.flatnonzero(held.rows[own] >= 0).tolist():
             node = int(held.nodes[place])
             way, at = _moved(model, table.joints[held.rows[own, place], : model.joints])

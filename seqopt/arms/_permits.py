@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from seqopt.arms._held import held_postures
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
@@ -103,7 +102,7 @@ def permits(scene: Scene) -> Permits:
     collide = np.pad(table.collide, ((0, 1), (0, 1)))
     most = max(r.arm.choices for r in scene.robots if r.arm is not None)
     rows = np.full((len(scene.robots), len(nodes) + 1, most), -1)
-    best, held = _chosen(table, at, ends, len(nodes)), held_postures(scene)
+    best, held = _chosen(table, at, ends, len(nodes)), scene.held_postures
     for own, r in enumerate(number):
         arm = scene.robots[r].arm
         assert arm is not None

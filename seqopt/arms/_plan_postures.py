@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from seqopt.arms._held import held_postures
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Ints
 from seqopt.plan._status import faults_in_words
@@ -51,7 +50,7 @@ class _Search:
 
     def __init__(self, scene: Scene, table: PostureTable, steps: Sequence[Step]) -> None:
         self._scene, self._table, self._steps = scene, table, steps
-        self._held = held_postures(scene)
+        self._held = scene.held_postures
         self._holds = [h for h in holds(scene, steps) if scene.robots[h.robot].arm is not None]
         self._since = [scene.since[name] for name in table.bricks]
 

@@ -23,8 +23,7 @@ from seqopt.arms._reached import Reached, Site, beside_others, reached_alone
 from seqopt.arms._urdf import model_path, shape_notes
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene._armed import HeldPostures
-from seqopt.scene.arm import MOST, Arm
+from seqopt.scene.arm import MOST, Arm, HeldPostures
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
 

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError
 from seqopt.network.network import Network
-from seqopt.scene._armed import held_postures
 from seqopt.scene.scene import Scene
 
 _Number = TypeVar("_Number", np.float64, np.bool_)
@@ -158,7 +157,7 @@ _KEY = "_arm_grips"  # of what is kept with a scene
 
 def _arm_grips(scene: Scene) -> _ArmGrips:
     """Return the compliance of grips, with that of the joints of arms behind them."""
-    held, (of, known) = held_postures(scene), vars(scene).get(_KEY, (None, None))
+    held, (of, known) = scene.held_postures, vars(scene).get(_KEY, (None, None))
     assert held is not None
     if of is held and isinstance(known, _ArmGrips):
         return known
@@ -166,7 +165,9 @@ def _arm_grips(scene: Scene) -> _ArmGrips:
     compliance, bears = [kinds.compliance], [kinds.turns]
     kind = np.repeat(np.arange(len(kinds.turns))[:, None], len(held.nodes), axis=1)
     count = len(kinds.turns)
-    for robot, rows, joints in zip(held.robots, held.rows, held.compliance(scene), strict=True):
+    for robot, rows, joints in zip(
+        held.robots, held.rows, held.compliance(scene.arms), strict=True
+    ):
         own, there = kinds.of_robot[robot], rows >= 0
         kind[own] = -1
         kind[own, there] = count + np.arange(there.sum())

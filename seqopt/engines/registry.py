@@ -26,7 +26,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SceneError
 from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network
-from seqopt.scene._armed import held_postures, hold_alike
+from seqopt.scene._armed import hold_alike
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import scene_to_dict
 
@@ -81,8 +81,12 @@ class Recipe:
         ways = [(r.stiffness, r.rotational_stiffness, r.payload) for r in self.scene.robots]
         kinds = [*dict.fromkeys(ways)]
         scene["grips"] = kinds if len(kinds) > 1 else [way[:2] for way in kinds]
-        if (held := held_postures(self.scene)) is not None:
-            flexibility = (self.scene.grip_kinds.of_robot, held.robots, held.compliance(self.scene))
+        if (held := self.scene.held_postures) is not None:
+            flexibility = (
+                self.scene.grip_kinds.of_robot,
+                held.robots,
+                held.compliance(self.scene.arms),
+            )
             scene["arms"] = [np.asarray(each).tobytes().hex() for each in flexibility]
         built = json.dumps(scene, sort_keys=True)
         options = {} if self.simplest else self.options  # joints that never fail need none
@@ -199,7 +203,7 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
     if name not in ENGINES:
         raise SceneError(f"engine {name} does not exist; known are {', '.join(ENGINES)}")
     network, options = network_of(network), dict[str, object]()
-    held_postures(network.scene)  # goes along with it to other processes
+    _ = network.scene.held_postures  # goes along with it to other processes
     if mortar is not None and name in LIMITED:
         options["mortar"] = find_mortar(mortar)
     elif mortar is not None:

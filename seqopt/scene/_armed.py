@@ -13,44 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._registry import offered
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse
-from seqopt.errors import ExtraError
+from seqopt.arrays import Bools, Ints, Terse
+from seqopt.scene.arm import from_arms
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class HeldPostures(FrozenValue):
-    """The postures of A arms whose joints give way, at N nodes, one of each arm at each node.
-
-    ``robots`` (A,): indices of the scene's robots; ``nodes`` (N,): ascending; ``rows`` (A, N):
-    postures of the table, -1 for none; ``jacobians``: by arm (N, 6, J), how a node moves with
-    joints, m and rad, in the axes of the scene; NaN where there is no posture.
-    """
-
-    robots: Ints
-    nodes: Ints
-    rows: Ints
-    jacobians: tuple[Floats, ...]
-
-    def row(self, robot: int, node: int) -> int | None:
-        """Return the posture of a robot at a node, -1 if there is none; None if any will do."""
-        own = np.flatnonzero(self.robots == robot)
-        if not len(own):
-            return None
-        return int(self.rows[own[0], np.searchsorted(self.nodes, node)])
-
-    def compliance(self, scene: Scene) -> Floats:
-        """Return how grips give way by the joints alone, (A, N, 6, 6); m and rad, N and N m."""
-        out = []
-        for robot, jacobian in zip(self.robots.tolist(), self.jacobians, strict=True):
-            arm = scene.robots[robot].arm
-            assert arm is not None
-            stiffness = np.array(arm.joint_stiffness)
-            out.append(np.einsum("nij,nkj->nik", jacobian / stiffness, jacobian))
-        return np.array(out)
 
 
 @dataclass(frozen=True)
@@ -75,21 +42,10 @@ class PlanPostures(Terse):
     unreached: tuple[Unreached, ...]
 
 
-def _asked(name: str) -> Any:
-    """Return what the room of arms offers under a name. Raises `ExtraError` if there is none."""
-    found = offered(name)
-    if found is None:
-        raise ExtraError(
-            "robots have arms, and the room seqopt.arms, which knows their reach, is not there: "
-            "install seqopt anew, or leave out the arms"
-        )
-    return found
-
-
 def find_postures(scene: Scene, cache: Path | str | None = None, tell: Tell | None = None) -> None:
     """Compute the postures of arms, or read them from a folder, before they are asked for."""
     if scene.has_arms:
-        _asked("find_postures")(scene, cache, tell)
+        from_arms("find_postures")(scene, cache, tell)
 
 
 def within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
@@ -100,7 +56,7 @@ def within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
     own = scene.within_reach(robot)
     if robot.arm is None:
         return own
-    until = _asked("permits")(scene).until[scene.robots.index(robot)]
+    until = from_arms("permits")(scene).until[scene.robots.index(robot)]
     return tuple(
         tuple(n for i, n in enumerate(b.nodes) if n in nodes and until[2 * k + i + 1] > k + 1)
         for k, (b, nodes) in enumerate(zip(scene.placed, own, strict=True))
@@ -112,7 +68,7 @@ def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     nodes = [node for brick in within_reach(scene, robot)[:bricks] for node in brick]
     if robot.arm is None:
         return tuple(nodes)
-    until = _asked("permits")(scene).until[
+    until = from_arms("permits")(scene).until[
         scene.robots.index(robot)
     ]  # by place: which count ends it
     place = {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
@@ -125,23 +81,13 @@ def go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
     ``bricks``: how many stand; ``held`` (n, R): places in build order that robots hold, from 1;
     none above 0 is a free robot.
     """
-    out: Bools = _asked("permits")(scene).allowed(bricks, held)
+    out: Bools = from_arms("permits")(scene).allowed(bricks, held)
     return out
-
-
-def held_postures(scene: Scene) -> HeldPostures | None:
-    """Return the postures in which arms hold whose joints give way; None if there are no such arms.
-
-    They are computed once, and go along with a scene to other processes.
-    """
-    arms = scene.grip_kinds.arms.any()
-    found: HeldPostures | None = _asked("held_postures")(scene) if arms else None
-    return found
 
 
 def can_hold(scene: Scene, kind: int, node: int) -> bool:
     """Return whether it is known how grips of a kind give way at a node."""
-    held = held_postures(scene)
+    held = scene.held_postures
     if held is None or not scene.grip_kinds.arms[kind]:
         return True
     return held.row([*scene.grip_kinds.of_robot].index(kind), node) != -1
@@ -153,13 +99,15 @@ def hold_alike(nominal: Scene, scene: Scene) -> Scene:
     It is as it was where it has other arms: joints may have other stiffnesses.
     """
     arms = nominal.grip_kinds.arms.any()
-    alike: Scene = _asked("hold_alike")(nominal, scene) if arms else scene
+    alike: Scene = from_arms("hold_alike")(nominal, scene) if arms else scene
     return alike
 
 
 def plan_postures(scene: Scene, steps: Sequence[object]) -> PlanPostures | None:
     """Return the postures of a plan, or the steps that have none; None if no robot has an arm."""
-    found: PlanPostures | None = _asked("plan_postures")(scene, steps) if scene.has_arms else None
+    found: PlanPostures | None = (
+        from_arms("plan_postures")(scene, steps) if scene.has_arms else None
+    )
     return found
 
 
@@ -173,7 +121,7 @@ class _NoRules:
 
 def posture_rules(scene: Scene, team: Sequence[int]) -> _NoRules:
     """Return the judge's rules of arms; ``team``: robots of the columns of states, by index."""
-    rules: _NoRules = _asked("PostureRules")(scene, team) if scene.has_arms else _NoRules()
+    rules: _NoRules = from_arms("PostureRules")(scene, team) if scene.has_arms else _NoRules()
     return rules
 
 
@@ -183,4 +131,4 @@ def check_postures(scene: Scene, steps: Sequence[object]) -> None:
     Or if their grips give way in another way than their joints do.
     """
     if scene.has_arms:
-        _asked("check_postures")(scene, steps)
+        from_arms("check_postures")(scene, steps)

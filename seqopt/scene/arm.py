@@ -6,12 +6,17 @@ Lengths are in m, joint stiffnesses in N m/rad. What an arm reaches is worked ou
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from seqopt.arrays import Terse, Vector
-from seqopt.errors import SceneError
+import numpy as np
+
+from seqopt._registry import offered
+from seqopt.arrays import Floats, FrozenValue, Ints, Terse, Vector
+from seqopt.errors import ExtraError, SceneError
 from seqopt.scene._checks import (
     check,
     kind_of,
@@ -126,3 +131,49 @@ class Arm(Terse):
         """Whether the model is one of an installed package."""
         package, colon, path = self.urdf.partition(":")
         return bool(colon and path) and len(package) > 1 and package.isidentifier()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HeldPostures(FrozenValue):
+    """The postures of A arms whose joints give way, at N nodes, one of each arm at each node.
+
+    ``robots`` (A,): indices of the scene's robots; ``nodes`` (N,): ascending; ``rows`` (A, N):
+    postures of the table, -1 for none; ``jacobians``: by arm (N, 6, J), how a node moves with
+    joints, m and rad, in the axes of the scene; NaN where there is no posture.
+    """
+
+    robots: Ints
+    nodes: Ints
+    rows: Ints
+    jacobians: tuple[Floats, ...]
+
+    def row(self, robot: int, node: int) -> int | None:
+        """Return the posture of a robot at a node, -1 if there is none; None if any will do."""
+        own = np.flatnonzero(self.robots == robot)
+        if not len(own):
+            return None
+        return int(self.rows[own[0], np.searchsorted(self.nodes, node)])
+
+    def compliance(self, arms: Sequence[Arm | None]) -> Floats:
+        """Return how grips give way by the joints alone, (A, N, 6, 6); m and rad, N and N m.
+
+        ``arms``: of all robots of the scene.
+        """
+        out = []
+        for robot, jacobian in zip(self.robots.tolist(), self.jacobians, strict=True):
+            arm = arms[robot]
+            assert arm is not None
+            stiffness = np.array(arm.joint_stiffness)
+            out.append(np.einsum("nij,nkj->nik", jacobian / stiffness, jacobian))
+        return np.array(out)
+
+
+def from_arms(name: str) -> Any:
+    """Return what the room of arms offers under a name. Raises `ExtraError` if there is none."""
+    found = offered(name)
+    if found is None:
+        raise ExtraError(
+            "robots have arms, and the room seqopt.arms, which knows their reach, is not there: "
+            "install seqopt anew, or leave out the arms"
+        )
+    return found

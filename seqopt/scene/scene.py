@@ -18,6 +18,7 @@ from seqopt.errors import SceneError, did_you_mean
 from seqopt.scene._checks import check, not_negative, printable, settle, short, vector, wholes
 from seqopt.scene._durations import _durations_in_words
 from seqopt.scene._props import Prop, settled_props
+from seqopt.scene.arm import Arm, HeldPostures, from_arms
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Reach, Robot, _grip_kinds, _GripKinds
 
 if TYPE_CHECKING:
@@ -238,9 +239,14 @@ class Scene(Shown):
         return {}
 
     @property
+    def arms(self) -> tuple[Arm | None, ...]:
+        """The arms of its robots, which must reach what these hold; see `seqopt.arms`."""
+        return tuple(robot.arm for robot in self.robots)
+
+    @property
     def has_arms(self) -> bool:
-        """Whether a robot has an arm, which must reach what it holds; see `seqopt.arms`."""
-        return any(robot.arm is not None for robot in self.robots)
+        """Whether a robot has an arm."""
+        return any(self.arms)
 
     @cached_property
     def placed(self) -> tuple[Brick, ...]:
@@ -372,6 +378,23 @@ class Scene(Shown):
         """How its robots give way where they hold, and after them its props."""
         holders = [*self.robots, *(prop.as_robot for prop in self.props)]
         return _grip_kinds(holders, [*self.brick_of_node])
+
+    @cached_property
+    def held_postures(self) -> HeldPostures | None:
+        """The postures in which arms hold whose joints give way; None if there are no such arms.
+
+        They are computed once, and go along to other processes.
+        """
+        found: HeldPostures | None = None
+        if self.grip_kinds.arms.any():
+            found = from_arms("compute_held_postures")(self)
+        return found
+
+    def holding(self, postures: HeldPostures) -> Scene:
+        """Return the same scene with arms that hold in given postures, not those of its own."""
+        out = replace(self)
+        settle(out, held_postures=postures)
+        return out
 
     @cached_property
     def prop_of_number(self) -> dict[int, Prop]:

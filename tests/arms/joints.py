@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seqopt.arms import _held
-from seqopt.scene._armed import HeldPostures
-from seqopt.scene.arm import Arm
+from seqopt.scene.arm import Arm, HeldPostures
 from seqopt.scene.parts import Robot
 
 
@@ -37,13 +35,12 @@ def with_joints(scene, stiffness, jacobians, hands=((None, None),), without=()):
     for robot, node in without:
         rows[robot, node] = -1
     found = HeldPostures(np.arange(len(made)), nodes, rows, tuple(map(np.array, jacobians)))
-    vars(out)[_held._KEY] = found
-    return out
+    return out.holding(found)
 
 
 def compliances(scene, grips):
     """How grips of robots on nodes give way, by formula; (3, 3) where they bear no moment."""
-    found, out = vars(scene)[_held._KEY], []
+    found, out = scene.held_postures, []
     for robot, jacobians, node in zip(scene.robots, found.jacobians, grips, strict=False):
         if node is not None:
             jacobian = jacobians[[*found.nodes].index(node)]

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.arms._held import held_postures
 from seqopt.arms._plan_postures import plan_postures
 from seqopt.engines.registry import make_engine
 from seqopt.responses.table import force_column
@@ -92,8 +91,8 @@ def soft():
 
 def principal(scene):
     """Stiffnesses of all grips in three directions of their own, the stiffest first, N/m."""
-    held = held_postures(scene)
-    own = held.compliance(scene)[held.rows >= 0][:, :3, :3]
+    held = scene.held_postures
+    own = held.compliance(scene.arms)[held.rows >= 0][:, :3, :3]
     return 1 / np.linalg.eigvalsh(own)
 
 

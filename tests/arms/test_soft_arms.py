@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.arms import _held, find_postures
-from seqopt.arms._held import held_postures
+from seqopt.arms import find_postures
 from seqopt.arms._judge import check_postures
 from seqopt.arms._model import ArmModel
 from seqopt.arms._permits import permits
@@ -54,7 +53,7 @@ def soft(bricks=5, robots=3):
 
 def by_joints(scene, grips):
     """How each grip of a step gives way, from the table; that of the crane is a number."""
-    held, out = held_postures(scene), []
+    held, out = scene.held_postures, []
     table = find_postures(scene)
     for i, (robot, node) in enumerate(zip(scene.robots, grips, strict=True)):
         if node is not None and robot.arm is None:
@@ -79,7 +78,7 @@ def largest(scene, bricks, grips):
 
 def allowed(scene):
     """The largest force of a state as `whole_graph` asks for it; None where arms cannot be."""
-    table, held = find_postures(scene), held_postures(scene)
+    table, held = find_postures(scene), scene.held_postures
 
     def allow(bricks, grips):
         rows = [
@@ -139,8 +138,8 @@ def test_two_joints_add_what_each_does(tmp_path):
 
 def test_an_arm_holds_each_node_in_one_posture_whatever_the_order():
     scene, back = soft(), in_order(soft(), "reversed")
-    held, table = held_postures(scene), find_postures(scene)
-    assert (held_postures(back).rows == held.rows).all()
+    held, table = scene.held_postures, find_postures(scene)
+    assert (back.held_postures.rows == held.rows).all()
     for own, name in enumerate(("north", "south")):
         for node, row in zip(held.nodes.tolist(), held.rows[own].tolist(), strict=True):
             assert (row in table.rows(name, node)) == (row >= 0)
@@ -151,13 +150,13 @@ def test_an_arm_holds_each_node_in_one_posture_whatever_the_order():
         nodes = [node for brick in each.placed for node in brick.nodes]
         rows = [[held.row(r, node) for node in nodes] for r in range(2)]
         assert found.rows[:2, 1:, 0].tolist() == rows
-    assert held_postures(two_arms()) is None
+    assert two_arms().held_postures is None
 
 
 def test_the_stiffest_is_taken_of_those_that_are_as_good():
     """Where a posture hits nothing and is in no one's way, no such one is stiffer."""
     scene = soft()
-    held, table = held_postures(scene), find_postures(scene)
+    held, table = scene.held_postures, find_postures(scene)
     give = np.trace(table.compliance[:, :3, :3], axis1=1, axis2=2)
     good = ~table.hits.any(axis=1) & ~table.collide.any(axis=1)
     rows = held.rows[held.rows >= 0]
@@ -220,7 +219,7 @@ def test_the_loop_agrees_with_brute_force(aim):
 def test_a_plan_keeps_the_postures_by_which_its_grips_give_way(schedule):
     scene = soft()
     plan = seqopt.optimize(scene, schedule, FORCE)
-    held = held_postures(scene)
+    held = scene.held_postures
     assert "no plan is better with one posture at a node" in str(plan.arms)
     for step, rows in zip(plan.steps, plan.arms.postures.steps, strict=True):
         wanted = [
@@ -234,28 +233,28 @@ def test_a_plan_keeps_the_postures_by_which_its_grips_give_way(schedule):
     assert found.to_numpy() == pytest.approx(dense, rel=1e-8, abs=1e-9)
 
 
-def test_the_judge_finds_grips_that_give_way_in_another_way(monkeypatch):
+def test_the_judge_finds_grips_that_give_way_in_another_way():
     """Its own route moves every joint a little; a tenth more in one joint is another grip."""
     scene = soft()
     plan = seqopt.optimize(scene, "free", FORCE)
     check_postures(scene, plan.steps)
-    found = held_postures(scene)
+    found = scene.held_postures
     changed = [jacobian.copy() for jacobian in found.jacobians]
     for jacobian in changed:
         jacobian[:, :, 1] *= 1.1
-    monkeypatch.setitem(vars(scene), _held._KEY, replace(found, jacobians=tuple(changed)))
+    scene = scene.holding(replace(found, jacobians=tuple(changed)))
     with pytest.raises(StepError, match=r"the grip of .* in another way than its joints"):
         check_postures(scene, plan.steps)
 
 
-def test_the_judge_finds_an_arm_that_is_not_at_its_node(monkeypatch):
+def test_the_judge_finds_an_arm_that_is_not_at_its_node():
     scene = soft()
     plan = seqopt.optimize(scene, "free", FORCE)
-    found = held_postures(scene)
+    found = scene.held_postures
     elsewhere = np.where(found.rows >= 0, found.rows[:, -1:], -1)
     one = [model[-1:].repeat(len(model), axis=0) for model in found.jacobians]
     wrong = replace(found, rows=elsewhere, jacobians=tuple(one))
-    monkeypatch.setitem(vars(scene), _held._KEY, wrong)
+    scene = scene.holding(wrong)
     with pytest.raises(StepError, match=r"in another way than its joints|arms cannot hold"):
         check_postures(scene, plan.steps)
 
@@ -317,7 +316,6 @@ def test_workers_and_scenarios_hold_in_the_same_postures():
 
 def test_the_formula_is_that_of_the_table():
     scene = soft(robots=2)
-    vars(scene).setdefault(_held._KEY, held_postures(scene))
     grips = (3, 6)
     for one, two in zip(compliances(scene, grips), by_joints(scene, grips), strict=True):
         assert one == pytest.approx(two, rel=1e-9)

@@ -16,7 +16,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError
 from seqopt.network.build import build_network
 from seqopt.responses._tolerance import misfits
-from seqopt.scene._armed import can_hold, held_postures
+from seqopt.scene._armed import can_hold
 from tests.arms.joints import compliances, with_joints
 from tests.builders import block, six_bricks
 from tests.limit_scenes import softened
@@ -200,16 +200,16 @@ def test_scenarios_hold_in_the_same_postures(arch25):
     (drawn,) = seqopt.scenarios(scene, count=1).with_grips((0.1, 0.2)).scenes
     factor = drawn.robots[1].arm.joint_stiffness[0] / 1e6
     assert 0.1 <= factor <= 0.2
-    found = held_postures(engine_for(engine, drawn).network.scene)
-    assert found == held_postures(scene)
-    own = [found.compliance(each)[1] for each in (drawn, scene)]
+    found = engine_for(engine, drawn).network.scene.held_postures
+    assert found == scene.held_postures
+    own = [found.compliance(each.arms)[1] for each in (drawn, scene)]
     assert np.allclose(factor * own[0], own[1], rtol=1e-12)
     first, second = drawn.robots
     away = replace(second, arm=replace(second.arm, position=(9.0, 0.0, 0.0)))
     other = drawn.with_robots(first, away)
     assert _held.hold_alike(scene, other) is other
-    assert _held._KEY not in vars(other)
-    assert _held._KEY not in vars(drawn)  # by itself it has postures of its own
+    assert "held_postures" not in vars(other)
+    assert "held_postures" not in vars(drawn)  # by itself it has postures of its own
 
 
 def test_other_grips_stand_for_joints_as_well(arch25):
