@@ -16,7 +16,7 @@ from scipy.linalg import lapack
 from seqopt.arrays import Bools, Floats, Ints, frozen
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import _couples
-from seqopt.engines.rigid._operator import ComplianceOperator, Doubts
+from seqopt.engines.rigid._operator import ComplianceOperator
 
 
 class Pairs(NamedTuple):
@@ -194,7 +194,7 @@ def grip_forces(
 
 
 def trusted(
-    operator: ComplianceOperator | Doubts,
+    operator: ComplianceOperator,
     index: Ints,
     found: _GripForces,
     most: float,
@@ -202,14 +202,12 @@ def trusted(
 ) -> Bools:
     """Return which sets' forces (S,) rounding changes little enough.
 
-    ``operator``: or, of rigid grips, its doubts alone; ``most``: largest of `_doubts` that is
-    accepted; ``compliance``: as of `grip_forces`.
+    ``most``: largest of `_doubts` that is accepted; ``compliance``: as of `grip_forces`.
     """
-    doubts = operator.doubts if isinstance(operator, ComplianceOperator) else operator
     lowest, least = found.lowest, np.inf
     if compliance.moved is None:  # else forces may undo what the weight does
         own = 0.0 if compliance.rigid else 2.0  # of what soft grips yield, that forces undo as well
-        least = len(found.pivot) * doubts.worst + own
+        least = len(found.pivot) * operator.worst_doubt + own
     out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
         return out
@@ -222,7 +220,7 @@ def trusted(
 
 
 def _doubts(
-    operator: ComplianceOperator | Doubts,
+    operator: ComplianceOperator,
     index: Ints,
     found: _GripForces,
     compliance: GripCompliance = RIGID,
@@ -234,12 +232,11 @@ def _doubts(
     leaves undetermined.
     """
     size = np.abs(found.force.T)
-    doubts = operator.doubts if isinstance(operator, ComplianceOperator) else operator
-    root, own, scale = doubts.shares.take(np.ascontiguousarray(index.T), axis=1)
+    root, own, scale = operator.doubts.take(np.ascontiguousarray(index.T), axis=1)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         own += (root * size).sum(axis=0)
         own *= scale
-        if isinstance(operator, ComplianceOperator) and not compliance.rigid:
+        if not compliance.rigid:
             own = _with_compliance(operator, own, size, root / scale, compliance)
         own /= found.pivot
         most = size.max(axis=0, initial=np.finfo(float).tiny)

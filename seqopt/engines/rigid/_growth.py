@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -81,18 +80,6 @@ _SAMPLE = 600  # motions that are compared with each other, about
 _MOST = 0.95  # share of all pairs of motions in space whose asymmetry counts as rounding
 
 
-class _Before(NamedTuple):
-    """The last brick count but one: its weight's answers, its loss, and what has changed since.
-
-    ``closing`` (1 + kb, n), ``changes`` of n rows: what loops added to twists and wrenches.
-    """
-
-    weighed: list[Floats]
-    loss: Floats
-    closing: Floats
-    changes: list[Floats]
-
-
 class Growth:
     """The answers of a growing structure to its weight and to unit wrenches on its bricks.
 
@@ -102,19 +89,12 @@ class Growth:
     count.
 
     ``tree``: on which the bricks hang. ``basis``: k directions in which bricks are loaded and move;
-    all by default. ``twist`` (1 + kB, kB): of the bricks, m and rad; ``wrench``: of every spring
-    on its second body, N and N m, in two arrays: if ``apart``, what edges and ground ends bear,
-    which is read most, and all other moments; else all, and none; ``columns``: which of the kS
-    numbers each array has; ``loss`` (B,): how much more than the last digit of a brick's motions is
-    rounding, as what moved it further before is gone; ``remembers``: whether `answers` takes the
-    last brick count but one from the last, which differs in rounding.
+    all by default. ``twist`` (1 + kB, kB): of the bricks, m and rad; ``wrench`` (1 + kB, kS): of
+    every spring on its second body, N and N m; ``loss`` (B,): how much more than the last digit of
+    a brick's motions is rounding, as what moved it further before is gone.
     """
 
-    remembers = False
-
-    def __init__(
-        self, network: Network, tree: SpanningTree, basis: Basis = SPACE, *, apart: bool = False
-    ) -> None:
+    def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
         self._network, self._tree, self._basis = network, tree, basis
         self._size = len(basis.wrench)
         most = self._size * len(tree.spring)
@@ -128,17 +108,9 @@ class Growth:
         self._along = self._carried(center - center[tree.parent])
         self.loss = np.ones(len(tree.spring))
         self.twist = np.empty((1 + most, most))
-        borne = np.full((self._acting[-1], 1), len(basis.force) if apart else self._size)
-        borne[network.springs.support[network.springs.support < len(borne)]] = self._size
-        self._parts = [(slice(n), slice(n, self._size)) for n in borne.ravel().tolist()]
-        first = np.arange(self._size) < borne
-        self.columns = np.flatnonzero(first), np.flatnonzero(~first)
-        ends = (np.cumsum(part.sum(axis=1)).tolist() for part in (first, ~first))
-        self._ends = [[0, *each] for each in ends]  # where the columns of springs end
-        self.wrench = tuple(np.zeros((1 + most, each[-1])) for each in self._ends)
+        self.wrench = np.zeros((1 + most, self._size * self._acting[-1]))
         self.bricks = self._closed = 0
         self._weighed: list[list[Floats]] = []
-        self._before: _Before | None = None
         self._start()
 
     def reach(self, bricks: int) -> None:
@@ -153,82 +125,51 @@ class Growth:
             self.bricks = bricks
             self._tie(np.arange(self._acting[bricks]))
             del self._weighed[bricks - self._closed + 1 :]
-            self._before = None
-            for array, row in zip((self.twist, *self.wrench), self._weighed[-1], strict=True):
+            for array, row in zip((self.twist, self.wrench), self._weighed[-1], strict=True):
                 array[0, : len(row)] = row
         while self.bricks < bricks:
-            weighed, loss = self._weighed[-1], self.loss[: self.bricks].copy()
             self._add()
-            closing, changes = np.empty((1 + self._moves, 0)), [np.empty((0, 1))] * 3
             mine = np.arange(*self._acting[self.bricks - 1 : self.bricks + 1])
             others = mine[mine != self._tree.spring[self.bricks - 1]]
             if others.size:
-                closing, changes = self._close(others)
+                self._close(others)
                 self._closed, self._weighed = self.bricks, []
-            self._before = _Before(weighed, loss, closing, changes)
             self._weighed.append([each.copy() for each in self._answers(0)])
 
-    def recalls(self, bricks: int) -> bool:
-        """Return whether `answers` of a brick count are there, or nearly so."""
-        last = self.remembers and self._before is not None
-        return self.bricks - last <= bricks <= self.bricks
-
-    def answers(self, bricks: int, held: Ints) -> tuple[list[Floats], Floats]:
+    def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats, Floats]:
         """Return what so many bricks do under the weight, and unit wrenches on some bricks (h,).
 
-        Results: twists and both arrays of wrenches, 1 + kh rows; the loss (h,).
+        Results: twists and wrenches, 1 + kh rows; the loss (h,).
         """
-        if not self.recalls(bricks):
-            self.reach(bricks)
-        k, before = self._size, self._before
-        rows: slice | Ints = slice(1 + k * bricks)
+        self.reach(bricks)
+        rows: slice | Ints = slice(1 + self._moves)
         if len(held) < bricks:
-            rows = np.concatenate([[0], (1 + k * held[:, None] + np.arange(k)).ravel()])
-        found = self._answers(rows)
-        if bricks == self.bricks or before is None:
-            return found, self.loss[held]
-        for i, (change, row) in enumerate(zip(before.changes, before.weighed, strict=True)):
-            found[i] = (found[i] - before.closing[rows] @ change)[:, : len(row)]
-            found[i][0] = row
-        return found, before.loss[held]
+            every = 1 + self._size * held[:, None] + np.arange(self._size)
+            rows = np.concatenate([[0], every.ravel()])
+        return *self._answers(rows), self.loss[held]
 
     @property
     def nbytes(self) -> int:
         """Bytes of the arrays for all bricks."""
-        return self.twist.nbytes + sum(each.nbytes for each in self.wrench)
-
-    @property
-    def borne(self) -> int:
-        """How many of the first columns of the first array of wrenches count."""
-        return int(self._ends[0][self._acting[self.bricks]])
+        return self.twist.nbytes + self.wrench.nbytes
 
     @property
     def _moves(self) -> int:
         return self._size * self.bricks
 
-    def _of(self, first: int, after: int, rows: slice | Ints | int) -> list[Floats]:
-        """Return what springs from one to before another transmit, of some rows."""
-        pairs = zip(self.wrench, self._ends, strict=True)
-        return [each[:, ends[first] : ends[after]][rows] for each, ends in pairs]
-
-    def _answers(self, rows: slice | Ints | int) -> list[Floats]:
+    def _answers(self, rows: slice | Ints | int) -> tuple[Floats, Floats]:
         """Return the twists of bricks that stand, and what springs that act transmit."""
-        return [self.twist[:, : self._moves][rows], *self._stressed(rows)]
-
-    def _stressed(self, rows: slice | Ints | int) -> list[Floats]:
-        return self._of(0, self._acting[self.bricks], rows)
+        acting = self._size * self._acting[self.bricks]
+        return self.twist[:, : self._moves][rows], self.wrench[:, :acting][rows]
 
     def _start(self) -> None:
         if self._closed:
-            for each in self.wrench:
-                each[:] = 0.0  # springs not of the tree act on all rows
+            self.wrench[:] = 0.0  # springs not of the tree act on all rows
         self.bricks = self._closed = 0
         self._left = 1.0  # rounding when the twists were summed anew
-        self._weighed = [[np.empty(0)] * 3]
-        self._before = None
+        self._weighed = [[np.empty(0)] * 2]
         self._tie(np.arange(0))
-        for each in (self.twist, *self.wrench):
-            each[0] = 0.0
+        self.twist[0] = self.wrench[0] = 0.0
 
     def _add(self) -> None:
         """Hang the next brick on its spring."""
@@ -237,8 +178,8 @@ class Growth:
         old, after = slice(0, 1 + k * brick), 1 + k * brick
         mine, rows = slice(k * brick, k * brick + k), slice(after, after + k)
         self.bricks += 1
-        for each in self._of(self._acting[brick], self._acting[self.bricks], 0):
-            each[:] = 0.0  # as in all old rows, never written yet
+        self.wrench[0, k * self._acting[brick] : k * self._acting[self.bricks]] = 0.0
+        acting = slice(k * self._acting[self.bricks])  # of old rows as of new springs: zeros
         own, along = self._own_arm[brick], self._along[brick]
         flexibility = own @ self._compliance[spring] @ own.T
         if parent != GROUND:
@@ -246,67 +187,56 @@ class Growth:
             theirs = slice(1 + moved.start, 1 + moved.stop)
             self.twist[rows, : k * brick] = along @ self.twist[theirs, : k * brick]
             self.twist[old, mine] = self.twist[old, moved] @ along.T
-            for row, from_it in zip(self._stressed(rows), self._stressed(theirs), strict=True):
-                row[:] = along @ from_it
+            self.wrench[rows, acting] = along @ self.wrench[theirs, acting]
             flexibility = flexibility + along @ self.twist[theirs, moved] @ along.T
             self.loss[brick] = self.loss[parent]
         else:
             self.twist[rows, : k * brick], self.twist[old, mine] = 0.0, 0.0
-            for each in self._stressed(rows):
-                each[:] = 0.0
+            self.wrench[rows, acting] = 0.0
             self.loss[brick] = 1.0
             if self._shift[spring].any():
                 self.twist[0, mine] = own @ self._shift[spring]
         self.twist[rows, mine] = flexibility
-        self._transmit(spring, rows, -own)
-        weight = self._basis.force @ self._network.weight[brick]
-        forces = slice(after, after + len(weight))
-        self._load(weight, forces)
-        begun = self._network.applied(brick + 1, before=brick)
-        for other in np.flatnonzero(begun.any(axis=1)):
-            first = 1 + k * int(other)
-            self._load(self._basis.wrench @ begun[other], slice(first, first + k))
+        self.wrench[rows, self._of(spring)] = -own
+        self._load(brick)
         self._tie(np.array([spring]), self._ties)
 
-    def _load(self, pull: Floats, rows: slice) -> None:
-        """Add what a pull at some rows does to what the weight does."""
-        for each, other in zip(self._answers(0), self._answers(rows), strict=True):
-            each[:] += pull @ other
+    def _load(self, brick: int) -> None:
+        """Add to what the weight does that of a brick, and of loads that begin with it."""
+        k, weight = self._size, self._basis.force @ self._network.weight[brick]
+        pulls = [(brick, weight)]
+        begun = self._network.applied(brick + 1, before=brick)
+        for other in np.flatnonzero(begun.any(axis=1)).tolist():
+            pulls.append((other, self._basis.wrench @ begun[other]))
+        for body, pull in pulls:
+            rows = slice(1 + k * body, 1 + k * body + len(pull))
+            for each, other in zip(self._answers(0), self._answers(rows), strict=True):
+                each[:] += pull @ other
 
-    def _transmit(self, spring: int, rows: slice, wrench: Floats) -> None:
-        """Set what a spring transmits (n, k), of some rows."""
-        for each, part in zip(self._of(spring, spring + 1, rows), self._parts[spring], strict=True):
-            each[:] = wrench[:, part]
+    def _of(self, spring: int) -> slice:
+        """Return the columns of what a spring transmits."""
+        return slice(self._size * spring, self._size * spring + self._size)
 
-    def _gives(self, spring: int, rows: slice, given: Floats) -> Floats:
-        """Return what a spring transmits (n, k), of some rows, times a matrix (k, k)."""
-        (one, other), (first, rest) = self._of(spring, spring + 1, rows), self._parts[spring]
-        out = one @ given[first]
-        return out + other @ given[rest] if other.shape[1] else out
-
-    def _close(self, springs: Ints) -> tuple[Floats, list[Floats]]:
-        """Let springs act that close loops; return what is added, as of `_Before`."""
+    def _close(self, springs: Ints) -> None:
+        """Let springs act that close loops."""
         k, rows = self._size, slice(0, 1 + self._moves)
         gaps = np.concatenate([self._gap(s) for s in springs], axis=1)
-        changes = [
-            np.concatenate([self._pulled(each, s) for s in springs])
-            for each in self._stressed(rows)
-        ]
+        answers = self._answers(rows)
+        pulled = np.concatenate([self._pulled(answers[1], s) for s in springs])
         own = linalg.block_diag(*self._compliance[springs])
         system = own + np.concatenate([self._pulled(gaps, s) for s in springs])
         factors = linalg.lu_factor(0.5 * (system + system.T))
         closing = -linalg.lu_solve(factors, gaps.T).T
         closing -= linalg.lu_solve(factors, (gaps + closing @ system).T).T
-        changes, before = [np.ascontiguousarray(gaps[1:].T), *changes], self._own().copy()
-        _add_products(self._answers(rows), closing, changes)
+        before = self._own().copy()
+        _add_products(answers, closing, [np.ascontiguousarray(gaps[1:].T), pulled])
         for i, spring in enumerate(springs.tolist()):
-            self._transmit(spring, rows, closing[:, k * i : k * i + k])
+            self.wrench[rows, self._of(spring)] = closing[:, k * i : k * i + k]
         self._tie(springs, self._ties)
         lost = (before / np.maximum(self._own(), TINY)).reshape(self.bricks, k).max(axis=1)
         self.loss[: self.bricks] *= np.maximum(lost, 1.0)
         if self.loss[: self.bricks].max() > max(_TAKEN, _WORSE * self._left):
             self._sum_again()
-        return closing, changes
 
     def _own(self) -> Floats:
         """Return how far unit wrenches move their own bricks, (kb,)."""
@@ -327,7 +257,7 @@ class Growth:
             part = slice(start, min(start + step, 1 + self._moves))
             twist = self.twist[part].reshape(part.stop - start, -1, k)
             for brick, parent, spring, given, along in ways:
-                twist[:, brick] = self._gives(spring, part, given)
+                twist[:, brick] = self.wrench[part, self._of(spring)] @ given
                 if parent != GROUND:
                     twist[:, brick] += twist[:, parent] @ along
                 elif start == 0:
@@ -354,7 +284,7 @@ class Growth:
             body, s, sign = trail[body]
             carried = self._carried(at - springs.position[s])
             turn = self._compliance[s] @ carried.T
-            out -= self._gives(s, slice(len(out)), sign * turn)
+            out -= self.wrench[: len(out), self._of(s)] @ (sign * turn)
             out[0] += sign * carried @ self._shift[s]
         out[0] -= self._shift[spring]
         return out

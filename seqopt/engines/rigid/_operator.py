@@ -35,37 +35,6 @@ _FEW = 200  # loads whose responses take little, and are always made once for al
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Doubts(FrozenValue):
-    """How far rounding may reach: of every load what it moves itself, the weight, and lost digits.
-
-    Arrays are the flexibility's diagonal, ``dead_displacement`` and ``loss`` (l,) of
-    `ComplianceOperator`.
-    """
-
-    flexibility: Floats
-    dead: Floats
-    loss: Floats
-
-    @cached_property
-    def shares(self) -> Floats:
-        """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
-        own = np.maximum(np.abs(self.flexibility), np.finfo(float).tiny)
-        root = np.sqrt(own * self.loss)
-        return frozen(np.stack([root, np.abs(self.dead) * self.loss / root, root / own]))
-
-    @cached_property
-    def worst(self) -> float:
-        """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
-
-        As `_doubts` of `seqopt.engines.rigid._grip_equations`: forces undo the displacements, so
-        these are no more in doubt than what the forces add up to.
-        """
-        most = np.abs(self.flexibility).max(initial=0.0)
-        own = np.sqrt(most * self.loss.max(initial=1.0))
-        return float(2 * own * self.shares[2].max(initial=0.0))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
 class ComplianceOperator(FrozenValue):
     """What loads on a partial structure of b bricks move and stress; rows of arrays are loads.
 
@@ -136,9 +105,28 @@ class ComplianceOperator(FrozenValue):
         return frozen(np.stack([self.axis, -self.axis], axis=1).reshape(-1, self.directions))
 
     @cached_property
-    def doubts(self) -> Doubts:
-        """What rounding may leave of the answers to its loads."""
-        return Doubts(self.flexibility.diagonal(), self.dead_displacement, self.loss)
+    def doubts(self) -> Floats:
+        """What rounding may leave of the answers to its loads, (3, l).
+
+        Roots of flexibilities with their lost digits, what the weight adds to the sum of them, and
+        what makes that a force.
+        """
+        diagonal = np.abs(self.flexibility.diagonal())
+        own = np.maximum(diagonal, np.finfo(float).tiny)
+        root = np.sqrt(own * self.loss)
+        weight = np.abs(self.dead_displacement) * self.loss / root
+        return frozen(np.stack([root, weight, root / own]))
+
+    @cached_property
+    def worst_doubt(self) -> float:
+        """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
+
+        As `_doubts` of `seqopt.engines.rigid._grip_equations`: forces undo the displacements, so
+        these are no more in doubt than what the forces add up to.
+        """
+        most = np.abs(self.flexibility.diagonal()).max(initial=0.0)
+        own = np.sqrt(most * self.loss.max(initial=1.0))
+        return float(2 * own * self.doubts[2].max(initial=0.0))
 
     def covers(self, bricks: Ints) -> bool:
         """Return whether loads act at the nodes of bricks."""
@@ -273,11 +261,9 @@ def load_rows(nodes: Ints, directions: int, moments: int) -> Ints:
 class OperatorBuilder:
     """Makes the operator of any brick count of a tree from what grows with it."""
 
-    def __init__(
-        self, network: Network, tree: SpanningTree, basis: Basis = SPACE, *, apart: bool = False
-    ) -> None:
+    def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
         self.network, self.basis = network, basis
-        self.growth = Growth(network, tree, basis, apart=apart)
+        self.growth = Growth(network, tree, basis)
         self.maps = scene_maps(network, basis)
         self.nodes = inner_motions(network, basis)
         self.moments = len(basis.moment) if network.scene.grip_kinds.turns.any() else 0
@@ -295,9 +281,8 @@ class OperatorBuilder:
         which = slice(bricks) if len(held) == bricks else held
         nodes = self.nodes[which]
         k, loads = nodes.shape[2], nodes.shape[0] * nodes.shape[1]
-        (moved, *carried), loss = self.growth.answers(bricks, held)
-        twist = _at_nodes(nodes, [moved], [held])
-        wrench = _at_nodes(nodes, carried, self.growth.columns)
+        moved, carried, loss = self.growth.answers(bricks, held)
+        twist, wrench = _at_nodes(nodes, moved), _at_nodes(nodes, carried)
         turned = twist.reshape(len(twist), bricks, k)[:, which].transpose(1, 0, 2)
         at_nodes = np.empty((len(twist), *nodes.shape[:2]))  # displacements
         np.matmul(turned, nodes.swapaxes(1, 2), out=at_nodes.transpose(1, 0, 2))
@@ -318,28 +303,13 @@ class OperatorBuilder:
         )
 
 
-_MAPPED = 2**14  # numbers mapped at a time, about: they stay in the processor's cache
-
-
-def _at_nodes(nodes: Floats, answers: Sequence[Floats], columns: Sequence[Ints]) -> Floats:
+def _at_nodes(nodes: Floats, answers: Floats) -> Floats:
     """Return what unit loads at nodes of bricks (h, w, k) mean, and the weight last.
 
-    ``answers``: of the weight and unit wrenches on these bricks, (1 + kh, n); of which columns.
+    ``answers`` (1 + kh, n): of the weight and unit wrenches on these bricks.
     """
-    h, w, k = nodes.shape
-    out = np.empty((h * w + 1, sum(each.shape[1] for each in answers)))
-    for each, some in zip(answers, columns, strict=True):
-        width = each.shape[1]
-        if width == out.shape[1]:
-            rows = each[1:].reshape(h, k, width)
-            np.matmul(nodes, rows, out=out[:-1].reshape(h, w, width))
-            out[-1] = each[0]
-            continue
-        step = max(1, _MAPPED // max(1, w * width))
-        for start in range(0, h if width else 0, step):  # to other columns, part by part
-            part = nodes[start : start + step]
-            rows = each[1 + k * start :][: k * len(part)].reshape(len(part), k, width)
-            mine = slice(w * start, w * (start + len(part)))
-            out[mine, some[:width]] = (part @ rows).reshape(-1, width)
-        out[-1, some[:width]] = each[0]
+    (h, w, k), width = nodes.shape, answers.shape[1]
+    out = np.empty((h * w + 1, width))
+    np.matmul(nodes, answers[1:].reshape(h, k, width), out=out[:-1].reshape(h, w, width))
+    out[-1] = answers[0]
     return out

@@ -19,14 +19,12 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from seqopt._interrupts import answered
 from seqopt.arrays import Floats, Ints, Terse
-from seqopt.engines.interface import Fields, Want
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import (
     InfeasibleError,
     MemoryShortError,
@@ -43,9 +41,7 @@ from seqopt.graph.solution import StatePath
 from seqopt.plan._paths import find_path
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
-from seqopt.responses.table import step_fields
-from seqopt.sequence.schedule import OpenGrip, Schedule
-from seqopt.sequence.steps import Step
+from seqopt.sequence.schedule import Schedule
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,13 +50,12 @@ class WindowSearch(Terse):
 
     ``alone``: the steps in which one move is open; ``shared``: of every move, the steps shared with
     the move before, whose choice is made; it may be empty; ``choice``: the chosen candidate of
-    every move; ``fields``: by number, of steps that an engine answered on the way.
+    every move.
     """
 
     alone: Layers
     shared: tuple[Layers, ...]
     choice: tuple[int, ...]
-    fields: Mapping[int, Fields] = field(default_factory=dict, compare=False)
 
     @property
     def explored(self) -> tuple[Layers, ...]:
@@ -78,14 +73,12 @@ class WindowSearch(Terse):
         return np.asarray(self.alone.sums.single[move] + self.shared[move].sums.single[0])
 
 
-def search_windows(
-    problem: Layers, watch: Watch | None = None, *, fields: bool = False
-) -> WindowSearch:
+def search_windows(problem: Layers, watch: Watch | None = None) -> WindowSearch:
     """Choose every open grip of a build, one move after the other, by ascending brick counts.
 
-    ``problem``: its own responses are not computed; ``fields``: whether those of steps are noted.
-    Raises `NothingFoundError` if a move has no candidate left after the choices before it, while
-    others may have led on; `TimeUpError` if time is over before the last move is chosen;
+    ``problem``: its own responses are not computed. Raises `NothingFoundError` if a move has no
+    candidate left after the choices before it, while others may have led on; `TimeUpError` if time
+    is over before the last move is chosen;
     `MemoryShortError` if there is not the memory for what it looks at; `KeyboardInterrupt`, with
     the nodes that were chosen so far as its text.
     """
@@ -98,12 +91,10 @@ def search_windows(
                 for choices in steps:  # with one open move
                     walk.own.add(choices.moves, walk.alone.step_costs(choices))
                 walk.choose(known=steps[-1].step.bricks)
-                if fields:
-                    walk.note()
         walk.choose(known=math.inf)
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(walk.so_far()) from stop
-    return WindowSearch(walk.alone, tuple(walk.shared), tuple(walk.choice), walk.fields)
+    return WindowSearch(walk.alone, tuple(walk.shared), tuple(walk.choice))
 
 
 class _Walk:
@@ -121,8 +112,6 @@ class _Walk:
         self.own = Joined([len(move.candidates) for move in self._schedule.moves], np.add)
         self.shared: list[Layers] = []
         self.choice: list[int] = []
-        self.fields: dict[int, Fields] = {}
-        self._noted = 0  # steps
 
     def choose(self, known: float) -> None:
         """Choose the moves whose steps have at most so many bricks."""
@@ -135,18 +124,6 @@ class _Walk:
             if len(self.shared) == k or self._last((k,)) > known:
                 return
             self._choose(k)
-
-    def note(self) -> None:
-        """Ask for all fields of steps that are chosen, where an engine has them at hand now."""
-        engine, steps, chosen = self._problem.engine, self._schedule.steps, len(self.choice)
-        for step in steps[self._noted :]:
-            if any(move >= chosen for move in step.moves):
-                return
-            self._noted += 1
-            if isinstance(engine, ComplianceEngine) and engine._recalls(step.bricks):
-                grips = (self._node(g.move) if isinstance(g, OpenGrip) else g for g in step.grips)
-                known = Step(step.number, step.kind, step.bricks, tuple(grips))
-                self.fields[step.number] = step_fields(engine, known, Want.ALL)
 
     def _last(self, moves: tuple[int, ...]) -> int:
         """Return the largest brick count of steps in which given moves are open."""
