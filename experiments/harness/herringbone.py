@@ -7,7 +7,7 @@ Places are filled that lie nearest to a middle line, at an angle from foot to fo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -21,11 +21,9 @@ from seqopt.scene._checks import check, finite, length, units, whole_between
 from seqopt.scene.boxes import as_vector, require_apart
 from seqopt.scene.library.common import (
     JointLaw,
-    Tile,
     _ground_under,
     _joints_between,
     mobile_robots,
-    tiles,
     touching_order,
 )
 from seqopt.scene.parts import Brick, Ground, Joint
@@ -33,6 +31,49 @@ from seqopt.scene.scene import Scene
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
+
+
+REPEAT = 4  # rows and columns after which a herringbone repeats
+
+
+@dataclass(frozen=True)
+class Tile:
+    """Two cells of a herringbone, covered by one brick that lies along its rows or across.
+
+    Rows are counted along the structure, columns across it; the given cell has the smaller numbers.
+    """
+
+    row: int
+    column: int
+    along: bool
+
+    @property
+    def cells(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Row and column of both cells."""
+        other = (self.row + 1, self.column) if self.along else (self.row, self.column + 1)
+        return (self.row, self.column), other
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Where its middle is, in rows and columns; a column is counted at its middle."""
+        if self.along:
+            return self.row + 1.0, float(self.column)
+        return self.row + 0.5, self.column + 0.5
+
+
+def tiles(rows: int, columns: Iterable[int]) -> list[Tile]:
+    """Return the tiles of a herringbone whose first cells are in some columns, between two edges.
+
+    With k = (row + column) mod 4 a tile along covers the cells k = 0 and 1 of a column, one across
+    k = 2 and the cell k = 3 in the next. A tile that would cross an edge is left out.
+    """
+    out = []
+    for column in columns:
+        for row in range(rows):
+            place = (row + column) % REPEAT
+            if place == 2 or (place == 0 and row + 1 < rows):
+                out.append(Tile(row, column, along=place == 0))
+    return out
 
 
 _Pose = tuple[Floats, Floats, Floats]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -216,53 +216,6 @@ def same_points(some: Floats, others: Floats, share: float) -> bool:
     near = share * float(np.abs(others).max() + np.ptp(others, axis=0).max())
     pairs = ((some, others), (others, some))
     return all(bool(np.max(KDTree(a).query(b)[0]) <= near) for a, b in pairs)
-
-
-def join_pieces(blocks: Sequence[FileBlock], key: str) -> tuple[FileBlock, str]:
-    """Return the pieces of a block as one, and how that was done.
-
-    Where two lie face on face, both faces go. So do faces between corners of closed pieces that
-    close nothing themselves. Raises `SceneError` if pieces are apart, or meet in other ways.
-    """
-    points = np.vstack([block.vertices for block in blocks])
-    start, pieces = 0, list[list[_Loop]]()
-    for block in blocks:
-        pieces.append([tuple(v + start for v in face) for face in block.faces])
-        start += len(block.vertices)
-    welded = iter(_welded(points, [face for piece in pieces for face in piece], Counter()))
-    pieces = [[next(welded) for _ in piece] for piece in pieces]
-    solid = [piece for piece in pieces if not _has_rim(piece)]
-    faces = [face for piece in solid for face in piece]
-    times, corners = Counter(map(frozenset, faces)), {v for face in faces for v in face}
-    loose = [face for piece in pieces if _has_rim(piece) for face in piece]
-    outer = [face for face in faces if times[frozenset(face)] == 1]
-    joined = FileBlock(key, *_compact(points, outer))
-    _require_one(joined, len(blocks), apart={v for face in loose for v in face} - corners)
-    if loose:
-        return joined, f"block {key} has {len(loose)} faces that close nothing: they are left out"
-    return joined, f"block {key} is {len(blocks)} pieces that are joined to one"
-
-
-def _has_rim(faces: Sequence[_Loop]) -> bool:
-    """Return whether faces leave something open: an edge has an odd number of them."""
-    times = Counter(frozenset(edge) for face in faces for edge in edges(face))
-    return any(count % 2 for count in times.values())
-
-
-def _require_one(joined: FileBlock, count: int, apart: Collection[int]) -> None:
-    """Require pieces that were joined to be one solid. ``apart``: corners of none."""
-    remedy = "unite them to one closed mesh, or give each as a block of its own"
-    whole = joined.faces and len({*_parts(len(joined.vertices), joined.faces).tolist()}) == 1
-    if apart or not whole:
-        raise SceneError(
-            f"block {joined.key}: its mesh is {count} pieces that do not lie face on face; {remedy}"
-        )
-    try:
-        repair_shape(joined)
-    except SceneError:
-        raise SceneError(
-            f"block {joined.key}: its mesh is {count} pieces that do not make one solid; {remedy}"
-        ) from None
 
 
 _CUT = "faces that are not flat are cut into triangles"

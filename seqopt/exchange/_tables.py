@@ -1,9 +1,4 @@
-"""Plans as a table and as JSON: absent, placed or held, by block and step.
-
-Also as sequencer_benchmark writes them: parts that a step installs, and parts that it holds.
-`assembly_sequence` of https://github.com/KIKI007/sequencer_benchmark is read there by
-``AssemblySequence::loadFromJson``. A part is the name of a brick.
-"""
+"""Plans as a table and as JSON: absent, placed or held, by block and step."""
 
 from __future__ import annotations
 
@@ -111,15 +106,3 @@ def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
         "steps": rows,
     }
     return json.dumps(whole, ensure_ascii=False) + "\n"
-
-
-def sequencer_json(scene: Scene, steps: Sequence[Step]) -> str:
-    """Return a plan as an ``assembly_sequence``; which robot holds, and where, it does not say."""
-    rows = [
-        {
-            "installPartIDs": list(row.new),
-            "holdPartIDs": sorted({brick for _, brick in row.holds.values()}),
-        }
-        for row in step_states(scene, steps)
-    ]
-    return json.dumps({"assembly_sequence": rows}) + "\n"

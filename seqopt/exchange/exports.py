@@ -30,7 +30,7 @@ from seqopt.exchange._grip_frames import (
     mesh_data,
     typed,
 )
-from seqopt.exchange._tables import plan_csv, plan_json, sequencer_json, step_states
+from seqopt.exchange._tables import plan_csv, plan_json, step_states
 from seqopt.exchange._tasks import Postures, Task, _known_tasks, tasks_csv, tasks_json
 from seqopt.exchange.imports import read_content
 from seqopt.scene._checks import short
@@ -264,11 +264,7 @@ def _block(points: Floats, faces: Sequence[Iterable[int]]) -> Document:
     return typed("compas_assembly.datastructures/Block", mesh_data(points, faces))
 
 
-_PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {
-    "csv": plan_csv,
-    "json": plan_json,
-    "sequencer": sequencer_json,
-}
+_PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {"csv": plan_csv, "json": plan_json}
 _TASKS: dict[str, Callable[[Scene, Iterable[Task]], str]] = {
     "tasks": tasks_json,
     "tasks_csv": lambda _, tasks: tasks_csv(tasks),
@@ -323,8 +319,8 @@ def export_plan(  # what is written, and what some formats take beside
     >>> import seqopt
     >>> scene = seqopt.load_scene("arch25")
     >>> steps = seqopt.sequential(seqopt.build_network(scene))
-    >>> export_plan(scene, steps[:2], "sequencer")[:46]
-    '{"assembly_sequence": [{"installPartIDs": [1],'
+    >>> export_plan(scene, steps[:2], "json")[:38]
+    '{"format": "seqopt-plan", "version": 1'
     """
     if form not in EXPORTS:
         raise StepError(f"format is {short(form)}; give one of {', '.join(EXPORTS)}")

@@ -26,7 +26,7 @@ from seqopt.exchange._mesh_files import (
     read_objects,
     read_off,
 )
-from seqopt.exchange._meshes import join_pieces, without_repeats
+from seqopt.exchange._meshes import without_repeats
 from seqopt.scene._checks import cut, printable, short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.scene import Scene
@@ -279,7 +279,7 @@ def _read_folder(path: Path, form: str | None) -> Content:
     if left:
         said.append(f"{len(left)} other files are left out: {cut(', '.join(left), 80)}")
     pairs = zip(files, contents, strict=True)
-    blocks = tuple(_one_block(file, content, said) for file, content in pairs)
+    blocks = tuple(_one_block(file, content) for file, content in pairs)
     return replace(contents[0], blocks=blocks, said=tuple(said))
 
 
@@ -296,13 +296,10 @@ def _form_of(path: Path, forms: set[str | None]) -> str:
     return found[0] if found else _IN_JSON
 
 
-def _one_block(file: Path, content: Content, said: list[str]) -> FileBlock:
-    """Return the one block of a file. ``said``: a list that gets how several pieces were joined."""
-    if len(content.blocks) == 1:
-        return replace(content.blocks[0], key=file.stem)
-    try:
-        block, how = join_pieces(content.blocks, file.stem)
-    except SceneError as error:
-        raise SceneError(f"{file}: {error}") from None
-    said.append(how)
-    return block
+def _one_block(file: Path, content: Content) -> FileBlock:
+    if len(content.blocks) > 1:
+        raise SceneError(
+            f"{file}: its mesh is {len(content.blocks)} pieces; unite them to one closed mesh, or "
+            "give each a file of its own"
+        )
+    return replace(content.blocks[0], key=file.stem)

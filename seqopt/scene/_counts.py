@@ -61,8 +61,6 @@ def _wall(given: _Given, now: int, bricks: int) -> _Given:
 
 def _dome(given: _Given, now: int, bricks: int) -> _Given:
     around = _grown(given["around"], now, bricks)
-    if given.get("bond") == "herringbone":
-        around += around % 2
     return {**given, "courses": _grown(given["courses"], now, bricks), "around": around}
 
 

@@ -25,7 +25,7 @@ import numpy as np
 from seqopt._files import parse_json, read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
-from seqopt.scene._checks import Reader, cut, in_words, short, which_fit
+from seqopt.scene._checks import Reader, cut, in_words, short
 from seqopt.scene._durations import Durations
 from seqopt.scene._overlaps import overlapping
 from seqopt.scene.arm import Arm
@@ -135,7 +135,7 @@ KINDS = {
     "arch": "an arch by span and rise: arch:span=2,rise=0.7,curve=catenary",
     "barrel": "one of the eight tested barrel vaults: barrel:test=3",
     "chain": "an arch of any number of bricks that turn evenly: chain:bricks=40",
-    "dome": "a dome: dome:courses=6,around=20,bond=herringbone",
+    "dome": "a dome: dome:courses=6,around=20,opening=0.6",
     "vault": "a barrel vault in running bond: vault:span=2,rise=0.8,columns=3",
     "wall": (
         "a wall in running bond: wall:columns=6,courses=4,corbel=0.02, or wall:length=2,height=0.6"
@@ -185,8 +185,6 @@ def _scene_by_words(words: str) -> Scene:
         scene = _made_of_words(name, given)
     except OverflowError as error:
         raise SceneError(f"scene {words}: its numbers are too large; give smaller ones") from error
-    except SceneError as error:
-        raise SceneError(f"{error}{which_fit(partial(_made_of_words, name), given)}") from error
     made = in_order(scene, order)
     return replace(made, provenance=f"{scene.provenance} In words: {words}.")
 

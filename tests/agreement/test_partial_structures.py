@@ -41,7 +41,7 @@ WORDS = (
     *(f"barrel:test={number}" for number in range(1, 9)),
     "wall:columns=6,courses=5",
     "wall:columns=5,courses=4,corbel=0.02",
-    "dome:courses=6,around=20,bond=herringbone",
+    "dome:courses=6,around=20",
 )
 ALL = (*ABOUT, *WORDS, ARMADILLO)
 

@@ -58,13 +58,6 @@ def test_the_table_comes_back_as_the_same_steps():
     assert rows[0]["placed"] == "1"
 
 
-def test_a_sequence_installs_every_part_once_and_holds_what_is_held():
-    rows = json.loads(export_plan(SCENE, STEPS, "sequencer"))["assembly_sequence"]
-    assert [part for row in rows for part in row["installPartIDs"]] == list(SCENE.build_order)
-    for row, step in zip(rows, STEPS, strict=True):
-        assert row["holdPartIDs"] == sorted({SCENE.brick_of_node[n].name for n in step.held})
-
-
 @pytest.fixture
 def sources(tmp_path):
     """Write documents; return the scenes that they become."""

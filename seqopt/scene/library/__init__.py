@@ -8,7 +8,7 @@ two bricks are in one place and every joint lies between the faces of its bricks
 <Scene chain 100: 100 bricks, 99 joints, 2 ground ends, 3 robots>
 >>> wall(WallShape(columns=6, courses=4))
 <Scene wall 6 x 4: 24 bricks, 53 joints, 6 ground ends, 3 robots>
->>> dome(DomeShape(courses=6, around=20, bond="herringbone")).grounds[0].brick
+>>> dome(DomeShape(courses=6, around=20)).grounds[0].brick
 1
 
 An arch by its span and rise stands on level supports; a wall may be corbelled:

@@ -1,4 +1,4 @@
-"""What generators share: joints where faces meet, checked numbers, robots, orders, herringbone."""
+"""What generators share: joints where faces meet, checked numbers, robots, orders."""
 
 from __future__ import annotations
 
@@ -184,49 +184,6 @@ def _bond_pairs(columns: int, bricks: int) -> list[tuple[int, int]]:
         below = (column, column + 1) if course % 2 else (column - 1, column)
         out += [(i - column - columns + c, i) for c in below if course and 0 <= c < columns]
         out += [(i - 1, i)] if column else []
-    return out
-
-
-REPEAT = 4  # rows and columns after which a herringbone repeats
-
-
-@dataclass(frozen=True)
-class Tile:
-    """Two cells of a herringbone, covered by one brick that lies along its rows or across.
-
-    Rows are counted along the structure, columns across it; the given cell has the smaller numbers.
-    """
-
-    row: int
-    column: int
-    along: bool
-
-    @property
-    def cells(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Row and column of both cells."""
-        other = (self.row + 1, self.column) if self.along else (self.row, self.column + 1)
-        return (self.row, self.column), other
-
-    @property
-    def middle(self) -> tuple[float, float]:
-        """Where its middle is, in rows and columns; a column is counted at its middle."""
-        if self.along:
-            return self.row + 1.0, float(self.column)
-        return self.row + 0.5, self.column + 0.5
-
-
-def tiles(rows: int, columns: Iterable[int]) -> list[Tile]:
-    """Return the tiles of a herringbone whose first cells are in some columns, between two edges.
-
-    With k = (row + column) mod 4 a tile along covers the cells k = 0 and 1 of a column, one across
-    k = 2 and the cell k = 3 in the next. A tile that would cross an edge is left out.
-    """
-    out = []
-    for column in columns:
-        for row in range(rows):
-            place = (row + column) % REPEAT
-            if place == 2 or (place == 0 and row + 1 < rows):
-                out.append(Tile(row, column, along=place == 0))
     return out
 
 

@@ -1,4 +1,4 @@
-"""Domes of any size, in running bond or in herringbone."""
+"""Domes of any size, in running bond."""
 
 from __future__ import annotations
 
@@ -12,25 +12,21 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene._checks import check, density, length, one_of, whole_between
+from seqopt.scene._checks import check, density, length, whole_between
 from seqopt.scene.boxes import as_vector, require_apart
 from seqopt.scene.library.common import (
     DOWN,
     MASONRY,
-    REPEAT,
     JointLaw,
     _masonry,
     _shares,
     a_law,
     few_enough,
     joint_width,
-    tiles,
     touching_order,
 )
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
-
-_BONDS = ("running", "herringbone")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +34,7 @@ class DomeShape:
     """The numbers that shape a dome, a cap of a sphere with an opening; lengths in m.
 
     ``courses``: rows from the ground to the opening, equally high. ``around``: bricks in the lowest
-    course. In running bond courses have fewer the higher they are; in herringbone all have as many
-    cells, twice this number, and it must be even. ``bond``: ``running`` or ``herringbone``.
+    course; courses have fewer the higher they are.
     ``span``, ``rise``: diameter at the ground and height over it, of the surface through the
     bricks' middles, before the opening is cut. ``opening``: diameter of the opening. ``thickness``:
     of the bricks, at right angles to the surface. ``gap``: least width of the joints, on the
@@ -54,7 +49,6 @@ class DomeShape:
 
     courses: int
     around: int
-    bond: str = "running"
     span: float = 2.0
     rise: float = 1.0
     opening: float = 0.5
@@ -68,12 +62,8 @@ class DomeShape:
         check(self, "dome", around=partial(whole_between, least=3))
         few_enough("dome", self.courses * self.around)
         check(self, "dome", span=length, rise=length, opening=length, thickness=length)
-        check(self, "dome", gap=joint_width, bond=partial(one_of, known=_BONDS))
+        check(self, "dome", gap=joint_width)
         check(self, "dome", density=density, law=a_law)
-        if self.bond == "herringbone" and 2 * self.around % REPEAT:
-            raise SceneError(
-                f"dome: around is {self.around}; give an even number, so that herringbone closes"
-            )
         if self.rise > 0.5 * self.span:
             raise SceneError(
                 f"dome: rise is {self.rise:g} m; give at most half of the span, {0.5 * self.span:g}"
@@ -120,8 +110,8 @@ def dome(shape: DomeShape) -> Scene:
 
     Examples
     --------
-    >>> dome(DomeShape(courses=4, around=12, bond="herringbone"))
-    <Scene dome 42: 42 bricks, 90 joints, 12 ground ends, 3 robots>
+    >>> dome(DomeShape(courses=4, around=12))
+    <Scene dome 39: 39 bricks, 82 joints, 12 ground ends, 3 robots>
     """
     places = _places(shape)
     loose = [_brick(shape, place, i) for i, place in enumerate(places)]
@@ -149,16 +139,9 @@ def dome(shape: DomeShape) -> Scene:
 def _places(shape: DomeShape) -> list[_Place]:
     """Return the places of bricks, from the ground up.
 
-    Bricks of courses are as long as the lowest ones, and shifted by half a brick; the tiles of a
-    herringbone close around the dome.
+    Bricks of courses are as long as the lowest ones, and shifted by half a brick.
     """
     out = []
-    if shape.bond == "herringbone":
-        cell = 0.5 * _TURN / shape.around
-        for tile in tiles(shape.courses, range(2 * shape.around)):
-            rows, half = (2, 0.5 * cell) if tile.along else (1, cell)
-            out.append(_Place(tile.row, tile.row + rows, cell * tile.middle[1], half))
-        return sorted(out, key=lambda place: (place.low, place.azimuth))
     for row in range(shape.courses):
         size = math.cos(shape.latitude(row)) / math.cos(shape.latitude(0))
         count = max(3, round(shape.around * size))

@@ -64,7 +64,6 @@ def small_domes(draw):
     shape = DomeShape(
         courses=draw(st.integers(1, 5)),
         around=draw(st.sampled_from([12, 14, 16, 20])),
-        bond=draw(st.sampled_from(["running", "herringbone"])),
         span=1.4,
         rise=draw(st.floats(0.3, 0.7)),
         opening=draw(st.floats(0.5, 0.9)),
@@ -160,11 +159,6 @@ def test_compliance_agrees_with_independent_routes(scene, share):
             "wall: dimensions is 0.0; give a positive number of m",
         ),
         (lambda: DomeShape(courses=1, around=2), "dome: around is 2; give a whole number from 3"),
-        (lambda: DomeShape(courses=1, around=12, bond="x"), "dome: bond is 'x'; give one of run"),
-        (
-            lambda: DomeShape(courses=1, around=13, bond="herringbone"),
-            "dome: around is 13; give an even number",
-        ),
         (lambda: DomeShape(courses=1, around=12, rise=1.1), "dome: rise is 1.1 m; give at most"),
         (lambda: DomeShape(courses=1, around=12, opening=2.0), "dome: opening is 2 m; give less"),
         (lambda: DomeShape(courses=1, around=12, span=-1.0), "dome: span is -1.0; give a positive"),
