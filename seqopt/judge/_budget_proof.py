@@ -1,10 +1,20 @@
-"""How little any path within caps on sums can cost: the certificate's own proof.
+r"""How little any path within caps on sums can cost: the certificate's own proof.
 
-It shares nothing with the formulations that it judges. Multipliers are climbed by subgradients from
-those that are claimed, if any; each proves a bound, the least priced cost of any path. Then paths
-are laid down from their ends back to the start. One is dropped that cannot cost less than the
-answer, or exceeds a cap, or is beaten in everything by another from the same state on. If none is
-left the answer is the best; if too many are, the least bound of those left aside holds for all.
+It shares nothing with the formulations that it judges. Every multiplier :math:`\lambda \ge 0` of
+the caps proves a bound, the least priced cost of any path. The best ones are duals of the cheapest
+mixture :math:`w` of the paths :math:`p` that were met so far, with what it exceeds caps by at a
+largest price :math:`\bar\lambda`,
+
+.. math::
+
+   \min_{w, \, z \ge 0} \; \sum_p c(p) \, w_p + \bar\lambda^T z
+   \quad\text{s.t.}\quad \sum_p w_p = 1, \qquad \sum_p a_b(p) \, w_p \le B_b + z_b
+   \quad \text{for every cap } b ;
+
+a path that is cheaper at these is met next (Dantzig and Wolfe, 1960). Then paths are laid down from
+their ends back to the start. One is dropped that cannot cost less than the answer, or exceeds a
+cap, or is dominated by another from the same state on. If none is left the answer is the best; if
+too many are, the least bound of those left aside holds for all.
 """
 
 from __future__ import annotations
@@ -17,10 +27,12 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph.duality import least_sum
 from seqopt.graph.graph import Graph
+from seqopt.graph.paths import distances, tied
 
-CLIMBS = 80  # multipliers that are tried
-PATIENCE = 4  # tries without a better bound after which steps are halved
+MIXTURES = 80  # multipliers that are tried
+DEAREST = 1e7  # largest multiplier, over the size of costs and caps
 MOST = 5_000  # partial paths that are kept at a level
 SLACK = 1e-9  # of a cap or a cost: what sums are off by; caps have as much more
 EPS = float(np.finfo(float).eps)
@@ -41,11 +53,6 @@ class Case:
     caps: Floats
     value: float
     scale: float
-
-    def reached(self, costs: Floats) -> Floats:
-        """Return the least sum of costs (m,) from the start to every state, (n,)."""
-        matrix: Any = self.graph.matrix(costs)
-        return np.asarray(dijkstra(matrix, indices=[0])[0])
 
 
 class _Parts(NamedTuple):
@@ -79,10 +86,10 @@ def case_of(
 def least_within(case: Case, prices: Floats, *, laid_down: bool) -> tuple[float, Floats]:
     """Return a bound on what any path within the caps costs, at most the value; its multipliers.
 
-    ``prices`` (B,): where the climb begins, as the case has them; ``laid_down``: whether what
-    multipliers leave open is closed by partial paths; the graph has a level for every move.
+    ``prices`` (B,): tried first, as the case has them; ``laid_down``: whether what multipliers
+    leave open is closed by partial paths; the graph has a level for every move.
     """
-    best, bound = _climbed(case, prices)
+    best, bound = _best_multipliers(case, prices)
     if laid_down and case.value - bound > SLACK * case.scale:
         bound = max(bound, _laid_down(case, best)[0])
     return (case.value if case.value - bound <= SLACK * case.scale else bound), best
@@ -94,42 +101,66 @@ def is_kept(graph: Graph, limited: Sequence[tuple[int, float]]) -> bool:
     return _laid_down(case, np.zeros_like(sizes))[1]
 
 
-def _climbed(case: Case, prices: Floats) -> tuple[Floats, float]:
-    """Return the best multipliers that were met on the way up, and the bound that they prove."""
-    best, bound, pace, waited = prices, -np.inf, 1.0, 0
-    now = prices
-    for _ in range(CLIMBS):
-        found, slope = _least(case, now)
+def is_beyond(graph: Graph, limited: Sequence[tuple[int, float]]) -> bool:
+    """Return whether potentials or multipliers prove that no path keeps all caps."""
+    if any(least_sum(graph, graph.amounts[:, column]) > tied(most) for column, most in limited):
+        return True
+    case, sizes = case_of(graph, np.zeros(len(graph.source)), limited, 1.0)
+    return least_within(case, np.ones_like(sizes), laid_down=False)[0] >= 1.0
+
+
+def _best_multipliers(case: Case, prices: Floats) -> tuple[Floats, float]:
+    """Return the best multipliers that were met, and the bound that they prove."""
+    best, bound, paths = prices, -np.inf, list[tuple[float, Floats]]()
+    ask = prices
+    for _ in range(MIXTURES):
+        found, *path = _least(case, ask)
         if found > bound:
-            best, bound, waited = now, found, 0
-        else:
-            waited += 1
-        if waited >= PATIENCE:
-            now, pace, waited = best, 0.5 * pace, 0
-            found, slope = _least(case, now)
-        uphill = np.where((now <= 0) & (slope < 0), 0.0, slope)
-        if case.value - bound <= SLACK * case.scale or not uphill.any():
+            best, bound = ask, found
+        if case.value - bound <= SLACK * case.scale:
             break
-        now = np.maximum(now + pace * (case.value - found) / (uphill @ uphill) * uphill, 0.0)
+        paths.append((path[0], path[1]))
+        ask, cost = _mixed(case, paths)
+        if cost - bound <= SLACK * abs(cost):
+            break
     return best, bound - SLACK**1.5 * case.scale
 
 
-def _least(case: Case, prices: Floats) -> tuple[float, Floats]:
-    """Return the least priced cost of any path, and by how much that path exceeds caps."""
+def _mixed(case: Case, paths: Sequence[tuple[float, Floats]]) -> tuple[Floats, float]:
+    """Return the multipliers of the cheapest mixture of paths, and what that costs."""
+    from scipy.optimize import linprog  # noqa: PLC0415  # slow to import, for budgets only
+
+    costs, over = np.array([cost for cost, _ in paths]), np.array([own for _, own in paths])
+    most = np.full(over.shape[1], DEAREST * case.scale)
+    found = linprog(
+        np.concatenate([costs, most]),
+        A_ub=np.hstack([over.T, -np.eye(len(most))]),
+        b_ub=np.zeros(len(most)),
+        A_eq=[[*np.ones(len(costs)), *np.zeros(len(most))]],
+        b_eq=[1.0],
+        method="highs",
+    )
+    if found.x is None or found.fun is None:
+        return np.zeros(len(most)), -np.inf
+    return np.clip(-found.ineqlin.marginals, 0.0, most), float(found.fun)
+
+
+def _least(case: Case, prices: Floats) -> tuple[float, float, Floats]:
+    """Return the least priced cost of any path, what that path costs, and its excess of caps."""
     graph, costs = case.graph, case.costs + case.takes @ prices
     matrix: Any = graph.matrix(costs)
     (reached,), (before,) = dijkstra(matrix, indices=[0], return_predecessors=True)
-    ends = np.flatnonzero(graph.ends)
+    ends, moves = np.flatnonzero(graph.ends), list[int]()
     at = int(ends[np.argmin(reached[ends])]) if len(ends) else 0
     if not len(ends) or not np.isfinite(reached[at]):
-        return np.inf, np.zeros(len(prices))
+        return np.inf, np.inf, np.zeros(len(prices))
     rounding = EPS * (graph.states + 1) * float(prices @ (1 + np.abs(case.caps)))
-    least, over = float(reached[at] - prices @ case.caps - rounding), -case.caps.copy()
+    least = float(reached[at] - prices @ case.caps - rounding)
     while at:
-        moves = np.flatnonzero((graph.source == before[at]) & (graph.target == at))
-        over += case.takes[moves[np.argmin(costs[moves])]]
+        own = np.flatnonzero((graph.source == before[at]) & (graph.target == at))
+        moves.append(int(own[np.argmin(costs[own])]))
         at = int(before[at])
-    return least, over
+    return least, float(case.costs[moves].sum()), case.takes[moves].sum(axis=0) - case.caps
 
 
 def _laid_down(case: Case, prices: Floats) -> tuple[float, bool]:
@@ -138,8 +169,8 @@ def _laid_down(case: Case, prices: Floats) -> tuple[float, bool]:
     And whether one was found that costs less than the answer.
     """
     graph, priced = case.graph, case.costs + case.takes @ prices
-    begun = case.reached(priced) - float(prices @ case.caps)
-    spared = np.column_stack([case.reached(takes) for takes in case.takes.T])
+    begun = distances(graph, priced) - float(prices @ case.caps)
+    spared = np.column_stack([distances(graph, takes) for takes in case.takes.T])
     order = np.argsort(graph.target, kind="stable")
     starts = np.searchsorted(graph.target[order], np.arange(graph.states + 1))
     ends = np.flatnonzero(graph.ends)
@@ -155,7 +186,7 @@ def _laid_down(case: Case, prices: Floats) -> tuple[float, bool]:
         grown = _Parts(to, behind, now.cost[row] + case.costs[move], taken, bound)
         fits = (taken + spared[to] <= case.caps).all(axis=1)
         now = grown.of(fits & (bound < case.value - SLACK * case.scale))
-        now = now.of(_unbeaten(now.at, now.cost, now.taken))
+        now = now.of(_undominated(now.at, now.cost, now.taken))
         if len(now.at) > MOST:
             ranked = np.argsort(now.bound, kind="stable")
             aside = min(aside, float(now.bound[ranked[MOST]]))
@@ -163,8 +194,8 @@ def _laid_down(case: Case, prices: Floats) -> tuple[float, bool]:
     return min(aside, float(now.cost.min(initial=case.value))), len(now.at) > 0
 
 
-def _unbeaten(at: Ints, cost: Floats, taken: Floats) -> Bools:
-    """Return which partial paths none is found to beat in cost and in all caps."""
+def _undominated(at: Ints, cost: Floats, taken: Floats) -> Bools:
+    """Return which partial paths none is found to dominate in cost and in all caps."""
     order = np.lexsort((taken.sum(axis=1), cost, at))
     at, cost, taken = at[order], cost[order], taken[order]
     good = np.ones(len(at), dtype=bool)

@@ -14,12 +14,12 @@ import numpy as np
 
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph._budgets import is_beyond
 from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import FAILS, PASSES, _lazy_path, lexicographic, reached
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
+from seqopt.judge._budget_proof import is_beyond
 from seqopt.judge._claims import budget_bounds
 from seqopt.judge._rule_moves import Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator
@@ -227,7 +227,10 @@ class Proof:
             return self._falls_everywhere(margins)
         graph = self.rebuilt(Filter((), margins)).graph()
         self.states = max(self.states, graph.states)
-        return is_beyond(graph, caps) if caps else not graph.ends[reached(graph)].any()
+        if not caps:
+            return not graph.ends[reached(graph)].any()
+        first = len(graph.peaks) - len(caps)
+        return is_beyond(graph, [*enumerate(caps, start=first)])
 
     def _falls_everywhere(self, margins: Sequence[float]) -> bool:
         """Return whether states that are proven to fall, or to lack margins, leave no path.

@@ -137,7 +137,7 @@ def signed_problem(rng, moves=3, size=5):
 def test_what_is_set_aside_counts_and_prices_are_not_negative(monkeypatch, most, climbs):
     """Few partial choices are kept, prices of any sign are claimed: no choice is below a bound."""
     monkeypatch.setattr(budget_proof, "MOST", most)
-    monkeypatch.setattr(budget_proof, "CLIMBS", climbs)
+    monkeypatch.setattr(budget_proof, "MIXTURES", climbs)
     rng = np.random.default_rng(4)
     proven = 0
     for _ in range(10):
