@@ -89,16 +89,17 @@ def least_within(case: Case, prices: Floats, *, laid_down: bool) -> tuple[float,
     ``prices`` (B,): tried first, as the case has them; ``laid_down``: whether what multipliers
     leave open is closed by partial paths; the graph has a level for every move.
     """
-    best, bound = _best_multipliers(case, prices)
+    best, bound, _ = _best_multipliers(case, prices)
     if laid_down and case.value - bound > SLACK * case.scale:
         bound = max(bound, _laid_down(case, best)[0])
     return (case.value if case.value - bound <= SLACK * case.scale else bound), best
 
 
-def is_kept(graph: Graph, limited: Sequence[tuple[int, float]]) -> bool:
-    """Return whether a path is found that keeps all caps; the graph has a level for every move."""
+def is_kept(graph: Graph, limited: Sequence[tuple[int, float]], *, laid_down: bool) -> bool:
+    """Return whether a path is found that keeps all caps; ``laid_down``: as of `least_within`."""
     case, sizes = case_of(graph, np.zeros(len(graph.source)), limited, 1.0)
-    return _laid_down(case, np.zeros_like(sizes))[1]
+    met = _best_multipliers(case, np.zeros_like(sizes)).met
+    return met or (laid_down and _laid_down(case, np.zeros_like(sizes))[1])
 
 
 def is_beyond(graph: Graph, limited: Sequence[tuple[int, float]]) -> bool:
@@ -109,21 +110,28 @@ def is_beyond(graph: Graph, limited: Sequence[tuple[int, float]]) -> bool:
     return least_within(case, np.ones_like(sizes), laid_down=False)[0] >= 1.0
 
 
-def _best_multipliers(case: Case, prices: Floats) -> tuple[Floats, float]:
-    """Return the best multipliers that were met, and the bound that they prove."""
-    best, bound, paths = prices, -np.inf, list[tuple[float, Floats]]()
-    ask = prices
+class _Ascent(NamedTuple):
+    """The best multipliers, the bound that they prove, and whether a path met keeps all caps."""
+
+    multipliers: Floats
+    bound: float
+    met: bool
+
+
+def _best_multipliers(case: Case, prices: Floats) -> _Ascent:
+    best, paths, ask = _Ascent(prices, -np.inf, met=False), list[tuple[float, Floats]](), prices
     for _ in range(MIXTURES):
-        found, *path = _least(case, ask)
-        if found > bound:
-            best, bound = ask, found
-        if case.value - bound <= SLACK * case.scale:
+        bound, cost, over = _least(case, ask)
+        best = best._replace(met=best.met or bool((over <= 0).all()))
+        if bound > best.bound:
+            best = best._replace(multipliers=ask, bound=bound)
+        if case.value - best.bound <= SLACK * case.scale:
             break
-        paths.append((path[0], path[1]))
-        ask, cost = _mixed(case, paths)
-        if cost - bound <= SLACK * abs(cost):
+        paths.append((cost, over))
+        ask, mixed = _mixed(case, paths)
+        if mixed - best.bound <= SLACK * abs(mixed):
             break
-    return best, bound - SLACK**1.5 * case.scale
+    return best._replace(bound=best.bound - SLACK**1.5 * case.scale)
 
 
 def _mixed(case: Case, paths: Sequence[tuple[float, Floats]]) -> tuple[Floats, float]:
@@ -153,7 +161,7 @@ def _least(case: Case, prices: Floats) -> tuple[float, float, Floats]:
     ends, moves = np.flatnonzero(graph.ends), list[int]()
     at = int(ends[np.argmin(reached[ends])]) if len(ends) else 0
     if not len(ends) or not np.isfinite(reached[at]):
-        return np.inf, np.inf, np.zeros(len(prices))
+        return np.inf, np.inf, np.full(len(prices), np.inf)
     rounding = EPS * (graph.states + 1) * float(prices @ (1 + np.abs(case.caps)))
     least = float(reached[at] - prices @ case.caps - rounding)
     while at:

@@ -62,7 +62,8 @@ def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
     ``name``, ``exact``: of the formulation that says that none does, as of `claimed`.
     """
     found = smallest_conflict(instance)
-    if not found and instance.is_layered and is_kept(instance.graph, _limited(instance.caps)):
+    limited, laid_down = _limited(instance.caps), instance.is_layered
+    if not found and is_kept(instance.graph, limited, laid_down=laid_down):
         return SolverError(
             f"formulation {name} says that no choice is within all budgets, and some are"
         )

@@ -1,0 +1,225 @@
+"""The judge is attacked: lies of every kind are refused or not believed, on every kind of problem.
+
+A liar solves truthfully and changes its answer. The honest answer, unchanged, is the control of
+every lie: it is accepted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache, partial, wraps
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.errors import InfeasibleError, SolverError, StepError
+from seqopt.graph.formulation import find_formulation
+from seqopt.graph.graph import Graph, LabelProof
+from seqopt.graph.orders import OrderSelection
+from seqopt.graph.paths import lexicographic
+from seqopt.sequence.rules import FreeRules, with_robots
+from tests.brute_force import ONES
+from tests.builders import small_arch
+
+HELD = FreeRules(ending="held")
+TIMES = "fetch=30,place=10,approach=10,grip=5,release=5"
+
+
+def loop(*goals, criterion="weighted", **more):
+    engine = seqopt.make_engine("compliance", seqopt.load_scene("chain:bricks=8"))
+    moves = seqopt.three_robot_loop(engine.network)
+    return seqopt.pose(engine, moves, seqopt.CRITERIA[criterion], *goals, **more)
+
+
+def free(*goals, scene=None, rules=HELD, **more):
+    engine = seqopt.make_engine("compliance", scene or small_arch(4))
+    return seqopt.pose(engine, rules, ONES, *goals, **more)
+
+
+def over_scenarios(make, scene, over):
+    return make(scenarios=seqopt.scenarios(scene, count=3, seed=1), over=over)
+
+
+CHAIN, ARCH, HOLD_NO = seqopt.load_scene("chain:bricks=8"), small_arch(5), FreeRules()
+TIMED = with_robots(small_arch(4), 3).with_durations(TIMES, "rob3:slower=2.5")
+WITHIN = {"scene": ARCH, "rules": HOLD_NO, "budgets": "travel=0.7m"}
+POSED = {
+    "loop": (loop, "overlap_dp"),
+    "loop, worst": (partial(loop, "minmax", criterion="worst-ratio"), "minimax"),
+    "loop, budget": (partial(loop, budgets="travel=0.9"), "labels"),
+    "loop, two budgets": (partial(loop, budgets=["travel=0.9", "robot_use:rob1=20:15"]), "labels"),
+    "loop, scenarios": (
+        partial(over_scenarios, partial(loop, criterion="worst-ratio"), CHAIN, "worst-total"),
+        "scenario_search",
+    ),
+    "free": (partial(free, "minmax,steps"), "schedule_search"),
+    "free, sum": (partial(free, "sum,regrips"), "schedule_search"),
+    "free, budget": (partial(free, "minmax,steps", **WITHIN), "schedule_search"),
+    "free, sum within": (partial(free, "sum", **WITHIN), "schedule_search"),
+    "free, scenarios": (
+        partial(over_scenarios, partial(free, scene=ARCH, rules=HOLD_NO), ARCH, "worst-total"),
+        "schedule_search",
+    ),
+    "time": (partial(free, "makespan", scene=TIMED), "makespan_labels"),
+    "orders": (partial(free, "minmax", orders="tied"), "order_search"),
+}
+COMPILED = {
+    "loop": "overlap_dp",
+    "loop, worst": "minimax",
+    "loop, budget": "labels",
+    "loop, scenarios": "path_dp",
+    "free": "path_dp",
+    "free, sum within": "schedule_search",
+    "time": "makespan_labels",
+}
+SPACES = [*POSED, *(f"instance: {name}" for name in COMPILED)]
+GAPS = {"free, sum within": 0.09, "free, scenarios": 0.01}  # that multipliers and weights leave
+
+
+@cache
+def honest(space):
+    """A problem, the formulation that solves it truthfully, and its answer."""
+    make, name = POSED[space.removeprefix("instance: ")]
+    problem = make()
+    if space.startswith("instance: "):
+        problem, name = seqopt.compile_instance(problem), COMPILED[space.removeprefix("instance: ")]
+    return problem, find_formulation(name), seqopt.solve(problem, name)
+
+
+def told(space, change):
+    """The certificate of an answer that is changed, if the judge lets it pass."""
+    problem, formulation, _ = honest(space)
+
+    @wraps(formulation.solve)
+    def solve(*args, **options):
+        return change(formulation.solve(*args, **options))
+
+    return seqopt.solve(problem, replace(formulation, solve=solve)).certificate
+
+
+def steps(change):
+    return lambda s: replace(s, states=tuple(change(s.states)))
+
+
+def values(value=1.0, bound=1.0):
+    """The values and bounds of all goals, times factors."""
+
+    def change(s):
+        if isinstance(s, OrderSelection):
+            return replace(s, objective=value * s.objective, bound=bound * s.objective)
+        scaled = [tuple(f * v for v in s.objective) for f in (value, bound)]
+        return replace(s, objective=scaled[0], bound=scaled[1])
+
+    return change
+
+
+def infeasible(_):
+    raise InfeasibleError("no plan is allowed")
+
+
+PATHS = {
+    "path cut short": steps(lambda own: own[:-1]),
+    "path without a step": steps(lambda own: own[:1] + own[2:]),
+    "path turned round": steps(lambda own: own[::-1]),
+    "no path": steps(lambda own: ()),
+    "unknown state": steps(lambda own: (*own[:-1], tuple(10**6 for _ in own[-1]))),
+}
+CLAIMS = {
+    "better value": values(0.9, 0.9),
+    "worse value": values(1.1, 1.0),
+    "bound above the value": values(1.0, 1.1),
+    "no number": values(float("nan"), 1.0),
+    "bound that is no number": values(1.0, float("nan")),
+    "infinite bound": values(1.0, np.inf),
+    "infeasible": infeasible,
+}
+REFUSED = [
+    *((space, lie) for space in SPACES for lie in CLAIMS),
+    *((space, lie) for space in SPACES for lie in PATHS if space != "orders"),
+]
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_the_honest_answer_is_accepted(space):
+    proof, own = told(space, lambda answer: answer), honest(space)[2].certificate
+    assert (proof.values, proof.bounds) == (own.values, own.bounds)
+    assert proof.gap <= GAPS.get(space.removeprefix("instance: "), 1e-9)
+
+
+@pytest.mark.parametrize(("space", "lie"), REFUSED)
+def test_a_lie_is_refused(space, lie):
+    with pytest.raises((SolverError, StepError)):
+        told(space, (PATHS | CLAIMS)[lie])
+
+
+def other_path(instance, best):
+    """Another path through an instance within its caps, and its value: no better than the best."""
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        costs = rng.uniform(size=(instance.arcs, 1))
+        graph = Graph(instance.source, instance.target, costs, (False,), instance.ends)
+        path = lexicographic(graph).path
+        try:
+            value = seqopt.judge_instance(instance, path).objective
+        except SolverError:  # it exceeds a cap
+            continue
+        if value > best * (1 + 1e-6):
+            return tuple((node,) for node in path), value
+    raise AssertionError("no other path was met")
+
+
+WITH_OTHERS = [
+    *("loop", "loop, worst", "loop, budget", "loop, scenarios"),
+    *(f"instance: {name}" for name in COMPILED if name != "time"),
+]
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0, 1e3])
+@pytest.mark.parametrize("space", WITH_OTHERS)
+def test_another_path_is_not_believed_to_be_the_best(space, share):
+    """Whatever multipliers or weights it comes with."""
+    problem, _, plan = honest(space)
+    best = plan.certificate.objective
+    one = problem if space.startswith("instance") else seqopt.compile_instance(problem)
+    nodes, value = other_path(one, best)
+
+    def lie(found):
+        prices = tuple(tuple(share * price for price in own) for own in found.prices)
+        claimed = (value, *found.objective[1:])
+        return replace(found, states=nodes, objective=claimed, bound=claimed, prices=prices)
+
+    try:
+        proof = told(space, lie)
+    except SolverError:
+        return
+    assert proof.bounds[0] <= best * (1 + 1e-9)
+    assert proof.gap > 1e-7  # it is claimed, and not proven
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1e3])
+@pytest.mark.parametrize("space", [name for name in SPACES if "scen" in name or "with" in name])
+def test_multipliers_and_weights_are_not_believed(space, share):
+    """Others prove what they prove, and no more than is true."""
+    own = honest(space)[2].certificate
+
+    def lie(found):
+        return replace(found, prices=tuple(tuple(share * p for p in each) for each in found.prices))
+
+    try:
+        proof = told(space, lie)
+    except SolverError:
+        return
+    assert proof.values == own.values
+    assert proof.bounds[0] <= own.values[0] * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("space", ["time", "instance: time"])
+def test_labels_that_are_left_out_are_missed(space):
+    def lie(found):
+        (proof,) = found.proofs
+        fewer = LabelProof(proof.states[1:], proof.labels[1:], proof.prices)
+        return replace(found, proofs=(fewer,))
+
+    with pytest.raises(SolverError, match="labels do not prove"):
+        told(space, lie)
