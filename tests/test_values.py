@@ -68,7 +68,7 @@ def values(arch25):
         *(shapes, joined, joined.shared, joined.faces[0]),
         *_faces(np.array(cube.vertices), cube),
         *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
-        *(network, network.springs, build_statics(network)),
+        *(network, network.springs, network.compliances, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
         *(SPACE, plane, tree, operator, parts, share(network)),
         mixed_system(parts, grips),

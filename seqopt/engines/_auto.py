@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike
 from seqopt.arrays import Bools, Floats
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._grip_compliance import read_compliance
+from seqopt.engines._grip_compliance import compliance_by_kind, read_compliance
 from seqopt.engines._kinds import ChoosingEngine, Level, LevelChoice, OpeningEngine
-from seqopt.engines._planar import _leaves_plane, find_plane, off_plane
+from seqopt.engines._planar import _leaves_plane, _mixes, find_plane, off_plane
 from seqopt.engines.interface import (
     Fields,
     NamedEngine,
@@ -50,19 +50,8 @@ def find_level(network: Network) -> LevelChoice:
         return LevelChoice(Level.RIGID, plane)
     if off_plane(network, plane).any():
         return _OFF_PLANE
-    kinds = network.scene.grip_kinds
-    if kinds.rigid:
-        return _IN_PLANE
-    if kinds.arms.any():
-        return _GIVING
-    columns = np.arange(2 * len(network.inner))[:, None]
-    nodes = np.array([network.node_name[i] for i in network.inner.ravel()], dtype=np.int64)
-    for holder in [*{kind: i for i, kind in enumerate(kinds.of_robot)}.values()]:
-        grips = kinds.numbers(nodes, [holder] * len(nodes))[:, None]
-        compliance = read_compliance(network, columns, grips, None)
-        if _leaves_plane(plane, compliance, columns).any():
-            return _GIVING
-    return _IN_PLANE
+    matrix = compliance_by_kind(network)
+    return _GIVING if _mixes(plane, matrix).any() else _IN_PLANE
 
 
 class _RigidBricks(NamedEngine):

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError
 from seqopt.network.network import Network
-from seqopt.scene.scene import Scene
 
 _Number = TypeVar("_Number", np.float64, np.bool_)
 
@@ -101,12 +100,6 @@ RIGID = GripCompliance()
 """Of rigid grips in their places."""
 
 
-def _lever_of(network: Network) -> float:
-    """Return the length of the longest inner edge, by which moments are measured, m."""
-    ends = network.node_position[network.inner]
-    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
-
-
 def read_compliance(
     network: Network, columns: Ints, grips: ArrayLike, moved: ArrayLike | None
 ) -> GripCompliance:
@@ -115,7 +108,7 @@ def read_compliance(
     ``grips``, ``moved``: as `seqopt.engines.interface.Engine.solve` takes them. Raises `GripError`
     if ``moved`` is not as many lengths.
     """
-    found = RIGID if network.scene.grip_kinds.rigid else _of_scene(network, grips)
+    found = _in_place(network, np.asarray(grips))
     if moved is None:
         return found
     offsets = _lengths(columns, moved)
@@ -123,77 +116,32 @@ def read_compliance(
     return replace(found, moved=offsets)
 
 
-def _of_scene(network: Network, grips: ArrayLike) -> GripCompliance:
-    """Return the compliance of grips in their places, by their kinds and arms."""
-    kinds, lever = network.scene.grip_kinds, _lever_of(network)
-    scale = np.repeat([1.0, lever], 3)
-    kind, compliance, bears = np.zeros((1, 1), dtype=np.int64), kinds.compliance, kinds.turns
-    if kinds.arms.any():
-        kind, found = _of_arms(network.scene, np.asarray(grips))
-        compliance, bears = found.compliance, found.transmits_moment
-    elif len(compliance) > 1:
-        _, kind = kinds.split(np.asarray(grips))
-    matrix = compliance * np.outer(scale, scale)
-    if not bears.any():
-        return GripCompliance(None, matrix[:, :3, :3], None, kind, lever)
-    return GripCompliance(None, matrix, bears, kind, lever)
+def _in_place(network: Network, grips: Ints) -> GripCompliance:
+    """Return the compliance of grips (S, r) in their places.
 
-
-class _ArmGrips(NamedTuple):
-    """The M compliances of the grips of a scene whose arms have compliant joints.
-
-    ``compliance`` (M, 6, 6); ``transmits_moment`` (M,); ``kind`` (K, N): which of these each kind
-    of the scene's has at each node, -1 where an arm has no posture; ``nodes`` (N,): ascending.
+    Raises `GripError` if nobody knows how one gives way: the posture of an arm is missing.
     """
-
-    compliance: Floats
-    transmits_moment: Bools
-    kind: Ints
-    nodes: Ints
-
-
-_KEY = "_arm_grips"  # of what is kept with a scene
-
-
-def _arm_grips(scene: Scene) -> _ArmGrips:
-    """Return the compliance of grips, with that of the joints of arms behind them."""
-    held, (of, known) = scene.held_postures, vars(scene).get(_KEY, (None, None))
-    assert held is not None
-    if of is held and isinstance(known, _ArmGrips):
-        return known
-    kinds = scene.grip_kinds
-    compliance, bears = [kinds.compliance], [kinds.turns]
-    kind = np.repeat(np.arange(len(kinds.turns))[:, None], len(held.nodes), axis=1)
-    count = len(kinds.turns)
-    for robot, rows, joints in zip(
-        held.robots, held.rows, held.compliance(scene.arms), strict=True
-    ):
-        own, there = kinds.of_robot[robot], rows >= 0
-        kind[own] = -1
-        kind[own, there] = count + np.arange(there.sum())
-        compliance.append(kinds.compliance[own] + joints[there])
-        bears.append(np.repeat(kinds.turns[own], there.sum()))
-        count += int(there.sum())
-    found = _ArmGrips(np.concatenate(compliance), np.concatenate(bears), kind, held.nodes)
-    vars(scene)[_KEY] = held, found
-    return found
-
-
-def _of_arms(scene: Scene, grips: Ints) -> tuple[Ints, _ArmGrips]:
-    """Return the kind (S, r) of each grip of a scene with such arms.
-
-    Raises `GripError` if an arm has no posture at a node.
-    """
-    found, (node, kind) = _arm_grips(scene), scene.grip_kinds.split(grips)
-    own = found.kind[kind, np.searchsorted(found.nodes, node)]
-    if (own < 0).any():
-        at = tuple(np.argwhere(own < 0)[0])
-        name = scene.robots[[*scene.grip_kinds.of_robot].index(kind[at])].name
+    if network.scene.grip_kinds.rigid:
+        return RIGID
+    scene, known = network.scene, network.compliances
+    node, of_robot = scene.grip_kinds.split(grips)
+    kind = known.at(node, of_robot)
+    if (kind < 0).any():
+        at = tuple(np.argwhere(kind < 0)[0])
+        name = scene.robots[[*scene.grip_kinds.of_robot].index(of_robot[at])].name
         raise GripError(
             f"robot {name} has no posture at node {node[at]}, so nobody knows how its grip gives "
             "way; move its base, or leave out joint_stiffness"
         )
-    return own, found
+    bears = known.transmits_moment if known.transmits_moment.any() else None
+    return GripCompliance(None, compliance_by_kind(network), bears, kind, network.lever)
+
+
+def compliance_by_kind(network: Network) -> Floats:
+    """Return the compliance (M, w, w) of each kind of grip, m/N, as of `GripCompliance`."""
+    known, scale = network.compliances, np.repeat([1.0, network.lever], 3)
+    matrix = known.compliance * np.outer(scale, scale)
+    return matrix if known.transmits_moment.any() else matrix[:, :3, :3]
 
 
 _RIGID = 1e-9  # compliance in a direction, over the largest, that stands for none
@@ -209,6 +157,35 @@ def invertible(matrix: Floats) -> Floats:
     if values[0] >= least or (values[0] > 0 and not (matrix - np.diag(np.diag(matrix))).any()):
         return matrix
     return np.asarray(axes * np.maximum(values, least) @ axes.T)
+
+
+class GripSpring(NamedTuple):
+    """A compliant grip as a spring between its node and its far end.
+
+    ``ways`` (w,): in which of three shifts and three turns; ``compliance`` (w, w): m and rad for N
+    and N m, with an inverse; ``offset`` (w,): of the far end, m.
+    """
+
+    grip: int
+    ways: list[int]
+    compliance: Floats
+    offset: Floats
+
+
+def grip_springs(compliance: GripCompliance, grips: int) -> list[GripSpring]:
+    """Return the compliant ones of the grips of one set, in space."""
+    if compliance.matrix is None:
+        return []
+    soft, turns = compliance.soft(1, grips)[0], compliance.transmit_moments(1, grips)[0]
+    matrix, offset = compliance.matrices(1, grips)[0], compliance.offsets(1, grips)[0]
+    out = []
+    for grip in range(grips):
+        ways = [way for way in range(6) if (soft[grip] if way < 3 else turns[grip])]
+        if ways:
+            scale = np.repeat([1.0, compliance.lever], 3)[ways]
+            own = invertible(matrix[grip][np.ix_(ways, ways)]) / np.outer(scale, scale)
+            out.append(GripSpring(grip, ways, own, np.pad(offset[grip], (0, 3))[ways]))
+    return out
 
 
 def _lengths(columns: Ints, moved: ArrayLike) -> Floats:

@@ -84,13 +84,17 @@ def _leaves_plane(plane: _Plane, compliance: GripCompliance, columns: Ints) -> B
         size = np.linalg.norm(compliance.moved, axis=2).max(axis=1, initial=0.0)
         out |= away > _FLAT * size
     if compliance.matrix is not None:
-        flexibility = compliance.matrices(*columns.shape)
-        across = Basis(plane.normal[None], plane.axes)
-        turned = compliance.transmits_moment is not None
-        ways = [b.wrench if turned else b.force for b in (plane.basis, across)]
-        mixed = np.abs(ways[0] @ flexibility @ ways[1].T).max(axis=(1, 2, 3), initial=0.0)
-        out |= mixed > _FLAT * np.abs(flexibility).max(axis=(1, 2, 3), initial=0.0)
+        out |= _mixes(plane, compliance.matrices(*columns.shape)).any(axis=1)
     return out
+
+
+def _mixes(plane: _Plane, compliance: Floats) -> Bools:
+    """Return which compliances (..., w, w) answer forces in a plane by motions out of it."""
+    across = Basis(plane.normal[None], plane.axes)
+    turned = compliance.shape[-1] > 3
+    ways = [basis.wrench if turned else basis.force for basis in (plane.basis, across)]
+    mixed = np.abs(ways[0] @ compliance @ ways[1].T).max(axis=(-2, -1))
+    return np.asarray(mixed > _FLAT * np.abs(compliance).max(axis=(-2, -1)))
 
 
 def _points_outside(network: Network, plane: _Plane) -> str:

@@ -18,7 +18,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._grip_compliance import GripCompliance, invertible
+from seqopt.engines._grip_compliance import GripCompliance, grip_springs
 from seqopt.engines.interface import Fields, SerialEngine
 from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.errors import SolverError
@@ -115,35 +115,22 @@ class _Holds(NamedTuple):
 
 def _hold(network: Network, columns: Ints, compliance: GripCompliance, size: int) -> _Holds:
     """Return how the grips of one set hold a frame with as many motions."""
-    grips = len(columns)
-    soft, turns = compliance.soft(1, grips)[0], compliance.transmit_moments(1, grips)[0]
-    far, at = (
-        compliance.offsets(1, grips)[0],
-        6 * network.inner.ravel()[columns][:, None] + np.arange(6),
-    )
-    fixed: list[Ints] = [np.zeros(0, dtype=np.int64)]
+    grips, at = len(columns), 6 * network.inner.ravel()[columns][:, None] + np.arange(6)
+    rigid, turns = ~compliance.soft(1, grips)[0], compliance.transmit_moments(1, grips)[0]
     spring: list[Floats] = [np.zeros((0, size))]
     stiffness: list[float] = []
     stretched: list[float] = []
-    for g in range(grips):
-        ways = [way for way in range(6) if (soft[g] if way < 3 else turns[g])]
-        if not soft[g]:
-            fixed.append(at[g, :3])
-        if ways:
-            scale = np.where(np.array(ways) < 3, 1.0, compliance.lever)
-            flexibility = compliance.matrices(1, grips)[0, g][np.ix_(ways, ways)] / np.outer(
-                scale, scale
-            )
-            values, axes = np.linalg.eigh(invertible(flexibility))
-            own = np.zeros((len(ways), size))
-            own[:, at[g, ways]] = axes.T
-            spring.append(own)
-            stiffness += (1 / values).tolist()
-            stretched += (own[:, at[g, :3]] @ far[g]).tolist()
+    for grip, ways, flexibility, offset in grip_springs(compliance, grips):
+        values, axes = np.linalg.eigh(flexibility)
+        own = np.zeros((len(ways), size))
+        own[:, at[grip, ways]] = axes.T
+        spring.append(own)
+        stiffness += (1 / values).tolist()
+        stretched += (axes.T @ offset).tolist()
     rows = sparse.csr_array(np.vstack(spring))
-    held = np.concatenate(fixed)
-    moved = far[~soft].ravel()
-    return _Holds(held, moved, rows, np.array(stiffness), np.array(stretched), turns)
+    moved = compliance.offsets(1, grips)[0][rigid].ravel()
+    fixed = at[rigid, :3].ravel()
+    return _Holds(fixed, moved, rows, np.array(stiffness), np.array(stretched), turns)
 
 
 def _frame(network: Network, bricks: int, contrast: float) -> tuple[Ints, sparse.csr_array, Floats]:

@@ -74,20 +74,12 @@ class Recipe:
         """What answers depend on, condensed: equal for equal scenes, options and arithmetic.
 
         Names and provenance of a scene change no answer and are left out; of robots only the
-        compliance of their grips counts, and where these are of several kinds what each carries; of
-        arms with compliant joints, their compliance at every node.
+        compliance of their grips counts.
         """
         scene = {k: v for k, v in scene_to_dict(self.scene).items() if k not in _WITHOUT_EFFECT}
-        ways = [(r.stiffness, r.rotational_stiffness, r.payload) for r in self.scene.robots]
-        kinds = [*dict.fromkeys(ways)]
-        scene["grips"] = kinds if len(kinds) > 1 else [way[:2] for way in kinds]
-        if (held := self.scene.held_postures) is not None:
-            flexibility = (
-                self.scene.grip_kinds.of_robot,
-                held.robots,
-                held.compliance(self.scene.arms),
-            )
-            scene["arms"] = [np.asarray(each).tobytes().hex() for each in flexibility]
+        grips = self.network.compliances
+        numbers = grips.compliance, grips.transmits_moment, grips.index
+        scene["grips"] = [(each.shape, each.tobytes().hex()) for each in numbers]
         built = json.dumps(scene, sort_keys=True)
         options = {} if self.simplest else self.options  # joints that never fail need none
         parts = (self.name, repr(sorted(options.items())), built, _arithmetic())
@@ -211,9 +203,10 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
             f"engine {name}: its joints never fail, so a mortar changes nothing; "
             f"use the engine {' or '.join(LIMITED)}"
         )
-    engine = ENGINES[name](network, **options)
-    vars(engine)["recipe"] = Recipe(name, network.scene, options)
-    return engine
+    engine: Any = ENGINES[name](network, **options)
+    engine.recipe = Recipe(name, network.scene, options)
+    made: Engine = engine
+    return made
 
 
 def simplest(engine: Engine) -> Engine:
@@ -224,11 +217,12 @@ def simplest(engine: Engine) -> Engine:
     """
     if not isinstance(engine, ChoosingEngine):
         return engine
-    found, recipe = make_engine(engine.choice.level.value, engine.network), recipe_of(engine)
-    vars(found)["chooser"] = engine
+    found: Any = make_engine(engine.choice.level.value, engine.network)
+    found.chooser, recipe = engine, recipe_of(engine)
     if recipe is not None:
-        vars(found)["recipe"] = replace(recipe, simplest=True)
-    return found
+        found.recipe = replace(recipe, simplest=True)
+    made: Engine = found
+    return made
 
 
 def _chooser_of(engine: Engine) -> ChoosingEngine | None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seqopt._showing import Shown, display
-from seqopt.arrays import Floats, FrozenValue, Ints, frozen
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import units
 from seqopt.scene.parts import Brick
@@ -108,6 +108,41 @@ class Springs(FrozenValue):
     def stiffness(self) -> Floats:
         """Translational and rotational stiffness side by side, (S, 6), N/m and N m/rad."""
         return frozen(np.hstack([self.translational_stiffness, self.rotational_stiffness]))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Compliances(FrozenValue):
+    """The compliance of every grip, one value for each of M kinds, whoever computed it.
+
+    Attributes
+    ----------
+    compliance : (M, 6, 6) float
+        How a node shifts and turns against the hand that holds it for a force and a moment on it,
+        m and rad for N and N m; zero of a rigid grip.
+    transmits_moment : (M,) bool
+        Which kinds bear moments; others let their nodes turn.
+    index : (K, N) int
+        The kind of a grip of each kind of robots at each node, -1 where nobody knows it; one column
+        where nodes do not matter.
+    nodes : (N,) int
+        Numbers of nodes, ascending.
+    """
+
+    compliance: Floats
+    transmits_moment: Bools
+    index: Ints
+    nodes: Ints
+
+    def at(self, node: Ints, kind: Ints) -> Ints:
+        """Return the kinds (S, r) of grips by robots of some kind on nodes; (1, 1) if all are one.
+
+        -1 of grips of which nobody knows how they give way.
+        """
+        if len(self.compliance) == 1:
+            return np.zeros((1, 1), dtype=np.int64)
+        if self.index.shape[1] == 1:
+            return kind
+        return np.asarray(self.index[kind, np.searchsorted(self.nodes, node)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -251,6 +286,29 @@ class Network(Shown, FrozenValue):
     def index_of_node(self) -> dict[int, int]:
         """Index of every inner node by its number in the scene."""
         return {name: i for i, name in enumerate(self.node_name) if isinstance(name, int)}
+
+    @cached_property
+    def lever(self) -> float:
+        """The length of the longest inner edge, by which moments are measured, m."""
+        ends = self.node_position[self.inner]
+        return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
+
+    @cached_property
+    def compliances(self) -> Compliances:
+        """Compliances of the scene's grips: of robots, and of the joints of arms behind them."""
+        kinds, held, scene = self.scene.grip_kinds, self.scene.held_postures, self.scene
+        parts, turns = [kinds.compliance], [kinds.turns]
+        nodes = np.zeros(1, dtype=np.int64) if held is None else held.nodes
+        index = np.repeat(np.arange(len(kinds.turns))[:, None], len(nodes), axis=1)
+        if held is not None:
+            behind = zip(held.robots, held.rows, held.compliance(scene.arms), strict=True)
+            for robot, postures, joints in behind:
+                own, there = kinds.of_robot[robot], postures >= 0
+                index[own] = -1
+                index[own, there] = sum(map(len, parts)) + np.arange(there.sum())
+                parts.append(kinds.compliance[own] + joints[there])
+                turns.append(np.repeat(kinds.turns[own], there.sum()))
+        return Compliances(np.concatenate(parts), np.concatenate(turns), index, nodes)
 
     @cached_property
     def index_of_grip(self) -> tuple[Ints, Ints]:

@@ -20,7 +20,7 @@ from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._grip_compliance import GripCompliance, invertible
+from seqopt.engines._grip_compliance import GripCompliance, grip_springs
 from seqopt.engines._kinds import OpeningEngine
 from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.engines.discrete._equilibrium_path import Held, Settled, settle
@@ -110,27 +110,13 @@ def _springs(
     network: Network, system: System, columns: Ints, compliance: GripCompliance
 ) -> list[_Spring]:
     """Return the soft grips of one set as springs."""
-    if compliance.matrix is None:
-        return []
-    grips, out = len(columns), []
-    nodes = network.node_position[network.inner.ravel()[columns]]
-    soft, turns = compliance.soft(1, grips)[0], compliance.transmit_moments(1, grips)[0]
-    flexibility, far = compliance.matrices(1, grips)[0], compliance.offsets(1, grips)[0]
-    scale = np.repeat([1.0, compliance.lever], 3)
-    for grip, body in enumerate(columns // 2):
-        ways = [way for way in range(6) if (soft[grip] if way < 3 else turns[grip])]
-        if ways:
-            shift = point_motion(nodes[grip] - network.centroid[body])
-            every = np.vstack([shift, np.eye(6)[3:]]) * system.unit[:6]
-            own = invertible(flexibility[grip][np.ix_(ways, ways)]) / np.outer(
-                scale[ways], scale[ways]
-            )
-            moved = np.append(far[grip], np.zeros(3))[ways]
-            out.append(
-                _Spring(
-                    grip, int(body), ways, every[ways], np.asarray(np.linalg.inv(own), float), moved
-                )
-            )
+    nodes, out = network.node_position[network.inner.ravel()[columns]], []
+    for grip, ways, flexibility, offset in grip_springs(compliance, len(columns)):
+        body = int(columns[grip] // 2)
+        shift = point_motion(nodes[grip] - network.centroid[body])
+        every = np.vstack([shift, np.eye(6)[3:]]) * system.unit[:6]
+        stiffness = np.asarray(np.linalg.inv(flexibility), float)
+        out.append(_Spring(grip, body, ways, every[ways], stiffness, offset))
     return out
 
 

@@ -14,7 +14,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines._grip_compliance import _lever_of
 from seqopt.engines.interface import SPACE, Basis
 from seqopt.engines.rigid._growth import Growth, SpanningTree
 from seqopt.engines.rigid._response_maps import (
@@ -269,7 +268,7 @@ class OperatorBuilder:
         self.moments = len(basis.moment) if network.scene.grip_kinds.turns.any() else 0
         if self.moments:
             turned = np.zeros((len(self.nodes), self.moments, len(basis.wrench)))
-            turned[..., -self.moments :] = _lever_of(network) * np.eye(self.moments)
+            turned[..., -self.moments :] = network.lever * np.eye(self.moments)
             self.nodes = np.concatenate([self.nodes, turned], axis=1)
 
     def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:

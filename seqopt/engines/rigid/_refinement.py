@@ -30,7 +30,7 @@ from scipy.sparse import csgraph
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._grip_compliance import RIGID, GripCompliance, _lever_of
+from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import _by_grip, grip_forces, still_forces
 from seqopt.engines.rigid._hanging import Hanging, HangingSystem
@@ -307,7 +307,7 @@ def _loaded(parts: Ungripped) -> sparse.csr_array:
         return parts.inner
     turned = np.zeros((3 * parts.bricks, size))
     turns = (6 * np.arange(parts.bricks)[:, None] + np.arange(3, 6)).ravel()
-    turned[np.arange(3 * parts.bricks), turns] = _lever_of(network)
+    turned[np.arange(3 * parts.bricks), turns] = network.lever
     both = sparse.vstack([parts.inner, sparse.csr_array(turned * parts.twist_unit)], format="csr")
     each = np.hstack([np.arange(size).reshape(-1, 6), size + np.arange(size // 2).reshape(-1, 3)])
     return sparse.csr_array(both[each.ravel()])
