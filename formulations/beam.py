@@ -21,7 +21,7 @@ from formulations.cascade import _charged, greedy
 from formulations.choice import Choice, onward
 from formulations.on_graph import on_graph
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import FormulationKind, On, Watch
+from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import moves_out, path_values
 from seqopt.problem.problem import Aim
@@ -71,7 +71,6 @@ FORMULATION = on_graph(
     "a beam between cascade and exact",
     choose,
     FormulationKind.HEURISTIC,
-    on=On.LAYERS,
     aim=Aim.SUM,
     alone=True,
 )

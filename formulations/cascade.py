@@ -29,7 +29,7 @@ from formulations.choice import Choice, onward
 from formulations.on_graph import on_graph
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import FormulationKind, On, Watch
+from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic, moves_along, tied
 from seqopt.problem.problem import Aim
@@ -96,7 +96,6 @@ FORMULATION = on_graph(
     "the cascading scheme of Bruun et al. over the whole build",
     choose,
     FormulationKind.HEURISTIC,
-    on=On.LAYERS,
     aim=Aim.SUM,
     alone=True,
     windowed=(),

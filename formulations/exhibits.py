@@ -49,7 +49,7 @@ from formulations.on_graph import on_graph
 from formulations.overlap_flow import ACCURACY, WholeProgram, by_integers, unit_flow
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import Formulation, On
+from seqopt.graph.formulation import Formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances
 from seqopt.problem.problem import Aim
@@ -189,7 +189,7 @@ def _below(scale: float) -> Callable[[float], float]:
 def _exhibit(
     name: str, summary: str, aim: Aim, write: Callable[[Graph], WholeProgram]
 ) -> Formulation:
-    return on_graph(name, summary, by_integers(write), on=On.LAYERS, aim=aim)
+    return on_graph(name, summary, by_integers(write), aim=aim)
 
 
 ASSIGNMENT_TIGHT = _exhibit("assignment_tight", "assignment, tight links", Aim.SUM, _tight)

@@ -37,7 +37,7 @@ from formulations.on_graph import on_graph
 from formulations.path_dp import shortest
 from seqopt.errors import ProblemError
 from seqopt.graph._budgets import within_budgets
-from seqopt.graph.formulation import FormulationKind, On, Watch
+from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import strictly_below
 from seqopt.problem.problem import Aim
@@ -69,19 +69,13 @@ def _chosen(graph: Graph, watch: Watch, most: int) -> Choice:
 
 
 LABELS = on_graph(
-    "labels",
-    "full overlap, labels within budgets",
-    _exact,
-    on=On.LAYERS,
-    aim=Aim.SUM,
-    takes_budgets=True,
+    "labels", "full overlap, labels within budgets", _exact, aim=Aim.SUM, takes_budgets=True
 )
 LAGRANGIAN = on_graph(
     "lagrangian",
     "full overlap, prices for budgets",
     relaxed,
     FormulationKind.BOUND,
-    on=On.LAYERS,
     aim=Aim.SUM,
     takes_budgets=True,
 )

@@ -1,8 +1,13 @@
 """What formulations of paths share: a graph goes in, a path comes out, whatever is built.
 
 A formulation is a function from a `seqopt.graph.graph.Graph` to a `formulations.choice.Choice`: a
-path, and what no path stays below. The graph is that of the open grips of a schedule, of the states
-of a free schedule, of all orders, or of an instance; see `on_graph`.
+path and its lower bounds. The graph is that of the open grips of a schedule, of the states of a
+free schedule, of all orders, or of an instance; see `on_graph`. One of your own needs this import
+alone:
+
+>>> from formulations.on_graph import (
+...     Aim, Choice, FormulationKind, Graph, Watch, on_graph, onward,
+... )
 """
 
 from __future__ import annotations
@@ -13,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from formulations.choice import Choice, Choose
+from formulations.choice import Choice, Choose, onward
 from formulations.states._search import after_margins, best_order, best_total, chosen, watched
 from formulations.states._totals import cheapest_by, least_total
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
-from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
 from seqopt.graph.orders import AllOrders, OrderSelection
@@ -128,7 +133,8 @@ class OnGraph(Terse):
         return after_margins(problem, lambda rest: chosen(rest, choose, watch, tell), tell)
 
 
-EVERYWHERE = (On.LAYERS, On.SCENARIOS, On.STATES, On.ORDERS, On.GRAPHS)
+__all__ = ["Aim", "Choice", "FormulationKind", "Graph", "Watch", "on_graph", "onward"]
+PATHS = ("goals", "tail", "order", "instance")  # what a path through a graph answers
 
 
 def on_graph(  # noqa: PLR0913  # the fields of a formulation
@@ -137,10 +143,10 @@ def on_graph(  # noqa: PLR0913  # the fields of a formulation
     choose: Choose,
     kind: FormulationKind = FormulationKind.EXACT,
     *,
-    on: On = On.STATES,
     aim: Aim | None = None,
     takes_budgets: bool = False,
     windowed: tuple[tuple[str, int | str], ...] | None = None,
+    answers: tuple[str, ...] = PATHS,
     alone: bool = False,
 ) -> Formulation:
     """Return the formulation that chooses a path through a graph.
@@ -155,14 +161,12 @@ def on_graph(  # noqa: PLR0913  # the fields of a formulation
         first goal is a peak, the graph has those below that of a first plan, by a narrow search.
     kind : FormulationKind, optional
         What it promises.
-    on : On, optional
-        What it is listed for; it runs on every graph.
-    aim, takes_budgets, windowed, alone : optional
+    aim, takes_budgets, windowed, answers, alone : optional
         As of `seqopt.graph.formulation.Formulation`.
 
     Returns
     -------
     Formulation
     """
-    solve, also = OnGraph(name, choose, takes_budgets), tuple(o for o in EVERYWHERE if o is not on)
-    return Formulation(name, summary, kind, aim, solve, takes_budgets, windowed, on, also, alone)
+    solve = OnGraph(name, choose, takes_budgets)
+    return Formulation(name, summary, kind, aim, solve, takes_budgets, windowed, answers, alone)

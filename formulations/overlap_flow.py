@@ -40,7 +40,7 @@ from formulations.on_graph import on_graph
 from formulations.solvers import minimize, minimize_by_highs
 from seqopt.arrays import Floats
 from seqopt.errors import NothingFoundError, ProblemError
-from seqopt.graph.formulation import FormulationKind, On, Watch
+from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import fewest_moves
 from seqopt.problem.problem import Aim
@@ -196,7 +196,6 @@ OVERLAP_LP = on_graph(
     "full overlap, linear program",
     _relaxed,
     FormulationKind.BOUND,
-    on=On.LAYERS,
     aim=Aim.SUM,
     takes_budgets=True,
 )
@@ -204,7 +203,6 @@ OVERLAP_MIP = on_graph(
     "overlap_mip",
     "full overlap, integer program with budgets",
     by_integers(_whole),
-    on=On.LAYERS,
     aim=Aim.SUM,
     takes_budgets=True,
 )

@@ -32,7 +32,7 @@ from formulations.cascade import at_hand
 from formulations.choice import Choice
 from formulations.on_graph import on_graph
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import On, Watch
+from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic
 from seqopt.problem.problem import Aim
@@ -62,20 +62,13 @@ def _least_peak(graph: Graph, watch: Watch) -> Choice:
 PATH_DP = on_graph(
     "path_dp", "dynamic programming over all states, one goal after the other", shortest
 )
-OVERLAP_DP = on_graph(
-    "overlap_dp", "full overlap, dynamic programming", shortest, on=On.LAYERS, aim=Aim.SUM
-)
+OVERLAP_DP = on_graph("overlap_dp", "full overlap, dynamic programming", shortest, aim=Aim.SUM)
 MINIMAX = on_graph(
-    "minimax",
-    "smallest worst cost over the build",
-    _least_peak,
-    on=On.LAYERS,
-    aim=Aim.PEAK,
-    alone=True,
+    "minimax", "smallest worst cost over the build", _least_peak, aim=Aim.PEAK, alone=True
 )
 SCENARIO_SEARCH = on_graph(
     "scenario_search",
     "totals over scenarios, by weights and labels that they bound",
     shortest,
-    on=On.SCENARIOS,
+    answers=("tail", "order", "instance"),
 )

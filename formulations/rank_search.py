@@ -27,7 +27,7 @@ from formulations.choice import Choice, onward
 from formulations.on_graph import on_graph
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import FormulationKind, On, Watch
+from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import moves_out
 from seqopt.problem.problem import Aim
@@ -93,7 +93,6 @@ FORMULATION = on_graph(
     "exhaustive search of the next moves",
     choose,
     FormulationKind.HEURISTIC,
-    on=On.LAYERS,
     aim=Aim.SUM,
     alone=True,
     windowed=(("horizon", 1),),

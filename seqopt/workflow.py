@@ -13,7 +13,7 @@ from typing import Any
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import On, find_formulation
+from seqopt.graph.formulation import find_formulation
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
@@ -211,7 +211,7 @@ def _chooses_states(
     if any(others) or not in_layers(moves):
         return True
     named = None if formulation is None else find_formulation(formulation)
-    return named is not None and named.on in (On.STATES, On.TIMES)
+    return named is not None and named.of_states
 
 
 def _find_moves(

@@ -10,7 +10,7 @@ import pandas as pd
 from experiments.harness.results import markdown, stored, two
 from experiments.instances.parts.tables import instance_tables
 from experiments.placement.parts.speed_points import speed_tables
-from seqopt.graph.formulation import On, formulations
+from seqopt.graph.formulation import formulations
 
 INSTANCES = ("instance_library", "instance_contest", "instance_large")
 UNNEEDED = "not needed without budgets"
@@ -46,7 +46,7 @@ def shapes_table(table: pd.DataFrame) -> str:
 
 
 def _contest(table: pd.DataFrame, when: dict[str, str]) -> str:
-    kinds = {name: each.kind.value for name, each in formulations(On.LAYERS).items()}
+    kinds = {name: each.kind.value for name, each in formulations("costs").items()}
     counts = sorted(table["bricks"].unique())
     head = ["formulation", "use it for", "kind", "largest gap"]
     head += [*(f"{n} bricks" for n in counts), "memory"]

@@ -26,7 +26,7 @@ from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.formulation import Formulation, On, formulations
+from seqopt.graph.formulation import Formulation, formulations
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.plan._layers import best_choice
 from seqopt.problem.problem import Aim
@@ -65,7 +65,7 @@ def rows(scene: str, engine: str, criterion: str, repeats: int) -> list[Row]:
     base: Row = {"scene": scene, "bricks": len(problem.schedule.scene.bricks)}
     base |= {"moves": len(problem.schedule.moves), "engine": engine, "criterion": criterion}
     base |= {"error": error(problem, reference)}
-    every = formulations(On.LAYERS).values()
+    every = formulations("costs").values()
     found = [_row(problem, formulation, reference, shared, repeats) for formulation in every]
     found.append(_search_row(built, engine, criterion, reference, repeats))
     return [base | row for row in found]
@@ -79,7 +79,7 @@ def _repeated(repeats: int, call: Callable[[], Result]) -> list[Result]:
 
 def contenders() -> dict[str, Aim]:
     """Return the names of what chooses, and what each makes least, in the order of the rows."""
-    return {f.name: f.aim for f in formulations(On.LAYERS).values()} | {NO_PROOF: Aim.SUM}
+    return {f.name: f.aim for f in formulations("costs").values()} | {NO_PROOF: Aim.SUM}
 
 
 def _pose(scene: Scene, engine: str, criterion: str) -> tuple[Layers, Times]:

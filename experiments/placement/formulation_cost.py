@@ -59,7 +59,7 @@ from formulations.overlap_flow import _whole
 from formulations.solvers import anatomy, minimize_by_highs
 from seqopt import Network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.formulation import On, Watch, find_formulation, formulations, trace_rows
+from seqopt.graph.formulation import Watch, find_formulation, formulations, trace_rows
 from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.plan._layers import best_choice
@@ -84,7 +84,7 @@ def compared(net: Network, criterion: Criterion, rounds: int) -> dict[str, float
     pose, problem = best(partial(problem_of, net, criterion), rounds), problem_of(net, criterion)
     row = {"bricks": float(len(net.scene.bricks)), "pose": pose}
     row["models"] = float(problem.evaluation.models)
-    for name, formulation in formulations(On.LAYERS).items():
+    for name, formulation in formulations("costs").items():
         if formulation.aim is Aim.SUM:
             graph = compile_layers(problem, Aim.SUM, alone=formulation.alone).instance
             row[name] = best(partial(formulation.solve, graph), rounds)
@@ -139,7 +139,7 @@ def specs() -> Iterator[Spec]:
         for criterion in COMPARED:
             for case in CASES:
                 rare = bricks >= RARE and (criterion != COMPARED[0] or case not in FEW)
-                for name, formulation in formulations(On.LAYERS).items():
+                for name, formulation in formulations("costs").items():
                     able = formulation.takes_budgets or case == NO_BUDGET
                     if able and not (rare and name in GENERAL):
                         yield bricks, criterion, case, name

@@ -33,15 +33,9 @@ from experiments.harness.runs import scene_named
 from seqopt import CRITERIA, FreeRules, Plan, build_network, pose, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import TimeUpError
-from seqopt.graph.formulation import (
-    Formulation,
-    FormulationKind,
-    On,
-    find_formulation,
-    formulations,
-)
+from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation, formulations
 from seqopt.graph.layers.compiled import compile_layers
-from seqopt.plan.solving import graph_of
+from seqopt.plan.solving import CANDIDATES, STATES, graph_of
 from seqopt.problem.problem import Aim
 
 SIZES = ("chain7", "chain11", "chain15", "arch25", "chain49", "chain97", "chain145")
@@ -63,15 +57,15 @@ def run(part: str, scene: str, aim: str, formulation: Formulation) -> tuple[Plan
     """Return the plan of a formulation for a problem of which nothing is computed, and its time."""
     engine = ComplianceEngine(build_network(scene_named(scene)))
     moves = FreeRules() if part == "free" else three_robot_loop(engine.network)
-    goals = aim if formulation.on is On.STATES else ()
+    goals = aim if formulation.of_states else ()
     problem = pose(engine, moves, CRITERIA["worst-ratio-published"], goals)
     start = time.process_time()
-    graph = graph_of(problem, formulation.on)
-    if formulation.on is On.LAYERS:
+    graph = graph_of(problem, STATES if formulation.of_states else CANDIDATES)
+    if formulation.aim:
         graph = compile_layers(graph, formulation.aim, alone=formulation.alone).instance
     found = formulation.solve(graph, seconds=PATIENCE)
     seconds = time.process_time() - start
-    layers, bricks = formulation.on is On.LAYERS, len(engine.network.scene.bricks)
+    layers, bricks = not formulation.of_states, len(engine.network.scene.bricks)
     proof = layers or (not found.stopped and bricks <= PROVEN)
     told = replace(formulation, solve=lambda *_, **__: found)
     return solve(problem, told, proof=proof), seconds
@@ -110,8 +104,8 @@ def alone(*case: str) -> dict[str, object]:
 
 def asked(part: str, aim: str) -> dict[str, Formulation]:
     """Return the formulations of states, and of a loop those of layers with the same aim."""
-    some = formulations(On.STATES)
-    layers = {name: f for name, f in formulations(On.LAYERS).items() if f.aim is AIMS[aim]}
+    some = {name: f for name, f in formulations("goals").items() if f.of_states}
+    layers = {name: f for name, f in formulations("costs").items() if f.aim is AIMS[aim]}
     return some | layers if part == "loop" else some
 
 
@@ -169,7 +163,7 @@ def experiment(part: str, options: Options) -> Finding:
         for aim in AIMS:
             for name, formulation in asked(part, aim).items():
                 base = {"bricks": bricks, "aim": aim, "formulation": name}
-                base |= {"graph": "states" if formulation.on is On.STATES else "layers"}
+                base |= {"graph": "states" if formulation.of_states else "layers"}
                 base |= {"kind": formulation.kind.value}
                 if (aim, name) not in late(table, bricks):
                     rows.append(base | solved(part, scene, aim, name))

@@ -22,7 +22,7 @@ from experiments.harness.results import stored
 from seqopt import CRITERIA, Network, build_network, pose, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import StepError
-from seqopt.graph.formulation import FormulationKind, On, formulations
+from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.scene.arch import ArchShape, arch_scene
 
 COMPARED = ("equations-2-3", "weighted", "worst-ratio")
@@ -44,7 +44,7 @@ def arch(rng: np.random.Generator) -> Network:
 def gaps(draws: int) -> Iterator[dict[str, object]]:
     """Yield a row for every arch, criterion and heuristic; arches out of reach are left out."""
     rng = np.random.default_rng(0)
-    known = formulations(On.LAYERS)
+    known = formulations("costs")
     heuristics = [n for n, f in known.items() if f.kind is FormulationKind.HEURISTIC]
     for draw in range(draws):
         network = arch(rng)

@@ -33,7 +33,7 @@ from formulations.states._search import best_order, exact_best, shortest, watche
 from formulations.states._totals import StopError
 from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.orders import (
     AllOrders,
     OrderSelection,
@@ -231,5 +231,5 @@ FORMULATION = Formulation(
     FormulationKind.EXACT,
     None,
     solve,
-    on=On.ORDERS,
+    answers=("order",),
 )

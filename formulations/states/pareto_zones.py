@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from seqopt.arrays import Bools, Floats
-from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.plan.front import FrontSelection, _StateFront
 from seqopt.work.progress import Tell
 
@@ -79,5 +79,5 @@ FORMULATION = Formulation(
     FormulationKind.EXACT,
     None,
     solve,
-    on=On.FRONTS,
+    answers=("front",),
 )

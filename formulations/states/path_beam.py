@@ -33,7 +33,7 @@ from formulations.states._search import (
 from formulations.states._totals import StopError
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Explorer
-from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.paths import lexicographic
 from seqopt.graph.solution import StatePath
@@ -94,6 +94,5 @@ FORMULATION = Formulation(
     FormulationKind.HEURISTIC,
     None,
     solve,
-    on=On.STATES,
-    also=(On.ORDERS,),
+    answers=("goals", "tail", "order"),
 )

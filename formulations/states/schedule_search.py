@@ -66,7 +66,7 @@ from formulations.states._totals import StopError
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph._budgets import is_beyond
 from seqopt.graph._explore import Explorer
-from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.instance import Instance
 from seqopt.graph.paths import distances, strictly_below, tied
 from seqopt.graph.solution import StatePath
@@ -275,7 +275,6 @@ FORMULATION = Formulation(
     FormulationKind.EXACT,
     None,
     solve,
-    on=On.STATES,
-    also=(On.GRAPHS,),
+    answers=("goals", "tail", "instance"),
     takes_budgets=True,
 )

@@ -27,7 +27,7 @@ from formulations.times._stages import ALMOST, Choose, Goals, StageFound, Stages
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
 from seqopt.graph.solution import StatePath
@@ -295,5 +295,5 @@ def in_time(
     ``cures``: whether it knows mortar that cures.
     """
     solve = _InTime(choose, name, cures)
-    also = (On.GRAPHS,)
-    return Formulation(name, summary, kind, None, solve, on=On.TIMES, also=also, takes_budgets=True)
+    answers = ("time", "instance")
+    return Formulation(name, summary, kind, None, solve, answers=answers, takes_budgets=True)

@@ -20,7 +20,7 @@ from seqopt._cli.values import (
 )
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
-from seqopt.graph.formulation import On, find_formulation
+from seqopt.graph.formulation import find_formulation
 from seqopt.network.build import build_network
 from seqopt.plan.solving import pose
 from seqopt.problem._limit_words import parse_limits
@@ -151,7 +151,7 @@ def _wants_states(asked: Posed) -> bool:
     if asked.schedule == FREE or asked.aim or asked.stands or asked.order == SEARCH:
         return True
     named = asked.formulation
-    return named is not None and find_formulation(named).on in (On.STATES, On.ORDERS, On.TIMES)
+    return named is not None and find_formulation(named).of_states
 
 
 def _require_known(asked: Posed, *, of_states: bool) -> None:

@@ -154,16 +154,16 @@ WATCH = "watch"  # the name by which a formulation takes a watch
 LEAST = {Aim.SUM: "sum", Aim.PEAK: "largest"}
 
 
-class On(Enum):
-    """What a formulation is given, and so what it finds."""
-
-    LAYERS = "open grips in layers of candidates"
-    SCENARIOS = "layers of candidates in many scenarios"
-    STATES = "the states of a build"
-    ORDERS = "the states of all orders"
-    TIMES = "the states of a build in time"
-    FRONTS = "Pareto sets"
-    GRAPHS = "instances"
+QUESTIONS = {
+    "costs": "the costs of candidates of moves",
+    "goals": "states of a build",
+    "tail": "totals over scenarios",
+    "time": "the time of a build",
+    "order": "orders of the bricks",
+    "front": "Pareto sets",
+    "instance": "instances",
+}
+"""What formulations answer: ``goals`` are sums and worst steps, an instance is arrays alone."""
 
 
 class FormulationKind(Enum):
@@ -193,20 +193,18 @@ class Formulation:
     kind : FormulationKind
         What it promises.
     aim : Aim or None
-        Over layers, what it minimizes: the sum of the costs, or the largest cost; None elsewhere,
+        What it minimizes of candidates of moves: the sum of the costs, or the largest cost; None
         where a problem has its goals.
     solve : callable
-        Takes what it is given and named options, returns a `seqopt.graph.solution.StatePath`; of
-        orders a `seqopt.graph.orders.OrderSelection`.
+        Takes a problem and named options, returns a `seqopt.graph.solution.StatePath`; of orders a
+        `seqopt.graph.orders.OrderSelection`.
     takes_budgets : bool
         Whether it can keep totals over the build within budgets.
     windowed : tuple of (str, int or str), optional
         Options with which it looks at one window after the other; empty if it always does, None if
         it never does.
-    on : On, optional
-        What it is given: layers, states, orders, scenarios.
-    also : tuple of On, optional
-        What else it can be given.
+    answers : tuple of str, optional
+        Which questions it answers, of `QUESTIONS`; one with an aim answers ``costs`` as well.
     alone : bool, optional
         Whether it is charged by ranks among the moves from one state, `Graph.alone`.
 
@@ -225,13 +223,24 @@ class Formulation:
     solve: Callable[..., Any]
     takes_budgets: bool = False
     windowed: tuple[tuple[str, int | str], ...] | None = None
-    on: On = On.LAYERS
-    also: tuple[On, ...] = ()
+    answers: tuple[str, ...] = ("goals", "tail", "instance")
     alone: bool = False
 
     def __repr__(self) -> str:
-        what = f"least {LEAST[self.aim]} of the costs" if self.aim else f"on {self.on.value}"
-        return f"<Formulation {self.name}: {self.summary} ({self.kind.value}, {what})>"
+        return f"<Formulation {self.name}: {self.summary} ({self.kind.value}, {self._for})>"
+
+    @property
+    def _for(self) -> str:
+        return f"least {LEAST[self.aim]} of the costs" if self.aim else QUESTIONS[self.answers[0]]
+
+    @property
+    def of_states(self) -> bool:
+        """Whether it chooses states of a build even where candidates of moves could be chosen."""
+        return self.aim is None and bool({"goals", "time"} & {*self.answers})
+
+    def fits(self, *questions: str) -> bool:
+        """Return whether it answers some `QUESTIONS`."""
+        return {*questions} <= {*self.answers, *(["costs"] if self.aim else [])}
 
     @property
     def looks_at_all(self) -> bool:
@@ -266,23 +275,18 @@ class Formulation:
         return WATCH in inspect.signature(self.solve).parameters
 
 
-def formulation_names(*on: On) -> tuple[str, ...]:
-    """Return the names of registered formulations; none is loaded if all are asked for.
-
-    ``*on``: what they are given; by default anything. Result: in alphabetical order.
-    """
-    if not on:
-        return tuple(sorted(plugins(GROUP)))
-    return tuple(name for name, found in _loaded(GROUP).items() if found.on in on)
+def formulation_names() -> tuple[str, ...]:
+    """Return the names of registered formulations in alphabetical order; none is loaded."""
+    return tuple(sorted(plugins(GROUP)))
 
 
-def formulations(*on: On) -> dict[str, Formulation]:
+def formulations(*questions: str) -> dict[str, Formulation]:
     """Return registered formulations: entry points of the group ``seqopt.formulations``.
 
     Parameters
     ----------
-    *on : On
-        What they are given; by default anything.
+    *questions : str
+        What they must answer, of `QUESTIONS`: ``costs`` for those that the loop is compared by.
 
     Returns
     -------
@@ -300,7 +304,7 @@ def formulations(*on: On) -> dict[str, Formulation]:
     >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets and f.aim]
     ['labels', 'lagrangian', 'overlap_lp', 'overlap_mip']
     """
-    return {name: found for name, found in _loaded(GROUP).items() if not on or found.on in on}
+    return {name: found for name, found in _loaded(GROUP).items() if found.fits(*questions)}
 
 
 def exhibits() -> dict[str, Formulation]:
@@ -338,9 +342,8 @@ def _load(entry: EntryPoint) -> Formulation:
             f"formulation {entry.name!r}: {entry.value} is a {type(found).__name__}; "
             "let the entry point name a Formulation"
         )
-    kinds: dict[str, Any] = {"name": str, "summary": str, "kind": FormulationKind, "on": On}
-    kinds |= {"also": tuple, "takes_budgets": bool, "aim": Aim | None}
-    kinds["solve"] = Callable
+    kinds: dict[str, Any] = {"name": str, "summary": str, "kind": FormulationKind}
+    kinds |= {"answers": tuple, "takes_budgets": bool, "aim": Aim | None, "solve": Callable}
     for field_name, kind in kinds.items():
         value = getattr(found, field_name)
         if not isinstance(value, kind):
@@ -348,6 +351,11 @@ def _load(entry: EntryPoint) -> Formulation:
                 f"formulation {entry.name!r}: {entry.value} has {type(value).__name__} as "
                 f"{field_name}; correct it"
             )
+    if unknown := {*found.answers} - {*QUESTIONS}:
+        raise ProblemError(
+            f"formulation {entry.name!r}: {entry.value} answers {', '.join(map(str, unknown))}; "
+            f"give some of {', '.join(QUESTIONS)}"
+        )
     return found
 
 
@@ -364,21 +372,21 @@ def find_formulation(name: str) -> Formulation:
     return _load(found[name])
 
 
-def as_formulation(given: object, *on: On) -> Formulation:
+def as_formulation(given: object, *questions: str) -> Formulation:
     """Return a formulation, by name or itself.
 
-    ``*on``: what it has to be for; by default anything. Raises `ProblemError` if it is none, or is
-    for something else.
+    ``*questions``: what it must answer, of `QUESTIONS`. Raises `ProblemError` if it is none, or
+    answers something else.
     """
     if isinstance(given, str):
         given = find_formulation(given)
     if not isinstance(given, Formulation):
-        known = ", ".join(formulation_names(*on))
+        known = ", ".join(formulations(*questions))
         raise ProblemError(f"a {type(given).__name__} is not a formulation; give one of {known}")
-    if on and not {given.on, *given.also} & {*on}:
-        able = [n for n, f in formulations().items() if {f.on, *f.also} & {*on}]
+    if not given.fits(*questions):
+        asked = next(each for each in questions if not given.fits(each))
         raise ProblemError(
-            f"{given.name} is for {given.on.value}, and {on[0].value} are asked for; "
-            f"use {' or '.join(able)}"
+            f"{given.name} is for {given._for}, and {QUESTIONS[asked]} are asked for; "
+            f"use {' or '.join(formulations(*questions))}"
         )
     return given

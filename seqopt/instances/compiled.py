@@ -22,7 +22,7 @@ from seqopt.graph.layers.layers import Layers
 from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.states._visits import FreeStates, ScenarioSums
 from seqopt.graph.states.states import States
-from seqopt.plan.solving import graph_of, natural, usual
+from seqopt.plan.solving import graph_of, usual
 from seqopt.problem.problem import Aim, Measure, Problem, RobustAim
 from seqopt.sequence._robot_kinds import node_numbers
 
@@ -77,7 +77,7 @@ def compile_instance(
 
 
 def _made(problem: Problem, name: str, aim: Aim | None, below: float) -> Instance:
-    graph = graph_of(problem, natural(problem))
+    graph = graph_of(problem)
     if not isinstance(graph, Layers):
         return _of_states(name, graph, below)
     if below < np.inf:

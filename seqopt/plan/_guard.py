@@ -190,7 +190,7 @@ def require_fit(
 ) -> None:
     """Raise a `ProblemError` unless a formulation takes budgets, if any, and has given options."""
     if budgets and not formulation.takes_budgets:
-        able = [name for name, other in formulations(formulation.on).items() if other.takes_budgets]
+        able = [name for name, other in formulations("costs").items() if other.takes_budgets]
         raise ProblemError(
             f"{formulation.name}: the budget {budgets[0].name!r} couples all moves; "
             f"use {' or '.join(able)}"

@@ -12,7 +12,6 @@ from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.graph.formulation import (
     End,
     Formulation,
-    On,
     Run,
     Watch,
     find_formulation,
@@ -126,7 +125,7 @@ def _solve_windows(graph: Layers, formulation: Formulation, run: Run) -> Plan:
     """Return the plan of a search that solves only the models it meets."""
     alone = formulation.window_options
     if alone is None or run.options not in ({}, alone):
-        known = formulations(On.LAYERS)
+        known = formulations("costs")
         able = [name for name in known if known[name].window_options is not None]
         options = "".join(f" {name}={value}" for name, value in run.options.items())
         raise ProblemError(

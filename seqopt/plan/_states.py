@@ -16,7 +16,6 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import (
     Formulation,
     FormulationKind,
-    On,
     Run,
     as_formulation,
     find_formulation,
@@ -46,11 +45,11 @@ AIMS = {SUM: Aim.SUM, PEAK: Aim.PEAK}
 def able(instance: Instance) -> tuple[str, ...]:
     """Return the names of formulations that an instance fits, the usual one first."""
     every = formulations()
-    kind = On.TIMES if instance.asks_time else On.STATES
-    found = [n for n, f in every.items() if f.on is kind and On.GRAPHS in f.also]
+    asked = ("time" if instance.asks_time else "goals", "instance")
+    found = [n for n, f in every.items() if f.fits(*asked) and not f.aim]
     if len(instance.goals) == 1 and instance.goals[0].kind in AIMS and not instance.asks_time:
         aim = AIMS[instance.goals[0].kind]
-        found += [n for n, f in every.items() if f.on is On.LAYERS and f.aim is aim]
+        found += [n for n, f in every.items() if f.aim is aim]
     if instance.caps:
         found = [name for name in found if every[name].takes_budgets]
     usual = ("makespan_labels", "labels" if instance.caps else "path_dp", "schedule_search")

@@ -14,7 +14,7 @@ from seqopt.arrays import Floats, FrozenValue, Ints, Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError, did_you_mean
 from seqopt.graph._explore import Explorer, Key, Visited
-from seqopt.graph.formulation import Formulation, On, as_formulation
+from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
@@ -333,7 +333,7 @@ def find_front(
     `InfeasibleError` if no plan is allowed; `SolverError` if a plan is not worth what is claimed,
     or the set lacks a point; `TimeUpError` if there is none in time.
     """
-    formulation = as_formulation(formulation, On.FRONTS)
+    formulation = as_formulation(formulation, "front")
     if not isinstance(problem, Problem):
         return _front_of(problem, formulation, seconds, progress, clock or Clock())
     end, watch = time.perf_counter() + seconds, clock or Clock()

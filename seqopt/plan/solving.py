@@ -18,7 +18,7 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_for, recipe_of, simplest
 from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
-from seqopt.graph.formulation import Formulation, On, Run, as_formulation
+from seqopt.graph.formulation import Formulation, Run, as_formulation
 from seqopt.graph.layers.layers import Layers, candidate_layers, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.plan._layers import solve_layers, with_budgets
@@ -117,13 +117,7 @@ def _moved(
 
 
 AIMS = {Aim.SUM: Goal(Measure.SUM), Aim.PEAK: Goal(Measure.PEAK)}
-USUAL = {
-    On.LAYERS: "overlap_dp",
-    On.SCENARIOS: "scenario_search",
-    On.STATES: "schedule_search",
-    On.ORDERS: "order_search",
-    On.TIMES: "makespan_labels",
-}
+CANDIDATES, STATES, ORDERS = "candidates", "states", "orders"  # graphs of a problem
 
 
 def pose(  # noqa: PLR0913  # every question is a word of its own
@@ -181,17 +175,12 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     return posed
 
 
-def natural(problem: Problem) -> On:
-    """Return which graph answers a problem if no formulation says."""
+def graph_kind(problem: Problem) -> str:
+    """Return which graph answers a problem if no formulation says: one of those above."""
     if problem.orders is not None:
-        return On.ORDERS
-    if problem.is_timed:
-        return On.TIMES
-    if not in_layers(problem.moves) or problem.goals or problem.stands is not None:
-        return On.STATES
-    if problem.scenarios and problem.over.aim is Aim.SUM:
-        return On.SCENARIOS
-    return On.LAYERS
+        return ORDERS
+    of_states = problem.is_timed or problem.goals or problem.stands is not None
+    return STATES if of_states or not in_layers(problem.moves) else CANDIDATES
 
 
 def in_layers(moves: Schedule | FreeRules) -> bool:
@@ -201,39 +190,40 @@ def in_layers(moves: Schedule | FreeRules) -> bool:
 
 def usual(problem: Problem) -> str:
     """Return the name of the formulation that solves a problem if none is named."""
-    return _usual_on(natural(problem), robust=bool(problem.scenarios), capped=bool(problem.budgets))
+    if problem.orders is not None:
+        return "order_search"
+    if problem.is_timed:
+        return "makespan_labels"
+    if graph_kind(problem) == STATES:
+        return "schedule_search"
+    if problem.scenarios:
+        return "scenario_search" if problem.over.aim is Aim.SUM else "minimax"
+    return "labels" if problem.budgets else "overlap_dp"
 
 
-def _usual_on(on: On, *, robust: bool, capped: bool) -> str:
-    if on is On.LAYERS and robust:
-        return "minimax"
-    return "labels" if on is On.LAYERS and capped else USUAL[on]
-
-
-def graph_of(problem: Problem, on: On | None = None) -> Graph:
+def graph_of(problem: Problem, kind: str = "") -> Graph:
     """Return the graph of choices of a problem; what was computed for it before is kept.
 
-    ``on``: what a formulation is given; by default as `natural`. Raises `ProblemError` if the
-    problem has no such graph.
+    ``kind``: ``candidates``, ``states`` or ``orders``; by default as `graph_kind`. Raises
+    `ProblemError` if the problem has no such graph.
     """
-    on = natural(problem) if on is None else on
-    if on.name not in problem.graphs:
-        problem.graphs[on.name] = MADE[on](problem)
-    found: Graph = problem.graphs[on.name]
+    kind = kind or graph_kind(problem)
+    if kind not in problem.graphs:
+        problem.graphs[kind] = BUILDERS[kind](problem)
+    found: Graph = problem.graphs[kind]
     return found
 
 
 def layers_of(problem: Problem) -> Layers:
     """Return the open grips of a problem in layers of candidates, budgets included."""
-    found = graph_of(problem, On.LAYERS)
+    found = graph_of(problem, CANDIDATES)
     assert isinstance(found, Layers)
     return found
 
 
 def states_of(problem: Problem) -> States:
     """Return the states and moves of a problem; where its order is sought, in the scene's own."""
-    on = natural(problem)
-    found = graph_of(problem, on if on in (On.ORDERS, On.TIMES) else On.STATES)
+    found = graph_of(problem, STATES if problem.orders is None else ORDERS)
     states = getattr(found, "states", found)  # of all orders, or themselves
     assert isinstance(states, States)
     return states
@@ -241,7 +231,7 @@ def states_of(problem: Problem) -> States:
 
 def _scaled_criterion(problem: Problem) -> Criterion:
     """Return the criterion with the numbers of the scene; raise what the usual graph says."""
-    if natural(problem) in (On.STATES, On.ORDERS, On.TIMES):
+    if graph_kind(problem) != CANDIDATES:
         return states_of(problem).criterion
     parse_budgets(problem.budgets)
     return (_scenarios(problem) if problem.scenarios else _plain_layers(problem)).criterion
@@ -336,22 +326,20 @@ def _all_orders(problem: Problem) -> AllOrders:
     return AllOrders(_states(problem), problem.orders)
 
 
-MADE: dict[On, Callable[[Problem], Graph]] = {
-    On.LAYERS: _layers,
-    On.SCENARIOS: _scenarios,
-    On.STATES: _in_own_order,
-    On.TIMES: _in_own_order,
-    On.ORDERS: _all_orders,
+BUILDERS: dict[str, Callable[[Problem], Graph]] = {
+    CANDIDATES: _layers,
+    STATES: _in_own_order,
+    ORDERS: _all_orders,
 }
 
 
-def _solver(on: On) -> Callable[[Any, Formulation, Run], Plan]:
+def _solver(kind: str) -> Callable[[Any, Formulation, Run], Plan]:
     """Return what makes the plan of a formulation of some graph."""
-    if on in (On.LAYERS, On.SCENARIOS):
+    if kind == CANDIDATES:
         return solve_layers
     from seqopt.plan._states import solve_orders, solve_states  # noqa: PLC0415  # with their proofs
 
-    return solve_orders if on is On.ORDERS else solve_states
+    return solve_orders if kind == ORDERS else solve_states
 
 
 def solve(
@@ -413,10 +401,10 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
     """
     if not isinstance(problem, Problem):
         return _of_graph(problem, formulation, run)
-    found = as_formulation(formulation or usual(problem), *_able(problem))
-    able = _able(problem)
-    on = found.on if found.on in able else next(on for on in able if on in found.also)
-    if on is On.LAYERS and found.aim is not None and problem.goals not in ((), (AIMS[found.aim],)):
+    found = as_formulation(formulation or usual(problem), *questions_of(problem))
+    kind = _kind_for(problem, found)
+    of_costs = kind == CANDIDATES and found.aim is not None
+    if of_costs and problem.goals not in ((), (AIMS[found.aim],)):
         asked = ", ".join(map(str, problem.goals))
         raise ProblemError(
             f"aim {asked}: {found.name} minimizes the {found.aim.value} of costs; "
@@ -432,21 +420,33 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
 
         def solved(one: Problem) -> Plan:
             with run.clock.needed("posing the problem"):
-                graph = graph_of(one, on)
-            return _solver(on)(graph, found, how)
+                graph = graph_of(one, kind)
+            return _solver(kind)(graph, found, how)
 
         return _with_postures(asked, solved(asked), solved)
 
     return replace(best_within(problem, best, run.clock), problem=problem)
 
 
-def _able(problem: Problem) -> tuple[On, ...]:
-    """Return what formulations of a problem may be for, the usual one first."""
-    first = natural(problem)
-    if first is On.LAYERS:
-        return (On.LAYERS, On.STATES)
-    of_candidates = in_layers(problem.moves) and len(problem.goals) <= 1
-    return (first, On.LAYERS) if first is On.STATES and of_candidates else (first,)
+def questions_of(problem: Problem) -> tuple[str, ...]:
+    """Return what a formulation must answer to solve a problem."""
+    if problem.orders is not None:
+        return ("order",)
+    if problem.is_timed:
+        return ("time",)
+    if not (problem.scenarios and problem.over.aim is Aim.SUM):
+        return ("goals",)
+    return ("tail", "instance") if graph_kind(problem) == CANDIDATES else ("tail",)
+
+
+def _kind_for(problem: Problem, formulation: Formulation) -> str:
+    """Return which graph of a problem a formulation is given."""
+    kind = graph_kind(problem)
+    totals = problem.scenarios and problem.over.aim is Aim.SUM
+    if kind == CANDIDATES and formulation.of_states and not totals:
+        return STATES
+    of_candidates = in_layers(problem.moves) and len(problem.goals) <= 1 and not problem.is_timed
+    return CANDIDATES if kind == STATES and of_candidates and formulation.aim else kind
 
 
 def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
@@ -457,18 +457,19 @@ def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> 
 
     if isinstance(problem, Instance):
         return solve_instance(problem, formulation, run)
-    robust = capped = False
     match problem:
         case States():
-            on = On.TIMES if problem.is_timed else On.STATES
+            kind, questions = STATES, ("time" if problem.is_timed else "goals",)
+            name = "makespan_labels" if problem.is_timed else "schedule_search"
         case AllOrders():
-            on = On.ORDERS
+            kind, questions, name = ORDERS, ("order",), "order_search"
         case Layers():
-            totals = problem.scenes and problem.over.aim is Aim.SUM
-            on = On.SCENARIOS if totals else On.LAYERS
-            robust, capped = bool(problem.scenes), bool(problem.budgets)
+            totals = bool(problem.scenes) and problem.over.aim is Aim.SUM
+            kind, questions = CANDIDATES, ("tail" if totals else "goals", "instance")
+            name = "labels" if problem.budgets else "overlap_dp"
+            if problem.scenes:
+                name = "scenario_search" if totals else "minimax"
         case _:
-            kind = type(problem).__name__
-            raise ProblemError(f"a {kind} is not a problem; give one that seqopt.pose made")
-    name = formulation or _usual_on(on, robust=robust, capped=capped)
-    return _solver(on)(problem, as_formulation(name, on), run)
+            found = type(problem).__name__
+            raise ProblemError(f"a {found} is not a problem; give one that seqopt.pose made")
+    return _solver(kind)(problem, as_formulation(formulation or name, *questions), run)

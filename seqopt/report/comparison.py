@@ -15,7 +15,7 @@ from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
 from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
-from seqopt.graph.formulation import Formulation, On, find_formulation, formulations
+from seqopt.graph.formulation import Formulation, find_formulation, formulations
 from seqopt.graph.layers.costs import TINY
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.plan._layers import on_the_way
@@ -266,7 +266,7 @@ def _plans(
         if count >= MOST:
             cascade = {"modified-sequential": find_formulation("cascade")}
             plans, _ = kept(modified_sequential(network, robots[:3]), cascade)
-        others, problem = kept(loop, formulations(On.LAYERS))
+        others, problem = kept(loop, formulations("costs"))
     except (StepError, ProblemError) as error:
         return {}, None, str(error)
     return plans | others, problem, ""

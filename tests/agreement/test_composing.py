@@ -17,7 +17,7 @@ import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, StepError
-from seqopt.graph.formulation import FormulationKind, On, find_formulation, formulation_names
+from seqopt.graph.formulation import FormulationKind, find_formulation, formulations
 from seqopt.graph.states.states import build_states
 from seqopt.problem.problem import parse_robust
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
@@ -40,7 +40,7 @@ FOUR_OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node
 SCALES = np.array([scale for _, scale in ONES.limits])
 IGNORED = FreeRules(payload="ignored")
 AIMS = ("minmax", "minmax,steps", "sum", "steps,minmax", "regrips,T_max", "travel", "T_max,sum")
-PLANS = [find_formulation(n) for n in formulation_names(On.STATES)]
+PLANS = [found for found in formulations("goals").values() if found.of_states]
 
 
 @cache

@@ -16,7 +16,7 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.formulation import FormulationKind, On, exhibits, formulations
+from seqopt.graph.formulation import FormulationKind, exhibits, formulations
 from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.instances.compiled import compile_instance
 from seqopt.judge.schedules import plan_values
@@ -44,16 +44,16 @@ def posed(schedule, criterion="ratio", bricks=5):
     return seqopt.pose(engine, moves, CRITERIA.get(criterion, EQUATIONS))
 
 
-def exact(on, aim=None):
-    """Every formulation that promises the least, exhibits among them."""
-    every = formulations(on) | {n: f for n, f in exhibits().items() if f.on is on}
+def exact(aim=None):
+    """Every formulation that promises the least, of costs with an aim or of states."""
+    every = formulations("goals") | exhibits()
     found = [n for n, f in every.items() if f.aim is aim and f.kind is FormulationKind.EXACT]
     return found + (["overlap_lp", "lagrangian"] if aim is Aim.SUM else [])
 
 
 def by_layers(problem, aim):
     """What layers of candidates say, by every exact formulation, and by two made exact."""
-    for name in exact(On.LAYERS, aim):
+    for name in exact(aim):
         yield name, seqopt.solve(problem, name).certificate.objective
     if aim is Aim.SUM:
         size = max(len(move.candidates) for move in problem.schedule.moves)
@@ -67,7 +67,7 @@ def by_layers(problem, aim):
 def by_states(problem, aim):
     """What states of the same schedule say, by every exact formulation."""
     asked = problem.but(goals=GOALS[aim])
-    for name in exact(On.STATES):
+    for name in exact():
         yield name, seqopt.solve(asked, name).objective[GOALS[aim]]
     yield "instance", seqopt.solve(compile_instance(asked)).objective[GOALS[aim]]
 
@@ -217,7 +217,7 @@ def test_steps_are_counted_alike(schedule):
     problem = posed(schedule)
     count = len(problem.schedule.steps)
     assert len(seqopt.solve(problem, "overlap_dp").steps) == count
-    for name in exact(On.STATES):
+    for name in exact():
         plan = seqopt.solve(problem.but(goals="steps"), name)
         assert plan.objective["steps"] == len(plan.steps) == count
 

@@ -12,7 +12,7 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, SolverError, StepError
-from seqopt.graph.formulation import FormulationKind, On, find_formulation, formulation_names
+from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.problem.problem import Orders
@@ -31,8 +31,8 @@ AIMS = ("minmax,steps", "steps,minmax", "sum", "travel,steps", "minmax,regrips,s
 FEW = ("minmax,steps", "steps,minmax", "travel,steps")
 PLANS = [
     name
-    for name in formulation_names(On.STATES)
-    if find_formulation(name).kind is FormulationKind.EXACT
+    for name, found in formulations("goals").items()
+    if found.of_states and found.kind is FormulationKind.EXACT
 ]
 
 

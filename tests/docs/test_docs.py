@@ -12,7 +12,7 @@ import pytest
 
 from experiments.harness.results import RESULTS, markdown, stored, two
 from seqopt._cli.arguments import COMMANDS
-from seqopt.graph.formulation import On, exhibits, formulations
+from seqopt.graph.formulation import exhibits, formulations
 from tests.browser import PLAIN, browsed, browses
 from tests.builders import ROOT
 from tests.docs.extensions import stated
@@ -242,7 +242,7 @@ def test_exhibits_stand_in_the_table_that_compares_them():
 def test_every_formulation_is_in_the_contest(table):
     rows = STATED[table].splitlines()[2:]
     names = [re.match(r"\| \[`(\w+)`\]", row)[1] for row in rows]
-    candidates = formulations(On.LAYERS)
+    candidates = formulations("costs")
     takers = [n for n, f in candidates.items() if f.takes_budgets or table == "free_table"]
     assert sorted(names) == takers
     for name in ("labels", "overlap_mip"):  # measured at every brick count
@@ -253,6 +253,6 @@ def test_every_formulation_is_in_the_contest(table):
 def test_every_formulation_has_its_program_and_is_in_the_example():
     page = (ROOT / "docs" / "formulations" / "programs.md").read_text(encoding="utf-8")
     sections = dict(re.findall(r"^### (\w+)\n(.*?)(?=^##)", page, re.M | re.S))
-    for name in formulations(On.LAYERS):
+    for name in formulations("costs"):
         assert len(sections[name].split()) > 20, name
         assert re.search(rf"^{name} +\d", page, re.M), name

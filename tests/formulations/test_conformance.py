@@ -20,7 +20,6 @@ from seqopt.graph.formulation import (
     GROUP,
     End,
     FormulationKind,
-    On,
     exhibits,
     find_formulation,
     formulations,
@@ -37,11 +36,11 @@ from tests.builders import small_arch
 from tests.layered import Costs, answer
 from tests.strategies import budgeted, problems
 
-SHOWN = formulations(On.LAYERS)  # what comparisons have
+SHOWN = formulations("costs")  # what comparisons have
 ALL = {
     name: found
     for name, found in (formulations() | exhibits()).items()
-    if On.GRAPHS in found.also and found.on is not On.TIMES
+    if found.fits("instance") and not found.fits("time")
 }
 EXACT_SUMS = [
     n for n, f in SHOWN.items() if f.aim is Aim.SUM and f.kind is not FormulationKind.HEURISTIC

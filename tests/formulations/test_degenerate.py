@@ -12,7 +12,7 @@ import pytest
 from formulations import solvers
 from formulations.overlap_flow import Flow
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError
-from seqopt.graph.formulation import Formulation, FormulationKind, On, formulations
+from seqopt.graph.formulation import Formulation, FormulationKind, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.solution import StatePath
 from seqopt.problem.problem import Aim
@@ -20,11 +20,9 @@ from tests.layered import Costs, answer, changed, told
 from tests.quality.degenerate import MALFORMED, judge, outcomes
 from tests.quality.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 
-ALL = formulations(On.LAYERS)
+ALL = formulations("costs")
 SMALL = Size(3, 3, 6)
-TAKERS = [
-    name for name, formulation in formulations(On.LAYERS).items() if formulation.takes_budgets
-]
+TAKERS = [name for name, formulation in formulations("costs").items() if formulation.takes_budgets]
 FLOWS = ("overlap_lp", "overlap_mip")
 EXACT = ("labels", "lagrangian", "minimax", "overlap_dp", *FLOWS)
 BOUNDS = ("lagrangian", "overlap_lp")  # where a budget binds

@@ -16,7 +16,7 @@ from formulations.states._search import path_values
 from formulations.states._totals import least_total
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph.formulation import FormulationKind, On, Watch, find_formulation, formulation_names
+from seqopt.graph.formulation import FormulationKind, Watch, formulations
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import _on_paths, fewest_moves, lexicographic
 from seqopt.graph.states._visits import explore
@@ -32,7 +32,7 @@ from tests.builders import from_both_sides, small_arch
 from tests.random_graphs import graphs, simple_paths, values_of
 from tests.strategies import free_builds
 
-ALL = {name: find_formulation(name) for name in formulation_names(On.STATES)}
+ALL = {name: found for name, found in formulations("goals").items() if found.of_states}
 EXACT = [name for name, found in ALL.items() if found.kind is FormulationKind.EXACT]
 AIMS = ("minmax", "minmax,steps", "sum", "steps,minmax", "regrips,sum(T_max)", "travel")
 slow, long = pytest.mark.slow, (pytest.mark.slow, pytest.mark.long)

@@ -16,7 +16,7 @@ import seqopt
 from formulations.states.order_search import FORMULATION
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph.formulation import FormulationKind, On, find_formulation, formulation_names
+from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.orders import AllOrders, OrderSelection, trying, whole_bound
 from seqopt.graph.states.states import build_states, over_scenarios, within
 from seqopt.judge._orders import finds_better_order
@@ -114,7 +114,7 @@ def test_what_adds_up_equals_brute_force(aim, bricks, robots):
 
 
 OF_ONE_AIM = {"minmax": ("overlap_lp", "overlap_mip"), "sum": ("minimax",)}  # what they refuse
-TAKE_ORDERS = [name for name, found in seqopt.formulations().items() if On.ORDERS in found.also]
+TAKE_ORDERS = [name for name in seqopt.formulations("order") if name != "order_search"]
 
 
 @once
@@ -176,9 +176,8 @@ def test_totals_over_scenarios_equal_brute_force(aim, bricks):
     nominal = posed(scene, TWO, "sum")
     problem = replace(nominal, states=over_scenarios(nominal.states, some.scenes, aim))
     worths = brute_force(problem)
-    for name in formulation_names(On.ORDERS, On.STATES):
-        able = find_formulation(name)
-        if On.ORDERS not in (able.on, *able.also):
+    for name, able in seqopt.formulations("order").items():
+        if able.aim is not None:
             continue
         plan = seqopt.solve(problem, name)
         found = plan.order.selection

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.graph.formulation import On, formulations
+from seqopt.graph.formulation import formulations
 from seqopt.graph.instance import Instance, _Cap, _Target
 from seqopt.problem.problem import Aim
 
 JUGS, WANTED = (5, 3), 4  # liters that jugs hold, and liters to be measured
-EVERY = {name: f for name, f in formulations(On.LAYERS, On.STATES).items() if On.GRAPHS in f.also}
+EVERY = formulations("goals", "instance")
 SUMS = [name for name, f in EVERY.items() if f.aim is not Aim.PEAK]
 PEAKS = [name for name, f in EVERY.items() if f.aim is not Aim.SUM]
 

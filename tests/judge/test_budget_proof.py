@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt.errors import InfeasibleError, SolverError, TimeUpError
-from seqopt.graph.formulation import End, FormulationKind, On, formulations
+from seqopt.graph.formulation import End, FormulationKind, formulations
 from seqopt.graph.graph import Graph
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import steps_over, travel
@@ -24,7 +24,7 @@ from seqopt.plan.solving import solve
 from tests.layered import Costs, answer
 from tests.strategies import budgeted
 
-TAKERS = {name: found for name, found in formulations(On.LAYERS).items() if found.takes_budgets}
+TAKERS = {name: found for name, found in formulations("costs").items() if found.takes_budgets}
 
 
 def bounded(problem, value, claimed):

@@ -10,7 +10,7 @@ import pytest
 import seqopt
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SeqoptError, SolverError, StepError
-from seqopt.graph.formulation import Formulation, FormulationKind, On, find_formulation
+from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation
 from seqopt.graph.states.states import build_states, within
 from seqopt.judge.schedules import judge_schedule
 from seqopt.network.build import build_network
@@ -77,7 +77,7 @@ def test_states_of_no_free_schedule_are_refused(plan):
     def nonsense(problem):
         return replace(plan.selection, states=((1, 99, 0, 0),))
 
-    liar = Formulation("liar", "lies", FormulationKind.EXACT, None, nonsense, on=On.STATES)
+    liar = Formulation("liar", "lies", FormulationKind.EXACT, None, nonsense, answers=("goals",))
     with pytest.raises(SolverError, match="none of this free schedule"):
         solve(plan.problem, liar)
 
@@ -148,7 +148,7 @@ def front_of(engine25):
 
     def judged(change):
         formulation = Formulation(
-            "changed", "", FormulationKind.EXACT, None, Changed(found, change), on=On.FRONTS
+            "changed", "", FormulationKind.EXACT, None, Changed(found, change), answers=("front",)
         )
         return find_front(front, formulation)
 

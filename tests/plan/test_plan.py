@@ -12,7 +12,7 @@ import seqopt
 from seqopt import Search
 from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError, StepError
-from seqopt.graph.formulation import FormulationKind, On
+from seqopt.graph.formulation import FormulationKind
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import Layers, candidate_layers, travel
 from seqopt.study.published import find_criterion
@@ -116,7 +116,7 @@ def test_a_plan_of_costs_alone_has_a_path_and_no_steps():
             ask()
 
 
-@pytest.mark.parametrize("name", seqopt.formulations(On.LAYERS))
+@pytest.mark.parametrize("name", seqopt.formulations("costs"))
 def test_budgets_are_refused_by_those_that_do_not_take_them(problem25, name):
     problem = replace(problem25, budgets=(travel(problem25, 1e3),))
     formulation = seqopt.formulations()[name]
@@ -127,7 +127,7 @@ def test_budgets_are_refused_by_those_that_do_not_take_them(problem25, name):
         seqopt.solve(problem, name)
 
 
-@pytest.mark.parametrize("name", seqopt.formulations(On.LAYERS))
+@pytest.mark.parametrize("name", seqopt.formulations("costs"))
 def test_without_proof_only_windows_are_searched(counted, name):
     engine, problem = counted
     formulation = seqopt.formulations()[name]

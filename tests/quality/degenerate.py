@@ -33,7 +33,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.formulation import Formulation, FormulationKind, On, formulations
+from seqopt.graph.formulation import Formulation, FormulationKind, formulations
 from tests.layered import Costs
 from tests.layered import answer as certified
 from tests.quality.degenerate_cases import CASES, Case, Size, enumerated
@@ -97,10 +97,10 @@ def outcomes(name: str, case: Case, size: Size, draws: int) -> list[dict[str, ob
         found: dict[str, dict[str, object]]
         try:
             problem = case(size, np.random.default_rng(seed))
-            found = {n: judge(problem, f) for n, f in formulations(On.LAYERS).items()}
+            found = {n: judge(problem, f) for n, f in formulations("costs").items()}
         except ProblemError as error:  # before any formulation
             status = "refused" if name in MALFORMED else "wrong"
-            found = {n: {"status": status, "message": str(error)} for n in formulations(On.LAYERS)}
+            found = {n: {"status": status, "message": str(error)} for n in formulations("costs")}
         for formulation, row in found.items():
             rows.append({"case": name, "seed": seed, "formulation": formulation} | row)
     return rows
@@ -119,7 +119,7 @@ def pivot(table: pd.DataFrame, column: str) -> str:
     wide = table.pivot_table(
         values=column, index="case", columns="formulation", aggfunc=summary, sort=False
     )
-    return wide.reindex(columns=list(formulations(On.LAYERS))).to_string(na_rep="-")
+    return wide.reindex(columns=list(formulations("costs"))).to_string(na_rep="-")
 
 
 def faults(table: pd.DataFrame) -> list[str]:

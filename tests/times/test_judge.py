@@ -11,7 +11,7 @@ import seqopt
 from formulations.times._search import in_time
 from seqopt._registry import OFFERS
 from seqopt.errors import SolverError
-from seqopt.graph.formulation import Formulation, FormulationKind, On, find_formulation
+from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation
 from seqopt.graph.graph import LabelProof
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
@@ -92,7 +92,7 @@ def test_without_labels_it_is_claimed(plan):
         found = find_formulation("makespan_labels").solve(problem)
         return replace(found, proofs=())
 
-    liar = Formulation("liar", "says so", FormulationKind.EXACT, None, told, on=On.TIMES)
+    liar = Formulation("liar", "says so", FormulationKind.EXACT, None, told, answers=("time",))
     found = seqopt.solve(plan.problem, liar)
     assert found.status is Status.CLAIMED
     assert 0 < found.certificate.gap < 1  # what counts of grips prove
@@ -103,7 +103,7 @@ def test_other_grips_than_those_of_the_states_are_refused(plan):
         found = find_formulation("makespan_labels").solve(problem)
         return replace(found, grips=found.grips[::-1])
 
-    liar = Formulation("liar", "says so", FormulationKind.EXACT, None, told, on=On.TIMES)
+    liar = Formulation("liar", "says so", FormulationKind.EXACT, None, told, answers=("time",))
     with pytest.raises(SolverError, match="robots hold other nodes"):
         seqopt.solve(plan.problem, liar)
 

@@ -42,7 +42,7 @@ from seqopt._cli.values import parse_options, parse_size, parse_time_limit
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, TimeUpError
-from seqopt.graph.formulation import End, Formulation, On, Run, as_formulation, trace_rows
+from seqopt.graph.formulation import End, Formulation, Run, as_formulation, trace_rows
 from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._range import at_sufficient_level
@@ -268,7 +268,7 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
         formulation = as_formulation(asked.formulation or usual(posed.problem))
     how = _how(asked, formulation)
     assemble = time.perf_counter() - start
-    in_stages = formulation.on in (On.STATES, On.TIMES)
+    in_stages = formulation.of_states
     run = replace(how, progress=asked.tell, clock=clock)
     if not in_stages:
         run = replace(run, progress=within(asked.tell, clock.left))
@@ -346,7 +346,7 @@ def _values(plan: Plan) -> str:
 def _how(asked: Optimize, formulation: Formulation) -> Run:
     """Return how a formulation is to be run, its own options among it."""
     how: dict[str, Any] = parse_options(formulation, asked.option)
-    if asked.max_memory is not None and formulation.on is On.ORDERS:
+    if asked.max_memory is not None and formulation.answers == ("order",):
         raise ProblemError(
             "--max-memory: the search of orders has none; leave it out, or give --option most=N"
         )

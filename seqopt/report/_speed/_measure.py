@@ -21,12 +21,20 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
 from seqopt.errors import ProblemError, SeqoptError, SolverError, TimeUpError
-from seqopt.graph.formulation import End, Formulation, FormulationKind, On, formulations
+from seqopt.graph.formulation import QUESTIONS, End, Formulation, FormulationKind, formulations
 from seqopt.graph.layers.costs import TINY
 from seqopt.judge.schedules import plan_values
 from seqopt.plan._layers import on_the_way
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import layers_of, natural, solve, states_of, usual
+from seqopt.plan.solving import (
+    CANDIDATES,
+    graph_kind,
+    layers_of,
+    questions_of,
+    solve,
+    states_of,
+    usual,
+)
 from seqopt.problem.problem import Aim, Problem
 from seqopt.report._speed._table import CUT, DONE, FAILED, SpeedTable
 from seqopt.responses.quantities import RESPONSES
@@ -51,7 +59,7 @@ class Reference:
     @property
     def in_layers(self) -> bool:
         """Whether candidates are chosen in layers, and not states."""
-        return natural(self.problem) is On.LAYERS
+        return graph_kind(self.problem) == CANDIDATES
 
     @cached_property
     def _best(self) -> tuple[float, ...]:
@@ -104,7 +112,7 @@ class Reference:
 
 
 TIMES = 3
-UNPROVEN = {On.LAYERS: "cascade", On.STATES: "schedule_search"}  # what needs the fewest models
+UNPROVEN = ("cascade", "schedule_search")  # what needs the fewest models, of costs and of states
 Found = TypeVar("Found")
 
 
@@ -222,13 +230,18 @@ def _reason(error: Exception) -> str:
 
 def _ways(problem: Problem) -> list[_Way]:
     """Return what chooses: formulations that minimize the same, and a search without proof."""
-    on = natural(problem)
-    if on not in UNPROVEN:
+    (asked,) = questions_of(problem)[:1]
+    if asked != "goals":
         raise ProblemError(
-            f"speed: it is measured where grips or states are chosen, not {on.value}"
+            f"speed: it is measured where grips or states are chosen, not {QUESTIONS[asked]}"
         )
-    known = [f for f in formulations(on).values() if f.aim is not Aim.PEAK]  # of another aim
-    unproven = [_Way(f, proof=False) for f in known if f.name == UNPROVEN[on]]
+    of_costs = graph_kind(problem) == CANDIDATES
+    known = [
+        each
+        for each in formulations("goals").values()
+        if bool(each.aim) == of_costs and each.aim is not Aim.PEAK
+    ]
+    unproven = [_Way(f, proof=False) for f in known if f.name in UNPROVEN]
     return [*map(_Way, known), *unproven]
 
 

@@ -13,8 +13,6 @@ import pandas as pd
 
 from seqopt._showing import display
 from seqopt.arrays import Bools
-from seqopt.graph.formulation import On
-from seqopt.plan.solving import USUAL
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +20,7 @@ if TYPE_CHECKING:
 DONE, CUT, FAILED = "done", "cut off", "failed"
 COLUMNS = 80  # of a terminal
 SAME = 1.1  # times that differ by less are equal: repetitions do
-USUAL_NAMES = (USUAL[On.LAYERS], USUAL[On.STATES])
+USUAL_NAMES = ("overlap_dp", "schedule_search")
 
 
 def dominated(table: pd.DataFrame) -> Bools:
