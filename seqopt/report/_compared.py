@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -76,17 +77,19 @@ def comparison_blocks(
     if comparison.table["objective"].notna().any():
         about = _about_choices(comparison, criterion)
         blocks.append(["How the grips were chosen", *_choices(comparison), "", about])
-    blocks += _notes(comparison)
-    return ["\n".join(_wrapped(line, width) for line in block) for block in blocks]
+    for heading, of_paper in (("Notes", False), ("Inconsistencies in the paper", True)):
+        said = [text for text in comparison.notes if text.startswith(OF_PAPER) == of_paper]
+        if said:
+            blocks.append([heading, *(f"- {text.removeprefix(OF_PAPER)}" for text in said)])
 
+    def wrapped(line: str) -> str:
+        if "  " in line:  # a row of a table
+            return line
+        rest = "  " * line.startswith("- ")
+        how: Any = {"break_long_words": False, "break_on_hyphens": False}
+        return textwrap.fill(line, width, subsequent_indent=rest, **how)
 
-def _wrapped(line: str, width: int) -> str:
-    """Return a line in lines of some columns; those of tables stay whole."""
-    if len(line) <= width or "  " in line:
-        return line
-    rest = "  " * line.startswith("- ")
-    how = {"break_long_words": False, "break_on_hyphens": False}
-    return textwrap.fill(line, width, subsequent_indent=rest, **how)  # type: ignore[arg-type]
+    return ["\n".join(map(wrapped, block)) for block in blocks]
 
 
 def shown_tables(comparison: Comparison) -> dict[str, pd.DataFrame]:
@@ -230,12 +233,3 @@ def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
         "far the objective is above its optimum. Models: how many partial structures with "
         f"different grips it looks at{paper}. Seconds: to choose and to check{shared}."
     )
-
-
-def _notes(comparison: Comparison) -> Iterator[list[str]]:
-    """Yield notes about the builds, then about the paper, each list under a heading."""
-    for heading, of_paper in (("Notes", False), ("Inconsistencies in the paper", True)):
-        found = [text for text in comparison.notes if text.startswith(OF_PAPER) == of_paper]
-        if found:
-            lines = [f"- {text.removeprefix(OF_PAPER)}" for text in found]
-            yield [heading, *lines]

@@ -32,19 +32,12 @@ from seqopt.report._style import (
     plain,
     styled,
 )
-from seqopt.report.comparison import Comparison, _in_shown_unit, _worst_of
+from seqopt.report.comparison import _in_shown_unit, _worst_of
 from seqopt.report.page import Build
 from seqopt.report.text import UNITS, in_words, typed
 from seqopt.stability.assessment import Stability, Verdict
 from seqopt.stability.failure_map import FailureMap
-from seqopt.study.published import PUBLISHED
 
-EXACT = 1e-7  # %: gaps below are rounding
-COSTS = {
-    "gap to the optimum [%]": "{:.2g}",
-    "time to choose [s]": "{:.2g}",
-    "structures analyzed": "{:,.0f}",
-}  # how the numbers are written
 TITLES = {
     "F_rob": "robot force",
     "M_sup": "support moment",
@@ -56,8 +49,7 @@ COLUMNS = {
     "F_max_N": "largest tension\nT_max [N]",
     "D_max_1e-3mm": "largest displacement\nD_max [µm]",
 }
-ROW, CASE = 0.21, 0.27  # inches: of a bar, of a row of a map of failure
-PRINTED = "plan published by Bruun et al., its responses computed here"
+CASE = 0.27  # inches: of a row of a map of failure
 MARKS = 12  # along a line, so that lines are told apart without their color
 LABELS = {
     "F_largest": "largest grip force [N]",
@@ -114,28 +106,7 @@ def _softness_chart(
 
 
 @styled
-def _maxima(result: Comparison) -> Figure:
-    names = list(result.table.index)
-    figure = new_figure(1.4 + 2 * ROW * len(names))
-    figure.suptitle("Largest response of any step", x=0.01, ha="left")
-    panels = figure.subplots(2, 2, sharey=True).ravel()
-    colors = [VERMILION if name == PUBLISHED else BLUE for name in names]
-    for panel, (column, unit) in zip(panels, UNITS.items(), strict=True):
-        values = result.table[column].astype(float)
-        bars = panel.barh([typed(name) for name in names], values, color=colors, height=0.7)
-        panel.bar_label(bars, [f" {value:.3g}" for value in values], fontsize=SMALL)
-        panel.set_title(f"{TITLES[column]}, {column} [{unit}]")
-        panel.margins(x=0.14)
-        panel.tick_params(axis="y", length=0)
-    panels[0].invert_yaxis()
-    if PUBLISHED in names:
-        key = [Patch(color=BLUE, label="plan made here"), Patch(color=VERMILION, label=PRINTED)]
-        figure.legend(handles=key, loc="outside lower center", ncols=2)
-    return figure
-
-
-@styled
-def _responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
+def responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the largest responses at every number of bricks; equal builds share a line."""
     tables = {}
     for first, names in merged(builds).items():
@@ -151,34 +122,6 @@ def _responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
     figure.legend(handles, labels, loc="outside lower left", ncols=1)
     axes[-1].set_yscale("log")
     plain(axes[-1].yaxis)
-    return figure
-
-
-@styled
-def _gaps(result: Comparison) -> Figure:
-    solved = result.table.dropna(subset=["seconds", "gap"])
-    figure = new_figure(0.9 + ROW * len(solved))
-    panels = figure.subplots(1, 3, sharey=True)
-    rows = np.arange(len(solved))
-    columns = (100 * solved["gap"], solved["solve_seconds"], solved["models"])
-    for panel, column, (title, text) in zip(panels, columns, COSTS.items(), strict=True):
-        values = column.to_numpy(float)
-        if title.startswith("time"):
-            panel.set_xscale("log")
-            panel.set_xlim(values.min() / 2, 30 * values.max())
-            plain(panel.xaxis)
-        else:
-            panel.set_xlim(0, 1.45 * max(values.max(), 0.01))
-        panel.hlines(rows, panel.get_xlim()[0], values, color=BLUE, lw=1)
-        panel.plot(values, rows, "o", color=BLUE, ms=5, clip_on=False)
-        for row, value in enumerate(values):
-            words = "none" if value < EXACT and panel is panels[0] else text.format(value)
-            beside: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
-            panel.annotate(words, (value, row), (6, 0), **beside)
-        panel.set_title(title)
-        panel.tick_params(axis="y", length=0, pad=8)
-    panels[0].set_yticks(rows, [typed(str(name)) for name in solved.index])
-    panels[0].set_ylim(len(solved) - 0.5, -0.5)
     return figure
 
 
@@ -277,15 +220,6 @@ def _scale(axes: Axes, far: float) -> None:
             axis.set_major_formatter(ScalarFormatter(useOffset=False))
 
 
-def comparison_figures(result: Comparison) -> dict[str, Figure]:
-    """Return the figures of a comparison of a scene that has a loop of its robots."""
-    return {
-        "maxima": _maxima(result),
-        "responses": _responses_figure(result.tables),
-        "gap_against_cost": _gaps(result),
-    }
-
-
 def plan_figures(engine: Engine, builds: Sequence[Build]) -> dict[str, bytes]:
     """Return figures of plans as PNG and SVG, by file name: steps, grips, and all responses."""
     files: dict[str, bytes] = {}
@@ -295,7 +229,7 @@ def plan_figures(engine: Engine, builds: Sequence[Build]) -> dict[str, bytes]:
         grips = gantt_picture(engine.network.scene, build.steps, build.table)
         files |= picture_files(f"{build.name}_grips", grips)
     tables = {build.name: build.table for build in builds}
-    return files | picture_files("responses", _responses_figure(tables))
+    return files | picture_files("responses", responses_figure(tables))
 
 
 @styled

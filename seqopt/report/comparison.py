@@ -163,9 +163,15 @@ def compare(
     if not tables and free is None:  # whose refusal says most
         raise type(first := next(iter(refused.values())))(f"{first}; {why[0]}")
     measured = _speed(engine, (problem, free), seconds=speed, progress=progress) if speed else None
-    notes += why + _loop_notes(scene, problem)
+    notes += why
+    criteria: dict[str, Criterion] = {}
+    if problem is not None:
+        loop_name = problem.schedule.method
+        notes += _idle_note(scene, f"{loop_name} loop", problem.schedule.steps)
+        criteria[loop_name] = problem.criterion
     if free is not None:
         tables[FREE], rows[FREE] = free.responses(), _free_row(free)
+        criteria[FREE] = free.states.criterion
     notes += _add_largest(scene, rows, tables)
     prover = prover or BuildProver(engine.network, progress=progress)
     verdicts = prover.of_builds({name: _steps_in_table(scene, t) for name, t in tables.items()})
@@ -173,20 +179,7 @@ def compare(
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     found = (maxima, printed, table, tables, loop, tuple(notes), refusal, left)
     enough = what_was_enough(within, tables)
-    return Comparison(*found, _criteria(problem, free), verdicts, enough, measured)
-
-
-def _loop_notes(scene: Scene, loop: Layers | None) -> list[str]:
-    """Return which robots never grip in a loop, in words."""
-    if loop is None:
-        return []
-    return _idle_note(scene, f"{loop.schedule.method} loop", loop.schedule.steps)
-
-
-def _criteria(loop: Layers | None, free: Plan | None) -> dict[str, Criterion]:
-    """Return the criteria of the loop and the free schedule, by the problem."""
-    found = {} if loop is None else {loop.schedule.method: loop.criterion}
-    return found | ({} if free is None else {FREE: free.states.criterion})
+    return Comparison(*found, criteria, verdicts, enough, measured)
 
 
 def _speed(
@@ -259,7 +252,12 @@ def _plans(
     ) -> tuple[dict[str, Plan], Layers]:
         """Within the linear range, if one of the plans leaves it and all can keep it."""
         found, again = solved(schedule, named), (Limit(LINEAR_RANGE, 1.0),)
-        return keeping(found, _farthest(found[0]), lambda: solved(schedule, named, again))[0]
+        shift = RESPONSES["D_max"]
+        farthest = max(
+            float(np.max(plan._columns[shift.column])) / shift.scale / plan._within.far
+            for plan in found[0].values()
+        )
+        return keeping(found, Moved(farthest, 0), lambda: solved(schedule, named, again))[0]
 
     try:
         loop, plans = find_schedule(network, robots=robots), dict[str, Plan]()  # it says most
@@ -270,15 +268,6 @@ def _plans(
     except (StepError, ProblemError) as error:
         return {}, None, str(error)
     return plans | others, problem, ""
-
-
-def _farthest(plans: Mapping[str, Plan]) -> Moved:
-    """Return how far plans move nodes, over the limit of the linear range, by their tables."""
-    shift = RESPONSES["D_max"]
-    return max(
-        Moved(float(np.max(plan._columns[shift.column])) / shift.scale / plan._within.far, 0)
-        for plan in plans.values()
-    )
 
 
 def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
@@ -303,11 +292,11 @@ def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
 
 def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
     """Return the largest responses of any step, the force of every robot for itself."""
-    worst = largest(scene, table)
-    columns = {f"{robot_response(r.name)} [N]": force_column(r) for r in scene.robots}
-    forces = {said: table[column].abs().max() for said, column in columns.items()}
-    del worst["F_rob"]
-    return pd.Series(forces | {f"{name} [{LARGEST[name]}]": worst[name] for name in worst})
+    forces = {
+        f"{robot_response(r.name)} [N]": table[force_column(r)].abs().max() for r in scene.robots
+    }
+    worst = {f"{n} [{LARGEST[n]}]": v for n, v in largest(scene, table).items() if n != "F_rob"}
+    return pd.Series(forces | worst)
 
 
 def _row(plan: Plan) -> dict[str, object]:

@@ -142,9 +142,7 @@ def test_a_block_that_is_open_is_named(tmp_path):
     path = folder(tmp_path, "obj")
     text = alone(TOWER[1]).rsplit("f ", 1)[0]
     (path / "1.obj").write_text(text, encoding="utf-8")
-    with pytest.raises(
-        SceneError, match=r"block 1: .* one side only; close the shape; if it is"
-    ):
+    with pytest.raises(SceneError, match=r"block 1: .* one side only; close the shape; if it is"):
         import_scene(path, given=GIVEN)
 
 

@@ -13,7 +13,7 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from seqopt.report._style import COLORS, look, looks, new_figure, picture_files, plain, styled
-from seqopt.report.charts import _responses_figure, front_figure, merged
+from seqopt.report.charts import front_figure, merged, responses_figure
 from seqopt.report.draw import POINTS, aside
 from seqopt.report.text import WORDS, in_words, typed
 from tests.pictures import flaws
@@ -123,7 +123,7 @@ def test_equal_tables_are_one_line():
 def test_the_worst_step_of_every_number_of_bricks_is_drawn():
     shown = {"bricks": [1, 1, 2], "step": [1, 2, 3], "M_sup_Nm": [1.0, 3.0, 2.0]}
     table = pd.DataFrame(shown).assign(F_max_N=1.0, **{"D_max_1e-3mm": 1.0})
-    axes, *_ = _responses_figure({"sequential": table}).axes
+    axes, *_ = responses_figure({"sequential": table}).axes
     (line,) = axes.get_lines()
     assert line.get_ydata().tolist() == [3.0, 2.0]
 

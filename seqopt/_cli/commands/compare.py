@@ -211,7 +211,7 @@ def _parse_grip_range(text: str | None) -> tuple[float, ...]:
 
 def _files(result: Comparison, softly: pd.DataFrame) -> dict[str, bytes | str]:
     """Return tables and figures of a comparison by file name; ``softly``: by stiffness of grips."""
-    loop, speed = result.loop, result.speed
+    speed = result.speed
     files: dict[str, bytes | str] = {
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
         **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
@@ -221,9 +221,9 @@ def _files(result: Comparison, softly: pd.DataFrame) -> dict[str, bytes | str]:
     if figure_notes():
         return files
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
-    from seqopt.report.charts import _softness_chart, comparison_figures  # noqa: PLC0415
+    from seqopt.report.charts import _softness_chart, responses_figure  # noqa: PLC0415
 
-    drawn = {} if loop is None else comparison_figures(result)
+    drawn = {"responses": responses_figure(result.tables)}
     drawn |= {} if softly.empty else {"grips": _softness_chart(softly, [*softly["build"].unique()])}
     drawn |= {} if speed is None else {"speed": speed.plot()}
     for name, figure in drawn.items():

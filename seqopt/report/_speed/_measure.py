@@ -73,24 +73,19 @@ class Reference:
 
     def gap(self, plan: Plan) -> float:
         """Return how far a plan is above the optimum, over its size; infinite if not allowed."""
-        found = self._layered(plan) if self.in_layers else self._of_states(plan)
-        return 0.0 if found < ROUNDING else found
-
-    def _layered(self, plan: Plan) -> float:
-        costs = layers_of(self.problem).sums
-        parts = np.abs(costs.parts(plan.choice))
-        if not np.isfinite(parts).all():
-            return np.inf
-        return (costs.cost(plan.choice) - costs.least_sum()) / max(float(parts.sum()), TINY)
-
-    def _of_states(self, plan: Plan) -> float:
-        """Return the gap in the first goal that is not at its optimum."""
+        if self.in_layers:
+            costs = layers_of(self.problem).sums
+            size = float(np.abs(costs.parts(plan.choice)).sum())
+            if not np.isfinite(size):
+                return np.inf
+            gap = (costs.cost(plan.choice) - costs.least_sum()) / max(size, TINY)
+            return 0.0 if gap < ROUNDING else gap
         try:
             values = plan_values(states_of(self.problem), plan.steps)
         except SolverError:  # a limit is exceeded
             return np.inf
         gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, self._best, strict=True)]
-        return next((gap for gap in gaps if abs(gap) >= ROUNDING), 0.0)
+        return max(next((gap for gap in gaps if abs(gap) >= ROUNDING), 0.0), 0.0)
 
     def error(self, engine: Engine, steps: Sequence[Step]) -> float:
         """Return the largest difference of a response of steps, over the largest of its kind."""
@@ -182,8 +177,14 @@ class _Stage:
         prepared: Problem | None = None
         before, why = 0.0, ""
         if self.reference.in_layers:
+
+            def prepare() -> Problem:
+                found = self.posed()
+                _ = layers_of(found).sums
+                return found
+
             try:
-                before, prepared = self.least(self._prepared)
+                before, prepared = self.least(prepare)
             except (SeqoptError, TimeoutError) as error:
                 why = _reason(error)
         for way in ways:
@@ -193,11 +194,6 @@ class _Stage:
             else:
                 found = self._row(way, own, before if own is not None else 0.0)
             yield {"engine": self.name, **way.facts, **found}
-
-    def _prepared(self) -> Problem:
-        found = self.posed()
-        _ = layers_of(found).sums
-        return found
 
     def _without(self, why: str) -> dict[str, object]:
         late = why == CUT
