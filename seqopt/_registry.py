@@ -16,7 +16,6 @@ OFFERS = {
     "steps_picture": "seqopt.report._pictures",
     "tilt_picture": "seqopt.report.charts",
     "gantt_picture": "seqopt.report._gantt",
-    "seconds_picture": "seqopt.report._gantt",
     "Film": "seqopt.report._film",
     "build_page": "seqopt.report._pages",
     "failure_figure": "seqopt.report.charts",

@@ -212,9 +212,9 @@ class ShownBuild(Shown):
         """
         scene, responses = self.engine.network.scene, self.responses()
         timed = self._timed if seconds is None else seconds
-        name = "seconds_picture" if timed else "gantt_picture"
-        clock = (self._waits, self._begin) if timed else ()
-        figure: Figure = display(name)(scene, self.steps, responses, (first, last), *clock)
+        clock = (self._waits, self._begin) if timed else None
+        draw = display("gantt_picture")
+        figure: Figure = draw(scene, self.steps, responses, (first, last), clock)
         return figure
 
     def animate(self, *, forces: bool = False, magnify: float = 0.0, seconds: float = 0.4) -> Any:

@@ -15,24 +15,28 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
+from seqopt.arrays import Floats
 from seqopt.errors import StepError
 from seqopt.report._style import SMALL, new_picture, styled
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.site import Site
-from seqopt.sequence.steps import AnyStep, Step
+from seqopt.sequence.steps import AnyStep
 from seqopt.times._curing import Waits
-from seqopt.times._steps import step_times
+from seqopt.times._steps import StepTime, step_times
 
 SHADES = "YlGnBu"
 PALE = "#f2efe9"  # of a grip whose force is not known
-DARK, PREPARES, CURES = "#222222", "#e8e8e8", "#f3dcc0"
+DARK, CURES = "#222222", "#f3dcc0"
+PREPARED: Any = {"fc": "#e8e8e8", "ec": DARK, "hatch": "///"}
 LANE = 0.74  # height of a bar, of a lane's
 SIZES = {"steps": (0.13, 6.0, 1.6, 1.2), "seconds": (0.15, 7.0, 1.8, 1.3)}
 """Inches: of a step, of a chart at least, beside the bars, above and below them."""
 WIDEST, LETTER = 30.0, 0.06  # inches: of a chart, of a letter
-Stops = Callable[[Hold], list[tuple[float, float]]]  # from when to when a grip has each step
+Span = tuple[float, float]
+Clock = tuple[Waits | None, Site | None]
+"""Of a chart over seconds: how mortar waits, and where a part of a build begins, if it does."""
 
 
 @styled
@@ -41,67 +45,69 @@ def gantt_picture(
     steps: Sequence[AnyStep],
     responses: pd.DataFrame | None = None,
     shown: tuple[int | None, int | None] = (None, None),
+    clock: Clock | None = None,
 ) -> Figure:
-    """Return the grips of a build over its steps, shaded by their forces, where these are given."""
-    first, last = shown = _numbers(steps, shown)
+    """Return the grips of a build over its steps, shaded by their forces, where these are given.
 
-    def stops(hold: Hold) -> list[tuple[float, float]]:
-        return [(number - 0.5, number + 0.5) for number in range(hold.first, hold.last + 1)]
+    With a ``clock`` over seconds: with what robots prepare, and waits for mortar behind all lanes.
+    """
+    first, last = numbers = _numbers(steps, shown)
+    begins = steps[0].number
+    times = None if clock is None else step_times(scene, steps, *clock)
+    ends = np.arange(len(steps) + 1) + begins - 0.5  # before and after every step
+    if times is not None:
+        ends = np.array([0.0, *(time.end for time in times)])
 
-    drawn = (scene, steps, responses, shown)
-    figure, axes, shade = _lanes(*drawn, "steps", stops, (first - 0.5, last + 0.5))
-    whole = (first, last) == (1, steps[-1].number)
-    said = "step" if whole else f"step, {first} to {last} of {steps[-1].number}"
-    axes.set(xlabel=said, xlim=(first - 0.7, last + 0.7))
-    open_ = Patch(fc=PALE, ec=DARK, hatch="//", label="still to be chosen")
-    more = [open_] if any(getattr(step, "moves", ()) for step in steps) else []
-    _explain(figure, axes, [*_marks(), *more], shade)
+    def stops(hold: Hold) -> list[Span]:
+        """Return from when to when a grip has each step."""
+        at, end = hold.first - begins, hold.last - begins
+        out: list[Span] = [*zip(ends[at : end + 1], ends[at + 1 : end + 2], strict=True)]
+        if times is not None:  # from its own act, or from the start, up to letting go
+            out[0] = (times[at].start if hold.robot in times[at].robots else 0.0, out[0][1])
+            out[-1] = (out[-1][0], ends[min(end + 2, len(times))])
+        return out
+
+    span = float(ends[first - begins]), float(ends[last - begins + 1])
+    drawn = _lanes(scene, steps, responses, numbers, stops, span, "seconds" if times else "steps")
+    figure, axes, shade = drawn
+    marks: list[Line2D | Patch] = [
+        Line2D([], [], color=DARK, marker="|", ms=11, mew=3.2, lw=0, label="places the brick"),
+        Patch(fc="white", ec=DARK, label="holds it (brick · node)"),
+    ]
+    if times is not None:
+        some = slice(first - begins, last - begins + 1)
+        cures = _prepared(axes, times[some], ends[some])
+        marks.insert(0, Patch(lw=0.5, label="prepares", **PREPARED))
+        marks += [Patch(fc=CURES, label="waits for mortar")] if cures else []
+        axes.set_xlabel("seconds")
+    else:
+        whole = (first, last) == (1, steps[-1].number)
+        axes.set_xlabel("step" if whole else f"step, {first} to {last} of {steps[-1].number}")
+        if any(getattr(step, "moves", ()) for step in steps):
+            marks.append(Patch(fc=PALE, ec=DARK, hatch="//", label="still to be chosen"))
+    place: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
+    axes.legend(handles=marks, ncols=len(marks), frameon=False, **place)
+    if shade is not None:
+        figure.colorbar(shade, ax=axes, label="grip force, N", pad=0.01)
     return figure
 
 
-@styled
-def seconds_picture(
-    scene: Scene,
-    steps: Sequence[Step],
-    responses: pd.DataFrame,
-    shown: tuple[int | None, int | None] = (None, None),
-    waits: Waits | None = None,
-    begin: Site | None = None,
-) -> Figure:
-    """Return the grips of a build over seconds, with what robots prepare.
+def _prepared(axes: Axes, times: Sequence[StepTime], before: Floats) -> bool:
+    """Draw what robots prepare for steps, and waits for mortar; return whether there are any.
 
-    ``waits``: as of `step_times`, where mortar cures: such waits are marked behind all lanes;
-    ``begin``: where a part of a build begins.
+    ``before``: when the steps before end, s.
     """
-    first, last = shown = _numbers(steps, shown)
-    begins, times = steps[0].number, step_times(scene, steps, waits, begin)
-    ends = [0.0, *(time.end for time in times)]  # before and after every step
-
-    def stops(hold: Hold) -> list[tuple[float, float]]:
-        at, end = hold.first - begins, hold.last - begins
-        start = times[at].start if hold.robot in times[at].robots else 0.0  # who held at first
-        out = [(start, ends[at + 1]), *zip(ends[at + 1 : end + 1], ends[at + 2 :], strict=False)]
-        return [*out[:-1], (out[-1][0], ends[min(end + 2, len(times))])]  # up to letting go
-
-    start, end = span = ends[first - begins], ends[last - begins + 1]
-    figure, axes, shade = _lanes(scene, steps, responses, shown, "seconds", stops, span)
-    room = 0.01 * (end - start)
-    axes.set(xlabel="seconds", xlim=(start - room, end + room))
-    look: Any = {"fc": PREPARES, "ec": DARK, "hatch": "///"}
     cures = False
-    for before, time in [*zip(ends, times, strict=False)][first - begins : last - begins + 1]:
+    for start, time in zip(before.tolist(), times, strict=True):
         if time.prepares is not None and time.ready is not None:
             low, wide = time.robots[0] - LANE / 4, time.ready - time.prepares
-            named: Any = {"gid": f"prepares {time.step}", "lw": 0.4, **look}
+            named: Any = {"gid": f"prepares {time.step}", "lw": 0.4, **PREPARED}
             axes.add_patch(Rectangle((time.prepares, low), wide, LANE / 2, **named))
-        ready = max(before, time.ready or 0.0)
+        ready = max(start, time.ready or 0.0)
         if time.joint and time.start > ready:  # it waits for mortar alone
             axes.axvspan(ready, time.start, fc=CURES, lw=0, zorder=0, gid="cures")
             cures = True
-    marks = [Patch(lw=0.5, label="prepares", **look), *_marks()]
-    marks += [Patch(fc=CURES, label="waits for mortar")] if cures else []
-    _explain(figure, axes, marks, shade)
-    return figure
+    return cures
 
 
 def _numbers(steps: Sequence[AnyStep], shown: tuple[int | None, int | None]) -> tuple[int, int]:
@@ -119,9 +125,9 @@ def _lanes(
     steps: Sequence[AnyStep],
     responses: pd.DataFrame | None,
     shown: tuple[int, int],
+    stops: Callable[[Hold], list[Span]],
+    span: Span,
     along: str,
-    stops: Stops,
-    span: tuple[float, float],
 ) -> tuple[Figure, Axes, ScalarMappable | None]:
     """Draw a lane per robot and a bar per grip; return what shades them, too, if forces are known.
 
@@ -145,7 +151,8 @@ def _lanes(
             parts = slice(hold.first - steps[0].number, hold.last - steps[0].number + 1)
             _bar(axes, hold, stops(hold), None if colors is None else colors[parts, hold.robot])
             _label(axes, scene, hold, stops(hold), inch)
-    axes.set(ylim=(count - 0.5, -0.5), axisbelow=True)
+    room = 0.2 if along == "steps" else 0.01 * (span[1] - span[0])
+    axes.set(ylim=(count - 0.5, -0.5), xlim=(span[0] - room, span[1] + room), axisbelow=True)
     axes.set_yticks(range(count), [robot.name for robot in scene.robots])
     axes.tick_params(left=False)
     axes.grid(visible=True, axis="x", lw=0.3)
@@ -183,21 +190,3 @@ def _label(
     look: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
     look["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
     axes.annotate(words, ((begin + end) / 2, hold.robot), rotation=0 if flat else 90, **look)
-
-
-def _marks() -> list[Line2D | Patch]:
-    """Return what explains marks and words of bars, in a legend."""
-    return [
-        Line2D([], [], color=DARK, marker="|", ms=11, mew=3.2, lw=0, label="places the brick"),
-        Patch(fc="white", ec=DARK, label="holds it (brick · node)"),
-    ]
-
-
-def _explain(
-    figure: Figure, axes: Axes, marks: list[Line2D | Patch], shade: ScalarMappable | None
-) -> None:
-    """Explain marks and shades."""
-    place: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
-    axes.legend(handles=marks, ncols=len(marks), frameon=False, **place)
-    if shade is not None:
-        figure.colorbar(shade, ax=axes, label="grip force, N", pad=0.01)
