@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 
@@ -24,31 +24,6 @@ from seqopt.scene.scene import Scene
 from seqopt.scene.shape import Polyhedron
 
 _SAME_MASS = 0.01  # share by which a mass and a density may differ by rounding
-
-
-def upward_order(
-    rank: Sequence[tuple[float, ...]],
-    pairs: Iterable[tuple[int, int]],
-    starts: Iterable[int],
-    keys: Sequence[str],
-    sunk: Collection[int] = (),
-) -> list[int]:
-    """Return blocks in an order in which each touches the ground or what stands before it.
-
-    ``sunk``: those that interpenetrate, which a wider gap does not help.
-    """
-    order = touching_order(rank, pairs, starts)
-    lost = sorted({*range(len(rank))} - {*order})
-    if lost:
-        inside = [keys[i] for i in lost if i in sunk]
-        remedy = "name supports, or allow a wider gap between faces"
-        if inside:
-            remedy = f"move {inside[0]} out of the block that it interpenetrates"
-        raise SceneError(
-            f"{len(lost)} blocks touch nothing that leads to the ground, the first of them "
-            f"{', '.join(keys[i] for i in lost[:5])}; {remedy}"
-        )
-    return order
 
 
 ROBOTS = 3  # where nobody says how many
@@ -166,7 +141,11 @@ def _bricks(
     keys = [block.key for block in content.blocks]
     numbers = block_numbers(keys)
     if [str(number) for number in numbers] != keys:
-        said.append(f"blocks are numbered {_numbered(keys, numbers)}")
+        shown = [f"{key} is {number}" for key, number in zip(keys, numbers, strict=True)]
+        more = "" if len(shown) <= 8 else f" and {len(shown) - 8} more"
+        own = numbers != [*range(1, len(keys) + 1)]
+        how = "as in their names" if own else "from 1 in the file's order"
+        said.append(f"blocks are numbered {how}: {', '.join(shown[:8])}{more}")
     density = None if given.density is None else positive("density", given.density, "kg/m³")
     built = [(i, block) for i, block in enumerate(content.blocks) if i not in supports]
     silent = [block.key for _, block in built if block.density is None and block.mass is None]
@@ -194,15 +173,6 @@ def _density(block: FileBlock, solid: Polyhedron, otherwise: float) -> float:
             f"{solid.volume:.4g} m³, its density {block.density:g} kg/m³; give one of both"
         )
     return found
-
-
-def _numbered(keys: Sequence[str], numbers: Sequence[int]) -> str:
-    """Return in words which numbers blocks have."""
-    shown = [f"{key} is {number}" for key, number in zip(keys, numbers, strict=True)]
-    more = "" if len(shown) <= 8 else f" and {len(shown) - 8} more"
-    own = numbers != [*range(1, len(keys) + 1)]
-    how = "as in their names" if own else "from 1 in the file's order"
-    return f"{how}: {', '.join(shown[:8])}{more}"
 
 
 def block_numbers(keys: Sequence[str]) -> list[int]:
@@ -245,6 +215,10 @@ def _order(
     sunk: Collection[int],
     said: list[str],
 ) -> list[int]:
+    """Return blocks in an order in which each touches the ground or what stands before it.
+
+    ``sunk``: those that interpenetrate.
+    """
     places = [*bricks]
     row = {i: k for k, i in enumerate(places)}
     courses = [content.blocks[i].course for i in places]
@@ -255,13 +229,22 @@ def _order(
         if known
         else "blocks are placed from the bottom up"
     )
-    order = upward_order(
+    order = touching_order(
         [(c or 0.0 if known else 0.0, h) for c, h in zip(courses, heights, strict=True)],
         [(row[a], row[b]) for (a, b), _ in touching.faces if a != GROUND],
         [row[b] for (a, b), _ in touching.faces if a == GROUND],
-        [content.blocks[i].key for i in places],
-        {row[i] for i in sunk if i in row},
     )
+    lost = sorted({*range(len(places))} - {*order})
+    if lost:
+        keys = {k: content.blocks[places[k]].key for k in lost}
+        inside = [key for k, key in keys.items() if places[k] in sunk]
+        remedy = "name supports, or allow a wider gap between faces"
+        if inside:  # which a wider gap does not help
+            remedy = f"move {inside[0]} out of the block that it interpenetrates"
+        raise SceneError(
+            f"{len(lost)} blocks touch nothing that leads to the ground, the first of them "
+            f"{', '.join([*keys.values()][:5])}; {remedy}"
+        )
     return [places[k] for k in order]
 
 

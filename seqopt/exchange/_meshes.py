@@ -40,15 +40,24 @@ def _split_blocks(vertices: Floats, faces: _Polygons) -> list[list[int]]:
     """
     place = _united(vertices)
     united = [[int(place[v]) for v in face] for face in faces]
-    sides = [_edges(face) for face in united]
-    part, real = _parts(len(vertices), faces), [i for i, edges in enumerate(sides) if edges]
+    sides = list[_Edges]()
+    for face in united:  # without edges that it passes twice
+        own = set[tuple[int, int]]()
+        for a, b in edges(face):
+            own ^= {(min(a, b), max(a, b))} if a != b else set()
+        sides.append(frozenset(own))
+    part, real = _parts(len(vertices), faces), [i for i, own in enumerate(sides) if own]
     blocks, rest = _closed(real, sides)
     if rest:
         alone = len({v for face in faces for v in face}) == sum(map(len, faces))
         groups = _grouped(real, _parts(len(vertices), united) if alone else part)
         ends = [_closed(group, sides) for group in groups]
         return [block for closed, left in ends for block in [*closed, left] if block]
-    return [own for block in blocks for own in _unmixed(block, sides, part)]
+    out = list[list[int]]()
+    for block in blocks:  # in parts that share no vertices, if each is closed too
+        groups = _grouped(block, part)
+        out += [block] if any(_closed(group, sides)[1] for group in groups) else groups
+    return out
 
 
 def _united(vertices: Floats) -> Ints:
@@ -59,14 +68,6 @@ def _united(vertices: Floats) -> Ints:
     reach = _WELD * float(np.ptp(points, axis=0).max(initial=0.0))
     pairs = KDTree(points).query_pairs(reach, output_type="ndarray")
     return _linked(len(points), pairs)[place.reshape(-1)]
-
-
-def _edges(face: Sequence[int]) -> _Edges:
-    """Return the edges of a face, without those that it passes twice."""
-    out = set[tuple[int, int]]()
-    for a, b in edges(face):
-        out ^= {(min(a, b), max(a, b))} if a != b else set()
-    return frozenset(out)
 
 
 def _closed(faces: Iterable[int], sides: Sequence[_Edges]) -> tuple[list[list[int]], list[int]]:
@@ -84,12 +85,6 @@ def _closed(faces: Iterable[int], sides: Sequence[_Edges]) -> tuple[list[list[in
         blocks[-1] += block
         block = []
     return blocks, block
-
-
-def _unmixed(block: list[int], sides: Sequence[_Edges], part: Ints) -> list[list[int]]:
-    """Return closed faces, in parts that share no vertices if each is closed too."""
-    groups = _grouped(block, part)
-    return [block] if any(_closed(group, sides)[1] for group in groups) else groups
 
 
 def _grouped(faces: Iterable[int], part: Ints) -> list[list[int]]:
@@ -151,27 +146,21 @@ def _named(blocks: list[FileBlock], source: str) -> Content:
         raise SceneError(f"{source}: it has no faces; {NO_BLOCKS}")
     if len(blocks) > MOST_BLOCKS:
         raise SceneError(f"{source}: {len(blocks)} blocks; {MOST_BLOCKS} is the most")
-    keys = _keys([block.key for block in blocks])
-    times = Counter(block.key for block in blocks if block.key)
+    seen, keys = Counter[str](), list[str]()
+    for block in blocks:  # numbered where several have one name; places if some have none
+        seen[block.key] += 1
+        keys.append(block.key if seen[block.key] == 1 else f"{block.key}-{seen[block.key]}")
+    if "" in seen or len({*keys}) < len(keys):
+        keys = [*map(str, range(len(keys)))]
     several = [
         f"{count} closed pieces are called {name}: each is a block of its own"
-        for name, count in times.items()
-        if count > 1
+        for name, count in seen.items()
+        if count > 1 and name
     ]
     return Content(
         tuple(replace(block, key=key) for block, key in zip(blocks, keys, strict=True)),
         said=("a mesh: no supports, faces or order", *several[:_NAMED]),
     )
-
-
-def _keys(names: Sequence[str]) -> list[str]:
-    """Return the names of blocks, numbered where several have one; places if some have none."""
-    seen = Counter[str]()
-    keys = []
-    for name in names:
-        seen[name] += 1
-        keys.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
-    return keys if "" not in seen and len(set(keys)) == len(keys) else [*map(str, range(len(keys)))]
 
 
 def _compact(points: Floats, faces: _Polygons) -> tuple[Floats, tuple[tuple[int, ...], ...]]:

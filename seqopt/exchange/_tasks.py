@@ -11,7 +11,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -125,7 +125,15 @@ def plan_tasks(
     [('rob2', 'pick', 2), ('rob2', 'place', 2), ('rob1', 'hold', 1)]
     """
     far = None if distance is None else positive("distance", distance, "m")
-    found = cache(partial(_grip, scene, far, _checked(scene, postures or {})))
+    known = _checked(scene, postures or {})
+
+    @cache
+    def found(robot: Robot, node: int) -> _Grip:
+        brick = scene.brick_of_node[node]
+        away = max(brick.dimensions) if far is None else far
+        posture = known.get((robot.name, node))
+        return _Grip(robot.name, node, brick.name, hold(scene, robot, node), away, posture)
+
     last: Grips = (None,) * len(scene.robots)
     for step in steps:
         tasks = []
@@ -148,19 +156,6 @@ class _Grip:
     held: Held
     far: float  # m; from the grip to where the tool comes from
     posture: tuple[float, ...] | None
-
-
-def _grip(
-    scene: Scene,
-    far: float | None,
-    known: Mapping[_Key, tuple[float, ...]],
-    robot: Robot,
-    node: int,
-) -> _Grip:
-    brick = scene.brick_of_node[node]
-    away = max(brick.dimensions) if far is None else far
-    posture = known.get((robot.name, node))
-    return _Grip(robot.name, node, brick.name, hold(scene, robot, node), away, posture)
 
 
 def _actions(step: Step, old: int | None, new: int | None) -> tuple[Action, ...]:
@@ -225,7 +220,15 @@ def tasks_json(scene: Scene, tasks: Iterable[Task]) -> str:
         "version": 1,
         "scene": scene.name,
         "unit": "m",
-        "blocks": [_block(brick) for brick in scene.placed],
+        "blocks": [
+            {
+                "block": brick.name,
+                "mass": brick.mass,
+                "frame": compas_frame(brick_frame(brick)),
+                "shape": typed("compas.datastructures/Mesh", mesh_data(*vertices_of(brick))),
+            }
+            for brick in scene.placed
+        ],
         "robots": [
             {
                 "robot": robot.name,
@@ -237,12 +240,6 @@ def tasks_json(scene: Scene, tasks: Iterable[Task]) -> str:
         "tasks": [_row(task) for task in tasks],
     }
     return json.dumps(whole, ensure_ascii=False) + "\n"
-
-
-def _block(brick: Brick) -> Document:
-    shape = typed("compas.datastructures/Mesh", mesh_data(*vertices_of(brick)))
-    frame = compas_frame(brick_frame(brick))
-    return {"block": brick.name, "mass": brick.mass, "frame": frame, "shape": shape}
 
 
 def _row(task: Task) -> Document:
@@ -332,7 +329,10 @@ def _in_posture(task: Task, brick: Brick, table: PostureTable, row: int) -> Task
     """Return a task with the joints and the frames of a row of the table."""
     axes, block = table.axes[row], brick_frame(brick)
     tool = Frame(brick.node_position(task.node), as_vector(axes[:, 0]), as_vector(axes[:, 1]))
-    out = replace(task, grip_in_block=tool.inside(block), depth=_depth(brick, tool))
+    outward = -tool.axes[2]
+    half = 0.5 * float(np.abs(brick.frame @ outward) @ np.array(brick.dimensions))
+    depth = half - float(np.subtract(tool.point, brick.position) @ outward)
+    out = replace(task, grip_in_block=tool.inside(block), depth=depth)
     if task.grip is None:
         return out
     joints = table.joints[row]
@@ -352,10 +352,3 @@ def _gone(task: Task, tool: Frame, frame: Frame | None) -> Frame | None:
     far = float(np.linalg.norm(way))
     back = way / far if task.action is Action.PLACE else -tool.axes[2]
     return tool.moved(back, far)
-
-
-def _depth(brick: Brick, tool: Frame) -> float:
-    """Return how far a node is behind the face that its tool looks through, m."""
-    out = -tool.axes[2]
-    half = 0.5 * float(np.abs(brick.frame @ out) @ np.array(brick.dimensions))
-    return half - float(np.subtract(tool.point, brick.position) @ out)

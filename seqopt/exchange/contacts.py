@@ -156,7 +156,11 @@ def touching_faces(
 
 def _found(shapes: Sequence[_Shape], gap: float, course: Progress) -> Iterator[_TouchingFace]:
     """Yield the faces over which blocks touch, pair by pair."""
-    facets, done = [_facets(shape) for shape in shapes], 0
+    facets, done = list[_Facets](), 0
+    for shape in shapes:
+        corners = tuple(shape.points[list(face)] for face in shape.faces)
+        normals = units(np.array([normal_of(face) for face in corners]))
+        facets.append(_Facets(corners, normals, np.array([face.mean(axis=0) for face in corners])))
     bounds = [bounds_of(shape.points) for shape in shapes]
     for tries, (i, j) in enumerate(near_pairs(bounds, gap)):
         course.add(i - done)
@@ -166,12 +170,6 @@ def _found(shapes: Sequence[_Shape], gap: float, course: Progress) -> Iterator[_
         for polygons, (origin, axes) in _overlaps(facets[i], facets[j], gap):
             for piece in _convex_pieces(polygons):
                 yield _TouchingFace((i, j), origin + piece @ axes[1:], axes[0])
-
-
-def _facets(shape: _Shape) -> _Facets:
-    corners = tuple(shape.points[list(face)] for face in shape.faces)
-    normals = units(np.array([normal_of(face) for face in corners]))
-    return _Facets(corners, normals, np.array([face.mean(axis=0) for face in corners]))
 
 
 def _overlaps(first: _Facets, second: _Facets, gap: float) -> Iterator[tuple[list[Any], Any]]:
@@ -185,19 +183,21 @@ def _overlaps(first: _Facets, second: _Facets, gap: float) -> Iterator[tuple[lis
         normal = first.normal[k] - second.normal[m]
         normal /= np.linalg.norm(normal)
         middle = 0.5 * (first.middle[k] + second.middle[m])
-        same = next((plane for plane in planes if _in_plane(plane, normal, middle, gap)), None)
+        same = next(
+            (
+                plane
+                for plane in planes
+                if normal @ plane[1][0] > _LEVEL
+                and abs((middle - plane[0]) @ plane[1][0]) <= 0.5 * gap
+            ),
+            None,
+        )
         origin, axes, known = (middle, plane_axes(normal), []) if same is None else same
         known += _overlap(first.corners[k], second.corners[m], (origin, axes), gap)
         if same is None and known:
             planes.append((origin, axes, known))
     for origin, axes, polygons in planes:
         yield polygons, (origin, axes)
-
-
-def _in_plane(plane: _Plane, normal: Floats, middle: Floats, gap: float) -> bool:
-    """Return whether a face lies in a plane, no farther off than half a gap."""
-    origin, axes, _ = plane
-    return bool(normal @ axes[0] > _LEVEL and abs((middle - origin) @ axes[0]) <= 0.5 * gap)
 
 
 def _overlap(first: Floats, second: Floats, plane: tuple[Floats, Floats], gap: float) -> list[Any]:

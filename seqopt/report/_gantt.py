@@ -54,7 +54,9 @@ def gantt_picture(
     first, last = numbers = _numbers(steps, shown)
     begins = steps[0].number
     times = None if clock is None else step_times(scene, steps, *clock)
-    ends = np.arange(len(steps) + 1) + begins - 0.5  # before and after every step
+    ends: Floats = np.asarray(
+        np.arange(len(steps) + 1) + begins - 0.5
+    )  # before and after every step
     if times is not None:
         ends = np.array([0.0, *(time.end for time in times)])
 

@@ -423,14 +423,20 @@ def _data(
 
 def _tasks(engine: Engine, build: Build) -> dict[str, str]:
     """Return what robots do in a build as CSV and JSON, compressed: to copy and to keep."""
-    texts, scene = build.tasks, engine.network.scene
-    if not texts:
-        try:
-            tasks = [*_known_tasks(scene, build.steps)]
-        except (ExtraError, SceneError):  # nothing computes postures: grips are proposals
-            tasks = [*plan_tasks(scene, build.steps)]
-        texts = {"csv": tasks_csv(tasks), "json": tasks_json(scene, tasks)}
+    texts = build.tasks or task_texts(engine.network.scene, build.steps)
     return {kind: _compressed(text.encode()) for kind, text in texts.items()}
+
+
+def task_texts(scene: Scene, steps: Sequence[Step]) -> dict[str, str]:
+    """Return what robots do in a build as CSV and JSON.
+
+    Arms are in their postures; where nothing computes these, grips are proposals.
+    """
+    try:
+        tasks = [*_known_tasks(scene, steps)]
+    except (ExtraError, SceneError):
+        tasks = [*plan_tasks(scene, steps)]
+    return {"csv": tasks_csv(tasks), "json": tasks_json(scene, tasks)}
 
 
 def _part(caption: str, part: pd.DataFrame | _Drawn) -> str:

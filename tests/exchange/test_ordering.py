@@ -7,7 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt.errors import SceneError
-from seqopt.exchange._building import upward_order
+from seqopt.exchange._content import Given
+from seqopt.exchange.imports import import_scene
+from seqopt.scene.library.common import touching_order
+from tests.blocks import box
+from tests.documents import obj
 
 
 @given(
@@ -17,21 +21,18 @@ from seqopt.exchange._building import upward_order
 )
 def test_each_touches_what_stands(count, links, rank):
     pairs = [(a, b) for a, b in links if a < count and b < count and a != b]
-    keys = [str(i) for i in range(count)]
-    try:
-        order = upward_order([(float(r),) for r in rank[:count]], pairs, [0], keys)
-    except SceneError:
-        reached, before = {0}, set()
-        while reached != before:
-            before = set(reached)
-            reached |= {b for pair in pairs for a, b in (pair, pair[::-1]) if a in reached}
-        assert len(reached) < count
-        return
-    assert sorted(order) == list(range(count))
+    order = touching_order(rank[:count], pairs, [0])
+    reached, before = {0}, set()
+    while reached != before:
+        before = set(reached)
+        reached |= {b for pair in pairs for a, b in (pair, pair[::-1]) if a in reached}
+    assert sorted(order) == sorted(reached)
     for k, i in enumerate(order):
         assert i == 0 or any({i, j} in ({a, b} for a, b in pairs) for j in order[:k])
 
 
-def test_those_left_over_are_named():
-    with pytest.raises(SceneError, match=r"1 blocks touch nothing .* c"):
-        upward_order([(0.0,)] * 3, [(0, 1)], [0], ["a", "b", "c"])
+def test_those_left_over_are_named(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text(obj(*(box((1, 1, 1), at=(0, 0, z)) for z in (0, 1, 5))), encoding="utf-8")
+    with pytest.raises(SceneError, match=r"1 blocks touch nothing .* block_2; name supports"):
+        import_scene(path, given=Given(unit="m", density=1.0))

@@ -48,7 +48,7 @@ from seqopt.problem.problem import Problem, judged_by
 from seqopt.problem.requirements import _said_limits
 from seqopt.report._pages import front_page, plan_page
 from seqopt.report.comparison import _worst_of, fixed_methods, shown_table
-from seqopt.report.page import _task_texts
+from seqopt.report.page import task_texts
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import Departure, LinearRange, _analyze_builds, builds_in_words
 from seqopt.scene.scene_file import dump_scene
@@ -267,7 +267,7 @@ def _write_picked(
     result = f"one of {len(found.front.steps)} plans"
     plan = _Picked(own, found.front.steps[chosen], f"plan with the least {name}", result=result)
     report = {"scene": own.network.scene.name, "picked": picked, **provenance(own)}
-    table, tasks = plan.responses(), _task_texts(own.network.scene, plan.steps)
+    table, tasks = plan.responses(), task_texts(own.network.scene, plan.steps)
     files = {
         **_bare_files(plan, table, report),
         **{f"tasks.{kind}": text for kind, text in tasks.items()},
