@@ -26,7 +26,7 @@ OFFERS = {
     "find_postures": "seqopt.arms.reach",
     "hold_alike": "seqopt.arms._held",
     "permits": "seqopt.arms._permits",
-    "plan_postures": "seqopt.arms._plan_postures",
+    "with_postures": "seqopt.arms._kept",
     "makespan": "seqopt.times._twin",
     "mortar_waits": "seqopt.times._curing",
     "reassign": "seqopt.times._tables",

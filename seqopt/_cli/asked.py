@@ -10,7 +10,7 @@ from seqopt._cli.given import given_scene
 from seqopt._cli.options import Asked, Built, Computed, Judged, Posed, Stands, Strict, Timed
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_props
-from seqopt.arms._plan_postures import arm_faults
+from seqopt.arms._kept import arm_faults
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import Mortar, _mortar_name
 from seqopt.engines._kinds import ChoosingEngine, Level

@@ -16,7 +16,6 @@ import numpy as np
 
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Ints
-from seqopt.plan._status import faults_in_words
 from seqopt.scene._armed import PlanPostures, Unreached
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
@@ -33,12 +32,6 @@ def plan_postures(scene: Scene, steps: Sequence[Step]) -> PlanPostures | None:
     """Return the postures of a plan, or the steps that have none; None if no robot has an arm."""
     table = find_postures(scene)
     return None if table is None else _Search(scene, table, steps).found()
-
-
-def arm_faults(scene: Scene, steps: Sequence[Step]) -> tuple[str, ...]:
-    """Return why arms cannot be in steps of a build, a line for each reason; none without arms."""
-    found = plan_postures(scene, steps)
-    return () if found is None else faults_in_words(found)
 
 
 class _Search:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from seqopt.arrays import Terse
 from seqopt.graph.formulation import End
 from seqopt.judge.certificate import TOLERANCE, _known_gap
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import _steps_in_words, length_text
-from seqopt.scene._armed import PlanPostures
+from seqopt.responses.quantities import length_text
 
 if TYPE_CHECKING:
     from seqopt.graph.orders import AllOrders, OrderSelection
@@ -105,55 +102,3 @@ class FoundOrder:
         if is_tolerance(goal.response):  # of which more is better
             return f"no order above {length_text(goal.shown(self.selection.bound))}{claimed}"
         return f"no order below {self.selection.bound:.6g}{claimed}"
-
-
-def faults_in_words(found: PlanPostures) -> tuple[str, ...]:
-    """Return why arms cannot be in steps, each reason with its steps."""
-    steps = defaultdict[str, list[int]](list)
-    for each in found.unreached:
-        steps[each.why].append(each.step)
-    return tuple(f"{why} ({_steps_in_words(numbers)})" for why, numbers in steps.items())
-
-
-@dataclass(frozen=True, repr=False)
-class KeptPostures(Terse):
-    """The postures of a plan, and what is known of plans with others.
-
-    ``asked``, ``most``: how many postures at each node were looked at, and with how many the plan
-    was made. ``floor``: lower bounds with any posture looked at, by goal, in display units; empty
-    without proof. ``bounds``: the same in SI units. ``best``: whether it is proven optimal.
-    """
-
-    postures: PlanPostures
-    asked: int
-    most: int
-    floor: dict[str, float]
-    bounds: tuple[float, ...]
-    best: bool
-
-    def described(self) -> dict[str, object]:
-        """Return what the summary of a plan says of arms, ready for JSON."""
-        found = {
-            "said": str(self),
-            "cannot": [*faults_in_words(self.postures)],
-            "postures_at_a_node": self.most,
-            "of": self.asked,
-            "bound": self.floor,
-            "best_of_table": self.best,
-        }
-        return {"arms": found}
-
-    def __str__(self) -> str:
-        faults = faults_in_words(self.postures)
-        if faults:
-            return "; ".join(faults)
-        kept = "all postures are kept while robots hold"
-        if self.best:
-            return f"{kept}; no plan is better with {_up_to(self.asked)} at a node"
-        at = f"{kept}; made with {_up_to(self.most)} at a node"
-        floor = ", ".join(f"{name} {value:.6g}" for name, value in self.floor.items())
-        return f"{at}, with {_up_to(self.asked)} no plan is below {floor}" if floor else at
-
-
-def _up_to(count: int) -> str:
-    return f"up to {count} postures" if count > 1 else "one posture"

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf, isfinite, nan
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -21,7 +21,7 @@ from seqopt.graph.layers.layers import Layers
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
-from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status, bare_summary
+from seqopt.plan._status import ENDS, FoundOrder, Status, bare_summary
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.problem import Problem, judged_by
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
@@ -79,7 +79,7 @@ class Plan(ShownBuild):
         How many models a lazy search solved; None if all were solved.
     order : FoundOrder or None
         The build order, where it was sought.
-    arms : KeptPostures or None
+    arms : seqopt.arms._kept.KeptPostures or None
         The postures of arms; None where no robot has one, or a graph was solved.
     moved : Moved or None
         How far steps move nodes over the limit of the linear range, in the worst scenario; None
@@ -107,7 +107,7 @@ class Plan(ShownBuild):
     search: WindowSearch | None = None
     looked_at: int | None = None
     order: FoundOrder | None = None
-    arms: KeptPostures | None = None
+    arms: Any = None
     moved: Moved | None = None
     beyond: str = ""
 
@@ -196,10 +196,10 @@ class Plan(ShownBuild):
         """The value of every goal by its name; of a tilt, what is survived, in degrees."""
         claimed, proof = self.selection.objective, self.certificate
         if proof is not None and not isinstance(self.graph, States):
-            return self._by_goal(proof.values)
-        return self._by_goal(claimed) if isfinite(claimed[0]) else {}
+            return self.in_display_units(proof.values)
+        return self.in_display_units(claimed) if isfinite(claimed[0]) else {}
 
-    def _by_goal(self, values: Sequence[float]) -> dict[str, float]:
+    def in_display_units(self, values: Sequence[float]) -> dict[str, float]:
         """Return values of the first goals by their names, as people read them."""
         if not isinstance(self.graph, States):
             return dict(zip(self.goals, values, strict=True))
@@ -533,7 +533,7 @@ def _bounds(plan: Plan) -> dict[str, float | None]:
         bounds = tuple(map(max, chosen.bound, bounds))
     if isinstance(plan.graph, States):
         bounds = bounds[: len(plan.states.aims)]
-    found = plan._by_goal(bounds) if bounds else {}
+    found = plan.in_display_units(bounds) if bounds else {}
     return {name: bound if isfinite(bound) else None for name, bound in found.items()}
 
 

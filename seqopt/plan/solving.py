@@ -1,10 +1,4 @@
-"""Solve a problem by any formulation; the answer is checked and becomes a plan.
-
-A graph of choices asks of every state whether there are postures of arms that go together, and does
-not remember them. So those of its plan are searched afterwards: if there are some that are kept
-while robots hold, no plan is better. If not, plans are made with fewer postures at each node, down
-to one, with which every plan keeps them.
-"""
+"""Solve a problem by any formulation; the answer is checked and becomes a plan."""
 
 from __future__ import annotations
 
@@ -16,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import engine_for, recipe_of, simplest
-from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
+from seqopt.engines.registry import simplest
+from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, Run, as_formulation
 from seqopt.graph.layers.layers import Layers, candidate_layers, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._range import best_within
-from seqopt.plan._status import KeptPostures
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import (
     WORST_PEAK,
@@ -39,7 +32,7 @@ from seqopt.problem.problem import (
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
-from seqopt.scene._armed import PlanPostures, plan_postures
+from seqopt.scene.arm import from_arms
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
@@ -50,71 +43,6 @@ if TYPE_CHECKING:
     from seqopt.graph.orders import AllOrders
 
     Graph = Layers | States | AllOrders
-
-_FEWER = (4, 2, 1)  # postures at each node, where plans with more of them do not keep theirs
-_SAME = 1e-9  # over the size of a value
-
-
-def _with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Plan]) -> Plan:
-    """Return a plan with its postures, or one that keeps them, where robots have arms."""
-    scene = problem.scene
-    if not scene.has_arms:
-        return plan
-    first = _found(plan)
-    most = max(robot.arm.choices for robot in scene.robots if robot.arm is not None)
-    floor, bounds = dict[str, float](), tuple[float, ...]()  # for display, and in SI units
-    if plan.certificate is not None and plan.gap is not None:
-        bounds = plan.certificate.bounds
-        floor = plan._by_goal(bounds[: len(plan.goals)])
-    if not first.unreached or recipe_of(problem.engine) is None:
-        proven = bool(floor) and not first.unreached
-        return replace(plan, arms=KeptPostures(first, most, most, floor, bounds, proven))
-    for fewer in (count for count in _FEWER if count < most):
-        try:
-            other = solved(_narrowed(problem, plan, fewer))
-        except (ProblemError, NothingFoundError):
-            continue
-        except TimeUpError:
-            break
-        found = _found(other)
-        if not found.unreached:
-            pairs = [(v, floor[name]) for name, v in other.objective.items() if name in floor]
-            none_below = all(v <= low + _SAME * max(abs(v), abs(low)) for v, low in pairs)
-            best = bool(floor) and none_below
-            return replace(other, arms=KeptPostures(found, most, fewer, floor, bounds, best))
-    return replace(plan, arms=KeptPostures(first, most, most, floor, bounds, best=False))
-
-
-def _found(plan: Plan) -> PlanPostures:
-    found = plan_postures(plan.engine.network.scene, plan.steps)
-    assert found is not None
-    return found
-
-
-def _narrowed(problem: Problem, plan: Plan, postures: int) -> Problem:
-    """Return a problem with fewer postures at each node, and the criterion of its plan."""
-
-    def fewer(scene: Scene) -> Scene:
-        arms = [
-            arm and replace(arm, postures=min(postures, arm.postures))
-            for arm in (robot.arm for robot in scene.robots)
-        ]
-        pairs = zip(scene.robots, arms, strict=True)
-        return scene.with_robots(*(replace(robot, arm=arm) for robot, arm in pairs))
-
-    return _moved(problem, fewer(problem.scene), plan, [fewer(each) for each in problem.scenarios])
-
-
-def _moved(
-    problem: Problem, scene: Scene, plan: Plan | None = None, scenarios: Sequence[Scene] = ()
-) -> Problem:
-    """Return a problem with other robots, and the criterion of a plan, scales included."""
-    engine, moves = engine_for(problem.engine, scene), problem.moves.in_scene(scene)
-    criterion = problem.criterion if plan is None else plan._of_scene.criterion
-    return replace(
-        problem, engine=engine, moves=moves, criterion=criterion, scenarios=tuple(scenarios)
-    )
-
 
 AIMS = {Aim.SUM: Goal(Measure.SUM), Aim.PEAK: Goal(Measure.PEAK)}
 CANDIDATES, STATES, ORDERS = "candidates", "states", "orders"  # graphs of a problem
@@ -423,7 +351,8 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
                 graph = graph_of(one, kind)
             return _solver(kind)(graph, found, how)
 
-        return _with_postures(asked, solved(asked), solved)
+        plan = solved(asked)
+        return from_arms("with_postures")(asked, plan, solved) if asked.scene.has_arms else plan
 
     return replace(best_within(problem, best, run.clock), problem=problem)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from seqopt._showing import Page, display
-from seqopt.arms._plan_postures import arm_faults
+from seqopt.arms._kept import arm_faults
 from seqopt.engines.interface import Engine
 from seqopt.errors import ExtraError, FileError, ProblemError, SeqoptError
 from seqopt.plan.build import ShownBuild

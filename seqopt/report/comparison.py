@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text
-from seqopt.arms._plan_postures import arm_faults
+from seqopt.arms._kept import arm_faults
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest

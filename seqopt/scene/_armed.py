@@ -103,14 +103,6 @@ def hold_alike(nominal: Scene, scene: Scene) -> Scene:
     return alike
 
 
-def plan_postures(scene: Scene, steps: Sequence[object]) -> PlanPostures | None:
-    """Return the postures of a plan, or the steps that have none; None if no robot has an arm."""
-    found: PlanPostures | None = (
-        from_arms("plan_postures")(scene, steps) if scene.has_arms else None
-    )
-    return found
-
-
 class _NoRules:
     """Which states arms can be in, by a second way for the judge: all, of robots without any."""
 

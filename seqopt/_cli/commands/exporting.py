@@ -12,7 +12,7 @@ from seqopt._cli.asked import posture_trouble, scene_facts
 from seqopt._cli.given import plan_folder
 from seqopt._cli.options import word
 from seqopt._files import require_apart, write_text
-from seqopt.arms._plan_postures import arm_faults
+from seqopt.arms._kept import arm_faults
 from seqopt.exchange._tasks import Postures
 from seqopt.exchange.exports import EXPORTS, LOST, TASKS, export_plan, read_folder
 from seqopt.problem._limit_words import number_word

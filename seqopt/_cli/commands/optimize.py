@@ -47,7 +47,6 @@ from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._range import at_sufficient_level
 from seqopt.plan._softer import _payload_advice
-from seqopt.plan._status import faults_in_words
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _solve_run, usual
 from seqopt.problem.problem import Problem
@@ -375,7 +374,7 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
         failures=(ended,) if early or clock.interrupted else (),
         status=Status.INTERRUPTED if clock.interrupted else Status.DONE,
     )
-    unreached = () if plan.arms is None else faults_in_words(plan.arms.postures)
+    unreached = () if plan.arms is None else plan.arms.faults
     left = plan.departures if found.analyzed else ()
     answer = strictly(answer, asked, over, left, found.verdicts, unreached)
     far = plan.is_far and not found.posed.problem.lifts_range
