@@ -5,22 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from seqopt.arrays import FrozenValue
-from seqopt.errors import FileError, SolverError
-from seqopt.graph.layers.costs import TINY
+from seqopt.errors import FileError
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.solution import StatePath
 from seqopt.network.network import Network
 from seqopt.responses._blocks import packed, remade
 from seqopt.responses._choices import Evaluation
 from seqopt.responses.quantities import CHOSEN_BY
-
-if TYPE_CHECKING:
-    from seqopt.graph.layers._partial_costs import PartialCosts
 
 SAME = 1e-5  # over its largest, that a response may differ: ten times what a screen may err
 
@@ -137,28 +131,3 @@ class Certificate(FrozenValue):
     def bound(self) -> float:
         """Lower bound of the first goal."""
         return self.bounds[0]
-
-
-def certify_partial(costs: PartialCosts, selection: StatePath, objective: float) -> Certificate:
-    """Check a selection of which not all pairs are known, from those that are.
-
-    ``costs``: what was looked at; ``selection``: what is claimed; ``objective``: the costs of the
-    steps that the selection meets, solved again. Raises `SolverError` if the selection is not worth
-    what was claimed, or its bound is not that of the pairs.
-    """
-    from seqopt.graph.layers._partial_costs import least_possible  # noqa: PLC0415  # few are lazy
-
-    scale = max(abs(objective), TINY)
-    (claimed,), (promised,) = selection.objective, selection.bound
-    if not abs(objective - claimed) <= TOLERANCE * scale:  # NaN never is
-        raise SolverError(f"the objective is {objective:.9g}, not {claimed:.9g} as claimed")
-    bound = least_possible(costs)
-    if not promised <= bound + TOLERANCE * scale:
-        raise SolverError(f"the claimed bound {promised:.9g} exceeds {bound:.9g}")
-    bound = min(bound, objective)
-    gap = (objective - bound) / scale
-    if not selection.stopped and gap > TOLERANCE:
-        raise SolverError(
-            f"the value of the choice is {objective:.9g}, and no more than {bound:.9g} is proven"
-        )
-    return Certificate((objective,), (bound,), gap, gap)

@@ -23,9 +23,9 @@ from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import Layers, steps_over, travel
 from seqopt.graph.solution import StatePath
 from seqopt.judge._step_checks import check_shape
-from seqopt.judge.certificate import _require_anew, certify_partial
+from seqopt.judge.certificate import _require_anew
 from seqopt.plan._guard import require_fit, require_proof, require_time
-from seqopt.plan._paths import find_path
+from seqopt.plan._paths import find_path, judged
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Aim, AskedBudget
 from seqopt.problem.requirements import LINEAR_RANGE
@@ -154,17 +154,17 @@ def _solve_lazily(graph: Layers, formulation: Formulation, run: Run) -> Plan:
         raise ProblemError("the costs of all choices are needed; leave out lazy")
     if run.options:
         raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
-    from seqopt.plan.search._window_search import search_pairs  # noqa: PLC0415  # few ask for it
+    from seqopt.plan.search._pair_search import search_pairs  # noqa: PLC0415  # few ask for it
 
     seconds: dict[str, float] = {}
     with timed(seconds, "search"):
         found = search_pairs(graph, formulation, Watch(run.left, run.progress))
-    chosen, along = found.selection, found.along
+    along, choice = found.along, found.along.choice
     with timed(seconds, "verify"):
-        certificate = certify_partial(found.costs, chosen, found.objective)
-        steps = _checked(graph.steps(found.choice), graph)
-        _require_anew(graph, found.choice, along.met)
-    chosen = replace(chosen, states=graph.rows(found.choice))
+        certificate = judged(found.instance, formulation, found.selection)
+        steps = _checked(graph.steps(choice), graph)
+        _require_anew(graph, choice, along.met)
+    chosen = replace(found.selection, states=graph.rows(choice))
     return Plan(graph, graph, formulation, chosen, certificate, steps, seconds, along, found.models)
 
 

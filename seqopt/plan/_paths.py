@@ -55,8 +55,8 @@ def find_path(
     certificate = None
     with timed(seconds, "verify"):
         if run.proof:
-            judged = partial(_path_judged, instance, formulation, selection)
-            certificate = run.clock.spare(PROOF, judged, None)
+            proof = partial(judged, instance, formulation, selection)
+            certificate = run.clock.spare(PROOF, proof, None)
             if certificate is None:
                 selection = replace(selection, stopped=run.clock.left_out[PROOF])
     if offset:
@@ -125,7 +125,7 @@ def _raised(
     return selection, replace(certificate, values=proven[0], bounds=proven[1])
 
 
-def _path_judged(instance: Instance, formulation: Formulation, found: StatePath) -> Certificate:
+def judged(instance: Instance, formulation: Formulation, found: StatePath) -> Certificate:
     """Return the certificate of a path, by what the formulation says proves its bounds."""
     nodes = [state[0] for state in found.states]
     answer = Answer("nodes", np.array(nodes), found.objective, tuple(_claims(instance, found)))

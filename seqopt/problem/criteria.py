@@ -183,6 +183,11 @@ class RankSum(Terse):
             "ranked": self.ranked.value,
         }
 
+    @property
+    def least(self) -> float | None:
+        """What a step costs at least; None where that depends on all pairs."""
+        return 1.0 if self.ranked is Ranked.CONDITIONAL else None
+
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs with so many bricks."""
         return tuple(name for name, _ in self._terms(bricks))
@@ -223,6 +228,7 @@ class WeightedSum(Terse):
 
     name: str
     terms: tuple[tuple[str, float, float | None], ...]  # response, weight, scale (N, N m or m)
+    least = 0.0  # that a step costs
 
     @property
     def settings(self) -> Mapping[str, object]:
@@ -258,6 +264,7 @@ class WorstRatio(Terse):
 
     name: str
     limits: tuple[tuple[str, float | None], ...]  # N, N m or m
+    least = 0.0  # that a step costs
 
     @property
     def settings(self) -> Mapping[str, object]:

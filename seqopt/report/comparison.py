@@ -320,7 +320,7 @@ def _facts(
     if PUBLISHED in rows and not robots:
         choice = published_choice(problem)
         value = problem.sums.cost(choice)
-        gap = (value - problem.sums.least_sum()) / max(abs(value), TINY)
+        gap = (value - problem.sums.least(Aim.SUM)) / max(abs(value), TINY)
         rows[PUBLISHED] |= {"problem": method, "objective": value, "gap": gap}
     counted = paper_models(problem.schedule) if method == "three-robot" else None
     return LoopFacts(method, problem.seconds(Aim.SUM), counted)

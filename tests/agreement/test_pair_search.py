@@ -14,13 +14,15 @@ from hypothesis import strategies as st
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.formulation import End
-from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
+from seqopt.graph.formulation import End, find_formulation
+from seqopt.graph.layers.compiled import compile_costs
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.solution import StatePath
-from seqopt.judge.certificate import certify_partial
+from seqopt.judge.certificate import TOLERANCE
 from seqopt.network.build import build_network
+from seqopt.plan._paths import judged
+from seqopt.plan.search._pair_search import KnownCosts
 from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import Ranked, StepCost
@@ -151,52 +153,61 @@ def test_bound_and_choice_meet_from_both_sides(engine25):
 def test_what_some_pairs_prove(problem, data, aim):
     """Whatever pairs are known, bound and best enclose the optimum; with all they meet."""
     sums = problem.sums
-    lift = -min(
-        0.0, *(float(a[np.isfinite(a)].min(initial=0.0)) for a in (*sums.single, *sums.shared))
-    )
-    costs = LayeredCosts(
-        tuple(single + lift for single in sums.single),
-        (np.zeros((1, sums.sizes[0])), *(shared + lift for shared in sums.shared[1:])),
-    )
-    whole = [dict(enumerate(shared)) if k else {} for k, shared in enumerate(costs.shared)]
-    seen = [
-        {
-            before: np.where(
-                data.draw(st.lists(st.booleans(), min_size=len(r), max_size=len(r))), r, np.nan
-            )
-            for before, r in rows.items()
-            if data.draw(st.booleans())
-        }
-        for rows in whole
-    ]
-    everything = PartialCosts(costs.single, tuple(whole), 0.0, aim)
-    best = everything.best
+    finite = [array[np.isfinite(array)].min(initial=0.0) for array in (*sums.single, *sums.shared)]
+    lift = -min(finite)
+    single = tuple(own + lift for own in sums.single)
+    first = np.zeros((1, sums.sizes[0]))
+    costs = LayeredCosts(single, (first, *(shared + lift for shared in sums.shared[1:])))
+    best = costs.least(aim)
+    seen = [np.ones(first.shape, dtype=bool)]
+    for shared in costs.shared[1:]:
+        drawn = data.draw(st.lists(st.booleans(), min_size=shared.size, max_size=shared.size))
+        seen.append(np.array(drawn, dtype=bool).reshape(shared.shape))
+    floors = tuple(np.where(at, own, 0.0) for at, own in zip(seen, costs.shared, strict=True))
+    part = KnownCosts(replace(costs, shared=floors), tuple(seen), aim)
     close = {"rel": 1e-9, "abs": 1e-9}
-    assert everything.bound == pytest.approx(best, **close)
-    part = PartialCosts(costs.single, tuple(seen), 0.0, aim)
     assert part.bound <= best + 1e-9 * abs(best) or np.isinf(best)
     assert part.best >= best - 1e-9 * abs(best) or np.isinf(part.best)
-    assert least_possible(part) == pytest.approx(part.bound, **close)
+    for through, known in zip(part.through, seen, strict=True):
+        assert np.isinf(through[known]).all()
+        assert (through >= part.bound * (1 - 1e-9)).all()
+    rows = [
+        (k, before, np.arange(len(row)), row)
+        for k, shared in enumerate(costs.shared)
+        for before, row in enumerate(shared)
+    ]
+    everything = part.learned(rows)
+    assert everything.bound == pytest.approx(best, **close)
+    assert everything.best == pytest.approx(best, **close)
+    assert everything.proven == np.isfinite(best)
     if np.isfinite(best):
         plan = answer(Costs(costs), "overlap_dp" if aim is Aim.SUM else "minimax")
         assert plan.certificate.objective == pytest.approx(best, **close)
 
 
-def test_a_claim_that_is_not_proven_is_refused(engine25):
-    row = np.array([3.0, np.nan])
-    part = PartialCosts((np.zeros(2), np.ones(2)), ({}, {0: row}), 1.0, Aim.SUM)
-    assert (part.bound, part.best) == (2.0, 4.0)
-    good = StatePath(((1, 0), (2, 0)), (4.0,), (2.0,), stopped="time")
-    assert certify_partial(part, good, 4.0).gap == 0.5
+@pytest.mark.parametrize(("aim", "best", "bound"), [(Aim.SUM, 6.0, 4.0), (Aim.PEAK, 3.0, 2.0)])
+def test_the_judge_holds_a_plan_against_the_graph_with_floors(aim, best, bound):
+    """The first move costs 2, the second 1 or 1.5, a pair that is known 3, others at least 1."""
+    single = np.full(2, 2.0), np.array([1.0, 1.5])
+    shared = np.zeros((1, 2)), np.array([[3.0, 1.0], [1.0, 1.0]])
+    seen = np.ones((1, 2), dtype=bool), np.array([[True, False], [False, False]])
+    part = KnownCosts(LayeredCosts(single, shared), seen, aim)
+    assert (part.best, part.bound) == (best, bound)
+    compiled = compile_costs("floors", part.floors, aim)
+    nodes = tuple((node,) for node in compiled.nodes((0, 0)))
+    good = StatePath(nodes, (best,), (bound,), stopped="time")
+    exact = find_formulation("overlap_dp" if aim is Aim.SUM else "minimax")
+    proof = judged(compiled.instance, exact, good)
+    assert (proof.bound, proof.gap) == (bound, (best - bound) / best)
+    judged(compiled.instance, exact, replace(good, bound=(bound + 0.9 * TOLERANCE * best,)))
     for wrong in (
-        replace(good, bound=(3.0,)),
-        replace(good, objective=(3.0,)),
+        *(replace(good, bound=(bound + more,)) for more in (1.1 * TOLERANCE * best, 0.1, np.inf)),
+        replace(good, objective=(best - 1,)),
         replace(good, objective=(np.nan,)),
         replace(good, stopped=""),
-        replace(good, bound=(np.nan,)),
     ):
         with pytest.raises(SolverError):
-            certify_partial(part, wrong, 4.0)
+            judged(compiled.instance, exact, wrong)
 
 
 def test_a_criterion_that_lies_about_its_least_cost_is_refused(engine25):

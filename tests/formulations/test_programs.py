@@ -34,7 +34,7 @@ def conditional(costs, move, before):
 def ranked(problem):
     """The problem as one of ranks, or None if no choice is allowed."""
     costs = problem.sums
-    if np.isinf(costs.least_sum()):
+    if np.isinf(costs.least(Aim.SUM)):
         return None
     rows = [
         np.array([conditional(costs, k, i) for i in range(len(shared))])

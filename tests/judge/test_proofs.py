@@ -11,13 +11,10 @@ import pytest
 
 import seqopt
 from seqopt.engines.interface import Want
-from seqopt.errors import SolverError
 from seqopt.graph import Explorer
-from seqopt.graph.layers._partial_costs import PartialCosts
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.orders import AllOrders, OrderStates, whole_bound
 from seqopt.graph.paths import keep_best, least_peak
-from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import explore, floors_of_goals
 from seqopt.graph.states.states import build_states
 from seqopt.judge import _budget_proof as budget_proof
@@ -25,10 +22,8 @@ from seqopt.judge._budget_proof import case_of, least_within
 from seqopt.judge._orders import finds_better_order
 from seqopt.judge._proof import Proof
 from seqopt.judge._states import StateEvaluator
-from seqopt.judge.certificate import TOLERANCE, certify_partial
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence.rules import Ending, FreeRules, with_robots
@@ -152,24 +147,6 @@ def test_what_is_set_aside_counts_and_prices_are_not_negative(monkeypatch, most,
             assert bound <= found[0] + 1e-6
             proven += bound > found[0] - 0.5
     assert proven
-
-
-ROW = np.array([3.0, np.nan])
-
-
-@pytest.mark.parametrize(("aim", "best", "bound"), [(Aim.SUM, 6.0, 4.0), (Aim.PEAK, 3.0, 2.0)])
-def test_what_some_pairs_prove_is_all_that_may_be_claimed(aim, best, bound):
-    """The first move costs 2, the second 1 or 1.5, a pair that is known 3, others at least 1."""
-    part = PartialCosts((np.full(2, 2.0), np.array([1.0, 1.5])), ({}, {0: ROW, 1: ROW}), 1.0, aim)
-    part = part if aim is Aim.PEAK else replace(part, rows=({}, {0: ROW}))
-    assert (part.best, part.bound) == (best, bound)
-    claimed = StatePath(((0,), (0,)), (best,), (bound,), stopped="time")
-    proof = certify_partial(part, claimed, best)
-    assert (proof.bound, proof.gap) == (bound, (best - bound) / best)
-    certify_partial(part, replace(claimed, bound=(bound + 0.9 * TOLERANCE * best,)), best)
-    for more in (1.1 * TOLERANCE * best, 0.1 * bound, bound, np.inf):
-        with pytest.raises(SolverError, match="claimed bound"):
-            certify_partial(part, replace(claimed, bound=(bound + more,)), best)
 
 
 def test_what_was_left_out_for_a_threshold_bounds_all_orders():

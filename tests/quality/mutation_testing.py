@@ -68,7 +68,7 @@ PROOFS = {
     "seqopt.judge._rule_moves": ("judge/test_free_proof", "judge/test_proofs"),
     "seqopt.graph.orders": ("formulations/test_order_search",),
     "seqopt.judge._orders": ("judge/test_proofs", "formulations/test_order_search"),
-    "seqopt.graph.layers._partial_costs": ("judge/test_proofs", "agreement/test_pair_search"),
+    "seqopt.plan.search._pair_search": ("agreement/test_pair_search",),
 }  # what says that nothing is better, or that there is nothing
 MODULES = {
     "seqopt.engines.rigid.compliance": (

@@ -104,7 +104,7 @@ def least_quantile(problem: Layers, share: float = 0.1) -> StepQuantile:
     levels = np.unique(np.concatenate([costs[np.isfinite(costs)] for _, costs in steps]))
 
     def kept(level: float) -> bool:
-        return _above(steps, sizes, level).least_sum() <= most
+        return _above(steps, sizes, level).least(Aim.SUM) <= most
 
     level = float(levels[bisect_left(levels, x=True, hi=len(levels) - 1, key=kept)])
     layers = (_above(steps, sizes, level), problem.sums)

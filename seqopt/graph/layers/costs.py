@@ -96,9 +96,16 @@ class LayeredCosts(FrozenValue):
             out.insert(0, join(own, join(pairs, out[0]).min(axis=1)))
         return out
 
-    def least_sum(self) -> float:
-        """Return the least total cost of any choice; infinite if none is allowed."""
-        return float((self.shared[0] + self.to_go(Aim.SUM)[0]).min())
+    def reached(self, aim: Aim) -> list[Floats]:
+        """Return the least cost up to each candidate (C_k,), its own included."""
+        out, join = [aim.join(self.single[0], self.shared[0][0])], aim.join
+        for own, pairs in zip(self.single[1:], self.shared[1:], strict=True):
+            out.append(join(own, join(out[-1][:, None], pairs).min(axis=0)))
+        return out
+
+    def least(self, aim: Aim) -> float:
+        """Return the least total, or largest cost, of any choice; infinite if there is none."""
+        return float(self.reached(aim)[-1].min())
 
 
 def _copied(costs: Floats) -> Floats:

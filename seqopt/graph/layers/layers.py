@@ -48,73 +48,53 @@ from seqopt.work._workers import hire, map_ordered
 from seqopt.work.progress import Progress
 
 
-def window(
-    schedule: Schedule, move: int, nodes: Sequence[int] | Mapping[int, int], *, alone: bool = False
+def windows(
+    schedule: Schedule,
+    asked: Sequence[tuple[int, int]],
+    wanted: Sequence[Ints] | None = None,
+    *,
+    alone: bool = False,
 ) -> Schedule:
-    """Return the steps that a move shares with the one before, as a schedule of that move alone.
+    """Return the steps that moves share with the ones before, as a schedule with a move for each.
 
-    ``schedule``: with all moves open; ``move``: index of a move; ``nodes``: chosen for the moves
-    before; that of the last of them is asked for; ``alone``: whether the steps in which the move
-    alone is open belong to it too. Result: of one move; without steps if it shares none.
+    ``asked`` (sequence of (int, int)): a move, and the candidate of the move before it; ``wanted``
+    (sequence of (c,) int): the candidates of the move that are looked at, by default all;
+    ``alone``: whether the steps in which the move alone is open belong to it too.
     """
+    moves, steps = [], []
+    for n, (k, before) in enumerate(asked):
+        move = schedule.moves[k]
+        some = range(len(move.candidates)) if wanted is None else wanted[n]
+        moves.append(replace(move, candidates=tuple(move.candidates[i] for i in some)))
+        takes: dict[object, int | OpenGrip] = {OpenGrip(k): OpenGrip(n)}
+        if k:
+            takes[OpenGrip(k - 1)] = schedule.moves[k - 1].candidates[before]
+        own = [*schedule.steps_of.get((k - 1, k), ())]
+        own += schedule.steps_of.get((k,), ()) if alone else ()
+        for step in sorted(own, key=lambda step: step.number):
+            grips = tuple(takes.get(grip, grip) for grip in step.grips)
+            steps.append(replace(step, grips=grips))
+    return replace(schedule, steps=tuple(steps), moves=tuple(moves))
 
-    def grip(held: int | OpenGrip | None) -> int | OpenGrip | None:
-        if not isinstance(held, OpenGrip):
-            return held
-        return OpenGrip(0) if held.move == move else nodes[held.move]
 
-    found = schedule.steps_of.get((move - 1, move), ())
-    if alone:
-        found = (*found, *schedule.steps_of.get((move,), ()))
-    steps = [
-        replace(step, grips=tuple(grip(held) for held in step.grips))
-        for step in sorted(found, key=lambda step: step.number)
-    ]
-    return replace(schedule, steps=tuple(steps), moves=(schedule.moves[move],))
-
-
-def _possible_after(schedule: Schedule, move: int, before: int) -> Bools:
-    """Return which candidates (C_k,) of a move are possible after a candidate of the one before.
+def possible_after(schedule: Schedule, move: int) -> Bools:
+    """Return which pairs (C_{k-1}, C_k) of a move and the one before are two nodes.
 
     Responses do not tell where all candidates are impossible: then nothing is known of any.
     """
-    candidates = np.array(schedule.moves[move].candidates)
+    before, now = (np.array(schedule.moves[k].candidates) for k in (move - 1, move))
     if (move - 1, move) not in schedule.steps_of:
-        return np.ones(len(candidates), dtype=bool)
-    return np.asarray(candidates != schedule.moves[move - 1].candidates[before])
+        return np.ones((len(before), len(now)), dtype=bool)
+    return np.asarray(before[:, None] != now)
 
 
 def _window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:
     """Return the steps that a move decides after a candidate of the one before, solved anew."""
     schedule = evaluation.schedule
-    nodes = {move - 1: schedule.moves[move - 1].candidates[before]} if move else {}
-    found = replace(
-        evaluation,
-        schedule=window(schedule, move, nodes, alone=True),
-        resources=evaluation.resources.alone(),
-    )
+    own, alone = windows(schedule, [(move, before)], alone=True), evaluation.resources.alone()
+    found = replace(evaluation, schedule=own, resources=alone).steps
     moves = {step.number: step.moves for step in schedule.steps}
-    return tuple(replace(each, moves=moves[each.step.number]) for each in found.steps)
-
-
-def _pairs_as_moves(
-    schedule: Schedule, asked: Sequence[tuple[int, int]], wanted: Sequence[Ints]
-) -> Schedule:
-    """Return the steps of pairs as a schedule with a move for every row.
-
-    ``asked`` (sequence of (int, int)): a move, and a candidate of the move before it; ``wanted``
-    (sequence of (c,) int): the candidates of the move that are looked at.
-    """
-    moves, steps = [], []
-    for n, ((k, before), some) in enumerate(zip(asked, wanted, strict=True)):
-        move = schedule.moves[k]
-        moves.append(replace(move, candidates=tuple(move.candidates[i] for i in some)))
-        node = schedule.moves[k - 1].candidates[before]
-        takes: dict[object, int | OpenGrip] = {OpenGrip(k): OpenGrip(n), OpenGrip(k - 1): node}
-        for step in schedule.steps_of[k - 1, k]:
-            grips = tuple(takes[g] if isinstance(g, OpenGrip) else g for g in step.grips)
-            steps.append(replace(step, grips=grips))
-    return replace(schedule, steps=tuple(steps), moves=tuple(moves))
+    return tuple(replace(each, moves=moves[each.step.number]) for each in found)
 
 
 @dataclass(frozen=True, repr=False)

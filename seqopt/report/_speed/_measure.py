@@ -78,7 +78,7 @@ class Reference:
             size = float(np.abs(costs.parts(plan.choice)).sum())
             if not np.isfinite(size):
                 return np.inf
-            gap = (costs.cost(plan.choice) - costs.least_sum()) / max(size, TINY)
+            gap = (costs.cost(plan.choice) - costs.least(Aim.SUM)) / max(size, TINY)
             return 0.0 if gap < ROUNDING else gap
         try:
             values = plan_values(states_of(self.problem), plan.steps)
