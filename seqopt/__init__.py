@@ -42,6 +42,7 @@ _HOMES = {
     "study.published": ("CRITERIA",),
     "problem.criteria": ("StepCost",),
     "problem.requirements": ("Limit",),
+    "problem.filters": ("register",),
     "problem.problem": ("Problem",),
     "graph.formulation": ("Formulation", "formulations"),
     "sequence.rules": ("FreeRules",),

@@ -21,6 +21,7 @@ from seqopt.plan.plan import Plan as Plan
 from seqopt.plan.solving import pose as pose
 from seqopt.plan.solving import solve as solve
 from seqopt.problem.criteria import StepCost as StepCost
+from seqopt.problem.filters import register as register
 from seqopt.problem.problem import Problem as Problem
 from seqopt.problem.requirements import Limit as Limit
 from seqopt.responses.table import analyze as analyze

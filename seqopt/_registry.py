@@ -1,12 +1,14 @@
 """What outer rooms offer to the core, which imports none of them: found by name, loaded when asked.
 
 A room that knows another amount, filter or picture adds a line here. What is not offered is missing
-and nothing else breaks: a goal without its `seqopt.judge._twin.Twin` is claimed, not proven.
+and nothing else breaks. Packages of others add amounts and filters by entry points of the group
+``seqopt.parts``, users by `seqopt.register`.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import Any
 
 OFFERS = {
@@ -35,6 +37,9 @@ OFFERS = {
     "times_table": "seqopt.times._tables",
 }
 """By name, the module of an outer room that has it."""
+PARTS = ("makespan",)  # which of these are amounts or filters
+ADDED: dict[str, Any] = {}
+"""Amounts and filters that users registered, by name."""
 
 
 def offered(name: str) -> Any:
@@ -46,3 +51,10 @@ def offered(name: str) -> Any:
         if error.name != ".".join(home.split(".")[:2]):
             raise
         return None
+
+
+def registered(kind: type) -> dict[str, Any]:
+    """Return what rooms, packages and users added of a kind, by name: amounts or filters."""
+    points = entry_points(group="seqopt.parts")
+    every = {name: offered(name) for name in PARTS} | {p.name: p.load() for p in points} | ADDED
+    return {name: part for name, part in every.items() if isinstance(part, kind)}

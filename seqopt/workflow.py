@@ -18,7 +18,9 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import in_layers, pose, solve
+from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.criteria import WORST_OVER_METHODS
+from seqopt.problem.filters import Filter
 from seqopt.problem.problem import WORST_PEAK, Orders, RobustAim
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
@@ -89,7 +91,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     engine: str = DEFAULT,
     *,
     aim: str | None = None,
-    limits: Sequence[Limit | str] | str = (),
+    limits: Sequence[Limit | Filter | str] | str = (),
     budgets: Sequence[str] | str = (),
     stands: Standing | Mortar | str | None = None,
     scenarios: Scenarios | Sequence[Scene] = (),
@@ -119,8 +121,9 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest level (`pose`).
     aim : str, optional
         What is to be small, the most important first: ``"minmax,steps"``.
-    limits : sequence of Limit or str
-        Bounds that no step may exceed: ``"payload"``, ``"F_largest=300"``, ``"linear_range=any"``.
+    limits : sequence of Limit, Filter or str
+        Bounds that no step may exceed: ``"payload"``, ``"F_largest=300"``, ``"linear_range=any"``;
+        and filters, by the names by which they were registered.
     budgets, stands, scenarios, over, also : optional
         As of `seqopt.pose`: ``"travel=3.5m"``, ``"dry"``, `seqopt.scenarios`, ``"cvar=0.9"``.
     order : str or sequence of int, optional
@@ -164,7 +167,9 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     moves = _find_moves(own.network, schedule, robots, candidates, rules)
     shared = Resources(search.workers, search.executor, search.cache)
     options, tell = dict(search.options), progress
-    states = _chooses_states(moves, formulation, others=(aim, stands, sought))
+    asked = parse_limits(limits, own.network.scene)
+    filters = [each for each in asked if isinstance(each, Filter)]
+    states = _chooses_states(moves, formulation, others=(aim, stands, sought, filters))
     if not states:
         shared, tell = replace(shared, max_memory=search.max_memory, progress=progress), None
     elif search.max_memory is not None:
@@ -173,7 +178,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         own,
         moves,
         *_with_defaults(criterion, aim, over, states=states),
-        limits,
+        asked,
         budgets=budgets,
         stands=stands,
         scenarios=scenarios,

@@ -30,7 +30,8 @@ from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore
 from seqopt.graph.states.states import States
 from seqopt.plan.search._margin_search import best_margin, bisected, with_margin
-from seqopt.problem.problem import Goal, Measure, RobustAim
+from seqopt.problem.amounts import STEPS
+from seqopt.problem.problem import RobustAim
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Stage, Tell
 
@@ -51,7 +52,7 @@ def best_order(
     plan; by default, if the first goal is a peak, those below that of the scene's own order.
     """
     try:
-        if problem.states.goals[0].of_margins:
+        if problem.states.goals[0].margins:
             return _order_of_margin(problem, tell)
         if width is not None:
             with suppress(NothingFoundError):
@@ -97,8 +98,8 @@ def _order_of_path(
 
 def _order_of_margin(problem: AllOrders, tell: Watching) -> OrderSelection:
     """Return the order with the best margin of stability, by halving an interval."""
-    name, states = problem.states.goals[0].response, problem.states
-    goals = (Goal(Measure.STEPS), *states.goals[len(states.aims) :])
+    name, states = problem.states.goals[0].name, problem.states
+    goals = (STEPS, *states.goals[len(states.aims) :])
 
     def demanding(value: float) -> tuple[Visited, Best | Within] | None:
         asked = replace(with_margin(states, name, value), goals=goals)
@@ -238,7 +239,7 @@ def _too_little(stop: StopError | KeyboardInterrupt) -> SeqoptError | KeyboardIn
 
 def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
     """Return what is found once margins of stability, which come first, are at their best."""
-    margins = [goal.of_margins for goal in problem.goals]
+    margins = [goal.margins is not None for goal in problem.goals]
     if sorted(margins, reverse=True) != margins:
         named = ", ".join(map(str, problem.goals))
         raise ProblemError(f"aims {named}: name bond, friction and tilt before all others")

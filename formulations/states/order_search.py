@@ -121,7 +121,7 @@ def solve(
         raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")
     search = _Search(problem, Watch(seconds), resources)
     states = problem.states
-    if states.totals or states.budgets or states.goals[0].of_margins:
+    if states.totals or states.budgets or states.goals[0].margins:
         tell = watched(states, search.watch, np.inf, resources.progress or (lambda _: None))
         return best_order(problem, shortest, search.watch, tell)
     try:

@@ -72,7 +72,6 @@ from seqopt.graph.paths import distances, strictly_below, tied
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates, floors_of_goals
 from seqopt.graph.states.states import States
-from seqopt.problem.problem import Measure
 from seqopt.work.progress import Tell
 
 MANY = 500_000  # grip sets, about: to look at all takes longer than a second narrow search
@@ -129,7 +128,7 @@ class _Search:
 
     def __init__(self, problem: States, options: _Options, tell: Watching = lambda _: None) -> None:
         self._problem, self._options, self._tell = problem, options, tell
-        self._peak = problem.goals[0].measure is Measure.PEAK
+        self._peak = problem.goals[0].is_peak
         self._cuts = self._peak and not problem.budgets
         self._wide = Explorer(FreeStates(problem), tell=tell)
         self.incumbent: StatePath | None = None
@@ -253,7 +252,7 @@ def _in_all(problem: States, one: StatePath | None, most: tuple[float, ...]) -> 
     if one is None:
         return None
     pairs = zip(problem.goals, worst.tolist(), one.objective, strict=False)
-    objective = tuple(w if goal.measure is Measure.PEAK else value for goal, w, value in pairs)
+    objective = tuple(w if goal.is_peak else value for goal, w, value in pairs)
     inside = all(map(le, objective, most))
     return replace(one, objective=objective, bound=objective) if inside else None
 

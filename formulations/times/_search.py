@@ -33,13 +33,14 @@ from seqopt.graph.paths import tied
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates, steps_of
 from seqopt.graph.states.states import States
-from seqopt.problem.problem import Goal, Measure
+from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_space import FreeSpace
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._fall_cuts import FallCuts
 from seqopt.times._graph import timed_graph
 from seqopt.times._steps import StepTime, reassigned_steps, step_times
+from seqopt.times._twin import makespan
 from seqopt.work.progress import Tell
 
 
@@ -118,10 +119,10 @@ def of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
     timed = instance.timed
     if timed is None:
         raise ProblemError(f"instance {instance.name}: no times are asked; take path_dp")
-    own = {PEAK: Measure.PEAK, TIME: Measure.MAKESPAN}
-    aims = tuple(Goal(own.get(goal.kind, Measure.SUM)) for goal in instance.goals)
-    caps = [Measure.MAKESPAN if c.column is None else Measure.SUM for c in instance.caps]
-    asked = Goals((*aims, *map(Goal, caps)), aims, tuple(cap.most for cap in instance.caps))
+    own = {PEAK: MINMAX, TIME: makespan}
+    aims = tuple(own.get(goal.kind, SUM) for goal in instance.goals)
+    caps = [makespan if cap.column is None else SUM for cap in instance.caps]
+    asked = Goals((*aims, *caps), aims, tuple(cap.most for cap in instance.caps))
     visited = Visited(timed.graph, ((0, 0, np.arange(instance.nodes)[:, None]),))
     stages = Stages(asked, visited, choose, watch, timed)
     try:
@@ -135,11 +136,11 @@ def of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
 
 
 def _timed_values(
-    goals: Sequence[Goal], values: Sequence[float], makespan: float
+    goals: Sequence[Amount], values: Sequence[float], makespan: float
 ) -> tuple[float, ...]:
     """Return the values of goals, those of makespans replaced."""
     pairs = zip(goals, values, strict=False)
-    return tuple(makespan if goal.measure is Measure.MAKESPAN else v for goal, v in pairs)
+    return tuple(makespan if goal.in_time else v for goal, v in pairs)
 
 
 def _no_higher(bounds: Sequence[float], values: tuple[float, ...]) -> tuple[float, ...]:
@@ -214,9 +215,9 @@ def _ceiling(problem: States, first: StatePath | None, waits: Waits) -> float:
 
     Unless budgets of time, or mortar, may forbid it.
     """
-    capped = any(g.measure is Measure.MAKESPAN for g in problem.goals[len(problem.aims) :])
+    capped = any(g.in_time for g in problem.goals[len(problem.aims) :])
     forbidden = capped or waits.cuts is not None
-    if first is None or forbidden or problem.goals[0].measure is not Measure.PEAK:
+    if first is None or forbidden or not problem.goals[0].is_peak:
         return np.inf
     return first.objective[0]
 

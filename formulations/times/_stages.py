@@ -31,7 +31,7 @@ from seqopt.graph._timed import TimedGraph
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import LabelProof
 from seqopt.graph.paths import _best_moves, _on_paths, moves_along, tied
-from seqopt.problem.problem import Goal, Measure
+from seqopt.problem.amounts import Amount
 
 BEAMS = (100, 1000, 5000)  # widths of the searches for a first path
 ALMOST = 1e-9  # over a value: a path must be better by more than this to be better
@@ -124,8 +124,8 @@ def beams(
 class Goals(NamedTuple):
     """What is asked: goals, of which the last ones are capped by ``budgets`` and no ``aims``."""
 
-    goals: tuple[Goal, ...]
-    aims: tuple[Goal, ...]
+    goals: tuple[Amount, ...]
+    aims: tuple[Amount, ...]
     budgets: tuple[float, ...]
 
 
@@ -138,7 +138,7 @@ class Stages:
         self._problem, self._choose, self._watch = problem, choose, watch
         self._visited, self._timed = visited, timed
         budgets = dict(enumerate(problem.budgets, start=len(problem.aims)))
-        is_time = {k: problem.goals[k].measure is Measure.MAKESPAN for k in budgets}
+        is_time = {k: problem.goals[k].in_time for k in budgets}
         time = min((tied(cap) for k, cap in budgets.items() if is_time[k]), default=np.inf)
         sums = tuple((k, tied(cap)) for k, cap in budgets.items() if not is_time[k])
         filtered = not budgets and timed.curing is None
@@ -151,11 +151,11 @@ class Stages:
         for k, goal in enumerate(self._problem.aims):
             if self._stage.late:
                 self._stage.bounds.append(-np.inf)
-            elif goal.measure is Measure.MAKESPAN:
+            elif goal.in_time:
                 self._makespan()
             elif self._stage.filtered:
                 self._filter(k)
-            elif goal.measure is Measure.PEAK:
+            elif goal.is_peak:
                 self._peak(k)
             else:
                 self._sum(k)

@@ -24,6 +24,7 @@ from seqopt.graph.formulation import find_formulation
 from seqopt.network.build import build_network
 from seqopt.plan.solving import pose
 from seqopt.problem._limit_words import parse_limits
+from seqopt.problem.filters import Filter
 from seqopt.problem.problem import (
     WORST_PEAK,
     Orders,
@@ -101,7 +102,8 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
         every = replace(every, direction=asked.direction)
     words |= {"stands": asked_standing(asked), "budgets": asked.budget}
     words |= {"orders": Orders.TIED} if sought else {}
-    others = (asked.aim, words["stands"], sought)
+    filters = [each for each in words["limits"] if isinstance(each, Filter)]
+    others = (asked.aim, words["stands"], sought, filters)
 
     def posed(begin: Place) -> Problem:
         moves = between(every, begin, end)

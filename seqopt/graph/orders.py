@@ -20,7 +20,8 @@ from seqopt.graph.paths import keep_best
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore, move_amounts
 from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
-from seqopt.problem.problem import LARGEST, Measure, Orders
+from seqopt.problem.amounts import LARGEST, StateArrays
+from seqopt.problem.problem import Orders
 from seqopt.problem.requirements import pickled
 from seqopt.responses._blocks import packed, unpacked
 from seqopt.scene._armed import can_hold
@@ -133,7 +134,7 @@ def _built(states: States) -> States:
             "order, or take all down from where nobody holds"
         )
     first = states.goals[0]
-    plain = first.measure is Measure.PEAK and not first.of_margins and rules.regrips is None
+    plain = first.is_peak and not first.margins and rules.regrips is None
     if not plain or states.budgets or states.totals:
         raise ProblemError(
             f"orders of a take-down are searched for its worst state, not for {first} or "
@@ -174,7 +175,7 @@ def whole_bound(problem: AllOrders) -> float:
     Result: minus infinity where there are too many grip sets to look at.
     """
     free = problem.judging(problem.scene.build_order)
-    if free.goals[0].measure is not Measure.PEAK:
+    if not free.goals[0].is_peak:
         return -np.inf
     numbers, scene, least = node_numbers(free.network), problem.scene, -np.inf
     taken = {*scene.blocked_nodes, *(prop.node for prop in scene.props)}
@@ -214,11 +215,13 @@ def _values(free: States, held: Ints) -> Floats:
     answers, forces = free.sets.answers(bricks, held)
     names = [name for name in free.named if name != LARGEST]
     found = dict(zip(names, answers.T, strict=True)) | {LARGEST: forces.max(axis=1, initial=0.0)}
-    loose = ~np.isfinite(answers).all(axis=1)
-    finite = {name: np.where(loose, 0.0, values) for name, values in found.items()}
-    if goal.response:
-        return np.where(loose, np.inf, finite[goal.response])
-    return np.where(loose, np.inf, free.criterion.costs(finite, bricks, len(held)))
+    whole = np.isfinite(answers).all(axis=1)
+    finite = {name: np.where(whole, values, 0.0) for name, values in found.items()}
+    places = np.where(held > 0, (held - 1) % (2 * bricks) + 1, 0)  # whoever holds
+    nodes, most = free._node_numbers[places], np.full(held.shape, np.inf)
+    seen = StateArrays(bricks, nodes, finite, forces, most, whole, free.criterion, places)
+    values = np.zeros(len(held)) if goal.states is None else goal.states(seen)
+    return np.where(whole, values, np.inf)
 
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
@@ -256,7 +259,7 @@ class OrderStates:
         """Whether the worst step counts, or what all steps take."""
         if self.problem.states.totals:
             return (False,) * len(self.problem.states.scenarios)
-        return tuple(goal.measure is Measure.PEAK for goal in self._asked.goals)
+        return tuple(goal.is_peak for goal in self._asked.goals)
 
     def start(self) -> tuple[Key, Ints]:
         """Return where builds begin."""

@@ -23,7 +23,7 @@ from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.states._visits import FreeStates, ScenarioSums
 from seqopt.graph.states.states import States
 from seqopt.plan.solving import graph_of, usual
-from seqopt.problem.problem import Aim, Measure, Problem, RobustAim
+from seqopt.problem.problem import Aim, Problem, RobustAim
 from seqopt.sequence._robot_kinds import node_numbers
 
 
@@ -108,7 +108,7 @@ def _tail(aim: RobustAim, count: int) -> _Target:
 def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
     """Return the instance of states: bricks that stand, and nodes that robots hold."""
     states = graph.states if isinstance(graph, AllOrders) else graph
-    if below < np.inf and (states.totals or states.goals[0].measure is not Measure.PEAK):
+    if below < np.inf and (states.totals or not states.goals[0].is_peak):
         raise ProblemError("below: the first aim is no worst step; leave it out")
     found = Explorer(_space(graph, states))
     found.rise(below)
@@ -127,7 +127,7 @@ def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
         if states.standing is not None and states.standing.curing is not None:
             raise ProblemError("instance: how mortar cures is not in it; leave curing out")
         timed = offered("timed_graph")(states, visited)
-        every = [k for k, goal in enumerate(states.goals) if goal.measure is not Measure.MAKESPAN]
+        every = [k for k, goal in enumerate(states.goals) if not goal.in_time]
         peaks = tuple(whole.peaks[k] for k in every)
         whole = Graph(whole.source, whole.target, whole.amounts[:, every], peaks, whole.ends)
     small, kept = on_paths(whole)
@@ -140,7 +140,7 @@ def _space(graph: States | AllOrders, states: States) -> Any:
     """Return states and moves, with all that is demanded of states asked."""
     if isinstance(graph, AllOrders):
         return OrderStates(graph, MOST_PARTS, every_goal=not states.totals)
-    asked = bool(states.demands) or any(goal.of_margins for goal in states.goals)
+    asked = bool(states.demands) or any(goal.margins for goal in states.goals)
     return (ScenarioSums if states.totals else FreeStates)(states, standing=asked)
 
 
@@ -149,12 +149,12 @@ def _asked(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap, 
     names, goals, caps = list[str](), list[_Target](), list[_Cap]()
     bounds = (*[None] * len(states.aims), *states.budgets)
     for goal, bound in zip(states.goals, bounds, strict=True):
-        is_time = goal.measure is Measure.MAKESPAN
+        is_time = goal.in_time
         column = None if is_time else len(names)
         if not is_time:
             names.append(str(goal))
         if bound is None:
-            kind = TIME if is_time else PEAK if goal.measure is Measure.PEAK else SUM
+            kind = TIME if is_time else PEAK if goal.is_peak else SUM
             goals.append(_Target(str(goal), kind, () if column is None else (column,)))
         else:
             caps.append(_Cap(str(goal), column, bound))

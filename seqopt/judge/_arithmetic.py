@@ -11,9 +11,8 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
 from seqopt.judge._claims import ABOVE, Claim, first_stage, next_stage, proven, within_caps
-from seqopt.judge._twin import twin_of
+from seqopt.judge._twin import path_twin
 from seqopt.judge.certificate import TOLERANCE, Certificate
-from seqopt.problem.problem import Measure
 
 
 class Answer(NamedTuple):
@@ -84,7 +83,7 @@ def _walked(instance: Instance, answer: Answer) -> _Walk:
         raise SolverError(f"the path stops at node {at}, where none may end")
     ends = 0.0
     if instance.timed is not None and instance.asks_time:
-        twin = twin_of(Measure.MAKESPAN)
+        twin = path_twin()
         ends = np.nan if twin is None else twin.path_value(instance.timed, arcs, acts)
     return _Walk(arcs, ends)
 

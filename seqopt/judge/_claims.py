@@ -22,8 +22,7 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Target
 from seqopt.graph.paths import TIED, tied
 from seqopt.judge._budget_proof import case_of, least_within
-from seqopt.judge._twin import twin_of
-from seqopt.problem.problem import Measure
+from seqopt.judge._twin import path_twin
 
 Labels = tuple[Ints, Floats]  # nodes (N,), and values (N, 1 + c + q)
 
@@ -92,7 +91,7 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value:
     elif goal.kind == TAIL:
         costs = stage.graph.amounts[:, list(goal.columns)] @ _weights(goal, claim)
     else:
-        twin = twin_of(Measure.MAKESPAN)
+        twin = path_twin()
         return -np.inf if twin is None else twin.claimed(instance, stage, claim, limited)
     return _sum(stage, costs, claim, limited)
 

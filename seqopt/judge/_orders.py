@@ -21,7 +21,6 @@ from seqopt.judge._proof import BELOW, Rebuilt, Space
 from seqopt.judge._rule_moves import RuleTables, Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator, ask
 from seqopt.network.build import build_network
-from seqopt.problem.problem import Measure
 from seqopt.problem.standing import slack
 from seqopt.scene._armed import can_hold
 from seqopt.scene.scene import Order, in_order
@@ -44,9 +43,9 @@ def finds_better_order(
     because there are more sets or time is over.
     """
     goal, demands = problem.states.goals[0], problem.states.demands
-    peak = goal.measure is Measure.PEAK
-    if goal.of_margins:
-        value = max(0.0, value - slack(goal.response, value)) if np.isfinite(value) else value
+    peak = goal.is_peak
+    if goal.margins:
+        value = max(0.0, value - slack(goal.name, value)) if np.isfinite(value) else value
         if value == 0:
             return False
         asked = Filter((), (value,) if np.isfinite(value) else ())
@@ -103,7 +102,7 @@ class _Orders(Space):
     def onward(self, part: Key, found: Reachable) -> Iterator[tuple[Key, Transitions]]:
         """Yield what follows by placing each of the bricks that may come next."""
         problem, (stand, _) = self._problem, part
-        parks = problem.states.goals[0].measure is Measure.TRAVEL
+        parks = problem.states.goals[0].needs_stays
         own = self.from_part(part, found.states)
         for brick in problem.next_bricks(stand) if len(own) else ():
             order = self._order(part, brick)

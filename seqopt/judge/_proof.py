@@ -23,8 +23,7 @@ from seqopt.judge._budget_proof import is_beyond
 from seqopt.judge._claims import budget_bounds
 from seqopt.judge._rule_moves import Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator
-from seqopt.judge._twin import Twin
-from seqopt.problem.problem import Measure
+from seqopt.judge._twin import PathTwin
 from seqopt.sequence._robot_kinds import node_numbers
 
 BELOW = 1e-9  # by how much a plan must be better, over the size of the value
@@ -71,7 +70,7 @@ class Rebuilt:
         part = space.first
         level, evaluator = space.at(part)
         start = evaluator.tables.start()
-        self._peaks = tuple(goal.measure is Measure.PEAK for goal in evaluator.problem.goals)
+        self._peaks = tuple(goal.is_peak for goal in evaluator.problem.goals)
         self.parts, self.states = [part], [start]  # the start passes whatever it takes
         self._ends, self._count = [np.zeros(1, dtype=bool)], 1
         none = np.zeros(0, dtype=np.int64)
@@ -168,7 +167,8 @@ class Proof:
 
     def _is_cut(self, values: Sequence[float]) -> bool:
         """Return whether states strictly below the one worst value there is reach no end."""
-        if [goal.measure for goal in self.evaluator.problem.goals] != [Measure.PEAK]:
+        goals = self.evaluator.problem.goals
+        if len(goals) > 1 or not goals[0].is_peak:
             return False
         graph = self.rebuilt(Filter(values, strict=True)).graph()
         seen = reached(graph)
@@ -206,7 +206,7 @@ class Proof:
         return budget_bounds(rebuilt.graph(), values, claimed, (caps, multipliers))
 
     def timed_bounds(
-        self, twin: Twin, values: Sequence[float], found: StatePath
+        self, twin: PathTwin, values: Sequence[float], found: StatePath
     ) -> tuple[float, ...]:
         """Return bounds of measures of whole paths, by their twin, of a path that is claimed."""
         rebuilt = self.rebuilt(Filter(values, exact=True))

@@ -5,20 +5,20 @@ Nothing that a search keeps is believed; what this judge computed once for a gri
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.paths import strictly_below, tied
-from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
 from seqopt.judge._rule_moves import RuleTables, ScheduleTables, Transitions
 from seqopt.judge._step_checks import props_that_hold
+from seqopt.judge._twin import exceeds, own_values, twin_of
+from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.problem import LARGEST, Goal, Measure
-from seqopt.problem.requirements import LIMIT_TOLERANCE, state_costs
+from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import KnownRows, solve_sets
@@ -74,22 +74,29 @@ def _ask_engine(problem: States, bricks: int, grips: Ints, *, low_precision: boo
     found[LARGEST] = forces.max(axis=1, initial=0.0)
     fit = np.asarray(np.isfinite(rows).all(axis=1))
     for limit in problem.limits:
-        fit &= ~limit.exceeded(found.get(limit.response, np.zeros(len(grips))))
-    values = np.column_stack([goal_values(problem, g, found, bricks, fit) for g in problem.goals])
+        fit &= ~exceeds(limit, found.get(limit.response, np.zeros(len(grips))))
+    free = ((0, 0), (0, len(problem.network.scene.robots) - grips.shape[1]))
+    nodes = problem.network.scene.grip_kinds.split(grips)[0]
+    nodes, borne = np.pad(nodes, free, constant_values=NONE), np.pad(forces, free)
+    most = np.full(borne.shape, np.inf)
+    seen = StateArrays(bricks, nodes, found, borne, most, fit, problem.criterion, grips)
+    for each in problem.filters:  # without a twin nothing is refused: a bound stays one
+        if each.twin is not None and fit.any():
+            rows = np.flatnonzero(fit)
+            fit[rows] = ~each.twin(seen.only(rows))
+    seen = seen._replace(possible=fit)
+    values = np.column_stack([state_values(goal, seen) for goal in problem.goals])
     if problem.spares and bricks == len(problem.network.inner) and not grips.shape[1]:
         values[:] = 0.0  # the whole that nobody holds, where a take-down begins
     return Answers(values, forces, fit & np.isfinite(values).all(axis=1))
 
 
-def goal_values(
-    problem: States, goal: Goal, responses: Mapping[str, Floats], bricks: int, fit: Bools
-) -> Floats:
+def state_values(goal: Amount, states: StateArrays) -> Floats:
     """Return the values (n,) of a goal in states with so many bricks; zero if not about states."""
-    if goal.of_margins or not goal.of_states:
-        return np.zeros(len(fit))
-    if goal.response:
-        return responses[goal.response]
-    return state_costs(problem.criterion, responses, bricks, fit)
+    values = own_values(goal)
+    if goal.states is None or values is None:
+        return np.zeros(len(states.possible))
+    return np.asarray(values(states))
 
 
 class Filter(NamedTuple):
@@ -131,7 +138,7 @@ class StateEvaluator:
         robots = range(len(problem.network.scene.robots))
         most, own = ([_load(problem, r, stand=stand) for r in robots] for stand in (False, True))
         self.tables = _tables(problem, most)
-        self.margins = sum(goal.of_margins for goal in problem.goals)
+        self.margins = sum(goal.margins is not None for goal in problem.goals)
         self._most = np.array([most[r] for r in self.tables.team])
         self._payload, self._loads = np.array([own[r] for r in self.tables.team]), np.array(own)
         kinds, nodes = problem.network.scene.grip_kinds, self.tables.nodes
@@ -147,13 +154,15 @@ class StateEvaluator:
         Every move to that end is a cut. Minus infinity where nothing is known.
         """
         goals, tables = self.problem.goals, self.tables
-        end, counted = dict(tables.certain()).get(tables.last), float(tables.least_steps())
+        end = dict(tables.certain()).get(tables.last)
         last = np.full(len(goals), -np.inf if end is None else 0.0)
         if end is not None and tables.bricks_at(tables.last):
             last = self.valued(tables.last, end, Filter(exact=True))[0][0]
-        known = {Measure.PEAK: last, Measure.STEPS: np.full(len(goals), counted)}
-        none = np.full(len(goals), -np.inf)
-        return tuple(float(known.get(goal.measure, none)[k]) for k, goal in enumerate(goals))
+        out = np.where([goal.is_peak for goal in goals], last, -np.inf)
+        for k, twin in enumerate(map(twin_of, goals)):
+            if twin is not None and twin.least is not None:
+                out[k] = twin.least(tables)
+        return tuple(out.tolist())
 
     def bars(self, margins: Sequence[float]) -> bool:
         """Return whether a state that every plan passes is not allowed, or lacks such margins."""
@@ -185,7 +194,7 @@ class StateEvaluator:
         if not bricks:
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
         below = np.inf
-        if len(asked.values) > k and goals[k].measure is Measure.PEAK:
+        if len(asked.values) > k and goals[k].is_peak:
             below = (strictly_below if asked.strict else tied)(asked.values[k])
         held, payload = self._held(states, self._most, self._beyond)
         values, forces, ok = self._answers(bricks, held, asked, np.inf if k else below)
@@ -198,7 +207,7 @@ class StateEvaluator:
         """Return what is demanded of states where the first goals, margins, have values."""
         base = self.problem.standing or Standing()
         pairs = zip(self.problem.goals, margins, strict=False)
-        own = (base.demanding(goal.response, max(value, 0.0)) for goal, value in pairs)
+        own = (base.demanding(goal.name, max(value, 0.0)) for goal, value in pairs)
         return (*self.problem.demands, *own)
 
     def may_stand(self, level: int, states: Ints, margins: Sequence[float]) -> Bools:
@@ -277,15 +286,19 @@ class StateEvaluator:
             goals = len(self.problem.goals)
             close = _near(found[:, goals:-1], self._most)
             for k, value in enumerate(asked.values):
-                if self.problem.goals[k].measure is Measure.PEAK:
+                if self.problem.goals[k].is_peak:
                     close |= _near(found[:, [k]], np.array([value]))
             found[close] = np.column_stack(ask(self.problem, bricks, grips[close], below))
         return found
 
     def amounts(self, values: Floats, found: Transitions) -> Floats:
         """Return what goals take of moves to states with such values, (m, g)."""
-        taken = np.column_stack([np.full(len(found.distance), float(found.regrip)), found.distance])
-        return move_amounts(self.problem, values, taken)
+        out = values.copy()
+        moves = MoveArrays(np.full(len(found.distance), float(found.regrip)), found.distance)
+        for k, goal in enumerate(self.problem.goals):
+            if goal.moves is not None and (own := own_values(goal)) is not None:
+                out[:, k] = own(moves)
+        return out
 
 
 def _load(problem: States, robot: int, *, stand: bool) -> float:
@@ -327,9 +340,9 @@ def interchangeable(
 def _six_digits_do(problem: States) -> bool:
     """Return whether six digits of responses say nearly as much of what goals take of states."""
     ratios = isinstance(problem.criterion, WorstRatio)
-    of_states = [goal for goal in problem.goals if goal.of_states and not goal.of_margins]
-    peaks = all(g.measure is Measure.PEAK and (g.response or ratios) for g in of_states)
-    return peaks and not problem.limits
+    of_states = [goal for goal in problem.goals if goal.states is not None]
+    peaks = all(goal.has_few_digits and (ratios or not goal.of_criterion) for goal in of_states)
+    return peaks and not problem.limits and not problem.filters
 
 
 def _near(values: Floats, bounds: Floats) -> Bools:

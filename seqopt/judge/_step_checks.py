@@ -95,7 +95,7 @@ def proven_margins(problem: States, steps: Sequence[Step]) -> dict[str, float]:
     ``tilt`` is from a right angle (rad); NaN where nothing is proven of a step. A `SolverError`
     names the step that is not proven to stand.
     """
-    standing, has_margins = problem.standing, any(goal.of_margins for goal in problem.goals)
+    standing, has_margins = problem.standing, any(goal.margins for goal in problem.goals)
     if not (has_margins or (standing and standing.tilt)):
         if standing is not None:
             verdicts = step_verdicts(problem.network, steps, standing.mortar)

@@ -1,21 +1,45 @@
-"""What a room outside the core brings to the judge with a measure of whole builds."""
+"""The judge's own functions of amounts and filters: each written a second time.
+
+What is built in has its twin here; what rooms, packages and users register brings its own. Without
+one an amount or a filter is what the search says, and no bound is proven.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
-from seqopt._registry import offered
+import numpy as np
+
+from seqopt._registry import registered
+from seqopt.arrays import Bools, Floats
+from seqopt.errors import ProblemError
 from seqopt.graph._timed import TimedGraph
 from seqopt.graph.graph import Graph
 from seqopt.network.network import Network
-from seqopt.problem.problem import Measure
+from seqopt.problem.amounts import BUILT_IN, Amount, MoveArrays, StateArrays
+from seqopt.problem.requirements import Limit
+from seqopt.responses._tolerance import is_tolerance
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 
+ROUNDED = 1e-9  # by which a response may be over a limit, over its size
+
 
 class Twin(NamedTuple):
-    """How a measure is computed and bounded once more, apart from the search.
+    """How an amount of states or moves is computed once more.
+
+    ``values``: of the same arrays as the amount's own function; ``least``: a lower bound of all
+    builds, from what rules or a schedule allow.
+    """
+
+    values: Callable[[Any], Floats]
+    least: Callable[[Any], float] | None = None
+
+
+class PathTwin(NamedTuple):
+    """How an amount of whole paths is computed and bounded once more.
 
     ``value``: of the steps of a problem, with the starts that are claimed; ``least``: combinatorial
     lower bound of all builds by some rules; ``bounds``: makes of an evaluator, rebuilt states, the
@@ -31,7 +55,67 @@ class Twin(NamedTuple):
     claimed: Callable[..., float]
 
 
-def twin_of(measure: Measure) -> Twin | None:
-    """Return the twin of a measure; None if no room offers one, so that it is claimed."""
-    found: Twin | None = offered(measure.value)
+def _criterion(states: StateArrays) -> Floats:
+    """Return what the criterion makes of responses; infinite where states are not possible."""
+    criterion, able = states.criterion, states.possible
+    costs = criterion.costs(states.responses, states.bricks, len(able))
+    if (least := costs[able].min(initial=0.0)) < 0:
+        raise ProblemError(f"criterion {criterion.name}: a step costs {least:.6g}, less than zero")
+    return np.where(able, costs, np.inf)
+
+
+def _response(name: str, states: StateArrays) -> Floats:
+    return states.responses[name]
+
+
+def _none(states: StateArrays) -> Floats:
+    """Return zeros: margins are found by the cone program, step by step."""
+    return np.zeros(len(states.possible))
+
+
+def _count(moves: MoveArrays) -> Floats:
+    return np.full(moves.regrips.shape, 1.0)
+
+
+def _taken(moves: MoveArrays) -> Floats:
+    return np.where(moves.regrips > 0, 1.0, 0.0)
+
+
+def _gone(moves: MoveArrays) -> Floats:
+    return np.abs(moves.distances)
+
+
+TWINS = {
+    "minmax": Twin(_criterion),
+    "sum": Twin(_criterion),
+    "steps": Twin(_count, lambda tables: float(tables.least_steps())),
+    "regrips": Twin(_taken),
+    "travel": Twin(_gone),
+}
+
+
+def twin_of(amount: Amount) -> Twin | None:
+    """Return the twin of an amount of states or moves; None if it has none, or is of paths."""
+    if amount.name in TWINS:
+        return TWINS[amount.name]
+    if amount.name in BUILT_IN or is_tolerance(amount.name):
+        return Twin(_none if amount.margins else partial(_response, amount.responses[0]))
+    return None if amount.twin is None or amount.in_time else Twin(amount.twin)
+
+
+def path_twin() -> PathTwin | None:
+    """Return the twin of makespans; None if no room offers one, so that they are claimed."""
+    found: PathTwin | None = getattr(registered(Amount).get("makespan"), "twin", None)
     return found
+
+
+def own_values(amount: Amount) -> Callable[[Any], Floats] | None:
+    """Return the judge's function of an amount, or its own where it has no twin; None of paths."""
+    twin = twin_of(amount)
+    return (amount.states or amount.moves) if twin is None else twin.values
+
+
+def exceeds(limit: Limit, values: Floats) -> Bools:
+    """Return where a response is beyond a limit; NaN, of a robot without a grip, is not."""
+    most = 1 / limit.bound if is_tolerance(limit.response) else limit.bound
+    return np.asarray(values - most > ROUNDED * np.abs(most))

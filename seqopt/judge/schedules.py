@@ -7,22 +7,22 @@ visited, on which only the time depends.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
+from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError, StepError
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.judge._proof import BELOW, Hint, Proof
 from seqopt.judge._rule_moves import check_free
-from seqopt.judge._states import goal_values
 from seqopt.judge._step_checks import check_props, check_shape, proven_margins, require_margin
-from seqopt.judge._twin import Twin, twin_of
+from seqopt.judge._twin import PathTwin, exceeds, own_values, twin_of
 from seqopt.judge.certificate import Certificate
-from seqopt.problem.problem import LARGEST, Goal, Measure
+from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.standing import _size, slack
 from seqopt.responses._props import EXCESS_COLUMN
 from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along, tolerances_along
@@ -58,12 +58,14 @@ def judge_schedule(
     for goal, spent, cap in zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True):
         if not spent <= cap + TOLERANCE * cap:
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
-    twin = twin_of(Measure.MAKESPAN) if problem.is_timed else None
+    twin = next((goal.twin for goal in problem.goals if goal.in_time), None)
     proves_time = twin is not None and bool(np.isfinite(selection.bound).any())
-    if not proves_time and (selection.stopped or problem.is_timed):  # bounds are claimed alone
+    is_claimed = not proves_time and (selection.stopped or problem.is_timed)
+    if is_claimed or not _has_twins(problem):  # bounds are claimed alone
         bounds = _with_counts(problem, twin, values, (-np.inf,) * len(values))
         gap = _gap(problem.aims, values, bounds)
-        return Certificate(values, bounds, gap, gap)
+        left = gap if is_claimed else _gap(problem.aims, values, selection.bound)
+        return Certificate(values, bounds, gap, left)
     proof, claimed = Proof(_weighed(problem, selection), hint), selection.bound
     margins = _margin_bounds(problem, proof, values)
     if twin is not None:
@@ -89,10 +91,16 @@ def _closed(values: Sequence[float], bounds: Sequence[float]) -> Bounds:
     return tuple(v if b >= v - BELOW * abs(v) else b for v, b in pairs)
 
 
-def _gap(goals: Sequence[Goal], values: Sequence[float], bounds: Sequence[float]) -> float:
+def _has_twins(problem: States) -> bool:
+    """Return whether all that is asked of states and moves was written a second time."""
+    goals = (twin_of(goal) is not None or goal.in_time for goal in problem.goals)
+    return all(goals) and all(each.twin is not None for each in problem.filters)
+
+
+def _gap(goals: Sequence[Amount], values: Sequence[float], bounds: Sequence[float]) -> float:
     """Return the most that bounds of the first goals leave open, over the size of their values."""
     return max(
-        (value - bound) / (_size(goal.response, value) or 1.0)
+        (value - bound) / (_size(goal.name, value) or 1.0)
         for goal, value, bound in zip(goals, values, bounds, strict=False)
     )
 
@@ -111,8 +119,8 @@ def _margin_bounds(problem: States, proof: Proof, values: Bounds) -> Bounds:
     """Return lower bounds of margins, up to their proven width."""
     out: list[float] = []
     for goal, value in zip(problem.goals, values, strict=True):
-        if goal.of_margins:
-            bound = max(0.0, value - slack(goal.response, value))
+        if goal.margins:
+            bound = max(0.0, value - slack(goal.name, value))
             if value > 0 and not proof.is_impossible((*values[: len(out)], bound)):
                 raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
             out.append(bound)
@@ -130,20 +138,20 @@ def _multipliers(problem: States, selection: StatePath) -> Sequence[Sequence[flo
 def _require_promised(problem: States, bounds: Bounds, promised: Sequence[float]) -> None:
     """Raise a `SolverError` if a bound, not of a margin, is below what is promised."""
     for goal, bound, least in zip(problem.aims, bounds, promised, strict=False):
-        if not goal.of_margins and not bound >= least - BELOW * abs(least):
+        if not goal.margins and not bound >= least - BELOW * abs(least):
             if not problem.budgets:
                 raise SolverError(f"{goal}: {least:.9g} is promised as the least; a plan has less")
             if not bound >= least - TOLERANCE * abs(least):
                 raise SolverError(f"{goal}: no plan within budgets is promised below {least:.9g}")
 
 
-def _with_counts(problem: States, twin: Twin | None, values: Bounds, bounds: Bounds) -> Bounds:
+def _with_counts(problem: States, twin: PathTwin | None, values: Bounds, bounds: Bounds) -> Bounds:
     """Return bounds of first goals, those of makespans no lower than the combinatorial one."""
     if twin is None:
         return bounds
     least = twin.least(problem.network, problem.rules)
     return tuple(
-        max(bound, min(least, value)) if goal.measure is Measure.MAKESPAN else bound
+        max(bound, min(least, value)) if goal.in_time else bound
         for goal, value, bound in zip(problem.goals, values, bounds, strict=False)
     )
 
@@ -198,40 +206,63 @@ def plan_values(
         found = [plan_values(each, steps, claimed) for each in problem.each]
         if problem.totals:
             return (problem.over.value(np.array(found)[:, 0]),)
+        moves = _moves(problem, steps)  # these are as they are planned
         pairs = zip(problem.goals, zip(*found, strict=True), strict=True)
-        of_ways = Measure.TRAVEL  # these are as they are planned
-        return tuple(_travel(problem, steps) if g.measure is of_ways else max(v) for g, v in pairs)
+        return tuple(max(v) if g.moves is None else _value(g, (), moves) for g, v in pairs)
     check_props(problem.engine, steps)
     check_shape(problem.engine, steps, problem.limits)
-    columns = _state_columns(problem, steps, _analyzed(problem.engine, steps))
+    table = _analyzed(problem.engine, steps)
+    forces = _forces(problem, table)
+    columns = _state_columns(problem, steps, table) | {LARGEST: forces.max(axis=1)}
     for limit in problem.limits:
-        if limit.response in columns and limit.exceeded(columns[limit.response]).any():
+        if limit.response in columns and exceeds(limit, columns[limit.response]).any():
             at = int(np.argmax(columns[limit.response])) + 1
             raise SolverError(f"step {at} exceeds the limit on {limit.label}")
-    margins, out = proven_margins(problem, steps), list[float]()
+    levels = [*_by_bricks(problem, columns, forces, steps)]
+    _check_filters(problem, levels, steps)
+    margins, moves, out = proven_margins(problem, steps), _moves(problem, steps), list[float]()
     for k, goal in enumerate(problem.goals):
-        if goal.of_margins:
-            require_margin(goal.response, claimed[k], margins[goal.response])
+        if goal.margins is not None:
+            require_margin(goal.name, claimed[k], margins[goal.name])
             out.append(claimed[k])
-        elif goal.measure is Measure.MAKESPAN:
-            twin = twin_of(goal.measure)
-            out.append(claimed[k] if twin is None else twin.value(problem, steps, starts))
+        elif goal.in_time:
+            known = goal.twin is not None
+            out.append(goal.twin.value(problem, steps, starts) if known else claimed[k])
         else:
-            costs = _costs(problem, goal, columns, steps)
-            out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
+            out.append(_value(goal, levels, moves))
     return tuple(out)
 
 
-def _state_columns(
-    problem: States, steps: Sequence[Step], table: _Columns
-) -> Mapping[str, np.ndarray]:
+Levels = Sequence[tuple[Ints, StateArrays]]  # rows of steps, and the states that they lead to
+
+
+def _check_filters(problem: States, levels: Levels, steps: Sequence[Step]) -> None:
+    """Raise a `SolverError` if a state does not pass a filter, by its own function or its twin."""
+    for each in problem.filters:
+        for rows, states in levels:
+            refused = ~each.passes(states)
+            refused |= False if each.twin is None else each.twin(states)
+            if refused.any():
+                number = steps[rows[np.flatnonzero(refused)[0]]].number
+                raise SolverError(f"step {number} does not pass the filter {each.name}")
+
+
+def _value(goal: Amount, levels: Levels, moves: MoveArrays) -> float:
+    """Return what an amount of states or moves takes of a plan, by its twin if it has one."""
+    values = own_values(goal)
+    assert values is not None  # it is of no whole path
+    every = [values(moves)] if goal.moves else [values(states) for _, states in levels]
+    costs = np.concatenate([np.zeros(1), *every])
+    return float(costs.max() if goal.is_peak else costs.sum())
+
+
+def _state_columns(problem: States, steps: Sequence[Step], table: _Columns) -> dict[str, Floats]:
     """Return responses (n,) by name, SI units, of the columns of `seqopt.analyze`."""
 
-    def column(name: str) -> np.ndarray:
+    def column(name: str) -> Floats:
         return np.asarray(table[name], dtype=float)
 
-    forces = [column(force_column(robot)) for robot in problem.network.scene.robots]
-    out = {LARGEST: np.nan_to_num(np.fmax.reduce(np.abs(forces)))}
+    out = dict[str, Floats]()
     for name in problem.named:
         if name == "C_max":
             out[name] = np.maximum(0.0, -column("F_min_N"))
@@ -244,31 +275,36 @@ def _state_columns(
     return out
 
 
-def _costs(
-    problem: States, goal: Goal, columns: Mapping[str, np.ndarray], steps: Sequence[Step]
-) -> np.ndarray:
-    """Return what a goal takes of every step, (n,)."""
-    if goal.measure is Measure.STEPS:
-        return np.ones(len(steps))
-    if goal.measure is Measure.REGRIPS:
-        return np.array([step.kind is StepKind.REPOSITION for step in steps], dtype=float)
-    if goal.measure is Measure.TRAVEL:
-        return np.array([_travel(problem, steps)])
-    bricks, out = np.array([step.bricks for step in steps]), np.zeros(len(steps))
-    for stand in {*bricks.tolist()}:  # an empty site takes nothing but responses
+def _forces(problem: States, table: _Columns) -> Floats:
+    """Return the sizes (n, robots) of the forces of grips, N; zero where a robot holds nothing."""
+    every = [table[force_column(robot)] for robot in problem.network.scene.robots]
+    return np.nan_to_num(np.abs(np.column_stack(every).astype(float)))
+
+
+def _by_bricks(
+    problem: States, columns: Mapping[str, Floats], forces: Floats, steps: Sequence[Step]
+) -> Iterator[tuple[Ints, StateArrays]]:
+    """Yield the rows of steps with as many bricks, and the states that they lead to.
+
+    The empty site, where a take-down ends, is none: nothing is taken of it.
+    """
+    bricks = np.array([step.bricks for step in steps])
+    nodes = np.array([[NONE if n is None else n for n in step.grips] for step in steps])
+    most, able = np.full(nodes.shape, np.inf), np.ones(len(steps), dtype=bool)
+    every = StateArrays(0, nodes, columns, forces, most, able, problem.criterion, nodes)
+    for stand in sorted({*bricks.tolist()} - {0}):
         rows = np.flatnonzero(bricks == stand)
-        found = {name: values[rows] for name, values in columns.items()}
-        if goal.response or stand:
-            out[rows] = goal_values(problem, goal, found, stand, np.ones(len(rows), dtype=bool))
-    return out
+        yield rows, every.only(rows)._replace(bricks=stand)
 
 
-def _travel(problem: States, steps: Sequence[Step]) -> float:
-    """Return how far robots go straight from one grip to the next, m."""
-    scene, site, total = problem.network.scene, problem.rules.begin, 0.0
+def _moves(problem: States, steps: Sequence[Step]) -> MoveArrays:
+    """Return the steps as moves: which are regrips, and how far robots go straight in them, m."""
+    scene, site = problem.network.scene, problem.rules.begin
     before = () if site is None else (site.stays or site.holds(scene), site.holds(scene))
+    distances = np.zeros(len(steps) + len(before))
     for nodes in zip(*before, *(step.grips for step in steps), strict=True):  # robot by robot
-        held = [scene.node_position(node) for node in nodes if node is not None]
-        for ends in pairwise(held):
-            total += float(np.linalg.norm(np.subtract(*ends)))
-    return total
+        held = [(k, scene.node_position(node)) for k, node in enumerate(nodes) if node is not None]
+        for (_, at), (k, to) in pairwise(held):
+            distances[k] += float(np.linalg.norm(np.subtract(at, to)))
+    regrips = [float(step.kind is StepKind.REPOSITION) for step in steps]
+    return MoveArrays(np.array(regrips), distances[len(before) :])

@@ -22,11 +22,10 @@ from seqopt.graph.states._visits import barred
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import case_of, is_kept, least_within
 from seqopt.judge._proof import Proof
-from seqopt.judge._twin import twin_of
 from seqopt.plan._remedies import LateError, Look, Remedies
 from seqopt.plan._stops import stops_of
 from seqopt.plan.search._margin_search import STEPS, WORST, with_margin
-from seqopt.problem.problem import Goal, Measure
+from seqopt.problem.amounts import Amount
 
 if TYPE_CHECKING:
     from seqopt.graph.orders import AllOrders
@@ -141,8 +140,8 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
             return SolverError(f"formulation {name} {ALLOWED}: {one}")
     words, proven = [], False
     for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
-        if problem.goals[k].measure is Measure.MAKESPAN:  # what it is at best takes a search
-            twin = twin_of(Measure.MAKESPAN)
+        if problem.goals[k].in_time:  # what it is at best takes a search
+            twin = problem.goals[k].twin
             least = -np.inf if twin is None else twin.least(problem.network, problem.rules)
             if least > tied(cap):
                 proven = True
@@ -160,14 +159,14 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
 
 def _with_any_margin(problem: States) -> States:
     """Return a problem in which states must have the margins that are asked for, however little."""
-    for name in (goal.response for goal in problem.goals if goal.of_margins):
+    for name in (goal.name for goal in problem.goals if goal.margins):
         problem = with_margin(problem, name, WORST[name])
     return problem
 
 
-def _of_criterion(problem: States) -> tuple[Goal, ...]:
+def _of_criterion(problem: States) -> tuple[Amount, ...]:
     """Return the aims that the criterion is asked for, which may forbid states."""
-    return tuple(goal for goal in problem.aims if goal.of_states and not goal.response)
+    return tuple(goal for goal in problem.aims if goal.of_criterion)
 
 
 def _why_impossible(problem: States, seconds: float = np.inf) -> str:
@@ -204,7 +203,7 @@ def _barred_said(problem: States, level: int, state: Ints) -> str:
     for one in each:
         if not one.values(level, state)[1].all():
             return f"{what} {_excess_said(one, level, state)}"
-    held = (one.stability.may_stand(bricks, *one._grips(state, stand=True)) for one in each)
+    held = (one.stability.may_stand(bricks, *one.held_to_stand(state)) for one in each)
     how = "is not proven to stand" if all(map(np.all, held)) else "does not stand"
     demand = next(iter(problem.demands), None)
     return f"{what} {how}{'' if demand is None else f' {demand.said}'}"
@@ -218,7 +217,7 @@ def _is_bare_end(problem: States, level: int, state: Ints) -> bool:
 
 def _excess_said(problem: States, level: int, state: Ints) -> str:
     """Return which limits a state exceeds, in words."""
-    found, _ = problem.responses(level, state)
+    found = problem.responses(level, state)[0].responses
     named = ((each, found[each.response]) for each in problem.limits if each.response in found)
     over = [
         f"{each.label}={each.shown(float(value[0])):.6g} instead of {each.shown(each.bound):g}"

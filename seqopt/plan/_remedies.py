@@ -1,7 +1,7 @@
 """What can be loosened in a problem without a plan, and how little of it is enough.
 
-Every demand yields its remedies: rules, standing, payloads, arms, reaches, limits and grips each
-say which problems have them loosened. A remedy counts where a plan exists with it alone.
+Every filter says how it can be loosened: rules, standing, payloads, arms, limits and others. Beside
+them reaches and grips are tried. A remedy counts where a plan exists with it alone.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import islice
 
 import numpy as np
 
-from seqopt.engines.registry import engine_for, recipe_of
+from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.paths import least_peak
@@ -24,7 +24,8 @@ from seqopt.graph.states.states import States
 from seqopt.plan._softer import HARD, ground_moves, softer_grips, whole_load
 from seqopt.plan._stops import Stops, stops_of
 from seqopt.plan.search._margin_search import STEPS, StandingLook, bisected
-from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure
+from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
+from seqopt.problem.filters import IGNORED, STANDING
 from seqopt.problem.requirements import Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
@@ -35,15 +36,8 @@ from seqopt.responses.quantities import (
     length_text,
     robot_response,
 )
-from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene
 from seqopt.sequence.two_robots import _enough_reach
-
-LARGE = 1e6  # N
-IGNORED = "payload=ignored"
-STANDING = "no requirement to stand"
-ARMS = "arms that reach more, or stand elsewhere"
-APART = "arms that are out of each other's way (slimmer, or elsewhere)"
 
 
 class LateError(Exception):
@@ -85,7 +79,7 @@ def worst_least(problem: States, response: str, look: Look = LOOK) -> float:
 
     ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``.
     """
-    found = look(replace(problem, goals=(Goal(Measure.PEAK, response),)))
+    found = look(replace(problem, goals=(BUILT_IN.get(response) or worst(response),)))
     return least_peak(found.graph().graph, 0) if found.whole else np.inf
 
 
@@ -141,7 +135,7 @@ class Remedies:
     def _alone(self) -> Iterator[Remedy]:
         """Yield rules, each loosened as little as is enough alone, and all else that is enough."""
         done: set[str] = set()
-        for text, problem in self._loosened():
+        for _, text, problem in self._ways("rules"):
             rule, _, _ = text.partition("=")
             if rule not in done and self.look.exists(problem):
                 done.add(rule)
@@ -161,16 +155,16 @@ class Remedies:
 
     def _in_pairs(self, alone: list[Remedy]) -> Iterator[Remedy]:
         """Yield what opens a way together with a rule; other arms only where they do not alone."""
-        for text, problem in self._loosened():
+        for _, text, problem in self._ways("rules"):
             for other in Remedies(problem, self.look)._alone():
                 if not (alone and other.of_arms):
                     yield other.beside(text)
 
-    def _loosened(self) -> Iterator[tuple[str, States]]:
-        """Yield rules that can be loosened: what stands is asked of robots with payloads."""
-        for text, rules in self.problem.rules.loosened(self._scene):
-            if not (self.problem.demands and text == IGNORED):
-                yield text, replace(self.problem, rules=rules)
+    def _ways(self, *names: str) -> Iterator[tuple[str, str, States]]:
+        """Yield how some filters can be loosened: their names, words, and the problem with that."""
+        for each in self.problem.every_filter:
+            if each.name in names:
+                yield from ((each.name, *way) for way in each.ways(self.problem))
 
     def _payload_if_ignored(self, problem: States) -> str:
         """Return the payload that is enough where a problem ignores them; in words, as below."""
@@ -181,27 +175,24 @@ class Remedies:
 
     def _stronger(self) -> Iterator[Remedy]:
         """Yield what alone is enough for states to stand: no need to, or robots that carry more."""
-        problem, look = self.problem, self.look
-        if problem.demands and look.exists(replace(problem, standing=None, settled=())):
-            yield Remedy(STANDING, self._enough_bond)
-        if self._stops.asks_payload and self._is_made and look.exists(self._carrying(LARGE)):
-            yield Remedy("robots that carry more", self._enough_payload)
+        enough = {"stands": self._enough_bond}
+        enough |= {"payload": self._enough_payload} if self._stops.asks_payload else {}
+        for name, text, problem in self._ways(*enough):
+            if self.look.exists(problem):
+                yield Remedy(text, enough[name])
 
     def _arms(self) -> Iterator[Remedy]:
-        """Yield other arms; robots without arms hold as others with joints that are rigid."""
-        scene = self._scene
-        able = scene.has_arms and not scene.grip_kinds.arms.any() and self._is_made
-        if able and self.look.exists(self._with_arms(lambda _: None)):
-            alone = self._with_arms(lambda arm: arm and replace(arm, keeps_apart=False))
-            yield _as_it_is(APART if self.look.exists(alone) else ARMS, of_arms=True)
+        """Yield other arms: that keep apart by themselves, or if they alone do not do."""
+        found = (text for _, text, problem in self._ways("arms") if self.look.exists(problem))
+        yield from (_as_it_is(text, of_arms=True) for text in islice(found, 1))
 
     def _limits(self) -> Iterator[Remedy]:
-        """Yield the limits without which alone there is a plan."""
-        for limit in self.problem.limits:
-            rest = tuple(other for other in self.problem.limits if other is not limit)
-            without = replace(self.problem, limits=rest)
-            if self.look.exists(without):
-                yield Remedy(limit.label, partial(self._enough_limit, limit))
+        """Yield the limits, and filters of others, without which alone there is a plan."""
+        labels = {limit.label: limit for limit in self.problem.limits}
+        for name, text, problem in self._ways(*labels, *map(str, self.problem.filters)):
+            if self.look.exists(problem):
+                raised = partial(self._enough_limit, labels[name]) if name in labels else None
+                yield _as_it_is(text) if raised is None else Remedy(text, raised)
 
     def _props(self) -> Iterator[Remedy]:
         """Yield that props help, if one at every brick does."""
@@ -239,7 +230,7 @@ class Remedies:
         """Return the least payload of all robots with which a plan exists, to three digits."""
 
         def exists(payload: float) -> bool:
-            return self.look.exists(self._carrying(payload))
+            return self.look.exists(self.problem.carrying(payload))
 
         low = min(robot.payload for robot in self._scene.robots)
         high = 2 * low
@@ -285,21 +276,7 @@ class Remedies:
         return stops_of(self.problem)
 
     def _exists_in(self, scene: Scene) -> bool:
-        return self.look.exists(_in_scene(self.problem, scene))
-
-    def _carrying(self, payload: float) -> States:
-        """Return the problem in which every robot may carry so much, N."""
-
-        def strong(scene: Scene) -> Scene:
-            return scene.with_robots(*(replace(r, payload=payload) for r in scene.robots))
-
-        worlds = tuple(engine_for(e, strong(e.network.scene)) for e in self.problem.scenarios)
-        return replace(_in_scene(self.problem, strong(self._scene)), scenarios=worlds)
-
-    def _with_arms(self, changed: Callable[[Arm | None], Arm | None]) -> States:
-        """Return the problem of robots with other arms, or of what they reach without them."""
-        robots = (replace(each, arm=changed(each.arm)) for each in self._scene.robots)
-        return _in_scene(replace(self.problem, scenarios=()), self._scene.with_robots(*robots))
+        return self.look.exists(self.problem.in_scene(scene))
 
 
 def _as_it_is(words: str, *, of_arms: bool = False) -> Remedy:
@@ -309,8 +286,3 @@ def _as_it_is(words: str, *, of_arms: bool = False) -> Remedy:
 def _payload_said(newton: float) -> str:
     said = _payload_text(newton)
     return f"a payload of {said} N (--payload {said})"
-
-
-def _in_scene(problem: States, scene: Scene) -> States:
-    engine = engine_for(problem.engine, scene)
-    return replace(problem, engine=engine, rules=problem.rules.in_scene(engine.network.scene))

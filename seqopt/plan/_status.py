@@ -99,6 +99,6 @@ class FoundOrder:
             return "others are not looked at yet"
         claimed = "" if self.proven else " (claimed, not proven)"
         goal = self.problem.states.goals[0]
-        if is_tolerance(goal.response):  # of which more is better
+        if is_tolerance(goal.name):  # of which more is better
             return f"no order above {length_text(goal.shown(self.selection.bound))}{claimed}"
         return f"no order below {self.selection.bound:.6g}{claimed}"

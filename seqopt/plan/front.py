@@ -27,7 +27,8 @@ from seqopt.plan._infeasible import confirmed, without_order
 from seqopt.plan._paths import PROOF
 from seqopt.plan._range import INTERRUPTED, RANGE, keeping, leaves
 from seqopt.plan.solving import graph_of, states_of
-from seqopt.problem.problem import Measure, Problem
+from seqopt.problem.amounts import REGRIPS, STEPS, Amount
+from seqopt.problem.problem import Problem
 from seqopt.responses._range import Moved, most_moved
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene import Order
@@ -77,7 +78,7 @@ class _StateFront:
     def __init__(self, problem: States, rounding: Mapping[str, float] | None = None) -> None:
         self._problem = problem
         for goal in problem.goals:
-            if goal.measure not in (Measure.PEAK, Measure.STEPS, Measure.REGRIPS):
+            if not goal.is_peak and goal not in (STEPS, REGRIPS):
                 raise ProblemError(
                     f"pareto: {goal} adds up along a plan; give responses, steps and regrips"
                 )
@@ -115,8 +116,7 @@ class _StateFront:
     @cached_property
     def _counted(self) -> list[int]:
         """Which goals count moves: bounds on them hold along a path, not state by state."""
-        measures = [goal.measure for goal in self._problem.goals]
-        return [k for k, measure in enumerate(measures) if measure is not Measure.PEAK]
+        return [k for k, goal in enumerate(self._problem.goals) if not goal.is_peak]
 
     def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
         """Return a point (k,) below bounds (k,) that no plan dominates, SI units, and its plan."""
@@ -149,7 +149,7 @@ class _StateFront:
 
     def _fewest(self, graph: Graph, bounds: Floats) -> Graph | None:
         """Return the paths with as many grips held at the end as those with the fewest moves."""
-        steps, regrips = self._of(Measure.STEPS), self._of(Measure.REGRIPS)
+        steps, regrips = self._of(STEPS), self._of(REGRIPS)
         found = []
         for held in range(self._problem.space.robots + 1):
             part = with_held(self._problem, graph, self._held == held)
@@ -159,27 +159,27 @@ class _StateFront:
                 found.append((count[0], least[0], part))
         return min(found, key=lambda each: each[:2])[2] if found else None
 
-    def _of(self, measure: Measure) -> int:
-        return next(k for k in self._counted if self._problem.goals[k].measure is measure)
+    def _of(self, amount: Amount) -> int:
+        return self._problem.goals.index(amount)
 
     def is_empty_below(self, bounds: Floats) -> bool:
         """Return whether no plan is below bounds (k,): another route, from the empty site."""
         graph = self._below(bounds)
         if not self._counted:
             return not graph.ends[reached(graph)].any()
-        if [self._problem.goals[k].measure for k in self._counted] == [Measure.STEPS]:
+        if [self._problem.goals[k] for k in self._counted] == [STEPS]:
             steps = distances(graph, np.ones(len(graph.source)))
             return not steps[graph.ends].min(initial=np.inf) < bounds[self._counted[0]]
-        regrips = graph.amounts[:, self._of(Measure.REGRIPS)]
+        regrips = graph.amounts[:, self._of(REGRIPS)]
         least = distances(graph, 1.0 + graph.states * regrips)
         least[np.isfinite(least)] //= graph.states
         last = np.flatnonzero(graph.ends)
         if self._problem.free_rules.how_it_ends is not Ending.HELD:
             last = np.unique(graph.source[graph.ends[graph.target]])
         found, held = least[last], self._held[last]
-        room = found < bounds[self._of(Measure.REGRIPS)]
+        room = found < bounds[self._of(REGRIPS)]
         if len(self._counted) > 1:
-            room &= steps_with(self._problem, found, held) < bounds[self._of(Measure.STEPS)]
+            room &= steps_with(self._problem, found, held) < bounds[self._of(STEPS)]
         return not room.any()
 
     @cached_property

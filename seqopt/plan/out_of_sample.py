@@ -95,7 +95,7 @@ def judge_unseen(plan: Plan, scenes: Layers | Scenarios | Sequence[Scene]) -> Tr
 def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
     """Return the worst values of a plan, margins aside, in scenarios it was not chosen by."""
     graph = plan.states
-    goals = tuple(goal for goal in graph.goals if not goal.of_margins)
+    goals = tuple(goal for goal in graph.goals if not goal.margins)
     if not goals:
         return {}
     scenes = [in_order(scene, graph.network.scene.build_order) for scene in unseen.scenes]

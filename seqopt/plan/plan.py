@@ -23,7 +23,8 @@ from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan._status import ENDS, FoundOrder, Status, bare_summary
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.problem import Problem, judged_by
+from seqopt.problem.amounts import judged_by
+from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
 from seqopt.problem.standing import Standing
 from seqopt.responses._choices import window_models
@@ -252,7 +253,8 @@ class Plan(ShownBuild):
         judged_exact = isinstance(graph, States) and not (
             graph.budgets or graph.totals or graph.is_timed
         )
-        exact = judged_exact and self.formulation.kind is not FormulationKind.HEURISTIC
+        is_exact = self.formulation.kind is not FormulationKind.HEURISTIC
+        exact = judged_exact and is_exact and isfinite(proof.gap)
         if exact or proof.gap <= TOLERANCE:
             return Status.OUTSIDE if self.is_far else Status.OPTIMAL
         if proof.claimed_gap <= TOLERANCE:

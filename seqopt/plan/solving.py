@@ -18,11 +18,10 @@ from seqopt.graph.states.states import States, build_states, over_scenarios, wit
 from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._range import best_within
 from seqopt.plan.plan import Plan
+from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.problem.problem import (
     WORST_PEAK,
     Aim,
-    Goal,
-    Measure,
     Orders,
     Problem,
     RobustAim,
@@ -44,7 +43,7 @@ if TYPE_CHECKING:
 
     Graph = Layers | States | AllOrders
 
-AIMS = {Aim.SUM: Goal(Measure.SUM), Aim.PEAK: Goal(Measure.PEAK)}
+AIMS = {Aim.SUM: SUM, Aim.PEAK: MINMAX}
 CANDIDATES, STATES, ORDERS = "candidates", "states", "orders"  # graphs of a problem
 
 
@@ -52,7 +51,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     engine: Engine,
     moves: Schedule | FreeRules,
     criterion: Criterion,
-    goals: Sequence[Goal] | str = (),
+    goals: Sequence[Amount] | str = (),
     limits: Sequence[Limit | str] | str = (),
     *,
     budgets: Sequence[str] | str = (),
@@ -69,7 +68,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     ----------
     engine, moves, criterion : Engine, Schedule or FreeRules, Criterion
         What has the scene, what can be chosen, what a step costs; of ``auto`` its simplest level.
-    goals : sequence of Goal or str, optional
+    goals : sequence of Amount or str, optional
         As ``"minmax,steps"``, over states; by default the sum of the costs of open grips or the
         largest, as the formulation minimizes, and of rules the worst step.
     limits, budgets, stands, scenarios, over, orders, also, resources : optional
@@ -107,8 +106,8 @@ def graph_kind(problem: Problem) -> str:
     """Return which graph answers a problem if no formulation says: one of those above."""
     if problem.orders is not None:
         return ORDERS
-    of_states = problem.is_timed or problem.goals or problem.stands is not None
-    return STATES if of_states or not in_layers(problem.moves) else CANDIDATES
+    asked = problem.is_timed or problem.goals or problem.filters or problem.stands is not None
+    return STATES if asked or not in_layers(problem.moves) else CANDIDATES
 
 
 def in_layers(moves: Schedule | FreeRules) -> bool:
@@ -201,6 +200,7 @@ def _require_candidates(problem: Problem) -> None:
         "orders": problem.orders is not None,
         f"aim {', '.join(map(str, problem.goals))}": of_states,
         "stands": problem.stands is not None,
+        f"filter {', '.join(map(str, problem.filters))}": bool(problem.filters),
     }
     for name in (name for name, asked in why.items() if asked):
         raise ProblemError(
@@ -216,7 +216,8 @@ def _states(problem: Problem) -> States:
     over = problem.over if problem.scenarios else WORST_PEAK
     goals = problem.goals or (AIMS[over.aim],)
     asked = problem.engine, problem.moves, problem.criterion, goals, problem.limits
-    found = replace(build_states(*asked, problem.stands), resources=problem.resources)
+    found = build_states(*asked, problem.stands)
+    found = replace(found, resources=problem.resources, filters=problem.filters)
     space = found.space
     ends = isinstance(space, FreeSpace) and space.first == space.levels
     if ends and space.ended(space.start()).all():

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from seqopt._registry import registered
 from seqopt.errors import ProblemError, did_you_mean
+from seqopt.problem.filters import Filter
 from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, Limit, as_limits, payload_limits
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import TOLERANCE
@@ -42,22 +44,27 @@ def split_word(text: str) -> tuple[str, str]:
 
 
 def parse_limits(
-    given: Sequence[str | Limit] | str | Limit, scene: Scene, where: str = "limit"
-) -> tuple[Limit, ...]:
-    """Return limits that are given as such, or in words.
+    given: Sequence[str | Limit | Filter] | str | Limit | Filter, scene: Scene, where: str = "limit"
+) -> tuple[Limit | Filter, ...]:
+    """Return limits and filters that are given as such, or in words.
 
-    Words are ``payload``, of the scene's robots, ``RESPONSE=VALUE``, SI units, and
-    ``linear_range=SHARE``, or ``any`` to lift it. ``where``: for messages.
+    Words are ``payload``, of the scene's robots, ``RESPONSE=VALUE``, SI units,
+    ``linear_range=SHARE``, or ``any`` to lift it, and names of filters that were registered.
+    ``where``: for messages.
     """
-    several = (given,) if isinstance(given, str | Limit) else given
+    several = (given,) if isinstance(given, str | Limit | Filter) else given
     if not isinstance(several, Sequence):
         return as_limits(several)
-    out: list[Limit] = []
+    out: list[Limit | Filter] = []
     for each in several:
-        if not isinstance(each, str):
+        if isinstance(each, Filter):
+            out.append(each)
+        elif not isinstance(each, str):
             out += as_limits([each])
         elif each == "payload":
             out += payload_limits(scene)
+        elif "=" not in each and each in (own := registered(Filter)):
+            out.append(own[each])
         else:
             out.append(_limit_of(each, where))
     return tuple(out)

@@ -9,7 +9,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from math import degrees, pi
 from numbers import Real
 from typing import Any, Protocol, TypeVar
 
@@ -22,17 +21,19 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.problem._limit_words import parse_limits
+from seqopt.problem.amounts import Amount, parse_goals, worst
+from seqopt.problem.filters import Filter
 from seqopt.problem.requirements import (
     LINEAR_RANGE,
     Criterion,
     Limit,
     _prop_limits,
-    _with_other_limits,
+    _tolerance_beside,
     as_limits,
 )
-from seqopt.problem.standing import MARGINS, Standing
+from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import NO_TOLERANCE, PROP_EXCESS, TOLERANCE, robot_response
+from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import settle, short
 from seqopt.scene.scene import Scene
@@ -182,87 +183,6 @@ def parse_robust(text: str) -> RobustAim:
     )
 
 
-LARGEST = "F_largest"
-STATE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", LARGEST, TOLERANCE)
-"""Responses of a state, whoever moved last: those that goals, criteria and limits may name."""
-
-
-class Measure(Enum):
-    """How a goal adds up over the steps of a build."""
-
-    PEAK = "peak"  # the largest of any step
-    SUM = "sum"  # the sum over all steps
-    STEPS = "steps"  # how many steps there are
-    REGRIPS = "regrips"  # how many grips are taken beside those that place a brick
-    TRAVEL = "travel"  # how far robots go from one grip to the next, m
-    MAKESPAN = "makespan"  # how long the build takes, s
-
-
-@dataclass(frozen=True)
-class Goal:
-    """A quantity that a free schedule minimizes."""
-
-    measure: Measure
-    response: str = ""  # whose peak or sum it is, or a margin; else that of the criterion
-
-    def __str__(self) -> str:
-        if self.response:
-            return f"sum({self.response})" if self.measure is Measure.SUM else self.response
-        return "minmax" if self.measure is Measure.PEAK else self.measure.value
-
-    @property
-    def of_states(self) -> bool:
-        """Whether it is about states, and not about moves alone."""
-        return self.measure in (Measure.PEAK, Measure.SUM)
-
-    @property
-    def of_margins(self) -> bool:
-        """Whether it is about how surely states stand, and not about responses."""
-        return self.response in MARGINS
-
-    def shown(self, value: float) -> float:
-        """Return a value, SI units, as people read it.
-
-        Of a tilt it is what is survived, in degrees, of a tolerance the length, m.
-        """
-        if is_tolerance(self.response) and self.measure is Measure.PEAK:
-            return 1 / value if 0 < value < NO_TOLERANCE else 0.0 if value else np.inf
-        return degrees(pi / 2 - value) if self.response == "tilt" else value
-
-
-def judged_by(goals: Sequence[Goal], criterion: Criterion) -> dict[str, object]:
-    """Return the criterion with its numbers, for a summary; None where no goal asks for it."""
-    if not any(goal.of_states and not goal.response for goal in goals):
-        return {"criterion": None}
-    return {"criterion": criterion.name, **criterion.settings}
-
-
-def parse_goals(text: str) -> tuple[Goal, ...]:
-    """Return goals from words, the most important first, with commas between them.
-
-    They are ``minmax`` (the worst of the criterion), ``sum`` (over all steps), ``steps``,
-    ``regrips``, ``travel``, ``makespan`` (how long the build takes, where robots have durations), a
-    response (its worst) or ``sum(RESPONSE)``; also ``bond`` and ``friction`` (the least with which
-    every state stands), ``tilt`` (the largest that every state survives) and ``tolerance`` (how far
-    grips may be off in every state).
-
-    >>> [str(goal) for goal in parse_goals("minmax,steps,sum(T_max)")]
-    ['minmax', 'steps', 'sum(T_max)']
-    """
-    goals = [Goal(measure) for measure in Measure]
-    goals += [Goal(Measure.PEAK, name) for name in (*STATE_RESPONSES, *MARGINS)]
-    goals += [Goal(Measure.SUM, name) for name in STATE_RESPONSES if name != TOLERANCE]
-    known = {str(goal): goal for goal in goals}
-    words = [word.strip() for word in text.split(",")] if isinstance(text, str) else [text]
-    for word in words:
-        if word not in known:
-            why = f"does not exist{did_you_mean(word, known)}; give {', '.join(known)}"
-            raise ProblemError(f"aim {short(word)} {why}")
-        if words.count(word) > 1:
-            raise ProblemError(f"aim {word}: it is listed twice; name it once")
-    return tuple(known[word] for word in words)
-
-
 SHAPE = re.compile(
     r"(?P<kind>travel|steps_over:(?P<response>.+)|robot_use:(?P<robot>.+))"
     r"=((?P<level>[^:=]+):)?(?P<bound>[^:=]+?)(?P<unit>m|x|)"
@@ -361,12 +281,14 @@ class Problem(Shown):
         What can be chosen: the open grips of a schedule, or every move that rules allow.
     criterion : Criterion
         What a step costs.
-    goals : tuple of Goal
+    goals : tuple of Amount
         What is to be small, the most important first; empty where the formulation says whether
         the sum of the costs of open grips or the largest counts.
     limits : tuple of Limit
         Bounds that no step may exceed, whether or not a grip is open in it. Without one on
         ``linear_range``, plans keep the linear range wherever any does.
+    filters : tuple of Filter
+        What states must pass beside these.
     budgets : tuple of str
         Caps on totals over the build, in words.
     stands : Standing or None
@@ -395,7 +317,7 @@ class Problem(Shown):
     engine: Engine
     moves: Schedule | FreeRules
     criterion: Criterion
-    goals: tuple[Goal, ...] = ()
+    goals: tuple[Amount, ...] = ()
     limits: tuple[Limit, ...] = ()
     budgets: tuple[str, ...] = ()
     stands: Standing | None = None
@@ -404,6 +326,7 @@ class Problem(Shown):
     orders: Orders | None = None
     also: tuple[str, ...] = ()
     resources: Resources = HERE
+    filters: tuple[Filter, ...] = ()
 
     def __post_init__(self) -> None:
         """Let a tolerance keep to other limits, and props to what they may bear."""
@@ -411,15 +334,15 @@ class Problem(Shown):
         if isinstance(network, Network):  # another engine is refused later
             kept = (each for each in limits if each.response != PROP_EXCESS)
             limits = (*kept, *_prop_limits(network.scene))
-        parts: tuple[Limit | Goal, ...] = (*limits, *self.goals)
-        names = _with_other_limits([part.response for part in parts], limits)
-        named = [replace(p, response=name) for p, name in zip(parts, names, strict=True)]
-        settle(self, limits=tuple(named[: len(limits)]), goals=tuple(named[len(limits) :]))
+        whole = _tolerance_beside(limits)
+        named = (replace(e, response=whole) if is_tolerance(e.response) else e for e in limits)
+        goals = (worst(whole) if is_tolerance(goal.name) else goal for goal in self.goals)
+        settle(self, limits=tuple(named), goals=tuple(goals))
 
     def __repr__(self) -> str:
         parts = [f"{self.scene.name!r}, {self.method!r}, criterion {self.criterion.name!r}"]
         parts += map(str, self.goals)
-        for name in ("limits", "budgets", "scenarios"):
+        for name in ("limits", "filters", "budgets", "scenarios"):
             count = len(getattr(self, name))
             parts += [f"{count} {name}"] if count else []
         parts += ["every state stands"] if self.stands is not None else []
@@ -439,8 +362,8 @@ class Problem(Shown):
     @property
     def is_timed(self) -> bool:
         """Whether it is asked how long the build takes."""
-        capped = any(str(words).startswith(f"{Measure.MAKESPAN.value}=") for words in self.budgets)
-        return capped or any(goal.measure is Measure.MAKESPAN for goal in self.goals)
+        capped = any(str(words).startswith("makespan=") for words in self.budgets)
+        return capped or any(goal.in_time for goal in self.goals)
 
     @property
     def schedule(self) -> Schedule:
@@ -486,15 +409,17 @@ def _in_values(words: Mapping[str, Any], engine: Engine) -> dict[str, Any]:
     """Return values in the place of words, by what they are about."""
     network = getattr(engine, "network", None)
     if "limits" in words and isinstance(network, Network):  # else it is refused later
-        words = {**words, "limits": parse_limits(words["limits"], network.scene)}
+        found = parse_limits(words["limits"], network.scene)
+        filters = tuple(each for each in found if isinstance(each, Filter))
+        words = {**words, "limits": [e for e in found if e not in filters], "filters": filters}
     return {name: READ[name](value) if name in READ else value for name, value in words.items()}
 
 
-def _goals(given: Sequence[Goal] | str, least: int = 0) -> tuple[Goal, ...]:
-    """Return goals, ``least`` of them or more, that are given as such, or by their names."""
+def _goals(given: Sequence[Amount] | str, least: int = 0) -> tuple[Amount, ...]:
+    """Return amounts, ``least`` of them or more, that are given as such, or by their names."""
     goals = parse_goals(given) if isinstance(given, str) else given
     kinds = {*map(type, goals)} if isinstance(goals, Sequence) else {type(goals)}
-    if kinds - {Goal} or len(kinds) < least:
+    if kinds - {Amount} or len(kinds) < least:
         raise ProblemError(f"aims {short(given)}: give goals, or their names, as 'minmax,steps'")
     return tuple(goals)
 
@@ -530,7 +455,7 @@ class _Asked(Protocol):
     @property
     def standing(self) -> Standing | None: ...
     @property
-    def goals(self) -> Sequence[Goal]: ...
+    def goals(self) -> Sequence[Amount]: ...
     @property
     def scenarios(self) -> Sequence[Engine]: ...
     @property
@@ -541,7 +466,7 @@ def _require_for_curing(problem: _Asked) -> None:
     """Raise a `ProblemError` where mortar cures and what is asked beside it is not modeled."""
     if problem.standing is None or problem.standing.curing is None:
         return
-    wrong = [str(goal) for goal in problem.goals if goal.of_margins]
+    wrong = [str(goal) for goal in problem.goals if goal.margins]
     wrong += ["props"] if problem.network.scene.props else []
     wrong += ["scenarios"] if problem.scenarios else []
     if wrong:

@@ -328,14 +328,13 @@ def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
     return tuple(limits)
 
 
-def _with_other_limits(names: Sequence[str], limits: Sequence[Limit]) -> tuple[str, ...]:
-    """Return names of responses, that of a tolerance with what limits allow wherever grips are."""
+def _tolerance_beside(limits: Sequence[Limit]) -> str:
+    """Return the name of the tolerance that keeps to other limits wherever grips are."""
     least = {
         name: min((each.bound for each in limits if each.response == name), default=math.inf)
         for name in ("T_max", "D_max")
     }
-    whole = Allowed(least["T_max"], least["D_max"]).name
-    return tuple(whole if is_tolerance(name) else name for name in names)
+    return Allowed(least["T_max"], least["D_max"]).name
 
 
 def payload_limits(scene: Scene) -> tuple[Limit, ...]:

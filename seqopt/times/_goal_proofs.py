@@ -14,7 +14,6 @@ from seqopt.graph.paths import tied
 from seqopt.graph.solution import StatePath
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
-from seqopt.problem.problem import Measure
 from seqopt.sequence._durations import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
@@ -129,7 +128,7 @@ class _GoalProofs:
         self._rows, self._graph, self._values, self._found = rows, graph, values, found
         problem = rows.evaluator.problem
         self._aims = len(problem.aims)
-        self._is_time = [goal.measure is Measure.MAKESPAN for goal in problem.goals]
+        self._is_time = [goal.in_time for goal in problem.goals]
         self._time, self._sums = np.inf, list[tuple[int, float]]()
         for k, cap in zip(range(self._aims, len(values)), problem.budgets, strict=True):
             self._cap(k, tied(cap))

@@ -55,7 +55,7 @@ def timed_graph(problem: States, visited: Visited, cuts: FallCuts | None = None)
 
 def _curing(problem: States, visited: Visited, cuts: FallCuts) -> CuringStates:
     """Return what visited states ask of mortar."""
-    every = [(level, *problem._grips(rows, stand=True)) for level, _, rows in visited.states]
+    every = [(level, *problem.held_to_stand(rows)) for level, _, rows in visited.states]
     bricks = [np.full(len(held), problem.space.bricks_at(level)) for level, held, _ in every]
     held, payload = (np.concatenate([each[k] for each in every]) for k in (1, 2))
     full, begin = cuts.joints.full, problem.rules.begin

@@ -19,8 +19,8 @@ from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import build_states
 from seqopt.plan.front import FrontSelection, _StateFront, find_front
 from seqopt.plan.solving import solve
+from seqopt.problem.amounts import parse_goals
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.problem import parse_goals
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.rules import FreeRules
 from tests.builders import small_arch

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.problem.problem import parse_goals
+from seqopt.problem.amounts import parse_goals
 from seqopt.responses._tolerance import Allowed, allowed_by, misfits, step_tolerance
 from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
 from seqopt.responses.quantities import NO_TOLERANCE

@@ -13,7 +13,7 @@ import seqopt
 from seqopt._registry import OFFERS
 from seqopt._showing import Page, display
 from seqopt.errors import ExtraError
-from seqopt.judge._twin import Twin
+from seqopt.problem.amounts import Amount
 
 WITHOUT = """
 import sys
@@ -35,7 +35,7 @@ for draw in (scene.plot, plan.plot, plan.gantt, plan.animate, plan.engine.networ
 def test_what_outer_rooms_offer_is_where_it_is_said_to_be():
     for name, module in OFFERS.items():
         found = getattr(import_module(module), name)
-        assert callable(found) or isinstance(found, Twin), name
+        assert callable(found) or isinstance(found, Amount), name
         assert display(name) is getattr(import_module(module), name)
 
 

@@ -44,7 +44,8 @@ from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
-from seqopt.problem.problem import Problem, judged_by
+from seqopt.problem.amounts import judged_by
+from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import _said_limits
 from seqopt.report._pages import front_page, plan_page
 from seqopt.report.comparison import _worst_of, fixed_methods, shown_table

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
+from seqopt.problem.amounts import STATE_RESPONSES
 from seqopt.problem.criteria import RankSum
-from seqopt.problem.problem import STATE_RESPONSES
 from seqopt.problem.requirements import Criterion, Limit, SceneFacts, _step_limits
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, robot_response

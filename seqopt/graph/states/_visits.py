@@ -12,7 +12,7 @@ from seqopt.errors import SolverError
 from seqopt.graph._explore import Explorer, Moves, _Space
 from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
-from seqopt.problem.problem import Measure
+from seqopt.problem.amounts import MoveArrays
 from seqopt.sequence import _rule_space as free_space
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_space import FreeSpace
@@ -175,7 +175,7 @@ class FreeStates(_Space):
 
     @property
     def peaks(self) -> tuple[bool, ...]:
-        return tuple(goal.measure is Measure.PEAK for goal in self.problem.goals)
+        return tuple(goal.is_peak for goal in self.problem.goals)
 
     def start(self) -> tuple[int, Ints]:
         return self.first, self.problem.space.start()
@@ -256,14 +256,10 @@ def move_amounts(problem: States, values: Floats, taken: Floats) -> Floats:
     ``values`` (m, g): what they take of the states that the moves lead to; ``taken`` (m, 2):
     whether the moves are regrips, and how far robots go, m. Result (m, g).
     """
-    out = values.copy()
+    out, moves = values.copy(), MoveArrays(*taken.T)
     for k, goal in enumerate(problem.goals):
-        if goal.measure is Measure.STEPS:
-            out[:, k] = 1.0
-        elif goal.measure is Measure.REGRIPS:
-            out[:, k] = taken[:, 0]
-        elif goal.measure is Measure.TRAVEL:
-            out[:, k] = taken[:, 1]
+        if goal.moves is not None:
+            out[:, k] = goal.moves(moves)
     return out
 
 
@@ -274,14 +270,14 @@ def floors_of_goals(problem: States) -> tuple[float, ...]:
     bricks and robots allow. Minus infinity where nothing is known.
     """
     space, out = problem.space, [-np.inf] * len(problem.goals)
+    values, within = np.zeros((1, len(out))), np.zeros(1, dtype=bool)
     if space.ends_bare:
         values, within = problem.values(space.levels, np.zeros_like(space.start()))
-        for k, goal in enumerate(problem.goals):
-            if within[0] and goal.measure is Measure.PEAK:
-                out[k] = float(values[0, k])
     for k, goal in enumerate(problem.goals):
-        if goal.measure is Measure.STEPS:
-            out[k] = float(space.fewest_steps)
+        if within[0] and goal.is_peak:
+            out[k] = float(values[0, k])
+        if goal.least is not None:
+            out[k] = goal.least(space)
     return tuple(out)
 
 
@@ -293,7 +289,7 @@ def barred(problem: States) -> tuple[int, Ints] | None:
     nothing is asked.
     """
     space = FreeStates(problem, standing=bool(problem.demands))
-    asked = problem.demands or problem.limits
+    asked = problem.demands or problem.limits or problem.filters
     for level, state in problem.space.without_choice() if asked else ():
         if not space.values(level, state, rough=False)[1].all():
             return level, state
@@ -313,7 +309,7 @@ def explore(
     called after every level; may raise to end the search. Nothing is visited where a state that
     every plan passes is not allowed.
     """
-    asked = bool(problem.demands) or any(goal.of_margins for goal in problem.goals)
+    asked = bool(problem.demands) or any(goal.margins for goal in problem.goals)
     space = FreeStates(problem, regrips=width is None, standing=asked)
     found = Explorer(space, width, tell)
     if barred(problem) is None:

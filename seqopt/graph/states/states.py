@@ -17,18 +17,10 @@ from seqopt.engines.registry import engine_for
 from seqopt.errors import ProblemError
 from seqopt.graph.states._checks import checked_limits, of_states
 from seqopt.network.network import Network
-from seqopt.problem.problem import (
-    LARGEST,
-    STATE_RESPONSES,
-    WORST_PEAK,
-    Aim,
-    Goal,
-    Measure,
-    RobustAim,
-    _goals,
-    _require_for_curing,
-)
-from seqopt.problem.requirements import LIMIT_TOLERANCE, Criterion, Limit, state_costs
+from seqopt.problem.amounts import LARGEST, NONE, STATE_RESPONSES, Amount, StateArrays
+from seqopt.problem.filters import Filter, filters_of
+from seqopt.problem.problem import WORST_PEAK, Aim, RobustAim, _goals, _require_for_curing
+from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets, _near
 from seqopt.responses._tolerance import is_tolerance
@@ -65,13 +57,14 @@ class States(Shown):
     ``over``: what is made of their totals, if the goal is a sum; ``weights``: by scenario, of its
     sum in that goal, in place of the largest.
     ``resources``: who solves grip sets, and where answers are kept; the proof believes none of
-    these; ``spares``: whether the whole that nobody holds costs nothing.
+    these; ``spares``: whether the whole that nobody holds costs nothing; ``filters``: what states
+    must pass beside limits.
     """
 
     engine: Engine
     rules: FreeRules | Schedule
     criterion: Criterion
-    goals: tuple[Goal, ...]
+    goals: tuple[Amount, ...]
     limits: tuple[Limit, ...] = ()
     standing: Standing | None = None
     settled: tuple[Standing, ...] = ()
@@ -81,6 +74,7 @@ class States(Shown):
     weights: tuple[float, ...] = ()
     resources: Resources = HERE
     spares: bool = False
+    filters: tuple[Filter, ...] = ()
 
     def __repr__(self) -> str:
         caps = zip(self.names[len(self.aims) :], self.budgets, strict=True)
@@ -168,13 +162,13 @@ class States(Shown):
     @property
     def is_timed(self) -> bool:
         """Whether it is asked how long the build takes."""
-        return any(goal.measure is Measure.MAKESPAN for goal in self.goals)
+        return any(goal.in_time for goal in self.goals)
 
     @property
     def parks(self) -> bool:
         """Whether it counts where a free robot was last: for its travel, or the time of it."""
         speeds = self.is_timed and has_speeds(self.network.scene)
-        return speeds or any(goal.measure is Measure.TRAVEL for goal in self.goals)
+        return speeds or any(goal.needs_stays for goal in self.goals)
 
     @cached_property
     def caps(self) -> Mapping[str, float]:
@@ -190,15 +184,15 @@ class States(Shown):
     @cached_property
     def named(self) -> tuple[str, ...]:
         """The responses that goals, criterion and limits name."""
-        names = [goal.response for goal in self.goals if goal.response]
-        if any(goal.of_states and not goal.response for goal in self.goals):
+        names = [name for part in (*self.goals, *self.filters) for name in part.responses]
+        if any(goal.of_criterion for goal in self.goals):
             names += self.criterion.wanted(1)
         names += [limit.response for limit in self.limits]
         own = sorted({name for name in names if is_tolerance(name)} - {TOLERANCE})
         return tuple(name for name in (*STATE_RESPONSES, PROP_EXCESS, *own) if name in names)
 
     @property
-    def aims(self) -> tuple[Goal, ...]:
+    def aims(self) -> tuple[Amount, ...]:
         """The goals that are to be made small."""
         return self.goals[: len(self.goals) - len(self.budgets)]
 
@@ -211,7 +205,7 @@ class States(Shown):
     @cached_property
     def screened(self) -> GripSets:
         """The same with six digits, to choose by: enough where only worst values count."""
-        if any(goal.of_states and goal.measure is not Measure.PEAK for goal in self.goals):
+        if self.filters or any(goal.states and not goal.has_few_digits for goal in self.goals):
             return self.sets
         return GripSets(self.engine, self.sets.names, self.resources, screen=True)
 
@@ -231,12 +225,11 @@ class States(Shown):
 
     def responses(
         self, level: int, states: Ints, *, rough: bool = False
-    ) -> tuple[Mapping[str, Floats], Bools]:
-        """Return the named responses of states, and which states are within all limits.
+    ) -> tuple[StateArrays, Bools]:
+        """Return states as amounts and filters see them, and which pass the filters.
 
         ``states`` (n, c): as in `seqopt.sequence._rule_space`; ``rough``: whether six digits are
-        enough, except for what is close to a limit. Results: ``responses`` (dict of str to (n,)
-        float): SI units; ``within`` (n,).
+        enough, except for what is close to a limit. What stands is asked later.
         """
         (held, most), bricks = self._grips(states), self.space.bricks_at(level)
         answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
@@ -244,13 +237,32 @@ class States(Shown):
             close = self._close(answers, forces, most)
             if close.any():
                 answers[close], forces[close] = self.sets.answers(bricks, held[close])
-        found = self._by_name(answers, forces)
-        within = np.isfinite(answers).all(axis=1) & np.isfinite(forces).all(axis=1)
-        for limit in self.limits:
-            if limit.response in found:
-                within &= ~limit.exceeded(found[limit.response])
-        carried: Bools = np.asarray((forces <= most + LIMIT_TOLERANCE * most).all(axis=1))
-        return found, within & carried
+        fits = np.isfinite(answers).all(axis=1) & np.isfinite(forces).all(axis=1)
+        found, places = self._by_name(answers, forces), states[:, : self.space.robots].clip(min=0)
+        nodes = self._node_numbers[places]
+        seen = StateArrays(bricks, nodes, found, forces, most, fits, self.criterion, states)
+        for each in self._asked_first:
+            fits &= each.passes(seen)
+        for each in self.filters if fits.any() else ():
+            if each.expensive:
+                rows = np.flatnonzero(fits)
+                fits[rows] = each.passes(seen.only(rows))
+        return seen, fits
+
+    @cached_property
+    def _node_numbers(self) -> Ints:
+        return np.array([NONE, *self.network.scene.placed_nodes])
+
+    @cached_property
+    def every_filter(self) -> tuple[Filter, ...]:
+        """All that states must pass: rules, standing, payloads, arms, limits, and others."""
+        return filters_of(self)
+
+    @cached_property
+    def _asked_first(self) -> tuple[Filter, ...]:
+        """Filters that no move keeps by itself, and that cost little."""
+        kept = ("rules", "arms")
+        return tuple(f for f in self.every_filter if not (f.expensive or f.name in kept))
 
     def _by_name(self, answers: Floats, forces: Floats) -> dict[str, Floats]:
         found = dict(zip(self.sets.names, answers.T, strict=True))
@@ -284,12 +296,10 @@ class States(Shown):
         if not bricks:  # the empty site, where a take-down ends
             return out, np.ones(len(states), dtype=bool)
         found, within = self.responses(level, states, rough=rough)
+        found = found._replace(possible=within)
         for column, goal in enumerate(self.goals):
-            if goal.of_states and not goal.of_margins:
-                if goal.response:
-                    out[:, column] = found[goal.response]
-                else:
-                    out[:, column] = state_costs(self.criterion, found, bricks, within)
+            if goal.states is not None:
+                out[:, column] = goal.states(found)
         if self.spares and bricks == len(self.network.inner):
             out[(states[:, : self.space.robots] <= 0).all(axis=1)] = 0.0
         within &= np.isfinite(out).all(axis=1)
@@ -313,10 +323,11 @@ class States(Shown):
             rows = np.flatnonzero(within)
             within[rows] = self.stand(level, states[rows])
         if bricks := self.space.bricks_at(level):
-            for column in (c for c, goal in enumerate(self.goals) if goal.of_margins):
-                name, rows = self.goals[column].response, np.flatnonzero(within)
-                grips = self._grips(states[rows], stand=True)
-                out[rows, column] = self.stability.margins(name, bricks, *grips)[:, 1]
+            for column, goal in enumerate(self.goals):
+                if goal.margins is not None:
+                    rows = np.flatnonzero(within)
+                    held = self.held_to_stand(states[rows])
+                    out[rows, column] = goal.margins(self.stability, bricks, *held)[:, 1]
         within &= np.isfinite(out).all(axis=1)
         return out, within
 
@@ -325,14 +336,14 @@ class States(Shown):
         if self.each:
             return np.asarray(np.all([p.stand(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)
-        return np.asarray(self.stability.stand(bricks, *self._grips(states, stand=True)))
+        return np.asarray(self.stability.stand(bricks, *self.held_to_stand(states)))
 
     def recalled(self, level: int, states: Ints) -> Ints:
         """Return which states are known to stand as is demanded, 1, which to fall, -1, else 0."""
         if self.each:
             return np.asarray(np.min([p.recalled(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)
-        return self.stability.recalled(bricks, *self._grips(states, stand=True))
+        return self.stability.recalled(bricks, *self.held_to_stand(states))
 
     def _worst(
         self, valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]], states: Ints, most: float
@@ -390,24 +401,43 @@ class States(Shown):
         payloads = np.array([robot.payload for robot in self.network.scene.robots])
         return np.asarray(np.minimum(payloads, self._caps))
 
-    def _grips(self, states: Ints, *, stand: bool = False) -> tuple[Ints, Floats]:
-        """Return the nodes held, ascending, and the largest force at each, (n, r).
-
-        ``stand``: whether stability is asked, for which the kinds of grips do not count.
-        """
+    def _grips(self, states: Ints) -> tuple[Ints, Floats]:
+        """Return the nodes held, ascending, and the largest force at each, (n, r)."""
         held = states[:, : len(self._caps)].clip(min=0)
-        if not stand and self._beyond.any():
+        if self._beyond.any():
             held = np.where(held > 0, held + self._beyond, 0)
-        order = np.argsort(held, axis=1, kind="stable")
-        most: Floats = self._payloads if stand else self._caps
-        return np.take_along_axis(held, order, axis=1), np.asarray(most[order])
+        return _ascending(held, self._caps)
+
+    def held_to_stand(self, states: Ints) -> tuple[Ints, Floats]:
+        """Return the same where stability is asked, for which kinds of grips do not count."""
+        return _ascending(states[:, : len(self._caps)].clip(min=0), self._payloads)
+
+    def in_scene(self, scene: Scene) -> States:
+        """Return the same problem of another scene, as of one with other robots."""
+        engine = engine_for(self.engine, scene)
+        return replace(self, engine=engine, rules=self.rules.in_scene(engine.network.scene))
+
+    def carrying(self, payload: float) -> States:
+        """Return the same problem in which every robot may carry so much, N."""
+
+        def strong(scene: Scene) -> Scene:
+            return scene.with_robots(*(replace(r, payload=payload) for r in scene.robots))
+
+        worlds = tuple(engine_for(e, strong(e.network.scene)) for e in self.scenarios)
+        return replace(self.in_scene(strong(self.network.scene)), scenarios=worlds)
+
+
+def _ascending(held: Ints, most: Floats) -> tuple[Ints, Floats]:
+    """Return places held (n, r) in ascending order, and what those who hold may carry."""
+    order = np.argsort(held, axis=1, kind="stable")
+    return np.take_along_axis(held, order, axis=1), np.asarray(most[order])
 
 
 def build_states(
     engine: Engine,
     rules: FreeRules | Schedule,
     criterion: Criterion,
-    goals: Sequence[Goal] | str = "minmax",
+    goals: Sequence[Amount] | str = "minmax",
     limits: Sequence[Limit] = (),
     stands: Standing | Mortar | str | None = None,
 ) -> States:
@@ -427,7 +457,7 @@ def build_states(
     named = _goals(goals, least=1)
     rules = rules.begun(engine.network.scene) if isinstance(rules, FreeRules) else rules
     limits = checked_limits(limits, engine.network)
-    if any(goal.of_states and not goal.response for goal in named):
+    if any(goal.of_criterion for goal in named):
         criterion = of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
     return _asked(States(engine, rules, criterion, named, limits, standing))
@@ -447,7 +477,7 @@ def within(problem: States, caps: Mapping[str, float]) -> States:
     """
     goals = [_goals(name)[0] for name in caps]
     for goal, cap in zip(goals, caps.values(), strict=True):
-        if goal.measure is Measure.PEAK or (goal.of_states and not goal.response):
+        if goal.is_peak or goal.of_criterion:
             raise ProblemError(
                 f"budget {goal}: it is no total of moves or of a response; give steps, regrips, "
                 "travel, makespan or sum(RESPONSE), or set a limit"
@@ -469,7 +499,7 @@ def over_scenarios(
     was posed for. A `ProblemError` names a goal that is no worst value, or not the one sum of which
     totals are made.
     """
-    sums = [goal for goal in problem.goals if goal.measure is Measure.SUM]
+    sums = [goal for goal in problem.goals if goal.states and not goal.is_peak]
     if over.aim is Aim.SUM and problem.goals != (*sums,)[:1]:
         raise ProblemError(
             f"robust aim {over}: it is made of one sum alone; leave other aims and budgets out, or "
@@ -488,7 +518,7 @@ def over_scenarios(
 
 def _asked(problem: States) -> States:
     """Return a problem whose stability can be asked, where it will be."""
-    if problem.standing is not None or any(goal.of_margins for goal in problem.goals):
+    if problem.standing is not None or any(goal.margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
     if problem.is_timed:
         require_for_makespan(problem.network.scene, problem.rules)

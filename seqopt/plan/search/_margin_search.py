@@ -16,14 +16,15 @@ from seqopt.graph._explore import Explorer
 from seqopt.graph.paths import FAILS, PASSES, _lazy_path
 from seqopt.graph.states._visits import FreeStates
 from seqopt.graph.states.states import States
-from seqopt.problem.problem import Goal, Measure
+from seqopt.problem.amounts import STEPS as COUNT
+from seqopt.problem.amounts import Amount
 from seqopt.problem.standing import Standing, slack
 from seqopt.stability.assessment import ROUGHEST
 
 WORST = {"bond": 1e9, "friction": ROUGHEST, "tilt": pi / 2}  # as goals count them
 FIRST = {"bond": 1e3, "friction": 0.5, "tilt": pi / 2 - 0.05}  # where the search begins
 State = tuple[int, ...]
-STEPS = (Goal(Measure.STEPS),)
+STEPS = (COUNT,)
 
 
 def best_margin(
@@ -36,7 +37,7 @@ def best_margin(
     of a plan that does. Raises `InfeasibleError` if no plan stands with any margin;
     `NothingFoundError` if it is open whether there is one within several budgets.
     """
-    name, look = problem.goals[0].response, StandingLook(problem, tell)
+    name, look = problem.goals[0].name, StandingLook(problem, tell)
     if problem.demands and not look.exists(look.demanding(WORST[name])):
         raise InfeasibleError("no plan of the free schedule stands as is demanded")
     low, high = bisected(name, lambda value: look.exists(look.demanding(value)))
@@ -60,9 +61,9 @@ class StandingLook:
         self._parts = np.repeat(np.arange(len(counts)), counts)
         self._starts = np.cumsum([0, *counts])
 
-    def demanding(self, value: float, goals: tuple[Goal, ...] = STEPS) -> States:
+    def demanding(self, value: float, goals: tuple[Amount, ...] = STEPS) -> States:
         """Return the problem in which every state must stand with a value as well."""
-        name = self._problem.goals[0].response
+        name = self._problem.goals[0].name
         return self.proving(replace(with_margin(self._problem, name, value), goals=goals))
 
     def proving(self, asked: States) -> States:

@@ -1,0 +1,219 @@
+r"""Filters: which states a plan may pass.
+
+A filter answers twice, since what it asks may stay open. A plan passes states :math:`s` that are
+*proven to pass*; a proof leaves out those that are *proven not to*:
+
+.. math:: P = \{s : f(s) \text{ is proven}\}, \qquad R = \{s : \neg f(s) \text{ is proven}\}, \qquad
+   P \cap R = \emptyset .
+
+Limits, payloads, rules, standing and arms are filters of one kind. Each says how it can be
+loosened, so that whoever explains that nothing is feasible needs no list of names. Whoever adds
+one registers it (`seqopt.register`) and asks for it by its name, as for a limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from seqopt._registry import ADDED
+from seqopt.arrays import Bools
+from seqopt.engines.registry import recipe_of
+from seqopt.errors import ProblemError
+from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays
+from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Limit
+from seqopt.scene._checks import short
+
+Passes = Callable[[StateArrays], Bools]
+Loosened = Callable[[Any], Iterator[tuple[str, Any]]]
+
+
+@dataclass(frozen=True, repr=False)
+class Filter:
+    """Which states a plan may pass.
+
+    Parameters
+    ----------
+    name : str
+        By which it is asked for, among limits.
+    passes : callable
+        Takes `StateArrays`, returns which states are proven to pass, (n,) bool.
+    responses : tuple of str
+        Those that it needs.
+    refuses : callable, optional
+        Returns which states are proven not to pass, (n,) bool; by default all others.
+    expensive : bool
+        Whether it is asked only of states that pass all other filters.
+    twin : callable, optional
+        What ``refuses`` says, written a second time: with it the judge proves that no plan is
+        better; without one the certificate says "claimed".
+    loosened : callable, optional
+        Takes a problem; yields how it can be loosened, in words, and the problem with that. By
+        default it can be left out.
+
+    Examples
+    --------
+    >>> Filter("two robots hold", lambda states: (states.nodes >= 0).sum(axis=1) == 2)
+    Filter('two robots hold')
+    """
+
+    name: str
+    passes: Passes = field(compare=False)
+    responses: tuple[str, ...] = ()
+    refuses: Passes | None = field(default=None, compare=False)
+    expensive: bool = False
+    twin: Passes | None = field(default=None, compare=False)
+    loosened: Loosened | None = field(default=None, compare=False)
+
+    def __str__(self) -> str:
+        return self.name
+
+    def __repr__(self) -> str:
+        return f"Filter({self.name!r})"
+
+    def fails(self, states: StateArrays) -> Bools:
+        """Return which states are proven not to pass, (n,)."""
+        return ~self.passes(states) if self.refuses is None else self.refuses(states)
+
+    def ways(self, problem: Any) -> Iterator[tuple[str, Any]]:
+        """Yield how it can be loosened in a problem, in words, and the problem with that."""
+        if self.loosened is not None:
+            yield from self.loosened(problem)
+        else:
+            rest = _without(self, problem.filters)
+            yield f"the filter {self.name} left out", replace(problem, filters=rest)
+
+
+def _without(part: object, parts: Sequence[Any]) -> tuple[Any, ...]:
+    return tuple(other for other in parts if other is not part)
+
+
+def _limit_filter(limit: Limit) -> Filter:
+    """Return the filter of a limit on a response."""
+
+    def passes(states: StateArrays) -> Bools:
+        values = states.responses.get(limit.response)
+        return states.possible if values is None else ~limit.exceeded(values)
+
+    def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
+        yield limit.label, replace(problem, limits=_without(limit, problem.limits))
+
+    return Filter(limit.label, passes, (limit.response,), loosened=loosened)
+
+
+IGNORED = "payload=ignored"
+STANDING = "no requirement to stand"
+PAYLOADS = "robots that carry more"  # where states must stand, held by what robots carry
+ARMS = "arms that reach more, or stand elsewhere"
+APART = "arms that are out of each other's way (slimmer, or elsewhere)"
+TAKEN = ("payload", LINEAR_RANGE, "rules", "stands", "arms")
+LARGE = 1e6  # N; more than robots have to carry
+
+
+def _rules_filter(problem: Any) -> Filter:
+    """Return the filter of the rules of a free schedule: moves lead only to what passes."""
+
+    def passes(states: StateArrays) -> Bools:
+        return np.asarray(problem.space.lawful(states.bricks, states.rows))
+
+    def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
+        for words, rules in problem.rules.loosened(problem.network.scene):
+            if not (problem.demands and words == IGNORED):  # robots hold with payloads
+                yield words, replace(problem, rules=rules)
+
+    return Filter("rules", passes, loosened=loosened)
+
+
+def _standing_filter(problem: Any) -> Filter:
+    """Return the filter of the demand to stand, of which it may be open whether it is met."""
+
+    def passes(states: StateArrays) -> Bools:
+        held = problem.held_to_stand(states.rows)
+        return np.asarray(problem.stability.stand(states.bricks, *held))
+
+    def refuses(states: StateArrays) -> Bools:
+        held = problem.held_to_stand(states.rows)
+        return np.asarray(~problem.stability.may_stand(states.bricks, *held))
+
+    def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
+        yield STANDING, replace(problem, standing=None, settled=())
+
+    return Filter("stands", passes, refuses=refuses, expensive=True, loosened=loosened)
+
+
+def _payloads_filter() -> Filter:
+    """Return the filter of what robots may carry, by each of their grips."""
+
+    def passes(states: StateArrays) -> Bools:
+        over = states.forces > states.most + LIMIT_TOLERANCE * states.most
+        return np.asarray(~over.any(axis=1))
+
+    def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
+        if recipe_of(problem.engine):
+            yield PAYLOADS, problem.carrying(LARGE)
+
+    return Filter("payload", passes, loosened=loosened)
+
+
+def _arms_filter(problem: Any) -> Filter:
+    """Return the filter of postures that go together: moves lead only to what passes."""
+
+    def passes(states: StateArrays) -> Bools:
+        return np.asarray(problem.space.for_arms(states.bricks, states.rows))
+
+    def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
+        scene = problem.network.scene  # robots without arms hold as those whose joints are rigid
+        if scene.grip_kinds.arms.any() or not recipe_of(problem.engine):
+            return
+        alone = replace(problem, scenarios=())
+        near = (
+            r if r.arm is None else replace(r, arm=replace(r.arm, keeps_apart=False))
+            for r in scene.robots
+        )
+        yield APART, alone.in_scene(scene.with_robots(*near))
+        yield ARMS, alone.in_scene(scene.with_robots(*(replace(r, arm=None) for r in scene.robots)))
+
+    return Filter("arms", passes, loosened=loosened)
+
+
+def filters_of(problem: Any) -> tuple[Filter, ...]:
+    """Return all that states of a problem must pass, in the order in which each is loosened."""
+    out = [_rules_filter(problem)]
+    out += [_standing_filter(problem)] if problem.demands else []
+    out += [_payloads_filter()]
+    out += [_arms_filter(problem)] if problem.network.scene.has_arms else []
+    return (*out, *map(_limit_filter, problem.limits), *problem.filters)
+
+
+def register(*parts: Amount | Filter) -> None:
+    """Add amounts and filters of your own, which aims, budgets and limits then ask for by name.
+
+    A package does the same by entry points of the group ``seqopt.parts``.
+
+    Parameters
+    ----------
+    *parts : Amount or Filter
+        Each takes the place of one that was registered by its name before.
+
+    Raises
+    ------
+    ProblemError
+        If something is neither, or has the name of something that is always there.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> from seqopt.problem import Amount
+    >>> seqopt.register(Amount("held", lambda states: (states.nodes >= 0).sum(axis=1)))
+    >>> seqopt.optimize("chain:bricks=7", "free", aim="minmax,held").objective["held"]
+    27.0
+    """
+    for part in parts:
+        if not isinstance(part, Amount | Filter):
+            raise ProblemError(f"{short(part)}: give an Amount or a Filter of seqopt.problem")
+        if part.name in (*BUILT_IN, *TAKEN):
+            raise ProblemError(f"{part!r}: this name has a meaning already; give another one")
+        ADDED[part.name] = part
