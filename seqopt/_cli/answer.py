@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from importlib.metadata import version
 from pathlib import Path
@@ -73,6 +73,15 @@ class Answer:
     notes: tuple[str, ...] = ()  # what else is worth knowing: lines on standard error
     failures: tuple[str, ...] = ()  # what went wrong although there is an answer: as notes
     status: Status = Status.DONE
+    faults: tuple[str, ...] = ()  # what --strict makes failures
+    value: Any = None  # what Python gets
+
+    def strictly(self) -> Answer:
+        """Return the answer of --strict: what does not hold is its status."""
+        if not self.faults or self.status not in (Status.DONE, Status.DOES_NOT_HOLD):
+            return self
+        failures = (*self.failures, *self.faults)
+        return replace(self, failures=failures, status=Status.DOES_NOT_HOLD)
 
     def document(self, command: str) -> Any:
         """Return facts and status of a command, ready for JSON."""

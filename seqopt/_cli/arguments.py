@@ -98,19 +98,19 @@ class _Command:
 COMMANDS = {
     "compare": _Command("show all ways to build a scene side by side", "compare:Compare"),
     "optimize": _Command("choose where robots hold, and write the plan", "optimize:Optimize"),
-    "replan": _Command("plan the rest of a build after a change", "replan:Replan"),
-    "pareto": _Command("find all plans that no other one beats in every aim", "pareto:Pareto"),
+    "replan": _Command("plan the rest of a build after a change", "replan:ReplanWords"),
+    "pareto": _Command("find all plans that no other one beats in every aim", "pareto:ParetoWords"),
     "analyze": _Command("compute forces and displacements in every step", "analyze:Analyze"),
     "times": _Command("say how long a build takes, and who does what when", "times:Times"),
-    "assess": _Command("prove which steps stand, and with what margins", "assess:Assess"),
-    "report": _Command("make a page that shows plans step by step", "report:Report"),
+    "assess": _Command("prove which steps stand, and with what margins", "assess:AssessWords"),
+    "report": _Command("make a page that shows plans step by step", "report:ReportWords"),
     "reach": _Command("say which arms reach which nodes, and how", "reach:Reach"),
     "scene": _Command("check, describe, export or list scenes", "scene:SceneAsked"),
     "import": _Command(
         "make a scene of an assembly of COMPAS, a mesh or a table", "importing:Import"
     ),
     "export": _Command("write a plan in a format of others", "exporting:Export"),
-    "instance": _Command("write the graph of a problem, for any solver", "instance:Instance"),
+    "instance": _Command("write the graph of a problem, for any solver", "instance:InstanceWords"),
     "judge": _Command("check a bare solution of an instance, and a bound", "judge:Judge"),
     "completion": _Command("let the shell complete words of seqopt", "completion:Completion"),
 }
@@ -186,13 +186,25 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
     return whole
 
 
-def request(words: Sequence[str], tell: Any = None) -> tuple[str, Any]:
+@dataclass(frozen=True)
+class Printed:
+    """How an answer is printed, and whether what does not hold in it is the exit status."""
+
+    quiet: bool = False
+    json: bool = False
+    strict: bool = False
+
+
+def request(words: Sequence[str], tell: Any = None) -> tuple[str, Any, Printed]:
     """Return the command that words name, and its options; a wrong word ends the program."""
     options = vars(parser(asked_command(words)).parse_args(words))
+    from seqopt._cli.signatures import given  # noqa: PLC0415  # of which help needs nothing
+
     name = options.pop("command")
-    options = {n: tuple(v) if isinstance(v, list) else v for n, v in options.items()}
-    more = {"words": (*words,)} | ({} if tell is None else {"tell": tell})
-    return name, COMMANDS[name].asked(**options, **more)
+    kind = COMMANDS[name].asked
+    told = {each: options.pop(each) for each in ("quiet", "json", "strict") if each in options}
+    more = {"made_by": words} if hasattr(kind, "made_by") else {}
+    return name, given(kind, options | more | {"progress": tell}), Printed(**told)
 
 
 def first_screen(command: argparse.ArgumentParser) -> str:

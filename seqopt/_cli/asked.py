@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.given import given_scene
-from seqopt._cli.options import Asked, Built, Computed, Judged, Posed, Stands, Strict, Timed
+from seqopt._cli.options import Built, Computed, Judged, Postures, Team, Tilted, Timed, listed
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_props
 from seqopt.arms._kept import arm_faults
@@ -54,25 +54,24 @@ def size_line(scene: Scene) -> str:
     return f"{scene.name}: {size}, {len(scene.grounds)} ground ends"
 
 
-def asked_scene(asked: Built, *, ranged: bool = False) -> Scene:
-    """Return the scene that options describe; ``ranged``: a range of --grips leaves its own."""
+def asked_scene(asked: Built) -> Scene:
+    """Return the scene that options describe; one of a range of --grips keeps its own."""
     if asked.order == "search":
         raise ProblemError(
             "--order search: only the free schedule has it; give optimize --schedule free"
         )
-    scene = in_order(given_scene(asked), asked.order)
-    for text in asked.payload:
+    order = None if asked.order is None else str(asked.order)
+    scene = in_order(given_scene(asked), order)
+    for text in listed(asked.payload):
         scene = parse_payload(text, scene)
-    if asked.robots.isdecimal():
-        scene = with_robots(scene, int(asked.robots))
+    if isinstance(asked, Team) and (count := str(asked.robots)).isdecimal():
+        scene = with_robots(scene, int(count))
     if asked.props is not None:
-        scene = scene.with_props(*parse_props(asked.props, scene))
-    if asked.grips is None or (ranged and ".." in asked.grips):
-        return scene
-    return parse_grips(asked.grips, scene)
+        scene = scene.with_props(*parse_props(str(asked.props), scene))
+    return scene if asked.grips is None else parse_grips(asked.grips, scene)
 
 
-def in_seconds(asked: Timed | Posed, scene: Scene) -> Scene:
+def in_seconds(asked: Timed, scene: Scene) -> Scene:
     """Return a scene with the durations of --durations."""
     try:
         return scene.with_durations(*asked.durations)
@@ -83,7 +82,8 @@ def in_seconds(asked: Timed | Posed, scene: Scene) -> Scene:
 def asked_engine(asked: Computed, network: Network) -> Engine:
     """Return the engine that a command is asked for; where none is named, that of the scene."""
     mortar = None if asked.mortar is None else mortar_word(asked.mortar, "--mortar")
-    of_verdicts = asked.engine not in LIMITED and not asked.no_stability
+    proven = isinstance(asked, Judged) and asked.stability
+    of_verdicts = asked.engine not in LIMITED and proven
     if asked.engine is None:
         engine = make_engine(DEFAULT, network, None if of_verdicts else mortar)
         # with a mortar of its own an engine is asked where joints open: set by set
@@ -95,7 +95,7 @@ def asked_engine(asked: Computed, network: Network) -> Engine:
         raise SceneError(f"--engine {asked.engine}: {why}") from error
 
 
-def posture_trouble(asked: Asked, scene: Scene) -> str:
+def posture_trouble(asked: Postures, scene: Scene) -> str:
     """Compute postures of arms, or take those that are kept; return why there are none, if so."""
     try:
         find_postures(scene, asked.cache, asked.tell)
@@ -171,12 +171,12 @@ def waits_said(build: ShownBuild) -> Iterator[str]:
 
 def asked_prover(asked: Judged, network: Network) -> BuildProver:
     """Return what says which steps of builds stand, with the mortars that a command shows."""
-    demanded = asked_standing(asked) if isinstance(asked, Stands) else None
+    demanded = asked_standing(asked) if isinstance(asked, Tilted) else None
     own = getattr(asked, "stands", None) or asked.mortar or "epoxy"
     mortar = mortar_word(own, "--mortar") if demanded is None else demanded.mortar
     name = own if isinstance(own, str) else _mortar_name(mortar)
     shown = {"dry": Mortar(friction=mortar.friction), name: mortar}
-    return BuildProver(network, {} if asked.no_stability else shown, asked.tell)
+    return BuildProver(network, shown if asked.stability else {}, asked.tell)
 
 
 def refused(prover: BuildProver) -> tuple[str, ...]:
@@ -221,15 +221,14 @@ def kept_range(answer: Answer, beyond: str | None) -> Answer:
     return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
 
 
-def strictly(
+def held_to(
     answer: Answer,
-    asked: Strict,
     over: Sequence[str],
     outside: Sequence[object] = (),
     verdicts: Mapping[str, Sequence[BuildVerdicts]] | None = None,
     unreached: Sequence[str] = (),
 ) -> Answer:
-    """Return an answer, `marked`, with payloads that are `exceeded` and the status of --strict.
+    """Return an answer, `marked`, with payloads that are `exceeded` and the faults of --strict.
 
     ``verdicts``: by build, with the mortar of the scene last; ``unreached``: as of `arm_notes`.
     """
@@ -250,7 +249,5 @@ def strictly(
         OUTSIDE: [*map(str, outside)],
         "does not stand": falls,
     }
-    said = [f"seqopt: {name}: {'; '.join(each)}" for name, each in wrong.items() if each]
-    if not asked.strict or not said or answer.status is not Status.DONE:
-        return answer
-    return replace(answer, failures=(*answer.failures, *said), status=Status.DOES_NOT_HOLD)
+    faults = (f"seqopt: {name}: {'; '.join(each)}" for name, each in wrong.items() if each)
+    return replace(answer, faults=(*faults,))

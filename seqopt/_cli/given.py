@@ -13,7 +13,7 @@ from shutil import rmtree
 from tempfile import mkdtemp
 from typing import NamedTuple
 
-from seqopt._cli.options import Asked, Built, Fixed, Posed
+from seqopt._cli.options import BuiltFrom, Fixed, Posed, Postures, Scened
 from seqopt._cli.values import parse_robots
 from seqopt._files import csv_text, read_text, write_folder
 from seqopt.arms.reach import find_postures
@@ -39,10 +39,14 @@ FORMS = "PLAN:STEP (a plan's folder or CSV file), a STATE.json, or a number of b
 
 
 class NamedSteps(NamedTuple):
-    """A closed sequence, and what it is called: its method, its title, or the stem of its file."""
+    """A closed sequence, and what it is called: its method, its title, or the stem of its file.
+
+    ``notes`` say which sequence it is where nobody asked for one.
+    """
 
     name: str
     steps: tuple[Step, ...]
+    notes: tuple[str, ...] = ()
 
 
 def is_folder(path: Path) -> bool:
@@ -50,7 +54,7 @@ def is_folder(path: Path) -> bool:
     return (path / "scene.json").is_file() and (path / "plan.csv").is_file()
 
 
-def given_scene(asked: Built) -> Scene:
+def given_scene(asked: Scened) -> Scene:
     """Return the scene that is given, also as a plan or the folder of one."""
     scene = asked.scene
     if isinstance(scene, ShownBuild):
@@ -62,10 +66,14 @@ def given_scene(asked: Built) -> Scene:
 
 def given_plan(asked: Fixed) -> ShownBuild | Path | None:
     """Return the plan whose steps are asked for, if one is named or stands for the scene."""
-    scene = asked.scene
-    if asked.plan is not None or asked.method is not None or isinstance(scene, ShownBuild):
-        return scene if asked.plan is None and isinstance(scene, ShownBuild) else asked.plan
-    return None if isinstance(scene, Scene) or not is_folder(Path(scene)) else Path(scene)
+    scene, plan = asked.scene, asked.plan
+    if plan is not None:
+        return plan if isinstance(plan, ShownBuild) else Path(plan)
+    if isinstance(scene, ShownBuild):
+        return scene
+    if asked.method is not None or isinstance(scene, Scene):
+        return None
+    return Path(scene) if is_folder(Path(scene)) else None
 
 
 def file_name(name: str | Path, end: str) -> Path:
@@ -73,17 +81,21 @@ def file_name(name: str | Path, end: str) -> Path:
     return Path(re.sub(r"\W+", "-", re.sub(r"\.json$", "", Path(name).name)).strip("-") + end)
 
 
-def plan_folder(asked: Asked, given: object, *, free: bool = False) -> Path:
+def plan_folder(
+    asked: Postures, given: BuiltFrom, *, free: bool = False
+) -> tuple[Path, tuple[str, ...]]:
     """Return the folder of a plan, which is made where a plan, a scene or its name is given.
 
-    The steps of a scene are usual ones, or the best ``free`` ones.
+    The steps of a scene are usual ones, or the best ``free`` ones; notes say which.
     """
+    notes: tuple[str, ...] = ()
     if isinstance(given, str | Path) and Path(given).is_dir():
-        return Path(given)
+        return Path(given), notes
     if not isinstance(given, ShownBuild):
-        scene = given if isinstance(given, Scene) else load_scene(str(given))
+        scene = given if isinstance(given, Scene) else load_scene(given)
         find_postures(scene, asked.cache, asked.tell)
-        given = _free(asked, scene) if free else _usual(asked, build_network(scene), ())
+        usual = _free(asked, scene) if free else _usual(asked, build_network(scene), ())
+        given, notes = usual
     folder = Path(mkdtemp(prefix="seqopt-"))  # there as long as this process
     atexit.register(rmtree, folder, ignore_errors=True)
     files: dict[str, bytes | str] = {
@@ -92,7 +104,7 @@ def plan_folder(asked: Asked, given: object, *, free: bool = False) -> Path:
         "summary.json": json.dumps(given.summary() if isinstance(given, Plan) else {}),
     }
     write_folder(folder, files)
-    return folder
+    return folder, notes
 
 
 def asked_steps(asked: Fixed, network: Network) -> NamedSteps:
@@ -115,8 +127,8 @@ def asked_steps(asked: Fixed, network: Network) -> NamedSteps:
         return NamedSteps(plan.stem, read_plan(scene, file))
     find_postures(scene, asked.cache, asked.tell)
     if method is None:
-        build = _usual(asked, network, robots)
-        return NamedSteps(build.title, build.steps)
+        build, notes = _usual(asked, network, robots)
+        return NamedSteps(build.title, build.steps, notes)
     if method != PUBLISHED:
         return NamedSteps(method, METHODS[method](network, robots))
     if not is_reference_arch(scene):
@@ -127,22 +139,23 @@ def asked_steps(asked: Fixed, network: Network) -> NamedSteps:
     return NamedSteps(method, published_plan(scene))
 
 
-def _usual(asked: Asked, network: Network, robots: Sequence[str]) -> ShownBuild:
-    """Return the build by the first fixed method that fits, else a plan; which one is noted."""
+def _usual(
+    asked: Postures, network: Network, robots: Sequence[str]
+) -> tuple[ShownBuild, tuple[str, ...]]:
+    """Return the build by the first fixed method that fits, else a plan, and which one it is."""
     for name, method in METHODS.items():
         with suppress(StepError):
             steps = method(network, robots)
             others = "--method, --plan or a plan's folder in place of SCENE names others"
-            asked.taken.append(f"steps: of the {name} method; {others}")
-            return GivenSequence(make_engine(USUAL, network), steps, name)
+            build = GivenSequence(make_engine(USUAL, network), steps, name)
+            return build, (f"steps: of the {name} method; {others}",)
     return _free(asked, network.scene)
 
 
-def _free(asked: Asked, scene: Scene) -> Plan:
-    """Return the best free schedule, which is noted."""
+def _free(asked: Postures, scene: Scene) -> tuple[Plan, tuple[str, ...]]:
+    """Return the best free schedule, and that it is this."""
     plan = optimize(scene, FREE, progress=asked.tell)
-    asked.taken.append(f"steps: of the best free schedule, {plan.result}")
-    return plan
+    return plan, (f"steps: of the best free schedule, {plan.result}",)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -153,12 +166,12 @@ class Place:
     done: tuple[Step, ...] | None = ()
 
 
-def asked_place(text: str | None, name: str, scene: Scene) -> tuple[Scene, Place]:
+def asked_place(text: int | str | None, name: str, scene: Scene) -> tuple[Scene, Place]:
     """Return the place of --from or --to, and the scene in an order that begins with its bricks."""
     if text is None:
         return scene, Place()
     try:
-        return read_place(scene, text, bare=name == "from")
+        return read_place(scene, str(text), bare=name == "from")
     except StepError as error:
         raise StepError(f"--{name} {text}: {error}") from None
 

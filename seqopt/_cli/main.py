@@ -76,12 +76,12 @@ def _run(words: Sequence[str]) -> int:
         show(EXAMPLES)
         return Status.DONE
     try:
-        name, asked = request(words)
+        name, asked, printed = request(words)
     except SystemExit as stop:  # the parser has said why, or printed its help
         return int(stop.code or 0)
     from seqopt._cli.watcher import Watcher  # noqa: PLC0415  # of which help needs nothing
 
-    with quiet_numbers(quiet=asked.quiet), Watcher(shows=not asked.quiet) as tell:
-        answer: Answer = COMMANDS[name].load().run(replace(asked, tell=tell))
-    answer = replace(answer, notes=(*asked.taken, *answer.notes))
-    return print_answer(answer, name, quiet=asked.quiet, as_json=asked.json)
+    with quiet_numbers(quiet=printed.quiet), Watcher(shows=not printed.quiet) as tell:
+        answer: Answer = COMMANDS[name].load().run(replace(asked, progress=tell))
+    answer = answer.strictly() if printed.strict else answer
+    return print_answer(answer, name, quiet=printed.quiet, as_json=printed.json)

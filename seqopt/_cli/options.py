@@ -1,28 +1,43 @@
 """What commands are asked: frozen values, whose docstrings are the help of the command line.
 
 A class names its question first; then every option that it has, the word for its value, and the
-help. `seqopt._cli.arguments` makes parsers of them, `seqopt.doors` functions of Python. A field
-that no docstring of a command describes has its default there, and is no option of it.
+help. `seqopt._cli.arguments` makes parsers of them, `seqopt.doors` functions of Python: a field is
+annotated with what these take, and is in words once `seqopt._cli.signatures.given` has read it.
+What a docstring describes and no field holds is for whoever prints the answer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import DEFAULT, ENGINES
 from seqopt.graph.formulation import formulation_names
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.criteria import Ranked
+from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.standing import Standing
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import MARGINS
 from seqopt.study.published import CRITERIA, PUBLISHED
 from seqopt.work.progress import Tell
+
+File: TypeAlias = Path | str
+BuiltFrom: TypeAlias = Scene | ShownBuild | Path | str
+Number: TypeAlias = float | str
+Words: TypeAlias = Sequence[str] | str
+Numbers: TypeAlias = Mapping[str, float] | Sequence[str] | str
+Bricks: TypeAlias = Sequence[int | str] | int | str
+Limits: TypeAlias = Sequence[Limit | str] | Limit | str
+Rules: TypeAlias = FreeRules | Sequence[str] | str
+Stability: TypeAlias = Standing | Mortar | str
 
 NAMES: dict[str, Callable[[], Iterable[str]]] = {  # what stands in braces in the help
     "criteria": lambda: CRITERIA,
@@ -37,12 +52,17 @@ NAMES: dict[str, Callable[[], Iterable[str]]] = {  # what stands in braces in th
 
 
 def word(default: Any = MISSING, **how: Any) -> Any:
-    """Return a field of which a parser knows more: ``choices``, ``place``, ``const``.
+    """Return a field of which a parser knows more: ``choices``, ``flag``, ``const``.
 
-    ``place``: it stands without dashes; ``const``: what it is where no value follows. What has no
-    default must be given.
+    ``const``: what it is where no value follows. What has no default must be given. The field of
+    an argument without dashes is no keyword, so that type checkers see it as functions have it.
     """
     return field(metadata=how) if default is MISSING else field(default=default, metadata=how)
+
+
+def listed(values: Any) -> tuple[Any, ...]:
+    """Return the words of an option that may be repeated, once `given` has read it."""
+    return tuple(values)
 
 
 def _unheard(_: object) -> None:
@@ -59,13 +79,12 @@ class Asked:
         print one JSON document, for scripts
     """
 
-    quiet: bool = False
-    json: bool = False
-    out: Path | None = None
-    cache: Path | None = None
-    tell: Tell = _unheard
-    words: Sequence[str] = ()
-    taken: list[str] = field(default_factory=list)  # notes on what is taken where nothing is asked
+    progress: Tell | None = None
+
+    @property
+    def tell(self) -> Tell:
+        """What is told how far the command is."""
+        return self.progress or _unheard
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,11 +96,25 @@ class Strict(Asked):
         linear range
     """
 
-    strict: bool = False
+
+@dataclass(frozen=True, kw_only=True)
+class Written(Asked):
+    """What is written and printed?
+
+    out : DIR
+        folder to write
+    """
+
+    out: File | None = None
+
+    @property
+    def path(self) -> Path | None:
+        """Where it goes."""
+        return None if self.out is None else Path(self.out)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Built(Asked):
+class Scened(Asked):
     """What is built, and by whom?
 
     scene : SCENE
@@ -91,6 +124,16 @@ class Built(Asked):
         in which order bricks are placed, if not in the scene's own: reversed, ends (from all ground
         ends at once), sides (course by course, from both ends of each to its middle), or the names
         of all bricks, as 1..12,25..13
+    """
+
+    scene: BuiltFrom = field(default="arch25", kw_only=False, metadata={"place": True})
+    order: Bricks | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Built(Scened):
+    """What is built, and by whom?
+
     grips : STIFFNESS
         how stiff the grips of all robots are, if not as the scene says: rigid, or N/m, as 1e6, or
         three along its axes, as 1e6x1e6x5e5; turning=N m/rad after a comma keeps held bricks from
@@ -105,16 +148,13 @@ class Built(Asked):
         as rob1=250
     """
 
-    scene: Scene | ShownBuild | Path | str = word("arch25", place=True)
-    order: str | None = None
-    grips: str | None = None
-    props: str | None = None
-    payload: tuple[str, ...] = ()
-    robots: str = ""
+    grips: Number | None = None
+    props: Bricks | None = None
+    payload: float | Numbers = ()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Team(Built):
+class Team(Asked):
     """What is built, and by whom?
 
     robots : N|NAME,NAME
@@ -122,6 +162,8 @@ class Team(Built):
         names of those that take part where the steps leave that open; in the order in which they
         place their first bricks (default: the first of the scene whose reach allows the build)
     """
+
+    robots: int | Words | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +177,7 @@ class Timed(Asked):
         robot with its name before, as rob3:fetch=75 or rob3:slower=2.5 (default: as the scene says)
     """
 
-    durations: tuple[str, ...] = ()
+    durations: Words = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,9 +188,11 @@ class Postures(Asked):
         where robots have arms: keep their postures there, and use what is there
     """
 
+    cache: File | None = None
+
 
 @dataclass(frozen=True, kw_only=True)
-class Fixed(Team):
+class Fixed(Written, Postures, Team, Built):
     """Which steps may a build have?
 
     method : CHOICE
@@ -159,17 +203,26 @@ class Fixed(Team):
     """
 
     method: str | None = word(None, choices=(*METHODS, PUBLISHED))
-    plan: Path | ShownBuild | None = None
+    plan: ShownBuild | File | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cost(Asked):
+class Judging(Asked):
     """What counts as best?
 
-    criteria : NAME
+    criterion : NAME
         what a step costs: equations-2-3 (of Bruun et al.), worst-ratio (over the least worst of
         fixed methods), or responses to rank with weights, as T_max,M_sup=2,F_move; all names:
         {criteria} (default: equations-2-3; with --aim, --stands or --schedule free worst-ratio)
+    """
+
+    criterion: Criterion | str | None = word(None, flag="--criteria")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ranks(Judging):
+    """What counts as best?
+
     crown : BRICKS
         for criteria of ranks: how many bricks are placed at the crown of an arch, or none (default:
         derived from the scene)
@@ -178,8 +231,7 @@ class Cost(Asked):
         together, or only the pairs with the node chosen before (default: pairs)
     """
 
-    criteria: str | None = None
-    crown: str | None = None
+    crown: Number | None = None
     ranked: str | None = word(None, choices=[each.value for each in Ranked])
 
 
@@ -189,20 +241,27 @@ class Stands(Asked):
 
     stands : MORTAR
         every state must be proven to stand, robots within payload: dry, epoxy or bond=STRENGTH (Pa)
+    """
+
+    stands: Stability | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tilted(Stands):
+    """What must hold?
+
     friction : F
         with --stands: coefficient of friction
     tilt : DEG
         with --stands: tilt that every state must survive
     """
 
-    stands: Any = None
-    friction: str | None = None
-    tilt: str | None = None
-    curing: tuple[str, ...] = ()
+    friction: Number | None = None
+    tilt: Number | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cured(Stands):
+class Cured(Tilted):
     """What must hold?
 
     curing : WORDS
@@ -211,9 +270,11 @@ class Cured(Stands):
         before, as 5-6:30min. What is let go waits for it (default: full at once)
     """
 
+    curing: Words = ()
+
 
 @dataclass(frozen=True, kw_only=True)
-class Computed(Asked):
+class Engined(Asked):
     """How are responses computed?
 
     engine : CHOICE
@@ -221,33 +282,40 @@ class Computed(Asked):
         the same with three unknowns per brick, where all lies in a plane; frame: stiff bars, a slow
         independent check; discrete: joints that open and slip; auto: the cheapest of planar,
         compliance and discrete that is enough
+    """
+
+    engine: str | None = word(None, choices=(*ENGINES,))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Computed(Engined):
+    """How are responses computed?
+
     mortar : MORTAR
         what holds the joints, in verdicts and in the engines auto and discrete: epoxy, that of
         Bruun et al. (default), dry, nothing, or bond=STRENGTH (Pa)
     """
 
-    engine: str | None = word(None, choices=(*ENGINES,))
-    mortar: Any = None
-    no_stability: bool = True
+    mortar: Mortar | str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Judged(Computed):
     """What is written and printed?
 
-    no_stability :
+    stability :
         do not prove which steps stand, dry and with epoxy (or the mortar of --stands or --mortar):
         quicker
     """
 
-    no_stability: bool = False
+    stability: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rules(Asked):
+class Ruled(Asked):
     """Which steps may a build have?
 
-    rule : NAME=VALUE
+    rules : NAME=VALUE
         what robots may do: least_grips=N (2, or 1 of two robots, from the second brick on),
         newest=either|placing|free (where the newest brick is held), regrips=N|any (between two
         bricks), placers=NAME,NAME|any, payload=kept|ignored, ending=held|released|one-by-one (how
@@ -255,14 +323,14 @@ class Rules(Asked):
         --candidates)
 
     What must hold?
-    limit : LIMIT
+    limits : LIMIT
         what no step may exceed: payload (of every robot), or RESPONSE=VALUE in SI units, as
         F_largest=300; also where no grip is open. Plans keep the linear range wherever one does:
         linear_range=any lifts that, 0.5 asks for half of it in every step
     """
 
-    rule: tuple[str, ...] = ()
-    limit: tuple[Any, ...] = ()
+    rules: Rules = word((), flag="--rule")
+    limits: Limits = word((), flag="--limit")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -271,25 +339,72 @@ class Aimed(Asked):
 
     aim : NAME,NAME
         what is to be as small as possible, the most important first: minmax (the worst step), sum,
-        steps, regrips, travel, makespan (time), a response, as T_max, and others; these are props
-        (how many are needed, at which nodes), bond, friction, tilt, and sum(RESPONSE); the worst
-        step is by the criterion, by default worst-ratio, and a makespan needs --durations (default:
-        minmax with --schedule free; with others the total of what their moves cost); with --order
+        steps, regrips, travel, makespan (time), a response, as T_max, and others; these are bond,
+        friction, tilt, and sum(RESPONSE); the worst step is by the criterion, by default
+        worst-ratio, and a makespan needs --durations (default: minmax with --schedule free; with
+        others the total of what their moves cost); with --order
         search the best order of the bricks is found too
+    """
 
-    Who chooses and proves, and how long?
+    aim: Words | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limited(Asked):
+    """Who chooses and proves, and how long?
+
     time_limit : SECONDS
         limit of the whole command, of choosing, proof and verdicts: the best choice by then is
         written with its bound, and what there was no time for is named; with --no-proof, where
         choosing and computing are one, the moves that were chosen by then
     """
 
-    aim: str | None = None
-    time_limit: str | None = None
+    time_limit: Number | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class Posed(Judged, Stands, Rules, Team):
+class Moves(Computed, Aimed, Stands, Ruled, Team, Scened):
+    """Which steps may a build have?
+
+    schedule : NAME|FILE
+        free: any robot may release, hold or place next, or a sequence with open grips: {schedules}
+        (of all robots), or a CSV file of steps; open grips are marked ? in it (default: the loop of
+        three robots, or of two where there is no third)
+    """
+
+    schedule: str | Path | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice(Judging, Timed, Moves):
+    """What must hold?
+
+    budgets : BUDGET
+        cap on a total over the build, with the formulations labels, lagrangian, overlap_mip and
+        overlap_lp: travel=0.8 (of what the optimum without budgets travels), travel=3.5m,
+        steps_over:F_largest=250:10 (at most 10 steps over 250 N), robot_use:rob1=100:5 (at most 5
+        in which rob1 carries over 100 N); with --aim or --schedule free: steps=N, regrips=N,
+        travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE
+
+    Who chooses and proves, and how long?
+    formulation : NAME
+        which mathematical program chooses: {formulations} (default: overlap_dp, which is exact and
+        the fastest, labels with --budget, minimax with --robust worst-peak, scenario_search with
+        other aims over scenarios; schedule_search with --aim, --stands or --schedule free,
+        makespan_labels where a makespan counts, order_search with --order search)
+    candidates : RULE
+        look at fewer nodes per move: near:12 for those at most 12 joints from the newest bricks,
+        within:1.5 for those at most 1.5 m from them; makes any formulation a heuristic (free: of
+        grips on bricks that stand; what is proven holds among these)
+    """
+
+    budgets: Words = word((), flag="--budget")
+    formulation: str | None = None
+    candidates: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Posed(Judged, Tilted, Built, Moves):
     """Which steps may a build have?
 
     --rule and --direction go with --schedule free alone, --keep with --direction take-down and not
@@ -308,24 +423,50 @@ class Posed(Judged, Stands, Rules, Team):
         with --direction take-down: bricks that stay, as 1..12
     """
 
-    schedule: Any = None
     begin: str | None = word(None, flag="--from")
-    to: str | None = None
-    direction: Any = None
-    keep: str | None = None
-    # what optimize alone has
-    durations: tuple[str, ...] = ()
-    aim: str | None = None
-    criteria: Any = None
-    crown: str | None = None
-    ranked: str | None = None
-    budget: tuple[str, ...] = ()
+    to: int | str | None = None
+    direction: str | None = None
+    keep: Bricks | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chosen(Ranks, Choice):
+    """In which scenarios is it good?
+
+    --scenarios, --unseen, --seed and --vary go with --robust alone.
+
+    robust : AIM
+        what is to be as small as possible over all scenarios, in place of --formulation: worst-peak
+        (the largest cost of any step), worst-total (the largest total), or cvar=0.9 (the mean total
+        of the worst tenth)
+    scenarios : N
+        how many samples of the scene (default: 30)
+    unseen : N
+        how many other samples, of the next seed, judge the plan (default: none; as many as there
+        are scenarios double the time)
+    seed : N
+        which samples are drawn (default: 0)
+    vary : NAME=VALUE
+        how far samples are from the scene: stiffness=3 (of each joint, by a factor up to it, up or
+        down), density=0.1 (of each brick, up to this share), position=0.002 (of each brick and
+        joint, up to so many m); these are the defaults; grips=2 (of grips that are not rigid, by a
+        factor up to it)
+
+    Who chooses and proves, and how long?
+    workers : N
+        processes to share the work among; pays from about ten seconds (default: {default})
+    cache : DIR
+        keep answers there and use what is there: a run that was ended goes on
+    max_memory : SIZE
+        what responses and costs may take, as 500MB or 2GB (default: four fifths of what is free);
+        of a free schedule states and moves, with a bound where it ends
+    """
+
     robust: str | None = None
-    scenarios: str | None = None
-    unseen: str | None = None
-    seed: str | None = None
-    vary: tuple[str, ...] = ()
-    formulation: str | None = None
-    candidates: str | None = None
-    workers: str = "1"
+    scenarios: int | str | None = None
+    unseen: int | str | None = None
+    seed: int | str | None = None
+    vary: Numbers = ()
+    workers: int | str = 1
+    cache: File | None = None
     max_memory: str | None = None

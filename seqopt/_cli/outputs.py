@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from seqopt._cli.given import is_folder
-from seqopt._cli.options import Asked
+from seqopt._cli.options import Asked, Written
 from seqopt._files import (
     csv_text,
     require_apart,
@@ -121,28 +121,30 @@ def written_to(folder: Path | None, *, page: bool = True, what: str = "it step b
     return f"written to {folder}" + f"; {folder / PAGE} shows {what}" * page
 
 
-def write_outputs(asked: Asked, files: Callable[[], Mapping[str, bytes | str]]) -> tuple[Path, ...]:
+def write_outputs(
+    asked: Written, files: Callable[[], Mapping[str, bytes | str]]
+) -> tuple[Path, ...]:
     """Write the folder that a command was asked for, whole, if it was asked for one; return it.
 
     Raises `FileError` if a file would overwrite what the command reads, or cannot be written.
     """
-    if asked.out is None:
+    if asked.path is None:
         return ()
     asked.tell("writing the plan")
     made = files()
-    require_apart([asked.out / name for name in made], _inputs(asked))
-    write_folder(asked.out, made)
-    return (asked.out,)
+    require_apart([asked.path / name for name in made], _inputs(asked))
+    write_folder(asked.path, made)
+    return (asked.path,)
 
 
-def require_out(asked: Asked, *names: str) -> None:
+def require_out(asked: Written, *names: str) -> None:
     """Raise `FileError`, before anything is computed, if the folder asked for cannot be made.
 
     Nor may what will have one of some names in it be what the command reads.
     """
-    if asked.out is not None:
-        require_folder(asked.out)
-        keep_apart(asked, *(asked.out / name for name in names))
+    if asked.path is not None:
+        require_folder(asked.path)
+        keep_apart(asked, *(asked.path / name for name in names))
 
 
 def keep_apart(asked: Asked, *outputs: Path | None) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from seqopt._cli.asked import asked_engine, asked_scene, in_seconds
 from seqopt._cli.given import Place, asked_place, between, kept_place
-from seqopt._cli.options import Posed
-from seqopt._cli.outputs import require_out
+from seqopt._cli.options import Chosen, Numbers, Posed, Words
 from seqopt._cli.values import (
     asked_criterion,
     asked_resources,
@@ -50,9 +49,9 @@ _NOT_STATES = "aims and --stands have no such; leave it out"
 _MORE = f"it needs more; give --stands MORTAR, or --schedule {FREE}"
 _WRONG = {
     "free": {"ranked": _NOT_FREE},
-    "states": {"ranked": _NOT_STATES, "rule": _NOT_STATES},
+    "states": {"ranked": _NOT_STATES, "rules": _NOT_STATES},
     "candidates": {
-        "rule": f"it needs more; give --schedule {FREE}",
+        "rules": f"it needs more; give --schedule {FREE}",
         "tilt": _MORE,
         "friction": _MORE,
     },
@@ -79,48 +78,55 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
     ``change``: what has changed where the build begins. Raises `ProblemError` or `StepError` if
     words do not go together, naming one.
     """
-    of_states = _wants_states(asked)
-    _require_known(asked, of_states=of_states)
+    choice = _choice(asked)
+    of_states = _wants_states(asked, choice)
+    _require_known(asked, choice, of_states=of_states)
     sought = asked.order == SEARCH
     asked = replace(asked, order=None) if sought else asked
-    criterion = asked_criterion(asked, DEFAULTS[FREE if of_states else "any other"].criterion)
+    criterion = asked_criterion(choice, DEFAULTS[FREE if of_states else "any other"].criterion)
     scene = asked_scene(asked)
     scene, begin, end, robots = _asked_ends(asked, scene, change)
-    scene = in_seconds(asked, scene) if asked.durations else scene
-    find_postures(scene, asked.cache, asked.tell)
-    words: dict[str, Any] = {"limits": parse_limits(asked.limit, scene, "--limit")}
-    (parse_caps if of_states else parse_budgets)(asked.budget)  # said before anything is built
-    words["resources"] = asked_resources(asked, None if of_states else asked.tell)
-    aim, known, unseen = _asked_scenarios(asked, scene)
+    scene = in_seconds(choice, scene) if choice.durations else scene
+    find_postures(scene, choice.cache, asked.tell)
+    words: dict[str, Any] = {"limits": parse_limits(asked.limits, scene, "--limit")}
+    (parse_caps if of_states else parse_budgets)(choice.budgets)  # said before anything is built
+    words["resources"] = asked_resources(choice, None if of_states else asked.tell)
+    aim, known, unseen = _asked_scenarios(choice, scene)
     words |= {} if aim is None else {"scenarios": known, "over": aim}
-    require_out(asked)
     engine = asked_engine(asked, build_network(scene))
-    rules = asked.rule if asked.schedule == FREE else None
+    rules = asked.rules if asked.schedule == FREE else None
     names = parse_robots(robots) or None
-    every = _find_moves(engine.network, asked.schedule, names, asked.candidates, rules, "--rule")
+    every = _find_moves(engine.network, asked.schedule, names, choice.candidates, rules, "--rule")
     if isinstance(every, FreeRules) and asked.direction is not None:
-        every = replace(every, direction=asked.direction)
-    words |= {"stands": asked_standing(asked), "budgets": asked.budget}
+        every = replace(every, **dict[str, Any](direction=asked.direction))
+    words |= {"stands": asked_standing(asked), "budgets": choice.budgets}
     words |= {"orders": Orders.TIED} if sought else {}
+    aims = None if asked.aim is None else str(asked.aim)
     filters = [each for each in words["limits"] if isinstance(each, Filter)]
-    others = (asked.aim, words["stands"], sought, filters)
+    others = (aims, words["stands"], sought, filters)
 
     def posed(begin: Place) -> Problem:
         moves = between(every, begin, end)
-        states = _chooses_states(moves, asked.formulation, others)
-        what = _with_defaults(criterion, asked.aim, aim or WORST_PEAK, states=states)
+        states = _chooses_states(moves, choice.formulation, others)
+        what = _with_defaults(criterion, aims, aim or WORST_PEAK, states=states)
         return pose(engine, moves, *what, **words)
 
     whole = posed(Place()) if begin.site is not None and change is None else None
     return PosedProblem(posed(begin), whole, aim, known, unseen)
 
 
+def _choice(asked: Posed) -> Chosen:
+    """Return what is asked of a choice; of a Pareto set nothing is."""
+    return asked if isinstance(asked, Chosen) else Chosen()
+
+
 def _aged(asked: Posed, scene: Scene, begin: Place) -> Place:
     """Return where a build begins with the ages of bricks, where mortar cures: as the plan was."""
-    standing = asked_standing(asked) if asked.curing and begin.done else None
+    standing = asked_standing(asked) if begin.done else None
     if begin.site is None or not begin.done or standing is None or standing.curing is None:
         return begin
-    scene = in_seconds(asked, scene) if asked.durations else scene
+    choice = _choice(asked)
+    scene = in_seconds(choice, scene) if choice.durations else scene
     waits = CuringBuilds(build_network(scene), standing.mortar, standing.curing).waits
     try:
         times = step_times(scene, begin.done, waits)
@@ -133,14 +139,14 @@ def _aged(asked: Posed, scene: Scene, begin: Place) -> Place:
 
 def _asked_ends(
     asked: Posed, scene: Scene, change: Change | None
-) -> tuple[Scene, Place, Place, str]:
+) -> tuple[Scene, Place, Place, int | Words | None]:
     """Return where a build begins and ends, the scene after what has changed, who takes part."""
     scene, begin = asked_place(asked.begin, "from", scene)
     begin, robots = _aged(asked, scene, begin), asked.robots
     if change is not None:
         scene, begin, robots = change(scene, begin)
     if asked.keep is not None:
-        scene, end = kept_place(asked, asked.keep, scene, begin)
+        scene, end = kept_place(asked, str(asked.keep), scene, begin)
         return scene, begin, end, robots
     found, end = asked_place(asked.to, "to", scene)
     if found != scene:
@@ -148,19 +154,19 @@ def _asked_ends(
     return scene, begin, end, robots
 
 
-def _wants_states(asked: Posed) -> bool:
+def _wants_states(asked: Posed, choice: Chosen) -> bool:
     """Return whether states of the build are to be chosen, and not candidates of moves."""
     if asked.schedule == FREE or asked.aim or asked.stands or asked.order == SEARCH:
         return True
-    named = asked.formulation
+    named = choice.formulation
     return named is not None and find_formulation(named).of_states
 
 
-def _require_known(asked: Posed, *, of_states: bool) -> None:
+def _require_known(asked: Posed, choice: Chosen, *, of_states: bool) -> None:
     """Raise an error if options are given that states, or candidates, do not have."""
     down, free = Direction.TAKE_DOWN.value, asked.schedule == FREE
     for name in ALONE:
-        if asked.robust is None and getattr(asked, name):
+        if choice.robust is None and getattr(choice, name):
             raise ProblemError(
                 f"--{name}: plans over scenarios alone have it; give --robust worst-peak, "
                 "worst-total or as cvar=0.9"
@@ -170,12 +176,12 @@ def _require_known(asked: Posed, *, of_states: bool) -> None:
     if asked.keep is not None and asked.direction != down:
         raise ProblemError(f"--keep {asked.keep}: it goes with --direction {down}")
     for name, why in _WRONG["free" if free else "states" if of_states else "candidates"].items():
-        if getattr(asked, name):
-            raise ProblemError(f"--{name}: {why}")
+        if getattr(asked, name, None):
+            raise ProblemError(f"--{'rule' if name == 'rules' else name}: {why}")
 
 
 def _asked_scenarios(
-    asked: Posed, scene: Scene
+    asked: Chosen, scene: Scene
 ) -> tuple[RobustAim | None, Scenarios | None, Scenarios | None]:
     """Return the aim over scenarios, those to choose by, and those of the next seed that judge."""
     if asked.robust is None:
@@ -191,7 +197,7 @@ def _asked_scenarios(
     return aim, drawn, None if other is None else _drawn(scene, asked.vary, other, seed + 1)
 
 
-def _drawn(scene: Scene, vary: Sequence[str], count: int, seed: int) -> Scenarios:
+def _drawn(scene: Scene, vary: Numbers, count: int, seed: int) -> Scenarios:
     """Return samples of a scene."""
     spread = parse_numbers("--vary", vary, SPREADS, zero=True, advice=", as stiffness=3")
     factor, grips = spread.pop("stiffness", 3.0), spread.pop("grips", 1.0)

@@ -28,6 +28,7 @@ QUESTIONS = (
 )  # in the order in which help asks them, after those of one command
 TOGETHER = ({"quiet", "json"}, {"method", "plan"}, {"list", "export", "view"})  # one of each
 PATHS = ("FILE", "DIR", "FOLDER", "PLAN_DIR", "INSTANCE", "SOLUTION")
+FILE = re.compile(r"Path|.*\bFile\b")  # what is annotated so is a path
 OPTION = re.compile(r"(\w+) :(?: (\S.*))?")
 PLAIN = ("Usage", "Examples")
 _Asked = TypeVar("_Asked", bound=Asked)
@@ -61,16 +62,17 @@ class Page:
 
 def page_of(kind: type[Asked]) -> Page:
     """Return what docstrings say of a command: first of what it shares with others."""
-    own, *shared, root, _ = kind.__mro__
+    command, *shared, root, _ = kind.__mro__
     page, known = Page(), {each.name: each for each in fields(kind)}
-    for part in (*reversed(shared), own, root):
+    for part in (*reversed(shared), command, root):
         page.read(part.__doc__ or "")
         if part in shared:  # a command may build on another one
             page.lines = {title: each for title, each in page.lines.items() if title[-1:] == "?"}
     names = {name: ", ".join(NAMES[name]()) for name in NAMES}
     for name, (question, value, text) in page.options.items():
-        choices = ", ".join(known[name].metadata.get("choices", ()))
-        more = names | {"choices": choices, "default": known[name].default}
+        own = known.get(name)
+        choices = ", ".join(own.metadata.get("choices", ())) if own else ""
+        more = names | {"choices": choices, "default": own and own.default}
         page.options[name] = question, value, text.format(**more)
     return page
 
@@ -95,15 +97,18 @@ def fill(command: argparse.ArgumentParser, kind: type[Asked]) -> None:
         for names in one:
             takes |= dict.fromkeys(names, group.add_mutually_exclusive_group())
         for name, (_, value, text) in own.items():
-            _add(takes.get(name, group), known[name], value, text)
+            _add(takes.get(name, group), name, known.get(name), value, text)
 
 
-def _add(takes: Any, known: Field[Any], value: str, text: str) -> None:
+def _add(takes: Any, name: str, known: Field[Any] | None, value: str, text: str) -> None:
     """Add an option: a switch, if it has no value; repeated, if its default is a tuple."""
+    if known is None:  # of whoever prints the answer
+        takes.add_argument(_flag(name), dest=name, action="store_true", help=text)
+        return
     more, default = known.metadata, known.default
     how: dict[str, Any] = {"help": text, "default": None if default is MISSING else default}
     if not value:
-        how["action"] = "store_true"
+        how["action"] = "store_false" if default else "store_true"
     else:
         how["metavar"] = None if value == "CHOICE" else value
         how |= {"choices": more["choices"]} if "choices" in more else {}
@@ -115,21 +120,23 @@ def _add(takes: Any, known: Field[Any], value: str, text: str) -> None:
         how |= {"nargs": "?", "const": more["const"]}
     if "place" in more:
         how |= {} if default is MISSING else {"nargs": "?"}
-        takes.add_argument(known.name, **how)
+        takes.add_argument(name, **how)
         return
-    flag = more.get("flag", f"--{known.name.replace('_', '-')}")
-    takes.add_argument(flag, dest=known.name, required=default is MISSING, **how)
+    flag = more.get("flag", _flag(f"no-{name}" if default is True else name))
+    takes.add_argument(flag, dest=name, required=default is MISSING, **how)
 
 
-def given(kind: type[_Asked], values: Mapping[str, Any], **more: Any) -> _Asked:
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def given(kind: type[_Asked], values: Mapping[str, Any]) -> _Asked:
     """Return what a command is asked, from values of Python; numbers and lists become words.
 
-    What is None is left to the command, and so is what ``more`` says that it has no field for.
-    Raises `ProblemError` if a word is none of a choice.
+    What is None is left to the command. Raises `ProblemError` if a word is none of a choice.
     """
     known = {each.name: each for each in fields(kind)}
-    told = {name: _value(known[name], v) for name, v in values.items() if v is not None}
-    return kind(**told, **{name: each for name, each in more.items() if name in known})
+    return kind(**{name: _value(known[name], v) for name, v in values.items() if v is not None})
 
 
 def _value(known: Field[Any], value: Any) -> Any:
@@ -147,7 +154,7 @@ def _value(known: Field[Any], value: Any) -> Any:
     if choices is not None and text not in choices:
         hint = did_you_mean(text, choices)
         raise ProblemError(f"{known.name} {text!r} does not exist{hint}; give {', '.join(choices)}")
-    return Path(text) if str(known.type).startswith("Path") and isinstance(text, str) else text
+    return Path(text) if FILE.match(str(known.type)) and isinstance(text, str) else text
 
 
 def _text(value: Any) -> Any:

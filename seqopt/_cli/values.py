@@ -9,7 +9,7 @@ from dataclasses import replace
 from math import radians
 from typing import Any
 
-from seqopt._cli.options import Cost, Posed, Stands
+from seqopt._cli.options import Chosen, Cured, Number, Numbers, Ranks, Tilted, Words
 from seqopt.contact.curing import _find_curing
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
@@ -31,27 +31,31 @@ NAMED = (None, *CRITERIA)
 PROPS = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma push, capacity=300"
 
 
-def speed_seconds(text: str | None) -> float:
+def speed_seconds(text: Number | None) -> float:
     """Return how long each engine and formulation may take, s; zero if speed is not asked for."""
     if text is None:
         return 0.0
     try:
-        return number_word(text, "--speed")
+        return number_word(str(text), "--speed")
     except ProblemError as error:
         raise ProblemError(f"{error}; give seconds, and the scene before it") from None
 
 
-def count_word(text: str | None, where: str, most: int, least: int = 1, usual: int = 0) -> int:
+def count_word(
+    text: int | str | None, where: str, most: int, least: int = 1, usual: int = 0
+) -> int:
     """Return a whole number within bounds, or the usual one; ``where``: argument, for messages."""
     if text is None:
         return usual
+    text = str(text)
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
         raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
     return int(text)
 
 
-def parse_robots(text: str) -> tuple[str, ...]:
+def parse_robots(robots: int | Words | None) -> tuple[str, ...]:
     """Return names of robots from words with commas between them; nothing for none or a count."""
+    text = "" if robots is None else str(robots)
     named = text and not text.isdecimal()
     return tuple(name.strip() for name in text.split(",")) if named else ()
 
@@ -68,11 +72,12 @@ def parse_payload(text: str, scene: Scene) -> Scene:
     return scene.with_robots(*said)
 
 
-def parse_grips(text: str, scene: Scene) -> Scene:
+def parse_grips(grips: Number, scene: Scene) -> Scene:
     """Return a scene with grips as stiff as a word says, ``rigid``, ``1e6`` or ``1e6x1e6x5e5``.
 
     ``turning=1e4`` after a comma is the rotational stiffness.
     """
+    text = str(grips)
     where = f"--grips {short(text)[1:-1]}"
     if ".." in text:
         raise SceneError(f"{where}: a range goes with compare; give one stiffness")
@@ -98,7 +103,7 @@ def parse_grips(text: str, scene: Scene) -> Scene:
 
 def parse_numbers(
     where: str,
-    texts: Sequence[str],
+    texts: Numbers,
     known: Collection[str] | None = None,
     *,
     zero: bool = False,
@@ -115,12 +120,12 @@ def parse_numbers(
     return out
 
 
-def parse_time_limit(text: str | None) -> float:
+def parse_time_limit(text: Number | None) -> float:
     """Return seconds from words, infinite where none are given."""
-    return math.inf if text is None else number_word(text, "--time-limit", zero=True)
+    return math.inf if text is None else number_word(str(text), "--time-limit", zero=True)
 
 
-def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, Any]:
+def parse_options(formulation: Formulation | str, texts: Words) -> dict[str, Any]:
     """Return options of a formulation, whose ``solve`` says which there are and of which type."""
     formulation = as_formulation(formulation)
     known = formulation.options
@@ -154,42 +159,44 @@ def mortar_word(text: str | Mortar, where: str) -> Mortar:
         raise ProblemError(f"{where} {text}{hint}: {known}") from error
 
 
-def asked_standing(asked: Stands) -> Standing | None:
+def asked_standing(asked: Tilted) -> Standing | None:
     """Return what is demanded of the stability of states, if anything is."""
     if isinstance(asked.stands, Standing):  # of Python
         return asked.stands
-    said = {"tilt": asked.tilt, "friction": asked.friction}
-    given = {
-        name: number_word(text, f"--{name}", zero=True)
-        for name, text in said.items()
-        if text is not None and asked.stands is not None
-    }
+    curing = asked.curing if isinstance(asked, Cured) else ()
+    said = {"tilt": asked.tilt, "friction": asked.friction, "curing": curing}
     if asked.stands is None:
-        names = [name for name in (*said, "curing") if getattr(asked, name)]
+        names = [name for name, text in said.items() if text]
         if names:
             raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands dry, say")
         return None
+    given = {
+        name: number_word(str(said[name]), f"--{name}", zero=True)
+        for name in ("tilt", "friction")
+        if said[name] is not None
+    }
     mortar = mortar_word(asked.stands, "--stands")
     try:
-        cures = _find_curing(" ".join(asked.curing)) if asked.curing else None
+        cures = _find_curing(" ".join(curing)) if curing else None
     except SceneError as error:
         raise ProblemError(f"--{error}") from error
     tilt = radians(given.pop("tilt", 0.0))
     return Standing(replace(mortar, **given), tilt, cures)
 
 
-def asked_criterion(asked: Cost | Posed, usual: Criterion) -> Criterion | None:
+def asked_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
     """Return the criterion of the options; ``usual``: the one that options of ranks refine."""
     said = {"crown": asked.crown, "ranked": asked.ranked}
     given = {name: text for name, text in said.items() if text is not None}
-    if asked.criteria is None and not given:
+    named = asked.criterion
+    if named is None and not given:
         return None
-    criterion = usual if asked.criteria is None else find_criterion(asked.criteria, "--criteria")
+    criterion = usual if named is None else find_criterion(named, "--criteria")
     for name, text in given.items():
-        if not isinstance(criterion, RankSum) or (name == "crown" and asked.criteria not in NAMED):
+        if not isinstance(criterion, RankSum) or (name == "crown" and named not in NAMED):
             raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
         kinds: dict[str, Any] = {"crown": _crown, "ranked": Ranked}
-        criterion = replace(criterion, **{name: kinds[name](text)})
+        criterion = replace(criterion, **{name: kinds[name](str(text))})
     return criterion
 
 
@@ -197,7 +204,7 @@ def _crown(text: str) -> float:
     return NEVER if text == "none" else number_word(text, "--crown")
 
 
-def asked_resources(asked: Posed, progress: Tell | None = None) -> Resources:
+def asked_resources(asked: Chosen, progress: Tell | None = None) -> Resources:
     """Return what a computation may use."""
     workers = count_word(asked.workers, "--workers", MOST_WORKERS)
     most = None if asked.max_memory is None else parse_size(asked.max_memory)
@@ -218,14 +225,14 @@ def parse_size(text: str) -> float:
     return float(found[1]) * float(1024 if "I" in unit else 1000) ** power
 
 
-def parse_props(text: str, scene: Scene, where: str = "--props") -> tuple[Prop, ...]:
+def parse_props(text: str, scene: Scene) -> tuple[Prop, ...]:
     """Return props from words, as ``13,27:1e6,push,capacity=300`` or ``every:1e6``.
 
     ``every`` is a node of each brick, ``all`` are all nodes, ``none`` are none; ``push`` and
     ``capacity`` are of all that are named.
     """
     props, common = list[Prop](), dict[str, object]()
-    where = f"{where} {short(text)[1:-1]}"
+    where = f"--props {short(text)[1:-1]}"
     for word in text.split(","):
         name, equals, value = word.strip().partition("=")
         if name == "capacity" and equals:

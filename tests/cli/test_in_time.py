@@ -40,7 +40,7 @@ def ended(command, words, when, how=KeyboardInterrupt):
         if when in told[-1] and sum(when in each for each in told) == 1:
             raise how
 
-    _, asked = request([*map(str, words)], tell)
+    _, asked, _ = request([*map(str, words)], tell)
     answer = command.run(asked)
     assert any(when in each for each in told)
     return answer

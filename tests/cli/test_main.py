@@ -160,7 +160,7 @@ def ends_in_step(number, how=TimeoutError):
 def test_a_time_limit_of_analyze_leaves_the_rows_so_far(tmp_path):
     path, fields = tmp_path / "rows.csv", tmp_path / "fields.npz"
     words = ["analyze", "--method", "cantilever", "--out", str(path), "--fields", str(fields)]
-    _, asked = request([*words, "--time-limit", "1e9"], ends_in_step(4))
+    _, asked, _ = request([*words, "--time-limit", "1e9"], ends_in_step(4))
     answer = analyze_command.run(asked)
     assert answer.status == 4
     assert answer.failures == (
@@ -177,7 +177,7 @@ def test_an_interrupt_of_analyze_leaves_the_rows_so_far(tmp_path):
     path = tmp_path / "rows.csv"
     words = ["analyze", "wall:columns=2,courses=2", "--method", "sequential", "--out", str(path)]
     tell = ends_in_step(3, KeyboardInterrupt)
-    _, asked = request([*words, "--engine", "auto", "--mortar", "dry"], tell)
+    _, asked, _ = request([*words, "--engine", "auto", "--mortar", "dry"], tell)
     answer = analyze_command.run(asked)
     assert answer.status == 130
     (said,) = answer.failures

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from argparse import Namespace
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 
 import seqopt
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import strictly
+from seqopt._cli.asked import held_to
 from seqopt._cli.main import main
 from seqopt.contact.faces import step_assembly
 from seqopt.report.comparison import compare
@@ -231,7 +230,8 @@ def test_a_plan_that_falls_does_not_hold_strictly(strict):
     dry = BuildVerdicts("dry", (Verdict.FALLS,), 1, "3", "2-3")
     bonded = BuildVerdicts("epoxy", (Verdict.STANDS,))
     for last, wrong in ((bonded, False), (dry, True)):
-        answer = strictly(Answer({}), Namespace(strict=strict), (), (), {"a": (dry, last)})
+        answer = held_to(Answer({}), (), (), {"a": (dry, last)})
+        answer = answer.strictly() if strict else answer
         assert (answer.status is Status.DOES_NOT_HOLD) == (wrong and strict)
         assert any("does not stand: a, dry: 1 of 1" in each for each in answer.failures) == (
             wrong and strict

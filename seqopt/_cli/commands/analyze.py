@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -17,12 +18,12 @@ from seqopt._cli.asked import (
     asked_engine,
     asked_scene,
     exceeded,
+    held_to,
     level_notes,
     scene_facts,
-    strictly,
 )
 from seqopt._cli.given import asked_steps
-from seqopt._cli.options import Computed, Fixed, Postures, Strict, word
+from seqopt._cli.options import Computed, File, Fixed, Number, Strict, word
 from seqopt._cli.outputs import keep_apart, put_table
 from seqopt._cli.values import parse_time_limit
 from seqopt._files import write_bytes
@@ -60,7 +61,7 @@ UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Analyze(Strict, Postures, Computed, Fixed):
+class Analyze(Strict, Computed, Fixed):
     """Compute how the structure responds in every step of one sequence, and write a table.
 
     It has the columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in
@@ -99,31 +100,33 @@ class Analyze(Strict, Postures, Computed, Fixed):
 
     staged: str | None = word(None, choices=[way.value for way in Placing])
     tolerance: str | None = word(None, const="")
-    fields: Path | None = None
-    time_limit: str | None = None
+    fields: File | None = None
+    time_limit: Number | None = None
 
 
 def run(asked: Analyze) -> Answer:
     """Analyze every step of a sequence."""
-    keep_apart(asked, asked.out, asked.fields)
+    archived = None if asked.fields is None else Path(asked.fields)
+    keep_apart(asked, asked.path, archived)
     clock, faults = Clock(parse_time_limit(asked.time_limit)), dict[int, SeqoptError]()
     with clock.needed("reading scene and steps"):
         scene = asked_scene(asked)
         find_postures(scene, asked.cache, asked.tell)
         network = build_network(scene)
-        engine, steps = asked_engine(asked, network), asked_steps(asked, network).steps
-    network, within = engine.network, LinearRange(engine)
+        engine, named = asked_engine(asked, network), asked_steps(asked, network)
+    network, within, steps = engine.network, LinearRange(engine), named.steps
     in_time = _InTime(_step_answers(asked, within, steps), clock)
     solved = _solved(engine, in_time, faults)
-    answers = solved if asked.fields is None else list(solved)
+    answers = solved if archived is None else list(solved)
     table = response_table(network, answers)
     reached = len(table) + len(faults)
     late, ended = _late(asked, reached, len(steps), engine, in_time)
     failures, status = (*_faults_said(faults, reached), *late), _status_of(faults, ended)
     if table.empty:
         none = _with_faults(scene, table, steps, faults)
-        said = put_table(asked.out, none, _counted(none, faults)) if faults else {}
-        return Answer(facts={"steps": none}, failures=failures, status=status, **said)
+        said = put_table(asked.path, none, _counted(none, faults)) if faults else {}
+        how: dict[str, Any] = {"failures": failures, "status": status, "notes": named.notes}
+        return Answer({"steps": none}, value=none, **how, **said)
     computed = [step for step in steps[:reached] if step.number not in faults]
     tolerances = partial(_with_tolerances, asked, engine, computed, table)
     table, off = clock.spare("tolerances", tolerances, (table, tuple[str, ...]()))
@@ -133,22 +136,23 @@ def run(asked: Analyze) -> Answer:
         "whether they are in the linear range", departures, tuple[Departure, ...]()
     )
     whole = _with_faults(scene, table, steps, faults) if faults else table
-    said = put_table(asked.out, whole, _counted(whole, faults))
-    if asked.fields is not None:
-        write_bytes(asked.fields, archive(network, answers))
-        said["written"] = (*said.get("written", ()), asked.fields)
+    said = put_table(asked.path, whole, _counted(whole, faults))
+    if archived is not None:
+        write_bytes(archived, archive(network, answers))
+        said["written"] = (*said.get("written", ()), archived)
     found = partial(what_was_enough, within, {"": table}, staged=staged is not None)
     enough = clock.spare("which model is enough", found, None)
     facts = {"scene": scene_facts(scene), "units": UNITS, "steps": whole, **provenance(engine)}
     answer = Answer(
+        value=whole,
         facts={**facts, "enough": None if enough is None else enough.facts()},
-        notes=(*off, *_notes(asked, within, steps, table, enough), *_not_done(clock)),
+        notes=(*named.notes, *off, *_notes(asked, within, steps, table, enough), *_not_done(clock)),
         failures=(*failures, *([INTERRUPTED] if clock.interrupted else ())),
         status=Status.INTERRUPTED if clock.interrupted else status,
         **said,
     )
     unreached = arm_notes(scene, {"": computed})
-    return strictly(answer, asked, exceeded(scene, table), outside, unreached=unreached)
+    return held_to(answer, exceeded(scene, table), outside, unreached=unreached)
 
 
 def _notes(

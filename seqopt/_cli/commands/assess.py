@@ -17,7 +17,7 @@ import pandas as pd
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import _settlement_notes, asked_scene, carrying_notes, scene_facts
 from seqopt._cli.given import asked_steps
-from seqopt._cli.options import Fixed
+from seqopt._cli.options import Fixed, Number, Words
 from seqopt._cli.outputs import keep_apart, put_table, require_out, write_outputs, written_to
 from seqopt._cli.values import MOST_WORKERS, count_word, mortar_word
 from seqopt._files import csv_text, read_text
@@ -39,29 +39,11 @@ from seqopt.work.progress import with_progress
 
 @dataclass(frozen=True, kw_only=True)
 class Assess(Fixed):
-    """Prove of every step of a sequence that it stands, or that it does not.
-
-    Bricks are rigid, and their joints may open and slide. Say which brick and joint fail first; on
-    request also how much bond, friction and robot force a step needs, and which tilt it survives.
-
-    Usage
-    [SCENE] [--method NAME] [--out FILE] [other options]
-    [SCENE] --plan FILE [--out FILE] [other options]
-    PLAN_DIR [--out FILE] [other options]
-    [SCENE] --map AXIS [--out DIR] [other options]
-
-    What must hold?
-    With --map, --holds says what is in the joints.
+    """What must hold?
 
     mortar : MORTAR
         what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing), or
         bond=STRENGTH (Pa) (default: dry, then epoxy, which alone decides the exit status)
-    friction : F
-        coefficient of friction, in place of the mortar's own
-    tensile_strength : PA
-        what a joint holds in tension, Pa, in place of the mortar's own
-    cohesion : PA
-        what a joint holds in shear without any pressure, Pa, in place of the mortar's own
 
     What is asked beside verdicts?
     One of: --margins with --steps, --load-factor, and --map with --holds.
@@ -92,6 +74,39 @@ class Assess(Fixed):
     What is written and printed?
     out : FILE
         CSV file to write (default: standard output); with --map a folder
+    """
+
+    mortar: Mortar | str | None = None
+    margins: Words | None = None
+    steps: str | None = None
+    load_factor: bool = False
+    map: str | None = None
+    holds: Words | None = None
+    workers: int | str = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssessWords(Assess):
+    """Prove of every step of a sequence that it stands, or that it does not.
+
+    Bricks are rigid, and their joints may open and slide. Say which brick and joint fail first; on
+    request also how much bond, friction and robot force a step needs, and which tilt it survives.
+
+    Usage
+    [SCENE] [--method NAME] [--out FILE] [other options]
+    [SCENE] --plan FILE [--out FILE] [other options]
+    PLAN_DIR [--out FILE] [other options]
+    [SCENE] --map AXIS [--out DIR] [other options]
+
+    What must hold?
+    With --map, --holds says what is in the joints.
+
+    friction : F
+        coefficient of friction, in place of the mortar's own
+    tensile_strength : PA
+        what a joint holds in tension, Pa, in place of the mortar's own
+    cohesion : PA
+        what a joint holds in shear without any pressure, Pa, in place of the mortar's own
 
     Examples
     --------
@@ -101,24 +116,17 @@ class Assess(Fixed):
     seqopt assess arch:span=2,rise=0.8 --map friction --out map
     """
 
-    mortar: Any = None
-    friction: str | None = None
-    tensile_strength: str | None = None
-    cohesion: str | None = None
-    margins: str | None = None
-    steps: str | None = None
-    load_factor: bool = False
-    map: str | None = None
-    holds: str | None = None
-    workers: str | None = None
+    friction: Number | None = None
+    tensile_strength: Number | None = None
+    cohesion: Number | None = None
 
 
-def answer_load_factor(asked: Assess) -> Answer:
+def answer_load_factor(asked: AssessWords) -> Answer:
     """Answer how much load every step of a sequence bears."""
     scene = asked_scene(asked)
     require_out(asked)
     network, mortars = build_network(scene), _asked_mortars(asked)
-    (title, steps), each, tables = asked_steps(asked, network), {}, []
+    (title, steps, taken), each, tables = asked_steps(asked, network), {}, []
     for name, mortar in mortars.items():
         found = each[name] = load_factors(network, steps, mortar, asked.tell)
         tables.append(load_factor_table(steps, found).assign(mortar=name))
@@ -133,7 +141,7 @@ def answer_load_factor(asked: Assess) -> Answer:
         return {"load_factors.csv": csv_text(table), PAGE: page}
 
     written = write_outputs(asked, files)
-    where = written_to(asked.out, what="how steps give way")
+    where = written_to(asked.path, what="how steps give way")
     lines = [f"{_with_mortar(name)}: {text}" for name, text in said.items()]
     last = tables[-1]  # the mortar that the build counts on
     failing = (last["load_factor"] < 1) | (last["unloaded"] != Verdict.STANDS.value)
@@ -145,7 +153,8 @@ def answer_load_factor(asked: Assess) -> Answer:
         text="\n".join([*lines, where]) if written else "",
         data="" if written else csv_text(table),
         written=written,
-        notes=_settlement_notes(scene),
+        value=table,
+        notes=(*taken, *_settlement_notes(scene)),
         failures=(unproven,) if len(unsure) else (),
         status=Status.FAILED if len(unsure) else status,
     )
@@ -215,24 +224,24 @@ class Rows:
                 self.path.unlink(missing_ok=True)
 
 
-def run(asked: Assess) -> Answer:
+def run(asked: AssessWords) -> Answer:
     """Assess every step of a sequence, or map builds; tables are written whatever the verdicts."""
     if asked.map is not None:
         from seqopt._cli.commands.mapping import answer_map  # noqa: PLC0415  # for maps only
 
-        return answer_map(asked, asked.map, (asked.holds or "dry,epoxy").split(","))
+        return answer_map(asked, asked.map, str(asked.holds or "dry,epoxy").split(","))
     if asked.load_factor:
         return answer_load_factor(asked)
-    keep_apart(asked, asked.out)
+    keep_apart(asked, asked.path)
     scene, mortars = asked_scene(asked), _asked_mortars(asked)
     network = build_network(scene)
-    steps = asked_steps(asked, network).steps
+    _, steps, taken = asked_steps(asked, network)
     kept = _found(asked, network, steps, mortars)
     rows = kept.rows
     went_on = f"kept: {kept.taken_up} of {len(rows)} verdicts, found before, from {kept.path}"
     each = {name: [row for row in rows if row["mortar"] == name] for name in mortars}
     lines = [f"{_with_mortar(name)}: {format_rows(own)}" for name, own in each.items()]
-    answer = put_table(asked.out, rows, "\n".join(lines) + ";")
+    answer = put_table(asked.path, rows, "\n".join(lines) + ";")
     kept.done()
     found = {name: Counter(row["verdict"] for row in own) for name, own in each.items()}
     counts = {name: {v.value: own[v.value] for v in Verdict} for name, own in found.items()}
@@ -250,7 +259,9 @@ def run(asked: Assess) -> Answer:
             "steps": rows,
         },
         **answer,
+        value=rows,
         notes=(
+            *taken,
             *((went_on,) if kept.taken_up else ()),
             *_settlement_notes(scene),
             *carrying_notes(scene, steps),
@@ -260,14 +271,14 @@ def run(asked: Assess) -> Answer:
     )
 
 
-def _asked_mortars(asked: Assess) -> dict[str, Mortar]:
+def _asked_mortars(asked: AssessWords) -> dict[str, Mortar]:
     """Return the mortar that is named, or dry joints and the epoxy, by what they are called.
 
     The last is what the build counts on. Numbers that are given take the place of its own, and
     friction in dry joints as well.
     """
     given = {
-        name: number_word(text, f"--{name.replace('_', '-')}", zero=True)
+        name: number_word(str(text), f"--{name.replace('_', '-')}", zero=True)
         for name in ("friction", "tensile_strength", "cohesion")
         if (text := getattr(asked, name)) is not None
     }
@@ -277,14 +288,14 @@ def _asked_mortars(asked: Assess) -> dict[str, Mortar]:
 
 
 def _found(
-    asked: Assess, network: Network, steps: Sequence[Step], mortars: Mapping[str, Mortar]
+    asked: AssessWords, network: Network, steps: Sequence[Step], mortars: Mapping[str, Mortar]
 ) -> Rows:
     """Return the rows of all steps, mortar by mortar; those kept of an earlier run are taken up."""
     margins, at = _asked_margins(asked, steps)
-    workers = count_word(asked.workers, "--workers", MOST_WORKERS, usual=1)
-    kept = asked.out is not None  # else nobody takes them up
+    workers = count_word(asked.workers, "--workers", MOST_WORKERS)
+    kept = asked.path is not None  # else nobody takes them up
     same = (dump_scene(network.scene), steps, mortars, margins, at, versions()) if kept else ()
-    rows = Rows(asked.out, same)
+    rows = Rows(asked.path, same)
     try:
         for before, (name, mortar) in enumerate(mortars.items()):
             if not (left := steps[max(0, len(rows.rows) - before * len(steps)) :]):
@@ -299,7 +310,7 @@ def _found(
     return rows
 
 
-def _asked_margins(asked: Assess, steps: Sequence[Step]) -> tuple[tuple[str, ...], range]:
+def _asked_margins(asked: AssessWords, steps: Sequence[Step]) -> tuple[tuple[str, ...], range]:
     """Return which margins are asked for, and the numbers of which steps."""
     margins = find_margins(asked.margins or ("all" if asked.steps else ()))
     if asked.steps is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,12 +15,12 @@ from seqopt._cli.asked import (
     asked_prover,
     asked_scene,
     exceeded,
+    held_to,
     level_notes,
     refused,
     scene_facts,
-    strictly,
 )
-from seqopt._cli.options import Cost, Judged, Postures, Strict, Team, word
+from seqopt._cli.options import Built, Judged, Number, Postures, Ranks, Strict, Team, Written, word
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import columns, wrapped
 from seqopt._cli.values import asked_criterion, parse_robots, speed_seconds
@@ -53,7 +53,7 @@ HOW_SOFT = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Compare(Strict, Postures, Judged, Cost, Team):
+class Compare(Written, Strict, Postures, Judged, Ranks, Team, Built):
     """Build a scene in every way that seqopt knows, on paper, and show all side by side.
 
     These are the fixed sequences, a loop of robots whose grips each formulation chooses, and the
@@ -79,7 +79,7 @@ class Compare(Strict, Postures, Judged, Cost, Team):
     seqopt compare arch25 --speed 20 --out speed
     """
 
-    speed: str | None = word(None, const="10")
+    speed: Number | None = word(None, const="10")
 
 
 def run(asked: Compare) -> Answer:
@@ -93,14 +93,14 @@ class Found(NamedTuple):
     engine: Engine
     criterion: Criterion
     prover: BuildProver
-    result: Comparison
+    value: Comparison
 
 
 def find(asked: Compare) -> Found:
     """Compare all ways to build a scene; with what it is compared by."""
-    _parse_grip_range(asked.grips)  # said before anything is computed
+    ranged = _parse_grip_range(asked.grips)  # said before anything is computed
     seconds = speed_seconds(asked.speed)
-    scene = asked_scene(asked, ranged=True)
+    scene = asked_scene(replace(asked, grips=None) if ranged else asked)
     find_postures(scene, asked.cache, asked.tell)
     engine = asked_engine(asked, build_network(scene))
     usual = DEFAULTS["any other"].criterion
@@ -131,12 +131,12 @@ def answered(asked: Compare, found: Found) -> Answer:
         blocks += ["\n".join([SOFTLY, *_softness_lines(softly, [*softly["build"].unique()])])]
         blocks += ["\n".join([TURNS, *lines])]
     written: tuple[Path, ...] = ()
-    if asked.out is not None:
+    if asked.path is not None:
         asked.tell("drawing figures")
         files = _files(result, softly) | {PAGE: comparison_page(engine, result)}
         files["summary.json"] = json.dumps(about, indent=2) + "\n"
         written = write_outputs(asked, lambda: files)
-        blocks.append(_where(asked.out, speed=result.speed is not None))
+        blocks.append(_where(asked.path, speed=result.speed is not None))
     else:
         blocks.append(wrapped("--out DIR writes tables, figures and a step viewer."))
     answer = Answer(
@@ -157,7 +157,7 @@ def answered(asked: Compare, found: Found) -> Answer:
     )
     over = exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)
-    return strictly(answer, asked, over, left, result.verdicts)
+    return held_to(answer, over, left, result.verdicts)
 
 
 def _where(folder: Path, *, speed: bool) -> str:
@@ -196,11 +196,11 @@ def _facts(result: Comparison) -> dict[str, object]:
     }
 
 
-def _parse_grip_range(text: str | None) -> tuple[float, ...]:
+def _parse_grip_range(grips: Number | None) -> tuple[float, ...]:
     """Return the stiffnesses of a range, as ``1e5..1e9``, N/m; none of one stiffness."""
-    if ".." not in (text or ""):
+    text = str(grips)
+    if ".." not in text:
         return ()
-    assert text is not None
     ends = [number_word(end, f"--grips {short(text)[1:-1]}") for end in text.split("..")]
     if len(ends) != 2 or not ends[0] < ends[1]:
         raise SceneError(

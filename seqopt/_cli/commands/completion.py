@@ -88,18 +88,18 @@ def _names() -> dict[str, list[str]]:
     responses = [*CHOICE_RESPONSES]
     return {
         "formulation": [*formulation_names()],
-        "criteria": [*CRITERIA, *responses],
+        "criterion": [*CRITERIA, *responses],
         "aim": [*AIMS, *responses],
         "pick": [*responses, "steps", "regrips"],
-        "limit": ["payload", *responses],
+        "limits": ["payload", *responses],
         "order": [*ORDERS, "search"],
         "stands": ["dry", "epoxy", "bond="],
         "under": [*METHODS, PUBLISHED],
         "robust": ["worst-peak", "worst-total", "cvar="],
         "vary": ["stiffness=", "density=", "position="],
-        "budget": ["travel=", "steps_over:", "robot_use:"],
+        "budgets": ["travel=", "steps_over:", "robot_use:"],
         "candidates": ["near:", "within:"],
-        "rule": [f"{name}=" for name in RULES],
+        "rules": [f"{name}=" for name in RULES],
     }
 
 

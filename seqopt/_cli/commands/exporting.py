@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from seqopt._cli import options
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import posture_trouble, scene_facts
 from seqopt._cli.given import plan_folder
-from seqopt._cli.options import word
+from seqopt._cli.options import BuiltFrom, File, Number
 from seqopt._files import require_apart, write_text
 from seqopt.arms._kept import arm_faults
 from seqopt.exchange._tasks import Postures
@@ -19,7 +18,7 @@ from seqopt.problem._limit_words import number_word
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export(options.Postures):
+class Export(options.Postures, options.Written):
     """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
 
     It says which block is absent, placed or held in which step, what each robot does and where, or
@@ -46,21 +45,21 @@ class Export(options.Postures):
     seqopt export best --format tasks --distance 0.15 --out tasks.json
     """
 
-    folder: Any = word(place=True)
-    format: str = word("csv", choices=EXPORTS)
-    source: Path | None = None
-    distance: str | None = None
+    folder: BuiltFrom = field(kw_only=False, metadata={"place": True})
+    format: str = field(default="csv", kw_only=False, metadata={"choices": EXPORTS})
+    source: File | None = None
+    distance: Number | None = None
 
 
 def run(asked: Export) -> Answer:
     """Write the plan of a folder in a format of others."""
-    folder = plan_folder(asked, asked.folder)
+    folder, taken = plan_folder(asked, asked.folder)
     inputs = [folder / name for name in ("scene.json", "plan.csv")]
-    outputs = [*filter(None, [asked.out])]
-    require_apart(outputs, [*inputs, *filter(None, [asked.source])])
+    source = None if asked.source is None else Path(asked.source)
+    require_apart([*filter(None, [asked.path])], [*inputs, *filter(None, [source])])
     scene, steps = read_folder(folder)
     given = asked.distance
-    distance = None if given is None else number_word(given, f"--distance {given}")
+    distance = None if given is None else number_word(str(given), f"--distance {given}")
     notes: tuple[str, ...] = ()
     postures: Postures | None = None  # of other formats than tasks
     if asked.format in TASKS and scene.has_arms:
@@ -68,15 +67,16 @@ def run(asked: Export) -> Answer:
             notes, postures = (f"arms: grips are proposals without postures; {trouble}",), {}
         else:
             notes = tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps))
-    text = export_plan(scene, steps, asked.format, asked.source, distance, postures)
+    text = export_plan(scene, steps, asked.format, source, distance, postures)
     said, lost = f"{len(steps)} steps", LOST.get(asked.format)
     if lost:
         said = f"{len(scene.bricks)} blocks, without {', '.join(lost)},"
     elif lost is not None:
         said = f"the scene and its {len(steps)} steps"
     facts = {"scene": scene_facts(scene), "steps": len(steps), "format": asked.format}
-    if asked.out is None:
-        return Answer(facts=facts | {"text": text}, data=text, notes=notes)
-    write_text(asked.out, text)
-    said = f"{said} written to {asked.out}"
-    return Answer(facts=facts, text=said, written=(asked.out,), notes=notes)
+    notes = (*taken, *notes)
+    if asked.path is None:
+        return Answer(facts=facts | {"text": text}, data=text, notes=notes, value=text)
+    write_text(asked.path, text)
+    said = f"{said} written to {asked.path}"
+    return Answer(facts=facts, text=said, written=(asked.path,), notes=notes, value=text)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from math import inf
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands.optimize import Optimize
 from seqopt._cli.given import file_name, given_scene
+from seqopt._cli.options import Choice, Number, Written
 from seqopt._cli.outputs import keep_apart
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.values import parse_time_limit
@@ -26,16 +27,9 @@ SAID = ("--quiet", "--json")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Instance(Optimize):
-    """Write the graph of a problem: its nodes and arcs, what they take, what is small and capped.
+class Instance(Written, Choice):
+    """What is written and printed?
 
-    Whoever reads it needs no scene. The options are those of optimize; what concerns the search
-    alone is left aside.
-
-    Usage
-    [SCENE] [--out FILE] [options of optimize]
-
-    What is written and printed?
     out : FILE
         file to write: .npz (the instance), .mps, .lp or .pbtxt (a program, the last for CP-SAT);
         without an end a folder with all of them
@@ -44,6 +38,21 @@ class Instance(Optimize):
     below : VALUE
         leave out states of which the first aim, a worst step, takes more; plans that are better
         than this stay
+    """
+
+    name: str | None = None
+    below: Number | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class InstanceWords(Instance, Optimize):
+    """Write the graph of a problem: its nodes and arcs, what they take, what is small and capped.
+
+    Whoever reads it needs no scene. The options are those of optimize; what concerns the search
+    alone is left aside.
+
+    Usage
+    [SCENE] [--out FILE] [options of optimize]
 
     Examples
     --------
@@ -52,47 +61,49 @@ class Instance(Optimize):
     seqopt instance chain:bricks=7 --schedule free --aim minmax,steps --out chain7
     """
 
-    name: str | None = None
-    below: str | None = None
+    made_by: Sequence[str] = ()  # words of the shell
 
 
-def run(asked: Instance) -> Answer:
+def run(asked: InstanceWords) -> Answer:
     """Write the instance of the problem that is asked for."""
-    path = asked.out
-    if path is None:
-        path = file_name(given_scene(asked).name, ".npz")
-        asked.taken.append(f"file: {path}; --out names another, or a folder for every format")
-    found = find(replace(asked, out=path))
-    write(asked, found, path)
-    limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(found).limited)
-    lines = [f"{found!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]
-    lines += [f"written to {path}; seqopt judge {path} SOLUTION checks an answer"]
-    return Answer(facts=found.facts_of(), text="\n".join(lines), written=(path,))
+    if asked.path is not None:
+        return answered(asked, find(asked))
+    path = file_name(given_scene(asked).name, ".npz")
+    asked = replace(asked, out=path)
+    answer = answered(asked, find(asked))
+    note = f"file: {path}; --out names another, or a folder for every format"
+    return replace(answer, notes=(note, *answer.notes))
 
 
-def find(asked: Instance) -> Graph:
+def find(asked: InstanceWords) -> Graph:
     """Return the instance of the problem that is asked for; the file where it goes names it."""
-    path = asked.out
+    path = asked.path
     if path and path.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
-    below = number_word(asked.below, "--below") if asked.below is not None else float("inf")
+    below = inf if asked.below is None else number_word(str(asked.below), "--below")
     clock = Clock(parse_time_limit(asked.time_limit))
     with clock.needed("posing the problem"):
-        problem = asked_problem(replace(asked, out=None)).problem
+        problem = asked_problem(asked).problem
     named = None if asked.formulation is None else find_formulation(asked.formulation)
     asked.tell("computing all that arcs take")
     aim = None if named is None else named.aim
-    facts = {"made_by": _made_by(asked.words)} if asked.words else {}
+    facts = {"made_by": _made_by(asked.made_by)} if asked.made_by else {}
     name = asked.name or (problem.scene.name if path is None else path.stem)
     with clock.needed("writing down the graph"):
         return compile_instance(problem, name=name, aim=aim, below=below, facts=facts)
 
 
-def write(asked: Instance, found: Graph, path: Path) -> None:
-    """Write an instance, apart from what the command reads."""
+def answered(asked: InstanceWords, found: Graph) -> Answer:
+    """Write an instance, apart from what the command reads, and return what is in it."""
+    path = asked.path
+    assert path is not None
     asked.tell("writing the instance")
     keep_apart(asked, path)
     save_instance(found, path)
+    limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(found).limited)
+    lines = [f"{found!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]
+    lines += [f"written to {path}; seqopt judge {path} SOLUTION checks an answer"]
+    return Answer(facts=found.facts_of(), text="\n".join(lines), written=(path,))
 
 
 def _made_by(words: Sequence[str]) -> str:

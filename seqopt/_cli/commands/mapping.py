@@ -45,7 +45,7 @@ def answer_map(asked: Fixed, over: str, holds: Sequence[str]) -> Answer:
     written = write_outputs(asked, lambda: _files(scene, builds, found))
     blocks = failure_blocks(scene, found, wrapped)
     if written:
-        where = written_to(asked.out, what="how steps fall")
+        where = written_to(asked.path, what="how steps fall")
         notes += [*figure_notes()]
     else:
         where = "--out DIR writes tables, a picture and a page that shows how steps fall"
@@ -60,6 +60,7 @@ def answer_map(asked: Fixed, over: str, holds: Sequence[str]) -> Answer:
         text="\n\n".join([*blocks, wrapped(where)]),
         headings=tuple(block.splitlines()[0] for block in blocks),
         written=written,
+        value=found.cases,
         notes=tuple(notes),
         status=Status.DOES_NOT_HOLD if falls else Status.DONE,
     )
@@ -105,7 +106,8 @@ def _over_bricks(
     scenes, notes = {now: (scene, builds)}, list[str]()
     for count in counts or [round(share * now) for share in SHARES]:
         try:
-            other = in_order(scene_of_bricks(str(asked.scene), int(count)), asked.order)
+            order = None if asked.order is None else str(asked.order)
+            other = in_order(scene_of_bricks(str(asked.scene), int(count)), order)
             if len(other.bricks) not in scenes:
                 scenes[len(other.bricks)] = other, _asked_builds(asked, other)[0]
         except SeqoptError as error:
@@ -122,7 +124,7 @@ def _asked_builds(asked: Fixed, scene: Scene) -> tuple[Builds, list[str]]:
     """Return the builds that are asked for, by name, and why others are not possible."""
     if asked.method is None and given_plan(asked) is None:
         return usual_builds(scene, asked.tell)
-    name, steps = asked_steps(asked, build_network(scene))
+    name, steps, _ = asked_steps(asked, build_network(scene))
     return {name: steps}, []
 
 

@@ -18,15 +18,15 @@ from seqopt._cli.asked import (
     _not_done,
     asked_prover,
     exceeded,
+    held_to,
     kept_range,
     level_notes,
     refused,
     rule_notes,
     scene_facts,
-    strictly,
     waits_said,
 )
-from seqopt._cli.options import Aimed, Cost, Cured, Posed, Strict, Timed, word
+from seqopt._cli.options import Chosen, Cured, Limited, Posed, Strict, Words, Written, word
 from seqopt._cli.outputs import (
     ALWAYS,
     _bare_files,
@@ -67,7 +67,7 @@ VERDICTS, UNSEEN = "which steps stand", "its values in unseen scenarios"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
+class Optimize(Written, Strict, Limited, Cured, Chosen, Posed):
     """Choose where robots hold, over all steps of a sequence, by one formulation.
 
     With --schedule free, choose every step. The answer is checked from the problem's own data, and
@@ -78,13 +78,6 @@ class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
     [SCENE] --schedule free [--out DIR] [other options]
     [SCENE] --robust AIM [--out DIR] [other options]
 
-    What is built, and by whom?
-    Which steps may a build have?
-    schedule : NAME|FILE
-        free: any robot may release, hold or place next, or a sequence with open grips: {schedules}
-        (of all robots), or a CSV file of steps; open grips are marked ? in it (default: the loop of
-        three robots, or of two where there is no third)
-
     What counts as best?
     With --aim, --stands, --order search or --schedule free states of the build are chosen:
     --ranked and criteria of ranks do not go with these.
@@ -93,61 +86,18 @@ class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
     --friction, --tilt and --curing go with --stands. Budgets on steps, regrips, makespan and sums
     go with --aim or --schedule free, those on steps_over and robot_use without.
 
-    budget : BUDGET
-        cap on a total over the build, with the formulations labels, lagrangian, overlap_mip and
-        overlap_lp: travel=0.8 (of what the optimum without budgets travels), travel=3.5m,
-        steps_over:F_largest=250:10 (at most 10 steps over 250 N), robot_use:rob1=100:5 (at most 5
-        in which rob1 carries over 100 N); with --aim or --schedule free: steps=N, regrips=N,
-        travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE
-
-    In which scenarios is it good?
-    --scenarios, --unseen, --seed and --vary go with --robust alone.
-
-    robust : AIM
-        what is to be as small as possible over all scenarios, in place of --formulation: worst-peak
-        (the largest cost of any step), worst-total (the largest total), or cvar=0.9 (the mean total
-        of the worst tenth)
-    scenarios : N
-        how many samples of the scene (default: 30)
-    unseen : N
-        how many other samples, of the next seed, judge the plan (default: none; as many as there
-        are scenarios double the time)
-    seed : N
-        which samples are drawn (default: 0)
-    vary : NAME=VALUE
-        how far samples are from the scene: stiffness=3 (of each joint, by a factor up to it, up or
-        down), density=0.1 (of each brick, up to this share), position=0.002 (of each brick and
-        joint, up to so many m); these are the defaults; grips=2 (of grips that are not rigid, by a
-        factor up to it)
-
     Who chooses and proves, and how long?
     --no-proof goes with cascade and rank_search, --lazy with exact formulations.
 
-    formulation : NAME
-        which mathematical program chooses: {formulations} (default: overlap_dp, which is exact and
-        the fastest, labels with --budget, minimax with --robust worst-peak, scenario_search with
-        other aims over scenarios; schedule_search with --aim, --stands or --schedule free,
-        makespan_labels where a makespan counts, order_search with --order search)
     option : NAME=VALUE
         option of the formulation, as horizon=2 or width=10
-    no_proof :
+    proof :
         with cascade or rank_search: compute only the responses that the search meets, about a
         fifth; how far the choice is from the optimum stays unknown
     lazy :
         with an exact formulation: compute only the responses that the proof needs; stopped before
         it is done, it leaves its best choice and a bound; with --aim or --schedule free it is done
         at any rate
-    candidates : RULE
-        look at fewer nodes per move: near:12 for those at most 12 joints from the newest bricks,
-        within:1.5 for those at most 1.5 m from them; makes any formulation a heuristic (free: of
-        grips on bricks that stand; what is proven holds among these)
-    workers : N
-        processes to share the work among; pays from about ten seconds (default: {default})
-    cache : DIR
-        keep answers there and use what is there: a run that was ended goes on
-    max_memory : SIZE
-        what responses and costs may take, as 500MB or 2GB (default: four fifths of what is free);
-        of a free schedule states and moves, with a bound where it ends
 
     What is written and printed?
     out : DIR
@@ -164,8 +114,8 @@ class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
     seqopt optimize my.json --criteria worst-ratio --limit payload --out mine
     """
 
-    option: tuple[str, ...] = ()
-    no_proof: bool = False
+    option: Words = ()
+    proof: bool = True
     lazy: bool = False
     tables: str = word("plan", choices=("plan", "all"))
 
@@ -292,7 +242,7 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
 def answered(asked: Optimize, found: Found) -> Answer:
     """Write a plan, and return what it is worth; what there is no time for is left out."""
     made: dict[str, bytes | str] = {}
-    if found.analyzed and found.summary and asked.out is not None:  # what says most comes first
+    if found.analyzed and found.summary and asked.path is not None:  # what says most comes first
         tables = partial(_plan_files, found.plan, choices=asked.tables == "all")
         made = found.clock.spare("its tables", tables, made)
     _ = found.verdicts, found.trial
@@ -350,8 +300,8 @@ def _how(asked: Optimize, formulation: Formulation) -> Run:
             "--max-memory: the search of orders has none; leave it out, or give --option most=N"
         )
     if asked.max_memory is not None and "max_memory" in formulation.options:
-        how["max_memory"] = parse_size(asked.max_memory)
-    return Run(proof=not asked.no_proof, lazy=asked.lazy, options=how)
+        how["max_memory"] = parse_size(str(asked.max_memory))
+    return Run(proof=asked.proof, lazy=asked.lazy, options=how)
 
 
 def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
@@ -376,7 +326,7 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
     )
     unreached = () if plan.arms is None else plan.arms.faults
     left = plan.departures if found.analyzed else ()
-    answer = strictly(answer, asked, over, left, found.verdicts, unreached)
+    answer = held_to(answer, over, left, found.verdicts, unreached)
     far = plan.is_far and not found.posed.problem.lifts_range
     return kept_range(answer, plan.beyond if far else None)
 
@@ -396,7 +346,7 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
     counts += [] if plan.order is not None else [f"{plan.models:,} models"]
     search = f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"
     page = found.analyzed and PAGE not in found.clock.left_out
-    yield f"{search}; {written_to(asked.out, page=page)}"
+    yield f"{search}; {written_to(asked.path, page=page)}"
     yield from map(wrapped, waits_said(plan) if plan.certificate is not None else ())
     yield from (f"stability, {each}" for each in found.verdicts.get(plan.title, ()))
     yield from [wrapped(found.whole)] if found.whole else []

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from math import inf
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -24,12 +23,13 @@ from seqopt._cli.asked import (
     rule_notes,
     scene_facts,
 )
-from seqopt._cli.options import Posed
+from seqopt._cli.options import Built, Judged, Moves, Numbers, Posed, Words, Written, word
 from seqopt._cli.outputs import (
     _bare_files,
     _steps_table,
     _time_files,
     figure_notes,
+    require_out,
     write_outputs,
     written_to,
 )
@@ -67,7 +67,34 @@ FOUR = "F_largest,M_sup,T_max,D_max"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pareto(Posed):
+class Pareto(Written, Judged, Built, Moves):
+    """Which steps may a build have?
+
+    schedule : NAME|FILE
+        free (default): any robot may place, hold or release next; or a sequence with open grips:
+        {schedules}, or a CSV file
+
+    What counts as best?
+    aim : NAME,NAME
+        what is to be small: responses and, of the free schedule, steps and regrips (default:
+        {default})
+    rounding : NAME=STEP
+        round a number up to multiples of a step (SI units)
+
+    Who chooses and proves, and how long?
+    seconds : S
+        limit of the whole command, with its proof, verdicts and page: what it has no time for is
+        left out and named; the points that were found by then are there
+    """
+
+    schedule: str | Path | None = FREE
+    aim: Words | None = FOUR
+    rounding: Numbers = word((), flag="--round")
+    seconds: float = inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParetoWords(Posed, Pareto):
     """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
 
     No other plan beats it in all aims at once (the Pareto set). Check each, and write a table, the
@@ -76,36 +103,17 @@ class Pareto(Posed):
     Usage
     [SCENE] [--out DIR] [--aim NAME,NAME] [other options]
 
-    Which steps may a build have?
-    schedule : NAME|FILE
-        free (default): any robot may place, hold or release next; or a sequence with open grips:
-        {schedules}, or a CSV file
-
     What counts as best?
     --under goes with --pick.
 
-    aim : NAME,NAME
-        what is to be small: responses and, of the free schedule, steps and regrips (default:
-        {default})
     pick : NAME
         also write a folder, pick, of the plan with the least of a column
-    round : NAME=STEP
-        round a number up to multiples of a step (SI units)
     under : BOUND
         for --pick: only plans below it: NAME=VALUE (SI units), or a method that is to be beaten in
         everything: sequential, cantilever, published
 
     What must hold?
     --friction and --tilt go with --stands.
-
-    Who chooses and proves, and how long?
-    seconds : S
-        limit of the whole command, with its proof, verdicts and page: what it has no time for is
-        left out and named; the points that were found by then are there
-
-    What is written and printed?
-    out : DIR
-        folder to write
 
     Examples
     --------
@@ -115,12 +123,10 @@ class Pareto(Posed):
     seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front
     """
 
-    schedule: Any = FREE
-    aim: str | None = FOUR
+    schedule: str | Path | None = FREE
+    aim: Words | None = FOUR
     pick: str | None = None
-    round: tuple[str, ...] = ()
-    under: tuple[str, ...] = ()
-    seconds: float = inf
+    under: Words = ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -130,7 +136,7 @@ class _Picked(GivenSequence):
     result: str = ""
 
 
-def run(asked: Pareto) -> Answer:
+def run(asked: ParetoWords) -> Answer:
     """Find all plans that no other beats in every aim, and write them."""
     return answered(asked, find(asked))
 
@@ -140,14 +146,14 @@ class Found:
     """A Pareto set, what was asked, and what there is time to say of it."""
 
     problem: Problem
-    front: Front
+    value: Front
     clock: Clock
     prover: Callable[[Network], BuildProver]
 
     @cached_property
     def provers(self) -> dict[Engine, BuildProver]:
         """What says which steps stand, by the engine of a build order."""
-        return {own: self.prover(own.network) for own in {*self.front.engines}}
+        return {own: self.prover(own.network) for own in {*self.value.engines}}
 
     @cached_property
     def methods(self) -> Mapping[str, pd.DataFrame]:
@@ -162,50 +168,51 @@ class Found:
 
         def departures() -> dict[str, tuple[Departure, ...]]:
             left: dict[str, tuple[Departure, ...]] = {}
-            for own, builds in _by_engine(self.front).items():
+            for own, builds in _by_engine(self.value).items():
                 left |= LinearRange(own).of_steps(builds)
-            return {name: left[name] for name in _names(self.front) if name in left}
+            return {name: left[name] for name in _names(self.value) if name in left}
 
         return self.clock.spare("which points leave the linear range", departures, {})
 
     @property
     def counts(self) -> dict[str, object]:
         """How many points there are, whether that is all, and how long it took."""
-        front = self.front
+        front = self.value
         counts = {"points": len(front.steps), "complete": front.complete}
         return {**counts, "seconds": dict(front.seconds)}
 
 
-def find(asked: Pareto) -> Found:
+def find(asked: ParetoWords) -> Found:
     """Find all plans that no other beats in every aim."""
     if not asked.seconds >= 0:
         raise ProblemError(f"--seconds {asked.seconds:g}: give a number from 0")
+    require_out(asked)
     clock = Clock(asked.seconds)
     with clock.needed("posing the problem"):
         problem = asked_problem(asked).problem
         free = states_of(problem)
-    rounding = parse_numbers("--round", asked.round, [str(goal) for goal in free.goals])
+    rounding = parse_numbers("--round", asked.rounding, [str(goal) for goal in free.goals])
     tell = within(asked.tell, clock.left)
     front = find_front(problem, rounding=rounding, progress=tell, clock=clock)
     clock.interrupted |= front.stopped == INTERRUPT
     return Found(problem, front, clock, partial(asked_prover, asked))
 
 
-def answered(asked: Pareto, found: Found) -> Answer:
+def answered(asked: ParetoWords, found: Found) -> Answer:
     """Write a Pareto set, and return what is in it; what there is no time for is left out."""
-    front, free, clock = found.front, states_of(found.problem), found.clock
+    front, free, clock = found.value, states_of(found.problem), found.clock
     scene = free.engine.network.scene
     files: Mapping[str, bytes | str] = {}
-    if asked.out is not None or any("=" not in text for text in asked.under):
+    if asked.path is not None or any("=" not in text for text in asked.under):
         _ = found.methods
     _ = found.departures
-    if asked.out is not None:
+    if asked.path is not None:
         pairs = zip(front.engines, front.steps, strict=True)
         bare = _files(found, [_steps_table(_Picked(own, steps)) for own, steps in pairs], {})
         files = clock.spare(DETAILS, partial(_front_files, asked, found), bare)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
-    if asked.out and not asked.pick:
+    if asked.path and not asked.pick:
         said += "; --pick D_max also writes a folder of the plan with the least"
     if asked.pick:
         chosen, picked, row = _chosen(asked, asked.pick, found)
@@ -213,13 +220,13 @@ def answered(asked: Pareto, found: Found) -> Answer:
         said += f"; picked row {chosen + 1}: {row}"
     written = write_outputs(asked, lambda: {**files, "scene.json": dump_scene(scene)})
     shown = "" if written else f"{_numbered(front).to_string(max_rows=MOST_ROWS)}\n"
-    if asked.out is not None and asked.pick and picked is not None:
-        write = partial(_write_picked, asked.out / "pick", asked.pick, found, chosen, picked)
+    if asked.path is not None and asked.pick and picked is not None:
+        write = partial(_write_picked, asked.path / "pick", asked.pick, found, chosen, picked)
         clock.spare("the folder of the plan that is picked", write, None)
     points = {"points": shown_table(front.table), "picked": picked}
     answer = Answer(
         facts={"scene": scene_facts(scene), **found.counts, **points},
-        text=f"{shown}{said}; {written_to(asked.out, page=DETAILS not in clock.left_out)}",
+        text=f"{shown}{said}; {written_to(asked.path, page=DETAILS not in clock.left_out)}",
         written=written,
         notes=(
             *level_notes(asked, free.engine),
@@ -234,12 +241,12 @@ def answered(asked: Pareto, found: Found) -> Answer:
     return kept_range(marked(answer, builds_in_words(found.departures)), front.beyond or None)
 
 
-def _chosen(asked: Pareto, name: str, found: Found) -> tuple[int, dict[str, object], str]:
+def _chosen(asked: ParetoWords, name: str, found: Found) -> tuple[int, dict[str, object], str]:
     """Return which plan is picked, its point, and that in words."""
     if asked.under and not found.methods and found.clock.left_out:
         raise TimeUpError(f"--pick {name}: --under was not looked at; give more")
-    chosen = pick(found.front.table, name, _under(asked.under, found))
-    values = shown_table(found.front.table).iloc[chosen]
+    chosen = pick(found.value.table, name, _under(asked.under, found))
+    values = shown_table(found.value.table).iloc[chosen]
     row = ", ".join(f"{name} {value_text(str(name), v)}" for name, v in values.items())
     return chosen, {"point": chosen + 1, **values}, row
 
@@ -251,7 +258,7 @@ def _files(
     numbered: pd.DataFrame | None = None,
 ) -> dict[str, bytes | str]:
     """Return the tables and the summary of a Pareto set."""
-    points = _numbered(found.front).reset_index() if numbered is None else numbered
+    points = _numbered(found.value).reset_index() if numbered is None else numbered
     plans = [table.assign(point=number) for number, table in enumerate(plans, start=1)]
     return {
         "pareto.csv": csv_text(points),
@@ -264,9 +271,9 @@ def _write_picked(
     folder: Path, name: str, found: Found, chosen: int, picked: Mapping[str, object]
 ) -> None:
     """Write the plan that is picked, a folder as of any plan."""
-    own = found.front.engines[chosen]
-    result = f"one of {len(found.front.steps)} plans"
-    plan = _Picked(own, found.front.steps[chosen], f"plan with the least {name}", result=result)
+    own = found.value.engines[chosen]
+    result = f"one of {len(found.value.steps)} plans"
+    plan = _Picked(own, found.value.steps[chosen], f"plan with the least {name}", result=result)
     report = {"scene": own.network.scene.name, "picked": picked, **provenance(own)}
     table, tasks = plan.responses(), task_texts(own.network.scene, plan.steps)
     files = {
@@ -278,9 +285,9 @@ def _write_picked(
     write_folder(folder, files)
 
 
-def _front_files(asked: Pareto, found: Found) -> dict[str, bytes | str]:
+def _front_files(asked: ParetoWords, found: Found) -> dict[str, bytes | str]:
     """Return the files of a Pareto set by name."""
-    front, problem = found.front, found.problem
+    front, problem = found.value, found.problem
     engine, free = problem.engine, states_of(problem)
     asked.tell("analyzing plans")
     each: dict[str, pd.DataFrame] = {}

@@ -8,7 +8,7 @@ import pandas as pd
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_scene, scene_facts
-from seqopt._cli.options import Built, Postures
+from seqopt._cli.options import Built, Postures, Written
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
@@ -24,7 +24,7 @@ from seqopt.scene.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reach(Postures, Built):
+class Reach(Written, Postures, Built):
     """Say which robots reach which nodes.
 
     Of those with arms, with how many postures, and up to how many bricks. Robots have arms in the
@@ -51,13 +51,14 @@ def run(asked: Reach) -> Answer:
     lines = [*(reach_described if scene.has_arms else reach_covered)(scene, table)]
     if written:
         names = "reach.csv, postures.csv" if scene.has_arms else "reach.csv"
-        lines.append(f"written to {asked.out}: {names}")
+        lines.append(f"written to {asked.path}: {names}")
     else:
         lines.append("--out DIR writes a row for every robot and node, and postures of arms")
     return Answer(
         facts={"scene": scene_facts(scene), "reach": table},
         text="\n".join(map(wrapped, lines)),
         written=written,
+        value=table,
         notes=figure_notes() if written and scene.has_arms else (),
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,12 +13,34 @@ from typing import Any, NamedTuple
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands import optimize
 from seqopt._cli.given import Place, plan_folder
-from seqopt._cli.options import Aimed, Cost, Cured, Judged, Postures, Rules, Strict, Timed, word
+from seqopt._cli.options import (
+    Aimed,
+    Bricks,
+    BuiltFrom,
+    Cured,
+    Engined,
+    File,
+    Judged,
+    Judging,
+    Limited,
+    Number,
+    Numbers,
+    Postures,
+    Ranks,
+    Ruled,
+    Stands,
+    Strict,
+    Timed,
+    Words,
+    Written,
+    listed,
+)
 from seqopt._cli.outputs import ALWAYS, require_out
 from seqopt._cli.terminal import wrapped
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
 from seqopt.exchange._measured import read_measured
+from seqopt.plan.plan import Plan
 from seqopt.plan.replan import compared, without
 from seqopt.responses._tolerance import is_tolerance, value_text
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
@@ -32,16 +54,9 @@ from seqopt.study.published import CRITERIA
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replan(Strict, Postures, Judged, Timed, Cured, Cost, Aimed, Rules):
-    """Plan the rest of a build from one of its steps, after something has changed.
+class Replan(Written, Engined, Aimed, Limited, Judging, Stands, Timed, Ruled):
+    """Which plan, and where does it stand?
 
-    A robot is lost, carries less or is new, a brick is missing. Any robot may release, hold or
-    place next; aims, criterion and rules are those of the plan, if nothing else is said.
-
-    Usage
-    PLAN_DIR [--at STEP] [changes] [--out DIR] [other options]
-
-    Which plan, and where does it stand?
     plan : PLAN_DIR|SCENE
         folder that optimize wrote: its plan, scene and summary; in place of it a scene, for which
         the best free schedule is planned first
@@ -69,12 +84,34 @@ class Replan(Strict, Postures, Judged, Timed, Cured, Cost, Aimed, Rules):
     What counts as best?
     As before, where nothing is said.
 
-    What must hold?
-    --friction, --tilt and --curing go with --stands.
-
     What is written and printed?
     out : DIR
         folder to write the new plan to
+    """
+
+    plan: BuiltFrom = field(default="arch25", kw_only=False, metadata={"place": True})
+    at: int | str = field(default=1, kw_only=False)
+    lost: Words = ()
+    payload: float | Numbers = ()
+    grips: Number | None = None
+    robots: int | str | None = None
+    missing: Bricks = ()
+    measured: File | None = None
+    to: int | str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplanWords(Strict, Postures, Judged, Cured, Ranks, Replan):
+    """Plan the rest of a build from one of its steps, after something has changed.
+
+    A robot is lost, carries less or is new, a brick is missing. Any robot may release, hold or
+    place next; aims, criterion and rules are those of the plan, if nothing else is said.
+
+    Usage
+    PLAN_DIR [--at STEP] [changes] [--out DIR] [other options]
+
+    What must hold?
+    --friction, --tilt and --curing go with --stands.
 
     Examples
     --------
@@ -83,18 +120,8 @@ class Replan(Strict, Postures, Judged, Timed, Cured, Cost, Aimed, Rules):
     seqopt replan free --at 12 --robots 4 --missing 9
     """
 
-    plan: Any = word(place=True)
-    at: str = "1"
-    lost: tuple[str, ...] = ()
-    payload: tuple[str, ...] = ()
-    grips: str | None = None
-    robots: str = ""
-    missing: tuple[str, ...] = ()
-    measured: Path | None = None
-    to: str | None = None
 
-
-def run(asked: Replan) -> Answer:
+def run(asked: ReplanWords) -> Answer:
     """Plan the rest of a build, and say what changes."""
     found = find(asked)
     with found.new.proving():
@@ -107,18 +134,24 @@ class Found(NamedTuple):
     folder: Path
     base: optimize.Optimize
     new: optimize.Found
+    notes: tuple[str, ...]
+
+    @property
+    def value(self) -> Plan:
+        """The plan of the rest."""
+        return self.new.plan
 
 
-def find(asked: Replan) -> Found:
+def find(asked: ReplanWords) -> Found:
     """Plan the rest of a build; with what was asked, as of ``optimize``."""
     for name, text in (("at", asked.at), ("robots", asked.robots or "0")):
-        if not text.isdecimal():
+        if not str(text).isdecimal():
             raise StepError(f"--{name} {text}: give a number")
     require_out(asked, *ALWAYS)
-    folder = plan_folder(asked, asked.plan, free=True)
+    folder, notes = plan_folder(asked, asked.plan, free=True)
     base, change = _as_optimize(asked, folder), partial(_changed, asked)
     try:
-        return Found(folder, base, optimize.find(base, change))
+        return Found(folder, base, optimize.find(base, change), notes)
     except InfeasibleError as error:
         more, scene = "", load_scene(folder / "scene.json")
         count = max(len(scene.robots), int(asked.robots or 0)) + 1
@@ -129,9 +162,9 @@ def find(asked: Replan) -> Found:
         raise InfeasibleError(f"{error}{more}") from None
 
 
-def answered(asked: Replan, found: Found) -> Answer:
+def answered(asked: ReplanWords, found: Found) -> Answer:
     """Write the new plan, and say what it changes."""
-    folder, base, new = found
+    folder, base, new, notes = found
     scene = load_scene(folder / "scene.json")
     steps = read_plan(scene, folder / "plan.csv")
     old = [step for step in steps if step.number > int(asked.at)]
@@ -148,6 +181,7 @@ def answered(asked: Replan, found: Found) -> Answer:
 
     facts = new.clock.spare("what the new plan changes", differs, None)
     answer = optimize.answered(base, new)
+    answer = replace(answer, notes=(*notes, *answer.notes))
     if facts is None:
         return answer
     return replace(
@@ -157,15 +191,16 @@ def answered(asked: Replan, found: Found) -> Answer:
     )
 
 
-def _as_optimize(asked: Replan, folder: Path) -> optimize.Optimize:
+def _as_optimize(asked: ReplanWords, folder: Path) -> optimize.Optimize:
     """Return what is asked, as of ``optimize``, which goes on from the step."""
     shared = {each.name for each in fields(asked)} & {e.name for e in fields(optimize.Optimize)}
     given = {name: getattr(asked, name) for name in shared}
     told = _told(folder, lost=bool(asked.lost))
-    given |= {name: told[name] for name in ("aim", "criteria", "limit") if not given[name] and told}
+    kept = ("aim", "criterion", "limits")
+    given |= {name: told[name] for name in kept if told and not given[name]}
     given |= {"scene": str(folder / "scene.json"), "schedule": FREE}
     given |= {"begin": f"{folder}:{asked.at}", "direction": told.get("direction")}
-    given["rule"] = (*told.get("rule", ()), *asked.rule)
+    given["rules"] = (*told.get("rules", ()), *listed(asked.rules))
     if given["direction"] and asked.missing:
         raise StepError("--missing: bricks are missing in a build; a take-down removes them anyway")
     return optimize.Optimize(**given)
@@ -192,9 +227,9 @@ def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
     return {
         "direction": rules.get("direction"),
         "aim": ",".join(map(str, aims if isinstance(aims, list) else ())),
-        "criteria": criterion if isinstance(criterion, str) and criterion in CRITERIA else None,
-        "rule": tuple(f"{name}={rules[name]}" for name in names if name in rules),
-        "limit": tuple(
+        "criterion": criterion if isinstance(criterion, str) and criterion in CRITERIA else None,
+        "rules": tuple(f"{name}={rules[name]}" for name in names if name in rules),
+        "limits": tuple(
             f"{TOLERANCE if is_tolerance(name) else name}={value}"  # beside which limits follows
             for name, value in limits.items()
             if name != PROP_EXCESS  # which the scene says
@@ -202,18 +237,20 @@ def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
     }
 
 
-def _changed(asked: Replan, scene: Scene, begin: Place) -> tuple[Scene, Place, str]:
+def _changed(asked: ReplanWords, scene: Scene, begin: Place) -> tuple[Scene, Place, str]:
     """Return scene and place after what has changed, and the robots that take part, by name."""
     assert begin.site is not None
-    if wrong := [text for text in asked.missing if not text.isdecimal()]:
+    missing = listed(asked.missing)
+    if wrong := [text for text in missing if not text.isdecimal()]:
         raise StepError(f"--missing {wrong[0]}: give the number of a brick")
     if asked.measured is not None:
-        found, stand = read_measured(scene, asked.measured), scene.build_order[: begin.site.bricks]
+        found = read_measured(scene, Path(asked.measured))
+        stand = scene.build_order[: begin.site.bricks]
         if early := [name for name in found if name in scene.build_order and name not in stand]:
             why = f"brick {early[0]} does not stand yet; leave it out"
             raise StepError(f"--measured {asked.measured}: {why}")
         scene = as_built(scene, found)
-    scene, site = without(scene, begin.site, asked.lost, [*map(int, asked.missing)])
+    scene, site = without(scene, begin.site, asked.lost, [*map(int, missing)])
     left = [robot.name for robot in scene.robots if robot.name not in asked.lost]
     return scene, Place(site, None), ",".join(left) if asked.lost else ""
 

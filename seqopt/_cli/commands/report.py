@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_engine, asked_prover, asked_scene, posture_trouble, scene_facts
 from seqopt._cli.given import file_name, plan_folder
-from seqopt._cli.options import Built, Judged, Postures, word
+from seqopt._cli.options import Built, BuiltFrom, File, Judged, Postures, Written, word
 from seqopt._cli.outputs import figure_notes, keep_apart
 from seqopt._files import require_folder, write_folder, write_text
 from seqopt._showing import PAGE, display
@@ -19,14 +19,9 @@ from seqopt.stability._builds import BuildProver
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report(Postures, Judged, Built):
-    """Write a page with a step viewer of the plans in a folder.
+class Report(Postures, Judged, Written):
+    """What is built, and by whom?
 
-    It shows the structure in three dimensions, who holds what, axial forces, displacements, and
-    responses along the build. It is one file and needs no network. If the folder has a scene.json,
-    that is the scene.
-
-    What is built, and by whom?
     folder : DIR
         folder that holds plans as CSV; in place of it a scene, whose usual steps are shown
 
@@ -38,6 +33,20 @@ class Report(Postures, Judged, Built):
     figures : FOLDER
         also write figures there as PNG and SVG: steps, who holds what when, and responses along the
         build (needs matplotlib)
+    """
+
+    folder: BuiltFrom = field(kw_only=False, metadata={"place": True})
+    film: File | None = None
+    figures: File | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportWords(Report, Built):
+    """Write a page with a step viewer of the plans in a folder.
+
+    It shows the structure in three dimensions, who holds what, axial forces, displacements, and
+    responses along the build. It is one file and needs no network. If the folder has a scene.json,
+    that is the scene.
 
     Examples
     --------
@@ -47,28 +56,31 @@ class Report(Postures, Judged, Built):
     seqopt report best --film build.gif
     """
 
-    folder: Path = word(place=True)
-    film: Path | None = None
-    figures: Path | None = None
+    scene: BuiltFrom = word("arch25", place=True)
 
 
-def run(asked: Report) -> Answer:
+def run(asked: ReportWords) -> Answer:
     """Write the page of the plans in a folder."""
-    film: Any = None if asked.film is None else display("Film")
+    film, figures = (None if p is None else Path(p) for p in (asked.film, asked.figures))
+    draws: Any = None if film is None else display("Film")
     if film is not None:
-        film.require(asked.film)
-    folder = plan_folder(asked, asked.folder)
-    usual = folder / PAGE if folder == asked.folder else file_name(asked.folder, ".html")
+        draws.require(film)
+    folder, taken = plan_folder(asked, asked.folder)
+    named = isinstance(asked.folder, str | Path)
     own = folder / "scene.json"
     if own.is_file():  # plans go with the scene that stands beside them
         asked = replace(asked, scene=own)
     scene = asked_scene(asked)
-    path = usual if asked.out is None else asked.out
-    keep_apart(asked, path, asked.film)
+    path = asked.path
+    if path is None and named and folder == Path(str(asked.folder)):
+        path = folder / PAGE
+    elif path is None:
+        path = file_name(str(asked.folder) if named else scene.name, ".html")
+    keep_apart(asked, path, film)
     written: tuple[Path, ...] = (path,)
-    if asked.figures is not None:
-        require_folder(asked.figures)
-        written += () if figure_notes() else (asked.figures,)
+    if figures is not None:
+        require_folder(figures)
+        written += () if figure_notes() else (figures,)
     trouble = posture_trouble(asked, scene)
     asked.tell("analyzing plans and writing the page")
     engine = asked_engine(asked, build_network(scene))
@@ -77,18 +89,20 @@ def run(asked: Report) -> Answer:
     if film is not None:
         asked.tell("drawing the film")
         first = folder_builds(engine, folder, BuildProver(engine.network, {}))[0]
-        written += (film(engine, first.steps).save(asked.film),)
-    if asked.figures is not None and asked.figures in written:
+        written += (draws(engine, first.steps).save(film),)
+    if figures is not None and figures in written:
         from seqopt.report.charts import plan_figures  # noqa: PLC0415  # needs an extra
 
         asked.tell("drawing figures")
-        write_folder(asked.figures, plan_figures(engine, folder_builds(engine, folder, prover)))
+        write_folder(figures, plan_figures(engine, folder_builds(engine, folder, prover)))
     return Answer(
         facts={"scene": scene_facts(scene)},
         text=f"written to {' and '.join(map(str, written))}",
         written=written,
+        value=written,
         notes=(
+            *taken,
             *([f"arms: drawn without postures; {trouble}"] if trouble else ()),
-            *(() if asked.figures is None else figure_notes()),
+            *(() if figures is None else figure_notes()),
         ),
     )

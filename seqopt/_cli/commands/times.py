@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import pandas as pd
@@ -18,7 +19,7 @@ from seqopt._cli.asked import (
     waits_said,
 )
 from seqopt._cli.given import asked_steps
-from seqopt._cli.options import Cured, Fixed, Postures, Timed
+from seqopt._cli.options import Cured, Fixed, Timed, Words
 from seqopt._cli.outputs import _time_files, figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing
@@ -27,10 +28,10 @@ from seqopt.contact.curing import _find_curing
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
+from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence
-from seqopt.scene.scene import Scene
 from seqopt.sequence._durations import has_durations
-from seqopt.sequence.steps import _idle_note
+from seqopt.sequence.steps import Step, _idle_note
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
 from seqopt.times._tables import aged_table, busy_table, softer_lines, spent_lines, total_lines
@@ -39,7 +40,7 @@ USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Times(Postures, Cured, Timed, Fixed):
+class Times(Cured, Timed, Fixed):
     """Say how long a build takes and who does what when.
 
     A robot that holds nothing prepares what it does next while others hold and act; actions come
@@ -74,19 +75,20 @@ class Times(Postures, Cured, Timed, Fixed):
     """
 
     reassign: bool = False
-    stiffens: tuple[str, ...] = ()
+    stiffens: Words = ()
 
 
 def run(asked: Times) -> Answer:
     """Say how long a build takes, and write its times if asked."""
     require_out(asked, "plan.csv", "times.csv")
-    scene = asked_scene(asked)
+    scene, taken = asked_scene(asked), list[str]()
     if not (asked.durations or has_durations(scene)):
         asked = replace(asked, durations=(USUAL_SECONDS,))
-        said = f"durations: not known, taken as {USUAL_SECONDS}; --durations says others"
-        asked.taken.append(said)
+        taken.append(f"durations: not known, taken as {USUAL_SECONDS}; --durations says others")
     scene = in_seconds(asked, scene)
-    build, given, least = _asked_build(asked, scene)
+    network = build_network(scene)
+    named = asked_steps(asked, network)
+    build, given, least = _asked_build(asked, network, named.steps)
     aged = _aged(asked, build)
     tables = {"plan.csv": build.responses, "times.csv": build.times}
     tables |= {} if aged is None else {"aged.csv": lambda: aged}
@@ -103,22 +105,27 @@ def run(asked: Times) -> Answer:
     lines = [*total, *waits_said(build), *spent_lines(busy)]
     if aged is not None:
         lines += softer_lines(scene, build.responses(), aged, exceeded(scene, aged))
-    kept = f"written to {asked.out}: {', '.join(tables)}"
+    kept = f"written to {asked.path}: {', '.join(tables)}"
     lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
     trouble = posture_trouble(asked, scene)
     cannot = (f"not checked; {trouble}",) if trouble else arm_notes(scene, {"": build.steps})
+    timed = build.times()
+    timed.attrs["robots"] = busy
     facts: dict[str, object] = {
         "makespan_s": given,
         "reassigned_s": least,
         "robots": busy,
-        "steps": build.times(),
+        "steps": timed,
     }
     facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
         facts={"scene": scene_facts(scene), **facts},
         text="\n".join(map(wrapped, lines)),
         written=written,
+        value=timed,
         notes=(
+            *taken,
+            *named.notes,
             *carrying_notes(scene, build.steps),
             *_idle_note(scene, "robots", build.steps),
             *(f"arms: {each}" for each in cannot),
@@ -127,13 +134,14 @@ def run(asked: Times) -> Answer:
     )
 
 
-def _asked_build(asked: Times, scene: Scene) -> tuple[GivenSequence, float, float | None]:
+def _asked_build(
+    asked: Times, network: Network, steps: Sequence[Step]
+) -> tuple[GivenSequence, float, float | None]:
     """Return a build, when it ends, s, and when it ends reassigned, if that is asked."""
-    network = build_network(scene)
-    steps, standing = asked_steps(asked, network).steps, asked_standing(asked)
+    standing = asked_standing(asked)
     if standing is not None and not asked.curing:
         raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
-    build = GivenSequence(make_engine(USUAL, network), steps, standing=standing)
+    build = GivenSequence(make_engine(USUAL, network), (*steps,), standing=standing)
     try:
         given = float(build.times()["end_s"].iloc[-1])
     except StepError as error:
