@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -12,6 +13,7 @@ import seqopt
 from seqopt import doors
 from seqopt._cli.arguments import COMMANDS
 from seqopt._cli.main import main
+from seqopt._cli.signatures import page_of
 from seqopt.scene.scene_file import save_scene
 from seqopt.work.progress import Stage
 from tests.builders import anywhere, small_arch
@@ -156,6 +158,26 @@ def test_every_command_has_a_function_of_python():
         taken = inspect.signature(getattr(doors, name)).parameters.values()
         assert all(each.kind is not each.VAR_KEYWORD for each in taken), name
         assert len(taken) <= 20, name
+
+
+def test_what_functions_take_is_written_once():
+    """Names, types and defaults are those of what a command is asked, and so are descriptions."""
+    for name in {*doors.__all__} - {"judge", "optimize"}:
+        kind = COMMANDS[name].asked
+        described, known = page_of(kind).options, inspect.signature(kind).parameters
+        for each in inspect.signature(getattr(doors, name)).parameters.values():
+            assert (each.annotation, each.default) == (
+                known[each.name].annotation,
+                known[each.name].default,
+            )
+            assert each.name in described or each.name == "progress", (name, each.name)
+
+
+def test_a_page_of_a_plan_is_named_by_its_scene(arch, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plan = seqopt.optimize(arch, "free")
+    (page,) = doors.report(plan, stability=False)
+    assert page == Path("-".join(plan.problem.scene.name.split())).with_suffix(".html")
 
 
 def test_a_word_that_python_does_not_know_is_refused():

@@ -57,6 +57,7 @@ from seqopt.work._clock import Clock
 from seqopt.work.progress import with_progress
 
 INTERRUPTED = "seqopt: interrupted; the steps are those that were computed"
+RANGE = "whether they are in the linear range"
 UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 
@@ -132,9 +133,7 @@ def run(asked: Analyze) -> Answer:
     table, off = clock.spare("tolerances", tolerances, (table, tuple[str, ...]()))
     staged = None if asked.staged is None else staged_fields(network, computed, asked.staged)
     departures = partial(within.departures, table, staged)
-    outside = clock.spare(
-        "whether they are in the linear range", departures, tuple[Departure, ...]()
-    )
+    outside: tuple[Departure, ...] = clock.spare(RANGE, departures, ())
     whole = _with_faults(scene, table, steps, faults) if faults else table
     said = put_table(asked.path, whole, _counted(whole, faults))
     if archived is not None:

@@ -89,7 +89,7 @@ def run(asked: Times) -> Answer:
     network = build_network(scene)
     named = asked_steps(asked, network)
     build, given, least = _asked_build(asked, network, named.steps)
-    aged = _aged(asked, build)
+    timed, aged = build.times(), _aged(asked, build)
     tables = {"plan.csv": build.responses, "times.csv": build.times}
     tables |= {} if aged is None else {"aged.csv": lambda: aged}
 
@@ -98,9 +98,9 @@ def run(asked: Times) -> Answer:
 
     written = write_outputs(asked, files)
     busy = busy_table(scene, build.steps, build._waits)
+    timed.attrs["robots"] = busy
     if build.standing is not None:
-        starts = build.times()["start_s"].tolist()
-        check_cured(build.engine.network, build.steps, build.standing, starts)
+        check_cured(network, build.steps, build.standing, timed["start_s"].tolist())
     total = total_lines(scene.name, len(build.steps), given, least)
     lines = [*total, *waits_said(build), *spent_lines(busy)]
     if aged is not None:
@@ -109,17 +109,11 @@ def run(asked: Times) -> Answer:
     lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
     trouble = posture_trouble(asked, scene)
     cannot = (f"not checked; {trouble}",) if trouble else arm_notes(scene, {"": build.steps})
-    timed = build.times()
-    timed.attrs["robots"] = busy
-    facts: dict[str, object] = {
-        "makespan_s": given,
-        "reassigned_s": least,
-        "robots": busy,
-        "steps": timed,
-    }
+    facts = {"scene": scene_facts(scene), "makespan_s": given, "reassigned_s": least}
+    facts |= {"robots": busy, "steps": timed}
     facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
-        facts={"scene": scene_facts(scene), **facts},
+        facts=facts,
         text="\n".join(map(wrapped, lines)),
         written=written,
         value=timed,
