@@ -37,27 +37,15 @@ def stored(instance: Instance) -> bytes:
     }
     columns = []
     for k, name in enumerate(instance.columns):
-        of, values = _column(instance, instance.amounts[:, k])
-        arrays[f"amount_{k}"] = values
-        columns.append({"name": name, "of": of})
+        values, of_nodes = instance.amounts[:, k], np.zeros(instance.nodes)
+        of_nodes[instance.target] = values
+        alike = np.array_equal(of_nodes[instance.target], values)  # all arcs to each take it
+        arrays[f"amount_{k}"] = of_nodes if alike else values
+        columns.append({"name": name, "of": "nodes" if alike else "arcs"})
     if instance.timed is not None:
         for name in (*TIMED, "longest"):
             arrays[f"timed_{name}"] = _narrow(getattr(instance.timed, name))
-    document = _document(instance, columns)
-    return _archive(arrays, json.dumps(document, indent=1) + "\n")
-
-
-def _column(instance: Instance, values: np.ndarray) -> tuple[str, np.ndarray]:
-    """Return whether a column is one of nodes, what all arcs to each take, and its values."""
-    of_nodes = np.zeros(instance.nodes)
-    of_nodes[instance.target] = values
-    if np.array_equal(of_nodes[instance.target], values):
-        return "nodes", of_nodes
-    return "arcs", values
-
-
-def _document(instance: Instance, columns: list[dict[str, str]]) -> dict[str, Any]:
-    return {
+    document = {
         "format": FORMAT,
         "version": VERSION,
         "name": instance.name,
@@ -69,6 +57,7 @@ def _document(instance: Instance, columns: list[dict[str, str]]) -> dict[str, An
         "timed": instance.timed is not None,
         "facts": dict(instance.facts),
     }
+    return _archive(arrays, json.dumps(document, indent=1) + "\n")
 
 
 def _narrow(values: np.ndarray) -> np.ndarray:

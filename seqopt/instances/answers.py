@@ -78,7 +78,9 @@ def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
         values = found.get("values", ())
     else:
         what, numbers, own, values = "nodes", found, (), ()
-    claims, said = (own, where) if _is_empty(bounds) else _loaded(bounds)
+    claims, said = (
+        (own, where) if isinstance(bounds, Sequence) and not len(bounds) else _loaded(bounds)
+    )
     if isinstance(claims, Mapping):
         claims = claims.get("bounds", claims)
     claims = [claims] if isinstance(claims, Mapping | Claim) else claims
@@ -90,10 +92,6 @@ def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
         _values(instance, values, where),
         tuple(_claim(each, f"{said}, bound {k}") for k, each in enumerate(claims, start=1)),
     )
-
-
-def _is_empty(bounds: Any) -> bool:
-    return isinstance(bounds, Sequence) and not len(bounds)
 
 
 def _loaded(given: Any) -> tuple[Any, str]:

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from seqopt._registry import offered
-from seqopt.arrays import Bools, Ints
+from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph._timed import TimedGraph
-from seqopt.graph.formulation import Formulation, as_formulation
+from seqopt.graph.formulation import as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
 from seqopt.graph.layers.compiled import compile_layers, on_paths
@@ -23,7 +23,7 @@ from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.states._visits import FreeStates, ScenarioSums
 from seqopt.graph.states.states import States
 from seqopt.plan.solving import graph_of, usual
-from seqopt.problem.problem import Aim, Problem, RobustAim
+from seqopt.problem.problem import Aim, Problem
 from seqopt.sequence._robot_kinds import node_numbers
 
 
@@ -72,37 +72,20 @@ def compile_instance(
     <Instance 'chain 7': 1613 nodes, 6405 arcs, minmax, steps>
     """
     name = name or problem.engine.network.scene.name
-    told = {"seqopt": version("seqopt"), **(facts or {})}
-    return replace(_made(problem, name, aim, below), facts=told)
-
-
-def _made(problem: Problem, name: str, aim: Aim | None, below: float) -> Instance:
     graph = graph_of(problem)
     if not isinstance(graph, Layers):
-        return _of_states(name, graph, below)
-    if below < np.inf:
+        instance = _of_states(name, graph, below)
+    elif below < np.inf:
         raise ProblemError("below: it is about states; name aims, or leave it out")
-    return _of_layers(name, graph, aim or _usual_aim(problem))
-
-
-def _usual_aim(problem: Problem) -> Aim | None:
-    found: Formulation = as_formulation(usual(problem))
-    return found.aim
-
-
-def _of_layers(name: str, graph: Layers, aim: Aim | None) -> Instance:
-    """Return the instance of candidates: a level for every move."""
-    graph.require_possible()
-    found = compile_layers(graph, aim, name)
-    if found.offset:
-        raise ProblemError(
-            f"instance {name}: a cost is below zero; ask for a criterion that is never negative"
-        )
-    return found.instance
-
-
-def _tail(aim: RobustAim, count: int) -> _Target:
-    return _Target(str(aim), TAIL, tuple(range(count)), aim.most(count))
+    else:  # a level for every move
+        graph.require_possible()
+        found = compile_layers(graph, aim or as_formulation(usual(problem)).aim, name)
+        if found.offset:
+            raise ProblemError(
+                f"instance {name}: a cost is below zero; ask for a criterion that is never negative"
+            )
+        instance = found.instance
+    return replace(instance, facts={"seqopt": version("seqopt"), **(facts or {})})
 
 
 def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
@@ -118,7 +101,8 @@ def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
     visited = found.graph()
     if states.totals:
         count = len(visited.graph.peaks)
-        asked: Any = [f"cost {k}" for k in range(count)], (_tail(states.over, count),), ()
+        tail = _Target(str(states.over), TAIL, tuple(range(count)), states.over.most(count))
+        asked: Any = [f"cost {k}" for k in range(count)], (tail,), ()
     else:
         asked = _asked(states)
     rows, timed = _rows(graph, visited), None
@@ -133,7 +117,9 @@ def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
     small, kept = on_paths(whole)
     if timed is not None:
         timed = _cut(timed, whole, kept, _by_goal(small, asked[1:]))
-    return _instance(name, small, asked, rows[kept], timed)
+    names, goals, caps = asked
+    arrays = small.source, small.target, small.ends
+    return Instance(name, *arrays, tuple(names), small.amounts, goals, caps, rows[kept], timed)
 
 
 def _space(graph: States | AllOrders, states: States) -> Any:
@@ -180,22 +166,10 @@ def _rows(graph: States | AllOrders, visited: Visited) -> Ints:
     return np.concatenate(parts)
 
 
-def _arcs_between(graph: Graph, on: Bools) -> Bools:
-    return np.asarray(on[graph.source] & on[graph.target])
-
-
-def _instance(
-    name: str, graph: Graph, asked: Any, rows: Ints, timed: TimedGraph | None = None
-) -> Instance:
-    names, goals, caps = asked
-    arrays = graph.source, graph.target, graph.ends
-    return Instance(name, *arrays, tuple(names), graph.amounts, goals, caps, rows, timed)
-
-
 def _cut(timed: TimedGraph, whole: Graph, kept: Ints, graph: Graph) -> TimedGraph:
     """Return a graph in time of those nodes that are kept; what it is without time is given."""
     on = np.isin(np.arange(whole.states), kept)
-    arcs = _arcs_between(whole, on)
+    arcs = on[whole.source] & on[whole.target]
     acts = arcs[timed.move]
     own = timed.prepares[arcs], timed.acts[arcs], timed.work[arcs]
     who = (np.cumsum(arcs) - 1)[timed.move[acts]], timed.column[acts], timed.origin[acts]
