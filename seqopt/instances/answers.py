@@ -40,8 +40,8 @@ def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certi
     Returns
     -------
     Certificate
-        Values, and what no path stays below: by what is given; where nothing is, by potentials, a
-        cut or prices that the judge finds itself. A bound without proof counts as claimed.
+        Values and lower bounds: by what is given; where nothing is, by potentials, a cut or prices
+        that the judge finds itself. A bound without proof counts as claimed.
 
     Raises
     ------
@@ -78,9 +78,8 @@ def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
         values = found.get("values", ())
     else:
         what, numbers, own, values = "nodes", found, (), ()
-    claims, said = (
-        (own, where) if isinstance(bounds, Sequence) and not len(bounds) else _loaded(bounds)
-    )
+    none = isinstance(bounds, Sequence) and not len(bounds)
+    claims, said = (own, where) if none else _loaded(bounds)
     if isinstance(claims, Mapping):
         claims = claims.get("bounds", claims)
     claims = [claims] if isinstance(claims, Mapping | Claim) else claims

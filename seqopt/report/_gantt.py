@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -59,17 +60,8 @@ def gantt_picture(
     )  # before and after every step
     if times is not None:
         ends = np.array([0.0, *(time.end for time in times)])
-
-    def stops(hold: Hold) -> list[Span]:
-        """Return from when to when a grip has each step."""
-        at, end = hold.first - begins, hold.last - begins
-        out: list[Span] = [*zip(ends[at : end + 1], ends[at + 1 : end + 2], strict=True)]
-        if times is not None:  # from its own act, or from the start, up to letting go
-            out[0] = (times[at].start if hold.robot in times[at].robots else 0.0, out[0][1])
-            out[-1] = (out[-1][0], ends[min(end + 2, len(times))])
-        return out
-
     span = float(ends[first - begins]), float(ends[last - begins + 1])
+    stops = partial(_stops, begins, ends, times)
     drawn = _lanes(scene, steps, responses, numbers, stops, span, "seconds" if times else "steps")
     figure, axes, shade = drawn
     marks: list[Line2D | Patch] = [
@@ -92,6 +84,16 @@ def gantt_picture(
     if shade is not None:
         figure.colorbar(shade, ax=axes, label="grip force, N", pad=0.01)
     return figure
+
+
+def _stops(begins: int, ends: Floats, times: Sequence[StepTime] | None, hold: Hold) -> list[Span]:
+    """Return from when to when a grip has each step; ``ends``: before and after every step."""
+    at, end = hold.first - begins, hold.last - begins
+    out: list[Span] = [*zip(ends[at : end + 1], ends[at + 1 : end + 2], strict=True)]
+    if times is not None:  # from its own act, or from the start, up to letting go
+        out[0] = (times[at].start if hold.robot in times[at].robots else 0.0, out[0][1])
+        out[-1] = (out[-1][0], ends[min(end + 2, len(times))])
+    return out
 
 
 def _prepared(axes: Axes, times: Sequence[StepTime], before: Floats) -> bool:
