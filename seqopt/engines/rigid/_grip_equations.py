@@ -2,7 +2,7 @@
 
 Two grips may share a brick: between them along it, rigid ones leave a force undetermined, which
 `share_pairs` gives to the node that it reaches. The compliance of soft grips is added to the
-equations (`_soften`).
+equations; where two that are nearly rigid share a brick, digits are lost (`nearly_rigid`).
 """
 
 from __future__ import annotations
@@ -348,69 +348,40 @@ def _solved(
         operator.flexibility.take(entries, out=part, mode="clip")  # others copy once more
     np.negative(dead, out=system[-1])
     scale = 1 / operator.softness if operator.loose else 1.0
-    apart = None
+    nodes = _count_grips(operator, count) * operator.directions
     if compliance.matrix is not None:
-        apart = _soften(system, operator, pairs, compliance, off)
-    else:
-        if off is not None:
-            system[-1, : len(off)] -= off
-        if len(pairs.sets):
-            nodes = _count_grips(operator, count) * operator.directions
-            _brace(system[:nodes, :nodes], pairs)
-    force, pivot = _solve_positive(system, operator.loose, scale)
-    return (force, pivot) if apart is None else apart.joined(force, pivot)
-
-
-def _soften(
-    system: Floats,
-    operator: ComplianceOperator,
-    pairs: Pairs,
-    compliance: GripCompliance,
-    off: Floats | None,
-) -> _Apart | None:
-    """Add the compliance of grips to equations (k + 1, k, S), as of `_solve_positive`, in place.
-
-    Two grips on one brick, of which one is soft, share what acts along it by their stiffness.
-    Where they are nearly rigid, what one bears for the other is an unknown apart, to stay accurate.
-
-    ``off`` (n, S): by how much grips already let their nodes move. Result: the sets with such
-    unknowns, if there are any.
-    """
-    count, sets = system.shape[1:]
-    grips = _count_grips(operator, count)
-    rigid = pairs.rigid(compliance, sets, grips)
-    close = _nearly_rigid(system, operator, pairs, compliance) & ~rigid
-    apart = (
-        _split_pairs(system, operator, pairs.only(close), compliance, off) if close.any() else None
-    )
-    _add_compliance(system, operator, compliance)
+        _add_compliance(system, operator, compliance)
+        _release_moments(system, operator, compliance)
+        pairs = pairs.only(pairs.rigid(compliance, sets, nodes // operator.directions))
     if off is not None:
         system[-1, : len(off)] -= off
-    if apart is not None:
-        system[:, :, apart.sets] = apart.system
-    if rigid.any():
-        nodes = grips * operator.directions
-        _brace(system[:nodes, :nodes], pairs.only(rigid))
-    _release_moments(system, operator, compliance)
-    return apart
+    if len(pairs.sets):
+        _brace(system[:nodes, :nodes], pairs)
+    return _solve_positive(system, operator.loose, scale)
 
 
 _CLOSE = 1e-4  # flexibility of two grips on one brick, over its own, below which digits are lost
 
 
-def _nearly_rigid(
-    system: Floats, operator: ComplianceOperator, pairs: Pairs, compliance: GripCompliance
+def nearly_rigid(
+    operator: ComplianceOperator, index: Ints, pairs: Pairs, compliance: GripCompliance
 ) -> Bools:
-    """Return which pairs (p,) are so stiff along their bricks that digits would be lost."""
-    if not len(pairs.sets):
-        return np.zeros(0, dtype=bool)
-    width = operator.directions
-    flexibility = compliance.matrices(system.shape[2], _count_grips(operator, system.shape[1]))
-    own = flexibility[pairs.sets, pairs.first] + flexibility[pairs.sets, pairs.second]
-    along = np.einsum("pi,pij,pj->p", pairs.axis, own[:, :width, :width], pairs.axis)
-    rows = width * pairs.second[:, None] + np.arange(width)
-    stands = system[rows, rows, pairs.sets[:, None]].mean(axis=1)
-    return np.asarray(along < _CLOSE * stands)
+    """Return which sets (S,) hold a brick by two soft grips so stiff that digits are lost.
+
+    They share what acts along the brick by their stiffness. ``index`` (S, k): loads at the grips.
+    """
+    out = np.zeros(len(index), dtype=bool)
+    if compliance.matrix is None or not len(pairs.sets):
+        return out
+    width, grips = operator.directions, _count_grips(operator, index.shape[1])
+    each = compliance.matrices(len(index), grips)
+    own = (each[pairs.sets, pairs.first] + each[pairs.sets, pairs.second])[:, :width, :width]
+    along = np.einsum("pi,pij,pj->p", pairs.axis, own, pairs.axis)
+    rows = index[pairs.sets[:, None], width * pairs.second[:, None] + np.arange(width)]
+    brick = operator.flexibility.diagonal()[rows].mean(axis=1)
+    close = (along < _CLOSE * brick) & ~pairs.rigid(compliance, len(index), grips)
+    out[pairs.sets[close]] = True
+    return out
 
 
 def _rows_of(operator: ComplianceOperator, grips: int, grip: int, ways: int) -> list[int]:
@@ -453,62 +424,3 @@ def _release_moments(
             system[row][:, mine] = 0.0
             system[:, row, mine] = 0.0
             system[row, row, mine] = 1.0
-
-
-class _Apart(NamedTuple):
-    """Equations of sets in which two grips share a brick and one is soft.
-
-    What both bear along the brick, and what one bears for the other, are unknowns apart.
-    """
-
-    sets: Ints  # (n,)
-    system: Floats  # (k + 1, k, n)
-    forces: Floats  # (n, k, k); those of grips for unit unknowns
-    factor: Floats  # (k, n); by how much less an unknown is determined than its pivot says
-
-    def joined(self, force: Floats, pivot: Floats) -> tuple[Floats, Floats]:
-        """Return the forces (k, S) of grips and their pivots (k, S) from those of unknowns."""
-        force[:, self.sets] = np.einsum("nij,jn->in", self.forces, force[:, self.sets])
-        pivot[:, self.sets] /= self.factor
-        return force, pivot
-
-
-def _split_pairs(
-    system: Floats,
-    operator: ComplianceOperator,
-    pairs: Pairs,
-    compliance: GripCompliance,
-    off: Floats | None,
-) -> _Apart:
-    """Return the changed equations of the sets with pairs of which one grip is soft."""
-    count = system.shape[1]
-    sets = np.unique(pairs.sets)
-    part = system[:, :, sets].transpose(2, 0, 1)
-    whole = np.tril(part[:, :count])
-    whole += np.tril(whole, -1).transpose(0, 2, 1)
-    flexibility, grips = np.zeros((len(sets), count, count)), _count_grips(operator, count)
-    each = compliance.select(sets).matrices(len(sets), grips)
-    for grip in range(grips):
-        rows = _rows_of(operator, grips, grip, each.shape[2])
-        flexibility[:, np.array(rows)[:, None], rows] = each[:, grip]
-    forces, kept = np.tile(np.eye(count), (2, len(sets), 1, 1))
-    factor, width = np.ones((count, len(sets))), operator.directions
-    for at, first, second, _, axis in zip(*pairs, strict=True):
-        n = int(np.searchsorted(sets, at))
-        one, other = (slice(width * g, width * g + width) for g in (first, second))
-        own = flexibility[n, one, one] + flexibility[n, other, other]
-        size = np.sqrt(np.trace(whole[n, other, other]) / width / (axis @ own @ axis))
-        along = np.outer(axis, axis)
-        kept[n, other, other] -= along
-        forces[n, other, other] += (size - 1) * along
-        forces[n, one, other] = -size * along
-        factor[other, n] = max(1.0, size)
-    load = np.einsum("nj,nji->ni", part[:, count], kept)
-    if off is not None:
-        own_off = np.pad(off[:, sets], ((0, count - len(off)), (0, 0)))
-        load -= np.einsum("jn,nji->ni", own_off, forces)
-    out = np.empty((len(sets), count + 1, count))
-    out[:, :count] = kept.transpose(0, 2, 1) @ whole @ kept
-    out[:, :count] += forces.transpose(0, 2, 1) @ flexibility @ forces
-    out[:, count] = load
-    return _Apart(sets, out.transpose(1, 2, 0), forces, factor)

@@ -32,7 +32,13 @@ from scipy.sparse.linalg import SuperLU, splu
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
-from seqopt.engines.rigid._grip_equations import _by_grip, grip_forces, still_forces
+from seqopt.engines.rigid._grip_equations import (
+    _by_grip,
+    grip_forces,
+    nearly_rigid,
+    pairs_of,
+    still_forces,
+)
 from seqopt.engines.rigid._hanging import Hanging, HangingSystem
 from seqopt.engines.rigid._mechanism import (
     Shared,
@@ -350,7 +356,8 @@ class _Corrector:
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)
         own = compliance.within(self.basis.force, self.basis.wrench)
-        found = grip_forces(operator, columns, index, compliance=own)
+        pairs = pairs_of(operator, columns)
+        found = grip_forces(operator, columns, index, pairs, own)
         if operator.loose:
             for at in np.flatnonzero(~(found.lowest >= _HARDLY_HELD)):
                 mine = compliance.select(slice(at, at + 1))
@@ -358,6 +365,7 @@ class _Corrector:
         states = self._states(index, found.force)
         force = self._in_space(found.force, columns.shape[1])
         done = self._correct(_Asked(columns, index, own), states, force)
+        done &= ~nearly_rigid(operator, index, pairs, own)
         wrench, twist = unscaled(parts, states[done])
         mine = compliance.select(done)
         solution = Solution(twist, wrench, *borne(force[done], columns.shape[1], mine))

@@ -48,6 +48,7 @@ from seqopt.engines.rigid._grip_equations import (
     _by_grip,
     _GripForces,
     grip_forces,
+    nearly_rigid,
     pairs_of,
     share_pairs,
     trusted,
@@ -130,6 +131,7 @@ def _try_forces(
         found = grip_forces(operator, columns[part], index[part], mine, own)
         force[part] = found.force
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
+        good[part] &= ~nearly_rigid(operator, index[part], mine, own)
     if np.count_nonzero(good) < sets:
         force[~good] = 0.0
     if not compliance.rigid and len(pairs.sets):
