@@ -198,48 +198,20 @@ def _sum_into(out: Floats, rows: Floats, part: int, loads: tuple[Ints, Floats], 
     """Find what the weight, the last of the rows (p, l + 1, n), and forces of a set mean in a part.
 
     Rows are not cut out, for each part and set: it takes as long as summing a hundred numbers.
+    Three at a time: those of a grip in space.
     """
     index, force = loads
-    count, done, weight = index.shape[1], 0, rows.shape[1] - 1
-    if count >= 9:
-        done = _sum_nine(out, rows, part, loads, s)
-    elif count >= 6:
-        done = _sum_six(out, rows, part, loads, s)
-    else:
-        for n in range(len(out)):
-            out[n] = rows[part, weight, n]
-    for k in range(done, count):
-        at, much = index[s, k], force[s, k]
-        for n in range(len(out)):
-            out[n] += much * rows[part, at, n]
-
-
-@_compiled()
-def _sum_nine(out: Floats, rows: Floats, m: int, loads: tuple[Ints, Floats], s: int) -> int:
-    """Begin a sum with the weight and nine loads: three grips in space."""
-    at, force = loads
-    last, a, b, c, d = rows.shape[1] - 1, at[s, 0], at[s, 1], at[s, 2], at[s, 3]
-    e, f, g, h, i = at[s, 4], at[s, 5], at[s, 6], at[s, 7], at[s, 8]
-    p, q, r, t, u = force[s, 0], force[s, 1], force[s, 2], force[s, 3], force[s, 4]
-    v, w, x, y = force[s, 5], force[s, 6], force[s, 7], force[s, 8]
+    count, weight, m = index.shape[1], rows.shape[1] - 1, part
     for n in range(len(out)):
-        first = rows[m, last, n] + p * rows[m, a, n] + q * rows[m, b, n] + r * rows[m, c, n]
-        second = t * rows[m, d, n] + u * rows[m, e, n] + v * rows[m, f, n]
-        out[n] = first + second + w * rows[m, g, n] + x * rows[m, h, n] + y * rows[m, i, n]
-    return 9
-
-
-@_compiled()
-def _sum_six(out: Floats, rows: Floats, m: int, loads: tuple[Ints, Floats], s: int) -> int:
-    """Begin a sum with the weight and six loads: two grips in space."""
-    at, force = loads
-    last, a, b, c, d = rows.shape[1] - 1, at[s, 0], at[s, 1], at[s, 2], at[s, 3]
-    e, f = at[s, 4], at[s, 5]
-    p, q, r, t, u, v = force[s, 0], force[s, 1], force[s, 2], force[s, 3], force[s, 4], force[s, 5]
-    for n in range(len(out)):
-        first = rows[m, last, n] + p * rows[m, a, n] + q * rows[m, b, n] + r * rows[m, c, n]
-        out[n] = first + t * rows[m, d, n] + u * rows[m, e, n] + v * rows[m, f, n]
-    return 6
+        out[n] = rows[m, weight, n]
+    for k in range(0, count - 2, 3):
+        a, b, c = index[s, k], index[s, k + 1], index[s, k + 2]
+        p, q, r = force[s, k], force[s, k + 1], force[s, k + 2]
+        for n in range(len(out)):
+            out[n] += p * rows[m, a, n] + q * rows[m, b, n] + r * rows[m, c, n]
+    for k in range(count - count % 3, count):
+        for n in range(len(out)):
+            out[n] += force[s, k] * rows[m, index[s, k], n]
 
 
 @_compiled("nnan", "nsz")  # else no maximum is taken of several numbers at once
