@@ -38,13 +38,21 @@ import numpy as np
 
 from formulations.choice import Choice
 from formulations.on_graph import on_graph
-from formulations.states._totals import path_of
 from seqopt.arrays import Floats
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import tied
 
 _Values = tuple[float, ...]
+
+
+def _path(popped: Sequence[tuple[int, int]], last: int) -> tuple[int, ...]:
+    """Return the states of a label's path by where each one comes from, the start left out."""
+    path = list[int]()
+    while last > 0:
+        state, last = popped[last]
+        path.append(state)
+    return tuple(reversed(path))
 
 
 def _best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
@@ -62,7 +70,7 @@ def _best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
     best, last = (np.inf,) * len(peaks), -1
     while heap:
         if len(popped) % 1000 == 0 and watch.over:
-            return Choice(path_of(popped, last), heap[0][0][:1], stopped=True)
+            return Choice(_path(popped, last), heap[0][0][:1], stopped=True)
         least, _, taken, state, before = heappop(heap)
         if not _improves(least, best) or _beaten(least, kept[state]):
             continue
@@ -75,7 +83,7 @@ def _best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
             bound = _and(peaks, more, ahead[to])
             if _improves(bound, best) and not _beaten(bound, kept[to]):
                 heappush(heap, (bound, move, more, to, len(popped) - 1))
-    return Choice(path_of(popped, last), best)
+    return Choice(_path(popped, last), best)
 
 
 def _and(peaks: Sequence[bool], first: Sequence[float], then: Sequence[float]) -> _Values:

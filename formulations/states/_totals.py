@@ -1,24 +1,23 @@
 r"""The path of least worst or tail total over scenarios: weights, then labels that they bound.
 
 A path :math:`p` has a total :math:`c_s(p)` in every scenario, and the aim makes
-:math:`\max_{w \in W} \sum_s w_s \, c_s(p)` of them, over weights from 0 up
-to the largest of one that add up to one. At fixed weights the cheapest path is what a formulation
-finds for a single sum, and a bound on all. What the best weights leave open is closed by labels,
-vectors of totals: with the least from every state on, under each of some weights, a label has a
-bound, and the one with the lowest is continued first. Labels whose bound is not below the best path
-are left out, and so is one that another one of its state dominates.
+:math:`\max_{w \in W} \sum_s w_s \, c_s(p)` of them, over weights from 0 up to the largest of one
+that add up to one. At fixed weights the cheapest path is what a formulation finds for a single sum,
+and a bound on all. What the best weights leave open is closed by labels, vectors of totals
+(`seqopt.graph._labels`): with the least from every state on, under each of some weights, a label
+has a bound.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from heapq import heappop, heappush
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from formulations.choice import Choose
 from seqopt.arrays import Floats, Ints
+from seqopt.graph._labels import Labels, LabelSearch, widening
 from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
@@ -28,7 +27,7 @@ from seqopt.problem.problem import RobustAim
 _Cheapest = Callable[[Graph], tuple[tuple[int, ...], float]]
 STEPS = 400  # weights that are tried at most
 CLOSE = 1e-9  # differences that are none, over the size of the values
-LABELS = 50_000  # that are continued at most
+LABELS = 16_384  # of a level that are continued at most
 
 
 class StopError(Exception):
@@ -63,7 +62,7 @@ def least_total(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch)
     ``cheapest``: an oracle of the shortest path through a graph with one goal, and its bound.
     """
     best = by_weights(graph, aim, cheapest, watch)
-    if watch.over or best.bound >= _below(best.value):
+    if watch.over or best.bound >= best.value - CLOSE * abs(best.value):
         return best._replace(bound=min(best.bound, best.value))
     return _by_labels(graph, aim, best, watch)
 
@@ -91,46 +90,38 @@ def by_weights(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) 
     return best._replace(bound=bound, weights=weights)
 
 
-def _below(value: float) -> float:
-    return value - CLOSE * abs(value)
-
-
 def _by_labels(graph: Graph, aim: RobustAim, known: LeastTotal, watch: Watch) -> LeastTotal:
-    """Return the best path, by labels continued in the order of what they come to at least."""
-    scenarios, best, path = len(graph.peaks), known.value, known.path
-    single = np.eye(scenarios) if aim.most(scenarios) >= 1 else np.zeros((0, scenarios))
-    proving = np.vstack([known.weights, single])
-    left = np.array([distances(graph, graph.amounts @ w, back=True) for w in proving])
-    starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
-    heap = [(known.bound, 0, 0, -1, np.zeros(scenarios))]
-    kept: dict[int, Floats] = {}
-    popped: list[tuple[int, int]] = []  # state, and which label it continues
-    count = 0
-    while heap and heap[0][0] < _below(best):
-        if len(popped) == LABELS or (len(popped) % 1000 == 0 and watch.over):
-            return LeastTotal(path, best, max(known.bound, heap[0][0]), known.weights)
-        _, _, state, before, totals = heappop(heap)
-        others = kept.get(state, np.zeros((0, scenarios)))
-        if (others <= totals).all(axis=1).any():
-            continue
-        kept[state] = np.vstack([others, totals])
-        popped.append((state, before))
-        if graph.ends[state] and aim.value(totals) < best:
-            path, best = path_of(popped, len(popped) - 1), aim.value(totals)
-        moves: Ints = np.arange(starts[state], starts[state + 1])
-        then = totals + graph.amounts[moves]
-        bounds = (then @ proving.T + left[:, graph.target[moves]].T).max(axis=1)
-        for k in np.flatnonzero(bounds < _below(best)).tolist():
-            count += 1
-            row = (float(bounds[k]), -count, int(graph.target[moves[k]]), len(popped) - 1, then[k])
-            heappush(heap, row)
-    return LeastTotal(path, best, best, known.weights)
+    """Return the best path by labels, vectors of totals that weights bound."""
+    before = LabelSearch(None, known.value, known.bound)
+    found = widening(_Totals(graph, aim, known.weights), (), before, watch, LABELS)
+    path = known.path if found.arcs is None else tuple(graph.target[found.arcs].tolist())
+    return LeastTotal(path, found.cost, found.bound, known.weights)
 
 
-def path_of(popped: Sequence[tuple[int, int]], last: int) -> tuple[int, ...]:
-    """Return the states of a label's path by where each one comes from, the start left out."""
-    path = list[int]()
-    while last > 0:
-        state, last = popped[last]
-        path.append(state)
-    return tuple(reversed(path))
+class _Totals:
+    """Labels of the totals of all scenarios, bounded by weights (S,), and by single scenarios."""
+
+    look_back = 32
+
+    def __init__(self, graph: Graph, aim: RobustAim, weights: Floats) -> None:
+        scenarios, self._graph, self._aim = len(weights), graph, aim
+        self.ends, self.levels = graph.ends, np.zeros(graph.states, dtype=np.int64)
+        self.starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
+        self.target, self.first = graph.target.astype(np.int64), np.zeros((1, scenarios))
+        single = np.eye(scenarios if aim.most(scenarios) >= 1 else 0, scenarios)
+        self._weights = np.vstack([weights, single])
+        left = [distances(graph, graph.amounts @ own, back=True) for own in self._weights]
+        self._left = np.column_stack(left)
+
+    def follow(self, labels: Labels, arc: Ints) -> Floats:
+        """Return totals after an arc each."""
+        return np.asarray(labels.taken + self._graph.amounts[arc])
+
+    def bounds(self, state: Ints, taken: Floats) -> Floats:
+        """Return what the aim makes at least of totals of paths."""
+        weighed = taken @ self._weights.T + self._left[state]
+        return np.asarray(weighed.max(axis=1, keepdims=True))
+
+    def values(self, taken: Floats, _: int) -> Floats:
+        """Return what the aim makes of totals."""
+        return self._aim.each(taken)

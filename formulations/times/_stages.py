@@ -14,19 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from formulations.states._totals import StopError
-from formulations.times._labels import (
-    STEPS,
-    Caps,
-    Labels,
-    LateError,
-    Prices,
-    Sweep,
-    Swept,
-    best_prices,
-)
+from formulations.times._labels import STEPS, Caps, Prices, TimedLabels, best_prices
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError, NothingFoundError
 from seqopt.graph._explore import Visited
+from seqopt.graph._labels import Labels, LateError, Swept
 from seqopt.graph._timed import TimedGraph
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import LabelProof
@@ -69,7 +61,8 @@ class Asked:
 
     def by(self, kept: Bools) -> Chosen:
         """Return the best path by some moves (m,), with its exact makespan."""
-        swept = Sweep(self.timed, self.prices, kept, Caps(sums=self.caps.sums)).run(Watch())
+        caps = Caps(sums=self.caps.sums)
+        swept = TimedLabels(self.timed, self.prices, kept, caps).sweep(Watch())
         return Chosen(swept.path, swept.best, self.prices.bound)
 
 
@@ -108,7 +101,8 @@ def beams(
     best = Swept()
     for width in BEAMS:
         try:
-            found = Sweep(timed, prices, kept, caps).run(watch, width=width, goal=goal)
+            labels = TimedLabels(timed, prices, kept, caps)
+            found = labels.sweep(watch, width=width, goal=goal)
         except LateError:
             break
         if found.best < best.best:
@@ -233,7 +227,7 @@ class Stages:
         found = beams(self._timed, kept, self._stage.caps, prices, self._watch)
         if found.path:
             return found
-        return Sweep(self._timed, prices, kept, self._stage.caps).run(self._watch)
+        return TimedLabels(self._timed, prices, kept, self._stage.caps).sweep(self._watch)
 
     def _sum(self, k: int) -> None:
         """Find the least sum of paths within caps; from then on it is a cap."""
@@ -249,7 +243,7 @@ class Stages:
             if swept.path:
                 stage.path, value = swept.path, swept.best
                 caps = replace(caps, sums=(*stage.caps.sums, (k, value * (1 - ALMOST))))
-            swept = Sweep(self._timed, prices, stage.kept, caps).run(self._watch, goal=goal)
+            swept = TimedLabels(self._timed, prices, stage.kept, caps).sweep(self._watch, goal=goal)
             if swept.path:
                 stage.path, value = swept.path, swept.best
             bound, labels = value, tuple(swept.kept)
@@ -267,8 +261,8 @@ class Stages:
         caps = replace(stage.caps, sums=(*stage.caps.sums, (STEPS, most)))
         prices = best_prices(self._timed, stage.kept, Watch(0.0))
         try:
-            sweep = Sweep(self._timed, prices, stage.kept, caps)
-            swept = sweep.run(self._watch, width=BEAMS[1], goal=len(stage.caps.sums))
+            narrow = TimedLabels(self._timed, prices, stage.kept, caps)
+            swept = narrow.sweep(self._watch, width=BEAMS[1], goal=len(stage.caps.sums))
         except LateError:
             return
         stage.path = swept.path or stage.path
@@ -285,7 +279,7 @@ class Stages:
         codes = graph.source.astype(np.int64) * graph.states + graph.target
         kept = np.isin(codes, codes[moves_along(graph, path)])
         prices = best_prices(self._timed, kept, Watch(0.0))
-        return Sweep(self._timed, prices, kept, Caps()).run(Watch()).best
+        return TimedLabels(self._timed, prices, kept, Caps()).sweep(Watch()).best
 
     def values(self, path: Sequence[int]) -> list[float]:
         """Return what goals take of a path, that of makespans left at zero."""
@@ -299,7 +293,6 @@ class Stages:
         if not labels:
             none = np.zeros((0, 1 + columns))
             return LabelProof(np.zeros((0, 1 + rows.shape[1]), dtype=np.int64), none, each)
-        parts = [np.column_stack([own.end, own.since, own.sums, own.placed]) for own in labels]
         state = np.concatenate([own.state for own in labels])
         states = np.column_stack([self._timed.levels[state], rows[state]])
-        return LabelProof(states, np.concatenate(parts), each)
+        return LabelProof(states, np.concatenate([own.taken for own in labels]), each)

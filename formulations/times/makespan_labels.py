@@ -32,9 +32,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from formulations.times._labels import Labels, LateError, Sweep
+from formulations.times._labels import TimedLabels
 from formulations.times._search import in_time
 from formulations.times._stages import ALMOST, Asked, Chosen
+from seqopt.graph._labels import Labels, LateError
 from seqopt.graph.formulation import FormulationKind
 
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of the gap that is left, up to which labels are set
@@ -47,8 +48,8 @@ def _least(asked: Asked) -> Chosen:
     labels: tuple[Labels, ...] = ()
     if not best.path:  # narrow searches found nothing, as budgets leave little
         try:
-            sweep = Sweep(asked.timed, asked.prices, asked.kept, asked.caps)
-            found = sweep.run(asked.watch, most=MOST)
+            every = TimedLabels(asked.timed, asked.prices, asked.kept, asked.caps)
+            found = every.sweep(asked.watch, most=MOST)
         except LateError:
             return Chosen((), np.inf, bound, late=True)
         return Chosen(found.path, found.best, found.best, tuple(found.kept))
@@ -57,7 +58,8 @@ def _least(asked: Asked) -> Chosen:
         limit = start + (best.value - start) * share if share < 1.0 else best.value * (1 - ALMOST)
         caps = replace(asked.caps, time=min(limit, asked.caps.time))
         try:
-            swept = Sweep(asked.timed, asked.prices, asked.kept, caps).run(asked.watch, most=MOST)
+            within = TimedLabels(asked.timed, asked.prices, asked.kept, caps)
+            swept = within.sweep(asked.watch, most=MOST)
         except LateError:
             return Chosen(best.path, best.value, bound, labels, late=True)
         asked.watch.tell(bound=bound)

@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
-from seqopt.graph._labels import LabelSearch, cheapest_within, ground
+from seqopt.graph._labels import CappedSums, LabelSearch, widening
 from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
 from seqopt.graph.duality import ROUNDING, least_sum
 from seqopt.graph.formulation import Watch
@@ -107,11 +107,11 @@ def _some_path(graph: Graph, caps: Sequence[float], watch: Watch) -> _Path:
     if path is not None:
         return path
     if found.bound <= _rounding(graph, found.prices, caps):
-        most = [tied(cap) for cap in caps]
-        asked = ground(graph, nothing, graph.amounts[:, goals:], most, found.prices)
+        most = np.array([tied(cap) for cap in caps])
+        growth = CappedSums(graph, nothing, graph.amounts[:, goals:], most, found.prices)
         until = Watch(watch.left)  # it is told no costs that are none
-        met = cheapest_within(asked, NONE, until, LABELS, any_path=True)
-        path = _path(graph, met.moves)
+        met = widening(growth, most, NONE, until, LABELS, any_path=True)
+        path = _path(graph, met.arcs)
         if path is None and until.over:
             raise TimeUpError("no path within all caps was found yet; give more")
         if path is None and np.isfinite(met.bound):
@@ -132,12 +132,12 @@ def _by_labels(
     most: int,
 ) -> _Found:
     """Return what labels find beyond what multipliers prove of a sum."""
-    columns, caps = [c for c, _ in limited], [tied(cap) for _, cap in limited]
+    columns, caps = [c for c, _ in limited], np.array([tied(cap) for _, cap in limited])
     costs = graph.amounts[:, goal]
-    asked = ground(graph, costs, graph.amounts[:, columns], caps, found.prices)
+    growth = CappedSums(graph, costs, graph.amounts[:, columns], caps, found.prices)
     known = np.inf if found.moves is None else float(costs[found.moves].sum())
-    met = cheapest_within(asked, LabelSearch(found.moves, known, found.bound), watch, most)
-    return found._replace(moves=met.moves, bound=met.bound)
+    met = widening(growth, caps, LabelSearch(found.moves, known, found.bound), watch, most)
+    return found._replace(moves=met.arcs, bound=met.bound)
 
 
 def _rounding(graph: Graph, prices: Floats, caps: Floats | Sequence[float]) -> float:

@@ -1,196 +1,237 @@
-r"""The cheapest path within caps on sums, by setting labels: exact, or a bound on what is left.
+r"""Best paths within limits by setting labels: exact, or a bound on what is left.
 
-A label is a beginning of a path, with what it costs, :math:`C`, and what it takes of capped sums,
-:math:`S`. Labels are continued by all moves from their states, move count by move count, and
-dropped
+A label is a beginning of a path, with a vector :math:`z` of what it takes: costs, capped sums,
+totals of scenarios, when robots are free. Labels are continued by all arcs from their states, level
+by level, and dropped
 
-- if another label of the same state costs no more and takes no more of any sum,
-- if what it has taken and the least that the rest takes exceed a cap,
-- if it cannot lead to less than the best path :math:`U` that is known: with multipliers
-  :math:`\lambda` and :math:`V_\lambda(v)`, the least priced cost from :math:`v` to an end,
+- if another label of the same state takes no more of anything: it is dominated,
+- if a lower bound of what paths through it take is beyond a limit; of what is minimized, that is
+  the best path known.
+
+What bounds a label is known by what is minimized. Of a sum within budgets :math:`B`, with
+multipliers :math:`\lambda`, the cost :math:`C`, the capped sums :math:`S`, and :math:`V_\lambda(v)`
+and :math:`D_b(v)`, the least priced cost and the least of a sum from a state :math:`v` to an end,
 
 .. math::
 
-   C + \lambda^T (S - B) + V_\lambda(v) \ge U .
+   C + \lambda^T (S - B) + V_\lambda(v) \qquad\text{and}\qquad S_b + D_b(v) \le B_b .
 
-First few labels are kept at a time, those with the least such bound; that gives a good :math:`U`.
-Then more, until none is left out that could lead to less. If there are too many, or time is over,
-the least bound of those left out bounds all paths.
+First few labels of a level are kept, those with the least bounds; that gives a good path. Then
+more, until none is left out that could lead to a better one. If there are too many, or time is
+over, the least bound of those left out bounds all paths.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import TIED, distances, moves_out
+from seqopt.graph.paths import distances, strictly_below
 
-NARROW, WIDER = 256, 16  # labels kept at first, and how many times as many then
-AT_ONCE = 2_000_000  # moves that are looked at together
-LOOK_BACK = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)  # earlier labels that one is compared with
+NARROW, WIDER = 256, 16  # labels of a level kept at first, and how many times as many then
+CHUNK = 2_000_000  # arcs of labels that are looked at together
+MARGIN = 1e-10  # over a limit: what is pruned is beyond it however sums are rounded
+
+
+class LateError(Exception):
+    """Time is over, or there are too many labels."""
 
 
 class Labels(NamedTuple):
-    """Beginnings of paths.
+    """Labels: the state of each (N,), what it takes (N, k), its last arc, and which it continues.
 
-    ``state`` is the last one, ``priced`` what they cost with multipliers, ``cost`` without,
-    ``taken`` (n, B) of capped sums; ``move`` their last one, ``back`` the label each came from.
+    Of the start's label arc and ``back`` are -1.
     """
 
     state: Ints
-    priced: Floats
-    cost: Floats
     taken: Floats
-    move: Ints
+    arc: Ints
     back: Ints
 
-    def of(self, rows: Ints | Bools | slice) -> Labels:
-        """Return some of them."""
+    def only(self, rows: Ints | Bools) -> Labels:
+        """Select rows."""
         return Labels._make(each[rows] for each in self)
 
-
-class Ground(NamedTuple):
-    """What labels are made of: costs (m,), capped sums (m, B), and the least of each to an end."""
-
-    graph: Graph
-    costs: Floats
-    amounts: Floats
-    caps: Floats
-    prices: Floats
-    priced: Floats  # (m,)
-    rest: Floats  # (n,), priced
-    least: Floats  # (n, B)
+    @property
+    def size(self) -> int:
+        """How many there are."""
+        return len(self.state)
 
 
-def ground(
-    graph: Graph, costs: Floats, amounts: Floats, caps: Sequence[float], prices: Floats
-) -> Ground:
-    """Return what labels are made of; ``prices`` (B,) from 0 lead the search and prove bounds."""
-    priced = costs + amounts @ prices
-    least = [distances(graph, each, back=True) for each in amounts.T]
-    rest = distances(graph, priced, back=True)
-    most = np.asarray(caps, dtype=float)
-    return Ground(graph, costs, amounts, most, prices, priced, rest, np.column_stack(least))
+def _joined(parts: Sequence[Labels]) -> Labels:
+    return Labels(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-class LabelSearch(NamedTuple):
-    """The moves of the best path that was met, none if there is none, and a bound on all paths."""
+class Growth(Protocol):
+    """What labels take, and how arcs continue them."""
 
-    moves: Ints | None
-    cost: float
-    bound: float
+    ends: Bools  # (n,)
+    levels: Ints  # (n,): no arc leads to a lower one
+    starts: Ints  # (n + 1,): the first arc from every state
+    target: Ints  # (a,)
+    first: Floats  # (1, k): what the start takes
+    look_back: int  # with how many labels of its state one is compared
+
+    def follow(self, labels: Labels, arc: Ints) -> Floats:
+        """Return what labels take after an arc each, (N, k); infinite where it cannot be taken."""
+
+    def bounds(self, state: Ints, taken: Floats) -> Floats:
+        """Return what paths through labels take at least of everything that is limited, (N, b)."""
+
+    def values(self, taken: Floats, aim: int) -> Floats:
+        """Return what paths that end with labels take of what is minimized, (N,)."""
 
 
-def cheapest_within(
-    asked: Ground, best: LabelSearch, watch: Watch, most: int, *, any_path: bool = False
-) -> LabelSearch:
-    """Return the cheapest path within caps.
+@dataclass
+class Swept:
+    """What labels found: the best path, all labels that were kept, and what was left out.
 
-    ``best``: what is known before; ``most``: how many labels are kept at a time; ``any_path``:
-    whether it ends with the first path that is found.
+    ``best``: infinite without a path; ``arcs``: of the path; ``left_out``: least bound of labels
+    that were pruned, of what is minimized; ``narrow``: whether some could have been better.
     """
-    width = min(NARROW, most)
-    while not watch.over and best.bound < best.cost:
-        found, left = _pass(asked, best.cost, width, watch)
-        if found is not None:
-            cost = float(asked.costs[found].sum())
-            if cost < best.cost:
-                best = LabelSearch(found, cost, best.bound)
-        best = best._replace(bound=max(best.bound, min(left, best.cost)))
-        watch.tell(best.cost, best.bound)
-        if width >= most or (any_path and best.moves is not None):
-            break
-        width = min(width * WIDER, most)
-    return best
+
+    best: float = np.inf
+    path: tuple[int, ...] = ()
+    arcs: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    kept: list[Labels] = field(default_factory=list)
+    left_out: float = np.inf
+    narrow: bool = False
 
 
-def _pass(asked: Ground, limit: float, width: int, watch: Watch) -> tuple[Ints | None, float]:
-    """Return the best path that a number of labels leads to, and the least bound left out."""
-    graph, none = asked.graph, np.zeros(1, dtype=np.int64)
-    start = asked.rest[0] * 0.0 - float(asked.prices @ asked.caps)
-    now = Labels(none, np.array([start]), np.zeros(1), np.zeros((1, len(asked.caps))), none, none)
-    rounds, closed, left = [now], now.of(slice(0)), np.inf
-    best: tuple[int, int] | None = None
-    while len(now.state):
-        if watch.over:
-            return None, -np.inf
-        closed = Labels._make(map(np.concatenate, zip(closed, now, strict=True)))
-        now, out = _narrowed(asked, _extended(asked, now, limit), 4 * width)
-        now, more = _narrowed(asked, _undominated(closed, now), width)
-        left = min(left, out, more)
-        rounds.append(now)
-        ended = np.flatnonzero(graph.ends[now.state])
-        if len(ended) and now.cost[ended].min() < limit:
-            row = int(ended[np.argmin(now.cost[ended])])
-            best, limit = (len(rounds) - 1, row), float(now.cost[row])
-    return _moves_to(rounds, best), left
+class Sweep:
+    """Labels within limits (b,), level by level.
 
-
-def _moves_to(rounds: Sequence[Labels], best: tuple[int, int] | None) -> Ints | None:
-    """Return the moves that lead to a label, by which each continues another one."""
-    if best is None:
-        return None
-    (count, row), out = best, list[int]()
-    for labels in reversed(rounds[1 : count + 1]):
-        out.append(int(labels.move[row]))
-        row = int(labels.back[row])
-    return np.array(out[::-1], dtype=np.int64)
-
-
-def _extended(asked: Ground, now: Labels, limit: float) -> Labels:
-    """Return labels with one more move that may lead to less than a limit, within the caps."""
-    tight = limit - TIED * abs(limit) if np.isfinite(limit) else limit
-    per = max(1, len(asked.graph.source) // asked.graph.states)
-    size, parts = max(1, AT_ONCE // per), []
-    for start in range(0, len(now.state), size):
-        part = now.of(slice(start, start + size))
-        row, move = moves_out(asked.graph, part.state)
-        state = asked.graph.target[move].astype(np.int64)
-        priced = part.priced[row] + asked.priced[move]
-        keep = np.flatnonzero(priced + asked.rest[state] < tight)
-        row, move, state, priced = row[keep], move[keep], state[keep], priced[keep]
-        taken = part.taken[row] + asked.amounts[move]
-        fits: Bools = np.asarray((taken + asked.least[state] <= asked.caps).all(axis=1))
-        cost = part.cost[row] + asked.costs[move]
-        parts.append(Labels(state, priced, cost, taken, move, row + start).of(fits))
-    return Labels._make(map(np.concatenate, zip(*parts, strict=True)))
-
-
-def _narrowed(asked: Ground, labels: Labels, width: int) -> tuple[Labels, float]:
-    """Return the labels with the least bounds, and the least bound of the others."""
-    if len(labels.state) <= width:
-        return labels, np.inf
-    bounds = labels.priced + asked.rest[labels.state]
-    order = np.argpartition(bounds, width)
-    return labels.of(np.sort(order[:width])), float(bounds[order[width]])
-
-
-def _undominated(closed: Labels, new: Labels) -> Labels:
-    """Return new labels without those that another one of the same state beats in everything.
-
-    Not every such label is found; with one sum all are.
+    ``aim``: which of what is limited is minimized; ``width``: how many labels of a level are
+    continued at a time, all by default.
     """
-    both = Labels._make(map(np.concatenate, zip(closed, new, strict=True)))
-    is_new = np.arange(len(both.state)) >= len(closed.state)
-    order = np.lexsort((is_new, *both.taken.T[::-1], both.cost, both.state))
-    state, taken = both.state[order], both.taken[order]
-    if taken.shape[1] == 1:
-        beaten = _beaten(state, taken[:, 0])
-    else:
-        beaten = np.zeros(len(state), dtype=bool)
-        for back in LOOK_BACK:
-            same = state[back:] == state[:-back]
-            beaten[back:] |= same & (taken[:-back] <= taken[back:]).all(axis=1)
-    return both.of(np.sort(order[is_new[order] & ~beaten]))
+
+    def __init__(
+        self, growth: Growth, limits: Floats, *, aim: int = 0, width: int | None = None
+    ) -> None:
+        self._growth, self._limits = growth, np.array(limits, dtype=float)
+        self._aim, self._width, self._found = aim, width, Swept()
+
+    def run(self, watch: Watch, most: int = 0) -> Swept:
+        """Return what is found; ``most``: labels that may be kept, 0 for any number."""
+        growth, found, count, best = self._growth, self._found, 0, -1
+        zero = np.zeros(1, dtype=np.int64)
+        start = self._within(Labels(zero, growth.first, zero - 1, zero - 1))
+        pending: dict[int, list[Labels]] = {int(growth.levels[0]): [start]}
+        for level in range(int(growth.levels.max()) + 1):
+            here: list[Labels] = []
+            while level in pending:
+                fresh = self._fresh(_joined(pending.pop(level)), here)
+                here.append(fresh)
+                found.kept.append(fresh)
+                value, at = self._at_end(fresh)
+                if value < found.best:
+                    found.best, best = value, count + at
+                    self._limits[self._aim] = min(self._limits[self._aim], value * (1 - MARGIN))
+                if watch.over or 0 < most < count + fresh.size:
+                    raise LateError
+                for after in self._continued(fresh, count):
+                    to = growth.levels[after.state]
+                    for further in np.unique(to).tolist():
+                        pending.setdefault(further, []).append(after.only(to == further))
+                count += fresh.size
+        self._trace(best)
+        return found
+
+    def _fresh(self, met: Labels, here: Sequence[Labels]) -> Labels:
+        """Return labels that are continued, of those met."""
+        width = self._width
+        met = met if width is None else self._narrowed(met, 4 * width)
+        fresh = _undominated(met, here, self._growth)
+        return fresh if width is None else self._narrowed(fresh, width)
+
+    def _narrowed(self, labels: Labels, width: int) -> Labels:
+        """Return the labels with the least bounds, in their order."""
+        if labels.size <= width:
+            return labels
+        bounds = self._growth.bounds(labels.state, labels.taken)[:, self._aim]
+        order = np.argsort(bounds, kind="stable")
+        self._found.narrow = True
+        self._found.left_out = min(self._found.left_out, float(bounds[order[width]]))
+        return labels.only(np.sort(order[:width]))
+
+    def _within(self, labels: Labels) -> Labels:
+        """Return labels within the limits; note the least bound of those that are not."""
+        bounds = self._growth.bounds(labels.state, labels.taken)
+        most = self._limits + MARGIN * np.abs(self._limits)
+        fits = np.isfinite(bounds) & (bounds <= most)
+        others = np.delete(fits, self._aim, axis=1).all(axis=1)
+        late = bounds[others & ~fits[:, self._aim], self._aim]
+        self._found.left_out = min(self._found.left_out, float(late.min(initial=np.inf)))
+        return labels.only(fits.all(axis=1))
+
+    def _at_end(self, labels: Labels) -> tuple[float, int]:
+        """Return the least value of labels at ends, and which it is."""
+        if not labels.size:
+            return np.inf, 0
+        values = self._growth.values(labels.taken, self._aim)
+        values = np.where(self._growth.ends[labels.state], values, np.inf)
+        at = int(np.argmin(values))
+        return float(values[at]), at
+
+    def _continued(self, labels: Labels, first: int) -> Iterator[Labels]:
+        """Yield what follows from labels, numbered from ``first``, by one arc each."""
+        starts = self._growth.starts
+        counts = np.diff(starts)[labels.state]
+        cuts = np.searchsorted(np.cumsum(counts), np.arange(0, counts.sum() + CHUNK, CHUNK)[1:])
+        for rows in np.split(np.arange(labels.size), np.unique(cuts)):
+            own = counts[rows]
+            if not own.any():
+                continue
+            row = np.repeat(rows, own)
+            arc = np.repeat(starts[labels.state[rows]] - np.cumsum(own) + own, own)
+            arc = arc + np.arange(len(row))
+            taken = self._growth.follow(labels.only(row), arc)
+            after = Labels(self._growth.target[arc], taken, arc, first + row)
+            yield self._within(after.only(np.isfinite(taken).all(axis=1)))
+
+    def _trace(self, number: int) -> None:
+        """Note the path of a label, its start left out."""
+        if number < 0:
+            return
+        arc, back = (np.concatenate([own[k] for own in self._found.kept]) for k in (2, 3))
+        arcs = list[int]()
+        while back[number] >= 0:
+            arcs.append(int(arc[number]))
+            number = int(back[number])
+        self._found.arcs = np.array(arcs[::-1], dtype=np.int64)
+        self._found.path = tuple(self._growth.target[self._found.arcs].tolist())
 
 
-def _beaten(state: Ints, taken: Floats) -> Bools:
-    """Return where an earlier label of the same state takes no more of the one sum."""
+def _undominated(fresh: Labels, known: Sequence[Labels], growth: Growth) -> Labels:
+    """Return the labels that no known one, and no other, is found to dominate."""
+    states = np.zeros(len(growth.ends), dtype=bool)
+    states[fresh.state] = True
+    old = [labels.only(states[labels.state]) for labels in known]
+    every = _joined([*old, fresh])
+    new = np.arange(every.size) >= every.size - fresh.size  # of equal ones the known one is first
+    order = np.lexsort((new, *every.taken.T[::-1], every.state))
+    state, taken, dominated = every.state[order], every.taken[order], np.zeros(every.size, bool)
+    rows, back = np.flatnonzero(new[order]), 0
+    if taken.shape[1] == 2:
+        dominated, rows = _above_another(state, taken[:, 1]), rows[:0]
+    while len(rows) and back < growth.look_back:
+        back += 1
+        rows = rows[rows >= back]
+        rows = rows[state[rows] == state[rows - back]]
+        worse = (taken[rows - back] <= taken[rows]).all(axis=1)
+        dominated[rows[worse]] = True
+        rows = rows[~worse]
+    return every.only(np.sort(order[~dominated & new[order]]))
+
+
+def _above_another(state: Ints, taken: Floats) -> Bools:
+    """Return where an earlier label of the same state takes no more."""
     new = np.ones(len(state), dtype=bool)
     new[1:] = state[1:] != state[:-1]
     apart = (taken.max(initial=0.0) - taken.min(initial=0.0) + 1.0) * (np.cumsum(new) - 1)
@@ -198,3 +239,76 @@ def _beaten(state: Ints, taken: Floats) -> Bools:
     out = np.zeros(len(state), dtype=bool)
     out[1:] = ~new[1:] & (taken[1:] - apart[1:] >= lowest[:-1])
     return out
+
+
+class LabelSearch(NamedTuple):
+    """The arcs of the best path that was met, none if there is none, and a bound on all paths."""
+
+    arcs: Ints | None
+    cost: float
+    bound: float
+
+
+def widening(
+    growth: Growth,
+    caps: Sequence[float],
+    best: LabelSearch,
+    watch: Watch,
+    most: int,
+    *,
+    any_path: bool = False,
+) -> LabelSearch:
+    """Return the best path within caps on what is limited after the first, by ever more labels.
+
+    ``best``: what is known before; ``most``: how many labels of a level are kept at most;
+    ``any_path``: whether it ends with the first path that is found.
+    """
+    width = min(NARROW, most)
+    while not watch.over and best.bound < best.cost:
+        limit = strictly_below(best.cost) if np.isfinite(best.cost) else np.inf
+        try:
+            found = Sweep(growth, np.array([limit, *caps]), width=width).run(watch)
+        except LateError:
+            break
+        if found.best < best.cost:
+            best = LabelSearch(found.arcs, found.best, best.bound)
+        closed = found.left_out >= strictly_below(best.cost)
+        best = best._replace(bound=best.cost if closed else max(best.bound, found.left_out))
+        watch.tell(best.cost, best.bound)
+        if width >= most or (any_path and best.arcs is not None):
+            break
+        width = min(width * WIDER, most)
+    return best
+
+
+class CappedSums:
+    """Labels of sums: what moves cost (m,), and amounts (m, B) that are capped.
+
+    ``multipliers`` (B,) of the caps, from 0, lead the search and prove bounds.
+    """
+
+    look_back = 32
+
+    def __init__(
+        self, graph: Graph, costs: Floats, amounts: Floats, caps: Floats, multipliers: Floats
+    ) -> None:
+        self.ends, self.levels = graph.ends, np.zeros(graph.states, dtype=np.int64)
+        self.starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
+        self.target = graph.target.astype(np.int64)
+        self._taken, self._multipliers = np.column_stack([costs, amounts]), multipliers
+        self.first, self._paid_back = np.zeros((1, 1 + len(caps))), float(multipliers @ caps)
+        self._rest = distances(graph, costs + amounts @ multipliers, back=True)
+        self._least = np.column_stack([distances(graph, own, back=True) for own in amounts.T])
+
+    def follow(self, labels: Labels, arc: Ints) -> Floats:
+        """Return costs and sums after an arc each."""
+        return np.asarray(labels.taken + self._taken[arc])
+
+    def bounds(self, state: Ints, taken: Floats) -> Floats:
+        """Return what paths cost at least by the multipliers, and take of capped sums."""
+        priced = taken[:, 0] + taken[:, 1:] @ self._multipliers - self._paid_back
+        return np.column_stack([priced + self._rest[state], taken[:, 1:] + self._least[state]])
+
+    def values(self, taken: Floats, aim: int) -> Floats:
+        """Return what paths cost."""
+        return np.asarray(taken[:, aim])
