@@ -347,24 +347,51 @@ class Network(Shown, FrozenValue):
         figure: Figure = display("network_picture")(self, bricks)
         return figure
 
-    def graph(self, bricks: int) -> nx.Graph[object]:
-        """Return a partial structure as a graph, with kinds, positions and lengths, m."""
-        import networkx as nx  # noqa: PLC0415  # slow to import, and needed nowhere else
+    @cached_property
+    def _graph(self) -> nx.Graph[object]:
+        """The whole network as a graph."""
+        import networkx as nx  # noqa: PLC0415  # 0.12 s, and only connectivity asks for it
 
-        graph: nx.Graph[object] = nx.Graph(name=self.scene.name, bricks=bricks)
-        for i in range(self.count_nodes(bricks)):
+        graph: nx.Graph[object] = nx.Graph(name=self.scene.name)
+        places = zip(self.node_kind, self.node_since, self.node_position, strict=True)
+        for name, (kind, since, position) in zip(self.node_name, places, strict=True):
             graph.add_node(
-                self.node_name[i],
-                kind=PartKind(self.node_kind[i]).name.lower(),
-                position=tuple(self.node_position[i].tolist()),
+                name, kind=PartKind(kind), since=int(since), position=tuple(position.tolist())
             )
-        for e in range(self.count_edges(bricks)):
-            a, b = self.edge_nodes[e]
-            graph.add_edge(
-                self.node_name[a],
-                self.node_name[b],
-                number=e + 1,
-                kind=PartKind(self.edge_kind[e]).name.lower(),
-                length=float(np.linalg.norm(self.node_position[b] - self.node_position[a])),
-            )
+        lengths = np.linalg.norm(np.diff(self.node_position[self.edge_nodes], axis=1)[:, 0], axis=1)
+        each = zip(self.edge_nodes, self.edge_kind, self.edge_since, lengths.tolist(), strict=True)
+        for number, ((a, b), kind, since, length) in enumerate(each, start=1):
+            ends = self.node_name[a], self.node_name[b]
+            kinds = {"kind": PartKind(kind), "since": int(since)}
+            graph.add_edge(*ends, number=number, length=length, **kinds)
+        return nx.freeze(graph)
+
+    def graph(self, bricks: int) -> nx.Graph[object]:
+        """Return a partial structure as a view of the network's graph.
+
+        Nodes have a ``kind`` (`PartKind`), ``since``, the brick count that brings them, and a
+        ``position``, m; edges a ``kind``, ``since``, their ``number`` and ``length``, m.
+        """
+        from networkx import subgraph_view  # noqa: PLC0415  # as for the whole graph
+
+        nodes, edges = self._graph.nodes, self._graph.edges
+        view: nx.Graph[object] = subgraph_view(
+            self._graph,
+            filter_node=lambda name: nodes[name]["since"] <= bricks,
+            filter_edge=lambda a, b: edges[a, b]["since"] <= bricks,
+        )
+        return view
+
+    def bodies(self, bricks: int) -> nx.Graph[int]:
+        """Return the bricks of a partial structure and the ground, as springs tie them.
+
+        Bricks by place in build order, the ground as `GROUND`. A spring without any stiffness ties
+        nothing.
+        """
+        from networkx import Graph  # noqa: PLC0415  # as for the whole graph
+
+        springs, graph = self.springs, Graph()
+        graph.add_nodes_from([*range(bricks), GROUND])
+        ties = (springs.since <= bricks) & springs.stiffness.any(axis=1)
+        graph.add_edges_from(springs.bodies[ties].tolist())
         return graph

@@ -26,7 +26,7 @@ from seqopt.network.network import Network, PartKind
 from seqopt.scene._armed import within_reach
 from seqopt.scene.parts import Anywhere, Brick, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
-from seqopt.sequence.schedule import acting_bodies, check_support
+from seqopt.sequence.schedule import check_support
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 _Make = TypeVar("_Make", bound=Callable[..., Any])
@@ -239,11 +239,9 @@ def _begins_elsewhere(network: Network) -> frozenset[int]:
     """
     placed = network.scene.placed
     along, stretch, out = lies_along(network), set[int](), set[int]()
-    tied: list[set[int]] = [set() for _ in placed]
-    for first, second in acting_bodies(network, len(placed)).tolist():
-        tied[second].add(first)
+    tied = network.bodies(len(placed))
     for k, brick in enumerate(placed):
-        if not tied[k] & stretch:
+        if stretch.isdisjoint(tied[k]):
             out.add(brick.name)
         if brick.name in along | out:
             stretch = set()

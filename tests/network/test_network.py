@@ -23,7 +23,7 @@ def test_edge_counts_of_the_study(engine25):
 def test_graph_carries_the_numbers(engine25, arch25):
     for bricks in (1, 7, 25):
         graph = engine25.network.graph(bricks)
-        inner = [n for n, kind in graph.nodes(data="kind") if kind == "inner"]
+        inner = [n for n, kind in graph.nodes(data="kind") if kind is PartKind.INNER]
         assert sorted(inner) == list(range(2 * bricks))  # node 0 exists but is never gripped
         numbers = [number for _, _, number in graph.edges(data="number")]
         assert sorted(numbers) == list(range(1, graph.number_of_edges() + 1))
