@@ -210,8 +210,8 @@ class Growth:
             pulls.append((other, self._basis.wrench @ begun[other]))
         for body, pull in pulls:
             rows = slice(1 + k * body, 1 + k * body + len(pull))
-            for each, other in zip(self._answers(0), self._answers(rows), strict=True):
-                each[:] += pull @ other
+            for weighed, answer in zip(self._answers(0), self._answers(rows), strict=True):
+                weighed[:] += pull @ answer
 
     def _of(self, spring: int) -> slice:
         """Return the columns of what a spring transmits."""
