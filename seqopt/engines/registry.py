@@ -11,8 +11,7 @@ import platform
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache, cached_property
-from importlib import import_module
+from functools import cache, cached_property, partial
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
@@ -133,23 +132,31 @@ def engine_for(engine: Engine, scene: Scene) -> Engine:
     return recipe_for(engine, scene).make()
 
 
-def _late(name: str, module: str) -> Callable[..., Engine]:
-    """Return what makes an engine whose module waits for that: it loads much, or is rare."""
+def _loaded(name: str, network: Network | Scene, **options: Any) -> Engine:
+    """Return an engine whose module waits until it is asked for: it loads much, or is rare."""
+    if name == "auto":
+        from seqopt.engines._auto import AutoEngine  # noqa: PLC0415
 
-    def made(network: Network | Scene, **options: Any) -> Engine:
-        kind = getattr(import_module(f"seqopt.engines.{module}"), name)
-        found: Engine = kind(network, **options)
-        return found
+        return AutoEngine(network, **options)
+    if name == "planar":
+        from seqopt.engines._planar import PlanarEngine  # noqa: PLC0415
 
-    return made
+        return PlanarEngine(network, **options)
+    if name == "frame":
+        from seqopt.engines.frame import FrameEngine  # noqa: PLC0415
+
+        return FrameEngine(network, **options)
+    from seqopt.engines.discrete.engine import DiscreteEngine  # noqa: PLC0415
+
+    return DiscreteEngine(network, **options)
 
 
 ENGINES: dict[str, Callable[..., Engine]] = {
-    "auto": _late("AutoEngine", "_auto"),
-    "planar": _late("PlanarEngine", "_planar"),
+    "auto": partial(_loaded, "auto"),
+    "planar": partial(_loaded, "planar"),
     "compliance": ComplianceEngine,
-    "frame": _late("FrameEngine", "frame"),
-    "discrete": _late("DiscreteEngine", "discrete.engine"),
+    "frame": partial(_loaded, "frame"),
+    "discrete": partial(_loaded, "discrete"),
 }
 USUAL = "compliance"  # the engine of what is only drawn, or compared with itself
 DEFAULT = "auto"  # the engine where none is asked for
