@@ -20,12 +20,16 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 import seqopt
+from experiments.engines.parts.softness import (
+    grip_range,
+    held_softly,
+    softness_chart,
+    turning_points,
+)
 from experiments.harness.claim import Claim, Finding, Options, Times, told
 from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25, grip_sets
 from seqopt.engines.interface import Engine, Want
-from seqopt.report.charts import _softness_chart
-from seqopt.report.softness import _grip_range, held_softly, turning_points
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import published_plan
 
@@ -87,7 +91,7 @@ def holds(table: pd.DataFrame, ratio: float) -> bool:
 
 def experiment(options: Options) -> Finding:
     engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
-    grid = (ARM, RIGID) if options.quick else _grip_range(1e5, 1e10)
+    grid = (ARM, RIGID) if options.quick else grip_range(1e5, 1e10)
     table = held_softly(engine, builds(engine), grid)
     ratio = 1.0 if options.quick else ratio_of_times(2048, 60)
     print(table.to_string(index=False, float_format="%.4g"))
@@ -100,7 +104,7 @@ def experiment(options: Options) -> Finding:
 
 
 def chart(table: pd.DataFrame) -> Figure:
-    return _softness_chart(table, [*dict.fromkeys(table["build"])], BAND)
+    return softness_chart(table, [*dict.fromkeys(table["build"])], BAND)
 
 
 CLAIM = Claim(

@@ -79,8 +79,6 @@ def parse_grips(grips: Number, scene: Scene) -> Scene:
     """
     text = str(grips)
     where = f"--grips {short(text)[1:-1]}"
-    if ".." in text:
-        raise SceneError(f"{where}: a range goes with compare; give one stiffness")
     shift, *rest = text.split(",")
     ways: list[tuple[float, ...] | None] = [None, None]
     for at, word in enumerate((shift, *(part.removeprefix("turning=") for part in rest))):

@@ -92,12 +92,6 @@ def comparison_blocks(
     return ["\n".join(map(wrapped, block)) for block in blocks]
 
 
-def shown_tables(comparison: Comparison) -> dict[str, pd.DataFrame]:
-    """Return the responses of the builds that differ in their largest ones, by name."""
-    shown = {*_unlike(comparison.table)}
-    return {name: table for name, table in comparison.tables.items() if name in shown}
-
-
 def _unlike(table: pd.DataFrame) -> dict[str, int]:
     """Return rows with different figures, the plainest of each, and how many others have these."""
     figures = table[[*RESPONSES]].round(3).apply(tuple, axis=1)

@@ -34,16 +34,10 @@ from seqopt.report._style import (
 )
 from seqopt.report.comparison import _in_shown_unit, _worst_of
 from seqopt.report.page import Build
-from seqopt.report.text import UNITS, in_words, typed
+from seqopt.report.text import in_words, typed
 from seqopt.stability.assessment import Stability, Verdict
 from seqopt.stability.failure_map import FailureMap
 
-TITLES = {
-    "F_rob": "robot force",
-    "M_sup": "support moment",
-    "T_max": "edge tension",
-    "D_max": "node displacement",
-}
 COLUMNS = {
     "M_sup_Nm": "support moment\nM_sup [N m]",
     "F_max_N": "largest tension\nT_max [N]",
@@ -73,36 +67,6 @@ VERDICTS = {
     Verdict.UNDECIDED.value: GRAY,
     Verdict.FALLS.value: VERMILION,
 }  # colors of steps
-
-
-@styled
-def _softness_chart(
-    table: pd.DataFrame, builds: Sequence[str], band: tuple[float, float] | None = None
-) -> Figure:
-    """Return the largest responses of builds over the stiffness of grips, from `held_softly`.
-
-    ``band``: stiffnesses between which industrial arms lie, N/m.
-    """
-    figure = new_figure(5.2)
-    panels = figure.subplots(2, 2, sharex=True).ravel()
-    finite, rigid = (table[np.isfinite(table["stiffness"]) == each] for each in (True, False))
-    end = 4 * float(finite["stiffness"].max())
-    for panel, (response, unit) in zip(panels, UNITS.items(), strict=True):
-        if band is not None:
-            panel.axvspan(*band, color=GRAY, alpha=0.2, lw=0, zorder=0, label="industrial arms")
-        for name, style in looks(builds).items():
-            own = finite[finite["build"] == name].sort_values("stiffness")
-            line = style.line() | {"markevery": 4, "label": name}
-            panel.plot(own["stiffness"], own[response], **line)
-            last = rigid.loc[rigid["build"] == name, response]
-            panel.plot([end] * len(last), last, style.marker, color=style.color)
-        panel.set(xscale="log", yscale="log", title=f"{TITLES[response]} [{unit}]")
-        plain(panel.yaxis)
-    dress(*panels)
-    for panel in panels[2:]:
-        panel.set_xlabel("stiffness of grips [N/m]; marks on the right: rigid")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    return figure
 
 
 @styled

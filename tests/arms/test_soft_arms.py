@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import seqopt
+from experiments.engines.parts.softness import held_softly
 from seqopt.arms import find_postures
 from seqopt.arms._judge import check_postures
 from seqopt.arms._model import ArmModel
@@ -18,7 +19,6 @@ from seqopt.engines.registry import make_engine
 from seqopt.errors import GripError, StepError
 from seqopt.plan.solving import layers_of
 from seqopt.problem.criteria import WorstRatio
-from seqopt.report.softness import held_softly
 from seqopt.responses.table import force_column
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import in_order

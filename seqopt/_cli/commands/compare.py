@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,27 +29,16 @@ from seqopt._showing import PAGE
 from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance, simplest
-from seqopt.errors import SceneError
 from seqopt.network.build import build_network
-from seqopt.problem._limit_words import number_word
 from seqopt.problem.requirements import Criterion
-from seqopt.report._compared import comparison_blocks, printed_largest, shown_tables
+from seqopt.report._compared import comparison_blocks, printed_largest
 from seqopt.report._pages import comparison_page
-from seqopt.report.comparison import CLOSED, Comparison, compare
-from seqopt.report.softness import _grip_range, _softness_lines, held_softly, turning_points
+from seqopt.report.comparison import Comparison, compare
 from seqopt.responses.table import builds_in_words
-from seqopt.scene._checks import short
 from seqopt.stability._builds import BuildProver
 from seqopt.workflow import DEFAULTS
 
-SOFTLY = "The same builds, by the stiffness of grips in N/m"
 SPEED = "Speed against accuracy"
-TURNS = "What turns as grips become softer"
-NO_TURN = "nothing does in this range"
-HOW_SOFT = (
-    "grips: how much this depends on how stiff they are: --grips 1e5..1e9; results for one "
-    "stiffness: --grips 1e6"
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +64,7 @@ class Compare(Written, Strict, Postures, Judged, Ranks, Team, Built):
     seqopt compare
     seqopt compare wall:columns=6,courses=4 --out wall
     seqopt compare arch25 --criteria worst-ratio --json
-    seqopt compare arch25 --grips 1e5..1e9
+    seqopt compare arch25 --grips 1e6
     seqopt compare arch25 --speed 20 --out speed
     """
 
@@ -98,9 +87,8 @@ class Found(NamedTuple):
 
 def find(asked: Compare) -> Found:
     """Compare all ways to build a scene; with what it is compared by."""
-    ranged = _parse_grip_range(asked.grips)  # said before anything is computed
     seconds = speed_seconds(asked.speed)
-    scene = asked_scene(replace(asked, grips=None) if ranged else asked)
+    scene = asked_scene(asked)
     find_postures(scene, asked.cache, asked.tell)
     engine = asked_engine(asked, build_network(scene))
     usual = DEFAULTS["any other"].criterion
@@ -115,25 +103,17 @@ def find(asked: Compare) -> Found:
 def answered(asked: Compare, found: Found) -> Answer:
     """Write a comparison, and return what is in it."""
     engine, criterion, prover, result = found
-    scene, grips = engine.network.scene, _parse_grip_range(asked.grips)
+    scene = engine.network.scene
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
     about = {"scene": scene.name, "criteria": criteria, **provenance(engine)}
     blocks = comparison_blocks(result, scene, criterion, columns())
     headings = [block.partition("\n")[0] for block in blocks]
     if result.speed is not None:
         blocks.append("\n".join([SPEED, *result.speed.describe(wrapped)]))
-    softly = held_softly(engine, shown_tables(result), grips, asked.tell)
-    shown = shown_tables(result)
-    closed = result.table.index[result.table["problem"] == CLOSED]  # these leave nothing to choose
-    turns = turning_points(softly, [n for n in map(str, closed) if n in shown]) if grips else ()
-    if grips:
-        lines = [wrapped(line, first="- ") for line in turns or [NO_TURN]]
-        blocks += ["\n".join([SOFTLY, *_softness_lines(softly, [*softly["build"].unique()])])]
-        blocks += ["\n".join([TURNS, *lines])]
     written: tuple[Path, ...] = ()
     if asked.path is not None:
         asked.tell("drawing figures")
-        files = _files(result, softly) | {PAGE: comparison_page(engine, result)}
+        files = _files(result) | {PAGE: comparison_page(engine, result)}
         files["summary.json"] = json.dumps(about, indent=2) + "\n"
         written = write_outputs(asked, lambda: files)
         blocks.append(_where(asked.path, speed=result.speed is not None))
@@ -142,16 +122,14 @@ def answered(asked: Compare, found: Found) -> Answer:
     answer = Answer(
         facts=about
         | {"scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)}
-        | ({"grips": {"rows": softly, "turns": list(turns)}} if grips else {})
         | ({} if result.speed is None else {"speed": result.speed.facts()}),
         text="\n\n".join(blocks),
-        headings=(*headings, SPEED, SOFTLY, TURNS),
+        headings=(*headings, SPEED),
         written=written,
         notes=(
             *level_notes(asked, simplest(engine)),
             *result.enough.lines,
             *refused(prover),
-            *(() if grips else (HOW_SOFT,)),
             *(figure_notes() if written else ()),
         ),
     )
@@ -196,35 +174,20 @@ def _facts(result: Comparison) -> dict[str, object]:
     }
 
 
-def _parse_grip_range(grips: Number | None) -> tuple[float, ...]:
-    """Return the stiffnesses of a range, as ``1e5..1e9``, N/m; none of one stiffness."""
-    text = str(grips)
-    if ".." not in text:
-        return ()
-    ends = [number_word(end, f"--grips {short(text)[1:-1]}") for end in text.split("..")]
-    if len(ends) != 2 or not ends[0] < ends[1]:
-        raise SceneError(
-            f"--grips {short(text)[1:-1]}: give the softest and the stiffest, 1e5..1e9"
-        )
-    return _grip_range(*ends)
-
-
-def _files(result: Comparison, softly: pd.DataFrame) -> dict[str, bytes | str]:
-    """Return tables and figures of a comparison by file name; ``softly``: by stiffness of grips."""
+def _files(result: Comparison) -> dict[str, bytes | str]:
+    """Return tables and figures of a comparison by file name."""
     speed = result.speed
     files: dict[str, bytes | str] = {
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
         **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
     }
-    files |= {} if softly.empty else {"grips.csv": csv_text(softly)}
     files |= {} if speed is None else {"speed.csv": csv_text(speed.table)}
     if figure_notes():
         return files
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
-    from seqopt.report.charts import _softness_chart, responses_figure  # noqa: PLC0415
+    from seqopt.report.charts import responses_figure  # noqa: PLC0415
 
     drawn = {"responses": responses_figure(result.tables)}
-    drawn |= {} if softly.empty else {"grips": _softness_chart(softly, [*softly["build"].unique()])}
     drawn |= {} if speed is None else {"speed": speed.plot()}
     for name, figure in drawn.items():
         files |= picture_files(name, figure)

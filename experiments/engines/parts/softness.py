@@ -5,19 +5,20 @@ Builds stay as they are, step by step; what varies is how robots give way where 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_for
 from seqopt.errors import SceneError
+from seqopt.report._style import GRAY, dress, looks, new_figure, plain, styled
 from seqopt.report.comparison import LARGEST
-from seqopt.report.text import IN_UNITS, QUANTITIES
+from seqopt.report.text import QUANTITIES, UNITS
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import solve_sets
 from seqopt.responses.quantities import CHOSEN_BY
@@ -32,10 +33,10 @@ _HALF = 0.5
 _BETWEEN = 4  # stiffnesses that are looked at in each decade
 
 
-def _grip_range(softest: float, stiffest: float) -> tuple[float, ...]:
+def grip_range(softest: float, stiffest: float) -> tuple[float, ...]:
     """Return stiffnesses of grips from the softest to the stiffest, evenly spaced, then rigid, N/m.
 
-    >>> [f"{stiffness:.3g}" for stiffness in _grip_range(1e6, 1e7)]
+    >>> [f"{stiffness:.3g}" for stiffness in grip_range(1e6, 1e7)]
     ['1e+06', '1.78e+06', '3.16e+06', '5.62e+06', '1e+07', 'inf']
     """
     if not 0 < softest < stiffest < np.inf:
@@ -175,20 +176,39 @@ def _crossing(values: pd.Series[float], level: float, beyond: pd.Series[bool]) -
     return f"{np.exp(np.log(stiff) + share * np.log(soft / stiff)):.2g}"
 
 
-def _softness_lines(table: pd.DataFrame, builds: Sequence[str]) -> list[str]:
-    """Return a table of some builds in text: the largest responses at every decade, 80 columns."""
-    known = np.unique(table["stiffness"])
-    finite = [float(k) for k in known if k < np.inf]
-    whole = [k for k in finite if abs(np.log10(k) - round(np.log10(k))) < 1e-9] or finite
-    shown = (*whole[:: -max(1, math.ceil(len(whole) / 6))][::-1], float(max(known)))
-    heads = [f"{k:.0e}".replace("e+0", "e").replace("e+", "e") for k in shown]  # as 3e6
-    heads = ["rigid" if k == np.inf else head for k, head in zip(shown, heads, strict=True)]
-    lines = []
-    for response, words in IN_UNITS.items():
-        wide = table.pivot_table(response, "build", "stiffness", sort=False)
-        lines.append(f"{words:<24}" + "".join(f"{head:>8}" for head in heads))
-        for name in builds:
-            values = wide.loc[name, list(shown)].to_numpy(float)
-            cells = (f"{v:.0f}" if 100 <= abs(v) < 1e7 else f"{v:.3g}" for v in values)
-            lines.append(f"  {name:<22}" + "".join(f"{cell:>8}" for cell in cells))
-    return lines
+TITLES = {
+    "F_rob": "robot force",
+    "M_sup": "support moment",
+    "T_max": "edge tension",
+    "D_max": "node displacement",
+}
+
+
+@styled
+def softness_chart(
+    table: pd.DataFrame, builds: Sequence[str], band: tuple[float, float] | None = None
+) -> Figure:
+    """Return the largest responses of builds over the stiffness of grips, from `held_softly`.
+
+    ``band``: stiffnesses between which industrial arms lie, N/m.
+    """
+    figure = new_figure(5.2)
+    panels = figure.subplots(2, 2, sharex=True).ravel()
+    finite, rigid = (table[np.isfinite(table["stiffness"]) == each] for each in (True, False))
+    end = 4 * float(finite["stiffness"].max())
+    for panel, (response, unit) in zip(panels, UNITS.items(), strict=True):
+        if band is not None:
+            panel.axvspan(*band, color=GRAY, alpha=0.2, lw=0, zorder=0, label="industrial arms")
+        for name, style in looks(builds).items():
+            own = finite[finite["build"] == name].sort_values("stiffness")
+            line = style.line() | {"markevery": 4, "label": name}
+            panel.plot(own["stiffness"], own[response], **line)
+            last = rigid.loc[rigid["build"] == name, response]
+            panel.plot([end] * len(last), last, style.marker, color=style.color)
+        panel.set(xscale="log", yscale="log", title=f"{TITLES[response]} [{unit}]")
+        plain(panel.yaxis)
+    dress(*panels)
+    for panel in panels[2:]:
+        panel.set_xlabel("stiffness of grips [N/m]; marks on the right: rigid")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure
