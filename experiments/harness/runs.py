@@ -27,8 +27,8 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.formulation import Formulation, formulations
+from seqopt.graph.layers.compiled import best_in_order
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.plan._layers import best_choice
 from seqopt.problem.problem import Aim
 from seqopt.sequence.three_robots import three_robot_loop
 
@@ -134,7 +134,7 @@ def _judged(reference: Layers, aim: Aim, choice: tuple[int, ...], seconds: Times
 def worth(reference: Layers, aim: Aim, choice: tuple[int, ...]) -> tuple[float, float]:
     """Return the value of a choice by the reference's data, and its gap to the optimum there."""
     costs = aim.costs(reference)
-    best = best_choice(reference.schedule.scene.name, costs, aim)
+    best = best_in_order([(costs, aim)])
     value, bound = (float(aim.value_of(costs, each)) for each in (choice, best))
     return value, max(0.0, value - bound) / max(abs(bound), np.finfo(float).tiny)
 

@@ -60,9 +60,8 @@ from formulations.solvers import anatomy, minimize_by_highs
 from seqopt import Network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.formulation import Watch, find_formulation, formulations, trace_rows
-from seqopt.graph.layers.compiled import compile_layers
+from seqopt.graph.layers.compiled import best_in_order, compile_layers
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.plan._layers import best_choice
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
@@ -225,7 +224,7 @@ def written(
 ) -> tuple[dict[str, object], pd.DataFrame]:
     """Return size, bound, nodes and time of a program, and what was found at which time."""
     costs = aim.costs(problem)
-    optimum = aim.value_of(costs, best_choice(name, costs, aim))
+    optimum = aim.value_of(costs, best_in_order([(costs, aim)]))
     graph = compile_layers(problem, aim, alone=find_formulation(name).alone).instance.asked
     written = SHAPES[aim][name](graph)
     size, relaxed = anatomy(written.program)

@@ -9,17 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from seqopt.errors import ProblemError, SolverError, StepError
-from seqopt.graph.formulation import (
-    End,
-    Formulation,
-    Run,
-    Watch,
-    find_formulation,
-    formulations,
-    timed,
-)
-from seqopt.graph.layers.compiled import compile_costs, compile_layers
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.formulation import End, Formulation, Run, Watch, formulations, timed
+from seqopt.graph.layers.compiled import best_in_order, compile_layers
+from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.layers import Layers, steps_over, travel
 from seqopt.graph.solution import StatePath
 from seqopt.judge._step_checks import check_shape
@@ -32,9 +24,7 @@ from seqopt.problem.requirements import LINEAR_RANGE
 from seqopt.scene._armed import check_postures
 from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.steps import Step
-from seqopt.work._clock import INTERRUPT
 
-CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
 EFFORT = ("seconds", "max_memory")  # of any formulation; responses have a memory of their own
 
 
@@ -50,7 +40,7 @@ def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
         else:
             budget = travel(problem, each.bound)
         if each.share:
-            free = best_choice(problem.schedule.scene.name, problem.sums, Aim.SUM)
+            free = best_in_order([(problem.sums, Aim.SUM)])
             budget = replace(budget, bound=each.bound * budget.spent(free))
         budgets.append(budget)
     return replace(problem, budgets=tuple(budgets)) if budgets else problem
@@ -73,18 +63,6 @@ def solve_layers(graph: Layers, formulation: Formulation, run: Run) -> Plan:
         require_proof(run.proof)
         return _solve_lazily(graph, formulation, run)
     return (_solve_all if run.proof else _solve_windows)(graph, formulation, run)
-
-
-def best_choice(name: str, costs: LayeredCosts, aim: Aim) -> tuple[int, ...]:
-    """Return the best choice without budgets, judged; an interrupt ends more than this.
-
-    Raises `InfeasibleError` if no choice is allowed; `KeyboardInterrupt` if it was interrupted.
-    """
-    found = compile_costs(name, costs, aim)
-    path = find_path(found.instance, find_formulation(CHOOSES[aim]), Run())
-    if path.selection.stopped == INTERRUPT:
-        raise KeyboardInterrupt
-    return found.choice([node for (node,) in path.selection.states])
 
 
 def on_the_way(plan: Plan) -> Plan:

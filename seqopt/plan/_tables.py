@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
 from itertools import pairwise
 
 import numpy as np
@@ -11,12 +10,10 @@ import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.ranking import move_costs, rank_of, split_gap, under_both
+from seqopt.graph.layers.ranking import move_costs, rank_of
 from seqopt.plan.search._window_search import WindowSearch
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices
-
-Objectives = dict[str, dict[str, float | None] | None]
 
 
 def chosen_table(
@@ -42,15 +39,6 @@ def chosen_table(
             single, shared = layered.single[k][now], layered.shared[k][before, now]
             rows.append({"single_cost": single, "shared_cost": shared, "rank_in_window": rank})
     return moves_table(problem, choice, grips).join(pd.DataFrame(rows))
-
-
-def split_objectives(problem: Layers, choice: tuple[int, ...], *, heuristic: bool) -> Objectives:
-    """Return `under_both` and of heuristics `split_gap`; None where there are no ranks."""
-    values = under_both(problem, choice)
-    known = None not in values.values()
-    parts = split_gap(problem, choice) if known and heuristic else None
-    split = None if parts is None else asdict(parts)
-    return {"objectives": values if known else None, "gap_parts": split}
 
 
 def moves_table(problem: Layers, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:

@@ -15,11 +15,11 @@ import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.costs import ScenarioCosts
+from seqopt.graph.layers.compiled import best_in_order
+from seqopt.graph.layers.costs import LayeredCosts, ScenarioCosts
 from seqopt.graph.layers.layers import Layers, in_scenarios
 from seqopt.graph.states.states import over_scenarios
 from seqopt.judge.schedules import plan_values
-from seqopt.plan._layers import best_choice
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import WORST_PEAK, Aim
 from seqopt.scene.scenarios import Scenarios
@@ -78,7 +78,7 @@ def judge_unseen(plan: Plan, scenes: Layers | Scenarios | Sequence[Scene]) -> Tr
         raise ProblemError("the plan was not chosen over scenarios; pose with scenarios")
     nominal, aim = problem.alone_in_scene, problem.over.aim
     known = ScenarioCosts(nominal.sums, nominal.peaks, 0, 0.0)
-    chosen = best_choice(nominal.schedule.scene.name, aim.costs(nominal), aim)
+    chosen = best_choice(aim.costs(nominal), aim)
     if not isinstance(scenes, Layers):
         some = scenes.scenes if isinstance(scenes, Scenarios) else scenes
         scenes = in_scenarios(nominal, some, problem.over)
@@ -105,10 +105,15 @@ def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
     return dict(zip(judged.names, plan_values(judged, plan.steps), strict=True))
 
 
+def best_choice(costs: LayeredCosts, aim: Aim) -> tuple[int, ...]:
+    """Return the best choice of an aim; of those of least peak the one of least sum."""
+    return best_in_order([(costs, aim), (costs, Aim.SUM)])
+
+
 def _row(costs: ScenarioCosts, aim: Aim, choices: Sequence[tuple[int, ...]]) -> dict[str, float]:
     """Return what three plans cost in a scenario."""
     try:
-        best = best_choice("scenario", aim.costs(costs), aim)
+        best = best_choice(aim.costs(costs), aim)
     except InfeasibleError:
         best = None
     out: dict[str, float] = {}

@@ -46,8 +46,8 @@ from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
 
 if TYPE_CHECKING:
+    from seqopt.graph.layers.ranking import Objectives
     from seqopt.graph.orders import AllOrders
-    from seqopt.plan._tables import Objectives
     from seqopt.plan.search._window_search import WindowSearch
 
 _UNCOMPARED = "not compared with the optimum"
@@ -397,10 +397,10 @@ class Plan(ShownBuild):
             or self.graph.scenarios
         ):
             return {"objectives": None, "gap_parts": None}
-        from seqopt.plan._tables import split_objectives  # noqa: PLC0415  # only in summaries
+        from seqopt.graph.layers.ranking import objectives  # noqa: PLC0415  # only in summaries
 
         heuristic = self.formulation.kind is FormulationKind.HEURISTIC
-        return split_objectives(self.graph, self.choice, heuristic=heuristic)
+        return objectives(self.graph, self.choice, heuristic=heuristic)
 
     def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
         """Return whether every step stands and by which margins, by the cone program.

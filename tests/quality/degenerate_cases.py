@@ -48,13 +48,20 @@ Rng = np.random.Generator
 Case = Callable[[Size, Rng], Costs]
 
 
+def keeps(budget: Budget, choice: tuple[int, ...]) -> bool:
+    """Return whether a choice is within a budget, up to rounding of the amounts that it takes."""
+    taken = budget.amounts.parts(choice)
+    size = max(abs(budget.bound), sum(map(abs, taken)))
+    return bool(sum(taken) <= budget.bound + 1e-9 * min(size, 1e300))
+
+
 def enumerated(problem: Costs, aim: Aim) -> tuple[float, list[tuple[int, ...]]]:
     """Return the best value over all combinations within limits and budgets, and who reaches it."""
     worth = problem.sums.cost if aim is Aim.SUM else problem.peaks.worst
     values: dict[tuple[int, ...], float] = {
         choice: worth(choice)
         for choice in product(*map(range, problem.sums.sizes))
-        if all(budget.slack(choice) >= -1e-9 for budget in problem.budgets)
+        if all(keeps(budget, choice) for budget in problem.budgets)
     }
     best = min(values.values(), default=np.inf)
     if not np.isfinite(best):

@@ -156,19 +156,6 @@ class Budget(FrozenValue):
         """Return what a choice takes of the budget, in its unit."""
         return self.amounts.cost(choice)
 
-    def slack(self, choice: Sequence[int]) -> float:
-        """Return what a choice leaves of the budget, as a share.
-
-        ``choice``: a candidate for every move. Result: what is left over the larger of the bound
-        and the amounts taken, all without sign, so that amounts that cancel count in full. Negative
-        beyond the bound; zero if nothing is left, one if there is no cap.
-        """
-        taken = self.amounts.parts(choice)
-        left = self.bound - sum(taken)
-        if left in (0, np.inf):
-            return min(left, 1.0)
-        return left / max(abs(self.bound), sum(map(abs, taken)))
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ScenarioCosts(FrozenValue):

@@ -12,7 +12,6 @@ from functools import cached_property
 from itertools import chain, pairwise
 
 import numpy as np
-import pandas as pd
 
 from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, Ints
@@ -353,10 +352,6 @@ class Layers(Shown):
             raise InfeasibleError(
                 f"{excess}, where no grip is left to choose; relax the limit or change the schedule"
             )
-
-    def table(self) -> pd.DataFrame:
-        """Return a row per open grip, as `seqopt.sequence.schedule.Schedule.table` does."""
-        return self.schedule.table()
 
     @property
     def candidates(self) -> tuple[tuple[int, ...], ...]:

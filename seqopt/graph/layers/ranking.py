@@ -3,37 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.errors import InfeasibleError
 from seqopt.graph.layers.compiled import best_in_order
 from seqopt.graph.layers.costs import TINY, LayeredCosts
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.criteria import Ranked, RankSum
 from seqopt.problem.problem import Aim
 
-
-@dataclass(frozen=True)
-class GapParts:
-    """The gap of a choice to the exact optimum, split in two parts.
-
-    ``short_sight``: against an exact optimum of the conditional objective, both charged as the
-    problem does: what is lost by not looking ahead. Negative where looking ahead would not have
-    served. ``objective``: what that optimum itself gives up: the change of objective.
-    """
-
-    short_sight: float
-    objective: float
-
-    @property
-    def gap(self) -> float:
-        """Both parts."""
-        return self.short_sight + self.objective
+Objectives = dict[str, dict[str, float] | None]
 
 
 def under_both(problem: Layers, choice: Sequence[int]) -> dict[str, float | None]:
@@ -52,20 +34,31 @@ def under_both(problem: Layers, choice: Sequence[int]) -> dict[str, float | None
     return out
 
 
-def split_gap(problem: Layers, choice: Sequence[int]) -> GapParts | None:
-    """Return the gap of a choice, in two parts.
+def split_gap(problem: Layers, choice: Sequence[int]) -> dict[str, float]:
+    """Return the gap of a choice to the exact optimum, in two parts.
 
     ``problem``: ranks candidates; its sums are what choices are charged; ``choice``: a candidate
-    for every move. Result: over the sum of the costs that the choice meets; None if no choice is
-    allowed.
+    for every move. Result: over the sum of the costs that the choice meets. ``short_sight``:
+    against an exact optimum of the conditional objective, both charged as the problem does: what is
+    lost by not looking ahead. Negative where looking ahead would not have served. ``objective``:
+    what that optimum itself gives up: the change of objective. Raises `InfeasibleError` if no
+    choice is allowed.
     """
     charged, conditional = problem.sums, problem.ranked(Ranked.CONDITIONAL).sums
     scale = max(sum(map(abs, charged.parts(choice))), TINY)
-    try:
-        there, best = _least_among_least(conditional, charged), _least_among_least(charged)
-    except InfeasibleError:
-        return None
-    return GapParts((charged.cost(choice) - there) / scale, (there - best) / scale)
+    there, best = _least_among_least(conditional, charged), _least_among_least(charged)
+    return {
+        "short_sight": (charged.cost(choice) - there) / scale,
+        "objective": (there - best) / scale,
+    }
+
+
+def objectives(problem: Layers, choice: Sequence[int], *, heuristic: bool) -> Objectives:
+    """Return `under_both` and of heuristics `split_gap`; None where there are no ranks."""
+    values = {name: v for name, v in under_both(problem, choice).items() if v is not None}
+    if len(values) < len(Ranked):
+        return {"objectives": None, "gap_parts": None}
+    return {"objectives": values, "gap_parts": split_gap(problem, choice) if heuristic else None}
 
 
 def _least_among_least(*costs: LayeredCosts) -> float:
