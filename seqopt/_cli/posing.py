@@ -30,7 +30,6 @@ from seqopt.problem.problem import (
     Problem,
     RobustAim,
     parse_budgets,
-    parse_caps,
     parse_robust,
 )
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
@@ -89,7 +88,7 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
     scene = in_seconds(choice, scene) if choice.durations else scene
     find_postures(scene, choice.cache, asked.tell)
     words: dict[str, Any] = {"limits": parse_limits(asked.limits, scene, "--limit")}
-    (parse_caps if of_states else parse_budgets)(choice.budgets)  # said before anything is built
+    parse_budgets(choice.budgets, of_states=of_states)  # said before anything is built
     words["resources"] = asked_resources(choice, None if of_states else asked.tell)
     aim, known, unseen = _asked_scenarios(choice, scene)
     words |= {} if aim is None else {"scenarios": known, "over": aim}

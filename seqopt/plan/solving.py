@@ -19,15 +19,7 @@ from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._range import best_within
 from seqopt.plan.plan import Plan
 from seqopt.problem.amounts import MINMAX, SUM, Amount
-from seqopt.problem.problem import (
-    WORST_PEAK,
-    Aim,
-    Orders,
-    Problem,
-    RobustAim,
-    parse_budgets,
-    parse_caps,
-)
+from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, parse_budgets
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
@@ -227,8 +219,8 @@ def _states(problem: Problem) -> States:
             "aim makespan: how long it takes to take bricks away is not modeled; leave "
             "direction=take-down out"
         )
-    if caps := parse_caps(problem.budgets):
-        found = within(found, caps)
+    if caps := parse_budgets(problem.budgets, of_states=True):
+        found = within(found, {cap.name: cap.bound for cap in caps})
     if found.standing is not None and found.standing.curing is not None and not found.is_timed:
         raise ProblemError(
             "curing: it says how long steps wait; add makespan to the aims, as makespan,steps"

@@ -183,12 +183,12 @@ def parse_robust(text: str) -> RobustAim:
     )
 
 
-SHAPE = re.compile(
-    r"(?P<kind>travel|steps_over:(?P<response>.+)|robot_use:(?P<robot>.+))"
-    r"=((?P<level>[^:=]+):)?(?P<bound>[^:=]+?)(?P<unit>m|x|)"
+BUDGET = re.compile(
+    r"(?P<name>sum\([^=]+\)|[^:=]+)(:(?P<of>.+))?"
+    r"=((?P<level>[^:=]+):)?(?P<bound>[^:=]+?)(?P<unit>[msx]?)"
 )
-CAP = re.compile(r"(?P<name>[^=]+)=(?P<bound>[^:=]+?)(?P<unit>[ms]?)")
-CAP_UNITS = {"travel": "m", "makespan": "s"}
+COUNTED = ("steps_over", "robot_use")  # a response or a robot, and a level
+UNITS = {"travel": "m", "makespan": "s"}
 CAPS = "travel=3.5m, makespan=600s, regrips=2, steps=50 or sum(T_max)=900, say"
 FORMS = "travel=0.8, travel=3.5m, steps_over:F_largest=250:10 or robot_use:rob1=100:5"
 
@@ -198,50 +198,56 @@ class AskedBudget:
     """A budget as it is asked for."""
 
     words: str
-    response: str  # whose steps over a level are counted; empty for the way that robots go
+    name: str  # of what is capped
+    response: str  # whose steps over a level are counted; empty for other totals
     level: float  # SI units
     bound: float  # how much there is
     share: bool  # whether that is a share of what the optimum without budgets takes
 
 
-def parse_budgets(texts: Sequence[str] | str) -> tuple[AskedBudget, ...]:
-    """Return budgets from words of `FORMS`, SI units; ``travel=0.8`` and ``0.8x`` are shares."""
-    texts = (texts,) if isinstance(texts, str) else texts
+def parse_budgets(
+    texts: Sequence[str] | str, *, of_states: bool = False
+) -> tuple[AskedBudget, ...]:
+    """Return budgets from words, SI units.
+
+    ``of_states``: whether they cap totals of states, in words of `CAPS`, or of candidates, in words
+    of `FORMS`, of which ``travel=0.8`` and ``0.8x`` are shares.
+    """
+    texts, forms = (texts,) if isinstance(texts, str) else texts, CAPS if of_states else FORMS
     if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
-        raise ProblemError(f"budgets {short(texts)}: give {FORMS}, as words")
-    found = [_parse(text) for text in texts]
-    about = [(budget.response, budget.level) for budget in found]
+        raise ProblemError(f"budgets {short(texts)}: give {forms}, as words")
+    found = [_parse(text, of_states=of_states) for text in texts]
+    about = [(budget.response or budget.name, budget.level) for budget in found]
     for i, budget in enumerate(found):
         if about[i] in about[:i]:
             raise ProblemError(f"budget {budget.words}: it stands there twice; give one bound")
     return tuple(found)
 
 
-def _parse(text: str) -> AskedBudget:
-    found = SHAPE.fullmatch(text)
-    if found is None or (found["level"] is None) != (found["kind"] == "travel"):
-        hint = did_you_mean(re.split("[=:]", text)[0], ("travel", "steps_over", "robot_use"))
-        states = f", or with an aim {CAPS}" if CAP.fullmatch(text) else ""
+def _parse(text: str, *, of_states: bool) -> AskedBudget:
+    found = BUDGET.fullmatch(text)
+    name = found["name"] if found else re.split("[=:]", text)[0]
+    whole = found is not None and not (found["of"] or found["level"])
+    unit = found["unit"] if found else ""
+    if of_states and not (whole and unit == UNITS.get(name, "")):
+        raise ProblemError(f"budget {short(text)} of states does not exist; give {CAPS}")
+    counted = found is not None and name in COUNTED and bool(found["of"] and found["level"])
+    if found is None or not (of_states or counted or (whole and name == "travel" and unit != "s")):
+        hint = did_you_mean(name, ("travel", *COUNTED))
+        states = f", or with an aim {CAPS}" if whole else ""
         raise ProblemError(f"budget {text} does not exist{hint}; give {FORMS}{states}")
-    is_travel, unit = found["kind"] == "travel", found["unit"]
-    if unit == "m" and not is_travel:
+    if counted and unit == "m":
         raise ProblemError(f"budget {text}: steps have no meters; give a number of them")
-    response = found["response"] or (robot_response(found["robot"]) if found["robot"] else "")
-    level, bound = (_positive(found[name] or "0", text) for name in ("level", "bound"))
-    return AskedBudget(text, response, level, bound, unit == "x" or (is_travel and not unit))
-
-
-def parse_caps(texts: Sequence[str] | str) -> dict[str, float]:
-    """Return caps on totals: ``travel=3.5m``, ``makespan=60s``, ``regrips=2``, ``sum(T_max)=9``."""
-    out: dict[str, float] = {}
-    for text in (texts,) if isinstance(texts, str) else texts:
-        found = CAP.fullmatch(text) if isinstance(text, str) else None
-        if found is None or found["unit"] != CAP_UNITS.get(found["name"], ""):
-            raise ProblemError(f"budget {short(text)} of states does not exist; give {CAPS}")
-        if found["name"] in out:
-            raise ProblemError(f"budget {text}: it stands there twice; give one bound")
-        out[found["name"]] = _positive(found["bound"], text)
-    return out
+    response = found["of"] or ""
+    level, bound = (_positive(found[part] or "0", text) for part in ("level", "bound"))
+    return AskedBudget(
+        text,
+        name,
+        robot_response(response) if name == "robot_use" else response,
+        level,
+        bound,
+        share=not of_states and (unit == "x" or (name == "travel" and not unit)),
+    )
 
 
 def _positive(text: str, words: str) -> float:
