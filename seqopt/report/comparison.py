@@ -42,15 +42,7 @@ from seqopt.sequence.three_robots import modified_sequential
 from seqopt.sequence.two_robots import METHODS, degeneration
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.study.published import (
-    IRREGULARITIES,
-    PUBLISHED,
-    is_reference_arch,
-    paper_models,
-    printed_maxima,
-    published_choice,
-    published_plan,
-)
+from seqopt.study.published import PUBLISHED, paper_models, published_about, published_choice
 from seqopt.work.progress import Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
@@ -152,7 +144,8 @@ def compare(
     engine = simplest(engine)
     scene, (tables, notes, refused) = engine.network.scene, _method_tables(engine, robots)
     maxima = pd.DataFrame({name: _quantities(scene, t) for name, t in tables.items()})
-    printed = printed_maxima().set_axis(maxima.index) if PUBLISHED in tables else None
+    known = published_about(scene) if tables else None
+    printed = None if known is None else known.maxima.set_axis(maxima.index)
     rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
     fixed = [largest(scene, table) for table in tables.values()]
     plans, problem, refusal = _plans(engine, criterion, progress, robots)
@@ -176,7 +169,7 @@ def compare(
     prover = prover or BuildProver(engine.network, progress=progress)
     verdicts = prover.of_builds({name: _steps_in_table(scene, t) for name, t in tables.items()})
     table = _table(rows, left := (within := LinearRange(engine)).of_builds(tables), verdicts)
-    notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
+    notes += [] if known is None else [f"In the paper: {text}" for text in known.irregularities]
     found = (maxima, printed, table, tables, loop, tuple(notes), refusal, left)
     enough = what_was_enough(within, tables)
     return Comparison(*found, criteria, verdicts, enough, measured)
@@ -370,8 +363,8 @@ def _method_tables(
         why = degeneration(engine.network, name)
         notes += [f"{name}: {why}"] if why else []
         notes += _idle_note(scene, name, steps)
-    if tables and is_reference_arch(scene):
-        tables[PUBLISHED] = analyze(engine, published_plan(scene))
+    if tables and (known := published_about(scene)) is not None:
+        tables[PUBLISHED] = analyze(engine, known.steps)
     refusals = [f"{name}: not possible here; {error}" for name, error in refused.items()]
     return tables, refusals + notes, refused
 
