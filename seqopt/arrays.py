@@ -109,6 +109,8 @@ def _parts(value: FrozenValue) -> list[object]:
 
 def _same(first: object, second: object) -> bool:
     """Return whether two contents are equal, arrays element by element, NaN like NaN."""
+    if first is None or second is None:
+        return first is second
     if isinstance(first, np.ndarray) and isinstance(second, np.ndarray):
         return first.dtype == second.dtype and np.array_equal(
             first, second, equal_nan=first.dtype.kind == "f"

@@ -89,7 +89,7 @@ class Instance(FrozenValue, Shown):
     caps: tuple[_Cap, ...] = ()
     states: Ints = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
     timed: TimedGraph | None = field(default=None, compare=False)
-    alone: Floats | None = field(default=None, compare=False)
+    alone: Floats | None = None
     facts: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:

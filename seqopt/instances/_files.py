@@ -42,6 +42,8 @@ def stored(instance: Instance) -> bytes:
         alike = np.array_equal(of_nodes[instance.target], values)  # all arcs to each take it
         arrays[f"amount_{k}"] = of_nodes if alike else values
         columns.append({"name": name, "of": "nodes" if alike else "arcs"})
+    if instance.alone is not None:
+        arrays["alone"] = instance.alone
     if instance.timed is not None:
         for name in (*TIMED, "longest"):
             arrays[f"timed_{name}"] = _narrow(getattr(instance.timed, name))
@@ -55,6 +57,7 @@ def stored(instance: Instance) -> bytes:
         "goals": [goal._asdict() for goal in instance.goals],
         "caps": [cap._asdict() for cap in instance.caps],
         "timed": instance.timed is not None,
+        "alone": instance.alone is not None,
         "facts": dict(instance.facts),
     }
     return _archive(arrays, json.dumps(document, indent=1) + "\n")
@@ -122,7 +125,8 @@ def _arrays(document: dict[str, Any], archive: Archive) -> dict[str, np.ndarray]
     nodes, arcs, timed = document["nodes"], document["arcs"], document["timed"]
     names = [f"amount_{k}" for k in range(len(document["columns"]))]
     more = [f"timed_{name}" for name in (*TIMED, "longest")] if timed else []
-    every = ("source", "target", "ends", "states", *names, *more)
+    beside = ("alone",) * document.get("alone", False)
+    every = ("source", "target", "ends", "states", *names, *beside, *more)
     archive.require((TEXT, *(f"{name}.npy" for name in every)))
     out = {name: archive.array(name, "iu", (arcs,)) for name in ("source", "target")}
     out["ends"] = archive.array("ends", "iu", (None,))
@@ -131,6 +135,10 @@ def _arrays(document: dict[str, Any], archive: Archive) -> dict[str, np.ndarray]
         out[name] = archive.array(name, "iuf", (nodes if column["of"] == "nodes" else arcs,))
         if not np.isfinite(out[name]).all():
             raise ValueError(f"{name}: give finite numbers; an arc that nobody may take is none")
+    for name in beside:
+        out[name] = archive.array(name, "iuf", (arcs, 2)).astype(float)
+        if not np.isfinite(out[name]).all():
+            raise ValueError(f"{name}: give finite numbers")
     return out | (_timed_arrays(archive, nodes, arcs) if timed else {})
 
 
@@ -214,6 +222,7 @@ def _instance(document: dict[str, Any], arrays: dict[str, np.ndarray]) -> Instan
         tuple(caps),
         states=states,
         timed=timed,
+        alone=arrays.get("alone"),
         facts=document["facts"],
     )
 

@@ -79,7 +79,8 @@ def compile_instance(
         raise ProblemError("below: it is about states; name aims, or leave it out")
     else:  # a level for every move
         graph.require_possible()
-        found = compile_layers(graph, aim or as_formulation(usual(problem)).aim, name)
+        asked = aim or as_formulation(usual(problem)).aim
+        found = compile_layers(graph, asked, name, alone=True)
         if found.offset:
             raise ProblemError(
                 f"instance {name}: a cost is below zero; ask for a criterion that is never negative"

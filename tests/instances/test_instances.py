@@ -108,6 +108,26 @@ def test_every_formulation_that_fits_agrees(compiled, kind):
         assert judged.objective >= best * (1 - 1e-6)
 
 
+@pytest.mark.parametrize("criterion", ["equations-2-3", "weighted"])
+@pytest.mark.parametrize("name", ["cascade", "rank_search", "beam"])
+def test_heuristics_answer_as_on_the_scene(tmp_path, name, criterion):
+    """What a search of one move alone is charged is part of the file: ranks of its candidates."""
+    engine = seqopt.make_engine("compliance", seqopt.load_scene("chain:bricks=8"))
+    moves = seqopt.three_robot_loop(engine.network)
+    problem = seqopt.pose(engine, moves, seqopt.CRITERIA[criterion])
+    one = seqopt.compile_instance(problem)
+    seqopt.save_instance(one, tmp_path / "x.npz")
+    read = seqopt.read_instance(tmp_path / "x.npz")
+    scene, found = seqopt.solve(problem, name), seqopt.solve(read, name)
+    assert found.certificate.objective == pytest.approx(scene.certificate.objective, rel=1e-12)
+    assert read == one
+    assert replace(read, alone=None) != one  # a control: it is compared
+    bad = replace(one, alone=np.full_like(one.alone, np.inf))
+    seqopt.save_instance(bad, tmp_path / "bad.npz")
+    with pytest.raises(FileError, match="alone: give finite numbers"):
+        seqopt.read_instance(tmp_path / "bad.npz")
+
+
 def test_what_does_not_fit_says_what_does(compiled):
     with pytest.raises(ProblemError, match="use path_dp"):
         seqopt.solve(compiled("peak"), "overlap_dp")
