@@ -19,19 +19,17 @@ from typing import Any
 import numpy as np
 
 from formulations.choice import Choice, Choose, onward
-from formulations.states._search import after_margins, best_order, best_total, chosen, watched
+from formulations.states._search import after_margins, best_total, chosen, watched
 from formulations.states._totals import cheapest_by, least_total
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
-from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.paths import path_values, tied
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import WORST_TOTAL, Aim, RobustAim, cvar
-from seqopt.responses.resources import HERE, Resources
 from seqopt.work.progress import Tell
 
 
@@ -99,15 +97,14 @@ class OnGraph(Terse):
 
     def __call__(
         self,
-        problem: States | AllOrders | Instance,
+        problem: States | Instance,
         *,
         watch: Watch | None = None,
         seconds: float = np.inf,
         max_memory: float = np.inf,
         progress: Tell = lambda _: None,
-        resources: Resources = HERE,
         **options: Any,
-    ) -> StatePath | OrderSelection:
+    ) -> StatePath:
         """Return the plan of the chosen path; where time or memory ends early, a first plan.
 
         Raises a `ProblemError` if there are budgets that it does not take.
@@ -121,13 +118,10 @@ class OnGraph(Terse):
             if problem.caps and not self.takes_budgets:
                 raise ProblemError(f"formulation {self.name}: it takes no caps; take labels")
             return path_of_instance(problem, choose, watch)
-        states = problem.states if isinstance(problem, AllOrders) else problem
-        if states.budgets and (states is not problem or not self.takes_budgets):
-            able = "schedule_search or path_beam" if problem is states else "order_search"
+        if problem.budgets and not self.takes_budgets:
+            able = "schedule_search or path_beam"
             raise ProblemError(f"formulation {self.name}: it takes no budgets; take {able}")
-        tell = watched(states, watch, max_memory, resources.progress or progress)
-        if isinstance(problem, AllOrders):
-            return best_order(problem, choose, watch, tell)
+        tell = watched(problem, watch, max_memory, progress)
         if problem.totals:
             return best_total(problem, choose, watch, tell)
         return after_margins(problem, lambda rest: chosen(rest, choose, watch, tell), tell)

@@ -11,8 +11,8 @@ import seqopt
 from seqopt.arrays import _LONGEST, Terse
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import SceneError
+from seqopt.graph._orders import among_orders
 from seqopt.graph.layers.layers import travel
-from seqopt.graph.orders import AllOrders
 from seqopt.graph.states.states import build_states
 from seqopt.plan.front import _StateFront, find_front
 from seqopt.plan.out_of_sample import judge_unseen
@@ -54,7 +54,7 @@ def met(problem25):
     values = [plan, lean, free, robust, free.report()]
     values += [judge_unseen(robust, drawn), drawn, loop, find_front(loop), _StateFront(aims)]
     values += [
-        seqopt.solve(AllOrders(free.states)),
+        seqopt.solve(among_orders(free.states, "tied")),
         *engines(network),
         *engines(posed.engine.network),
     ]

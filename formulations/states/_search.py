@@ -1,148 +1,52 @@
-"""What formulations of states share: first plans, budgets, scenarios and orders, by any choice."""
+"""What formulations of states share: first plans, budgets and scenarios, by any choice."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from operator import le
+from dataclasses import dataclass, replace
+from itertools import groupby
+from math import comb
+from operator import itemgetter, le
 
 import numpy as np
 
 from formulations.choice import Choice, Choose
-from formulations.states._totals import LeastTotal, StopError, cheapest_by, least_total
+from formulations.states._totals import StopError, cheapest_by, least_total
 from seqopt._interrupts import answered
+from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
-from seqopt.graph._budgets import Within, within_budgets
+from seqopt.graph._budgets import Within, is_beyond, within_budgets
 from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph.formulation import Watch, find_formulation
+from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.orders import (
-    MOST_PARTS,
-    AllOrders,
-    OrderSelection,
-    OrderStates,
-    Trial,
-    order_value,
+from seqopt.graph.paths import (
+    Best,
+    _on_paths,
+    distances,
+    lexicographic,
+    path_values,
+    reached,
+    strictly_below,
+    tied,
 )
-from seqopt.graph.paths import Best, _on_paths, lexicographic, path_values, reached, tied
 from seqopt.graph.solution import StatePath
-from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore
+from seqopt.graph.space import Space
+from seqopt.graph.states.explored import build_space, explore, floors_of_goals
 from seqopt.graph.states.states import States
-from seqopt.plan.search._margin_search import best_margin, bisected, with_margin
-from seqopt.problem.amounts import STEPS
-from seqopt.problem.problem import RobustAim
+from seqopt.plan.search._margin_search import best_margin
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Stage, Tell
 
 WIDTH = 50  # new states of a brick count from which the narrow search goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
+MANY = 500_000  # grip sets, about: to look at all takes longer than a second narrow search
+WIDER = 4  # how many times as wide the second narrow search is
+FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
 GROWN = 1.1  # times as much is kept before it is asked again how much memory is free
 
 Watching = Callable[[Explorer], None]
 Search = Callable[[States], StatePath]
-
-
-def best_order(
-    problem: AllOrders, choose: Choose, watch: Watch, tell: Watching, width: int | None = None
-) -> OrderSelection:
-    """Return the order of the path that is chosen through the states of all orders at once.
-
-    ``width``: how many new states of a set of bricks are kept, where these are enough to find a
-    plan; by default, if the first goal is a peak, those below that of the scene's own order.
-    """
-    try:
-        if problem.states.goals[0].margins:
-            return _order_of_margin(problem, tell)
-        if width is not None:
-            with suppress(NothingFoundError):
-                return _order_of_path(problem, choose, watch, tell, width)
-        return _order_of_path(problem, choose, watch, tell, None)
-    except StopError as stop:
-        if str(stop) == "memory":
-            raise ProblemError(
-                f"scene {problem.scene.name}: the states of all orders do not fit the memory; "
-                "give an order"
-            ) from None
-        raise _too_little(stop) from None
-
-
-def _order_of_path(
-    problem: AllOrders, choose: Choose, watch: Watch, tell: Watching, width: int | None
-) -> OrderSelection:
-    """Return the order of a path that is chosen by a first goal that is no margin."""
-    states, order = problem.states, problem.scene.build_order
-    space = OrderStates(problem, MOST_PARTS)
-    found = Explorer(space, width, tell)
-    own = np.inf  # or the value of the scene's own order, if it is one of those asked for
-    if problem.allows(order) and not (width or states.totals or states.budgets):
-        own = order_value(problem, Trial(order, np.inf))
-    found.rise(own if space.peaks[0] else np.inf)
-    if not found.whole:
-        raise found.without_plan("no order of the bricks has a plan")
-    if states.totals:
-        return _order_of_total(found, problem, choose, watch)
-    if states.budgets:
-        return _order_within(found, problem, len(space.parts) - 1)
-    found.refine()
-    visited = found.graph()
-    chosen_ = choose(visited.graph.only(_on_paths(visited.graph)), watch)
-    path, value, stopped = chosen_.path, own, "time" * chosen_.stopped
-    if path and path_values(visited.graph, path)[0] < own:
-        value, order = path_values(visited.graph, path)[0], problem.order_of(visited.of(path))
-    if not np.isfinite(value):
-        raise TimeUpError("no order with a plan was found yet; give more")
-    bound = min(chosen_.bounds[0] if chosen_.bounds else -np.inf, value)
-    return OrderSelection(order, value, bound, len(space.parts) - 1, stopped)
-
-
-def _order_of_margin(problem: AllOrders, tell: Watching) -> OrderSelection:
-    """Return the order with the best margin of stability, by halving an interval."""
-    name, states = problem.states.goals[0].name, problem.states
-    goals = (STEPS, *states.goals[len(states.aims) :])
-
-    def demanding(value: float) -> tuple[Visited, Best | Within] | None:
-        asked = replace(with_margin(states, name, value), goals=goals)
-        found = Explorer(OrderStates(replace(problem, states=asked), MOST_PARTS), tell=tell)
-        if not found.rise():
-            return None
-        with suppress(InfeasibleError):  # of budgets
-            return exact_best(found, states.budgets)
-        return None
-
-    low, high = bisected(name, lambda value: demanding(value) is not None)
-    found = demanding(high)
-    assert found is not None  # as it was before
-    order = problem.order_of(found[0].of(found[1].path))
-    value = find_formulation("schedule_search").solve(problem.at(order)).objective[0]
-    return OrderSelection(order, value, min(low, value), 0)
-
-
-def _order_within(found: Explorer, problem: AllOrders, evaluated: int) -> OrderSelection:
-    """Return the order of a path within budgets that is good in the first goal."""
-    visited, best = exact_best(found, problem.states.budgets)
-    order = problem.order_of(visited.of(best.path))
-    plan = find_formulation("schedule_search").solve(problem.at(order))
-    value, bound = plan.objective[0], best.bounds[0] if isinstance(best, Within) else -np.inf
-    return OrderSelection(order, value, min(bound, value), evaluated)
-
-
-def _order_of_total(
-    found: Explorer, problem: AllOrders, choose: Choose, watch: Watch
-) -> OrderSelection:
-    """Return the order of the path of least total over scenarios."""
-    visited, best = _least_total(found, problem.states.over, choose, watch)
-    stopped, parts = "time" * watch.over, len({part for _, part, _ in visited.states})
-    order, weights = problem.order_of(visited.of(best.path)), tuple(best.weights.tolist())
-    return OrderSelection(order, best.value, best.bound, parts - 1, stopped, weights)
-
-
-def _least_total(
-    found: Explorer, aim: RobustAim, choose: Choose, watch: Watch
-) -> tuple[Visited, LeastTotal]:
-    visited = found.graph()
-    graph = visited.graph.only(_on_paths(visited.graph))
-    return visited, least_total(graph, aim, cheapest_by(choose, watch), watch)
 
 
 def shortest(graph: Graph, _: Watch) -> Choice:
@@ -158,17 +62,20 @@ def best_total(
     ``choose``: paths of least sum; ``width``: how many new states of a brick count are kept; by
     default all, without which no plan is proven to be the least.
     """
-    space = ScenarioSums(problem, regrips=width is None, standing=bool(problem.demands))
+    demands = bool(problem.demands)
+    space = build_space(problem, regrips=width is None, standing=demands)
     try:
         found = Explorer(space, width, tell)
         if not found.rise():
             if width is not None:
                 return best_total(problem, choose, watch, tell)
             raise found.without_plan("no plan is allowed")
-        visited, best = _least_total(found, problem.over, choose, watch)
+        visited = found.graph()
+        graph = visited.graph.only(_on_paths(visited.graph))
+        best = least_total(graph, problem.over, cheapest_by(choose, watch), watch)
     except StopError as stop:
         raise _too_little(stop) from None
-    plan = _selection(visited, Best(best.path, (best.value,)))
+    plan = selected(space, visited, Best(best.path, (best.value,)))
     prices, bound = (tuple(best.weights.tolist()),), (best.bound,)
     return replace(plan, bound=bound, prices=prices, stopped="time" * watch.over)
 
@@ -191,7 +98,7 @@ def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> Sta
     stopped = ("interrupt" if watch.interrupted else "time") * best.stopped
     if best.path:
         values = path_values(graph, best.path)
-        found = _selection(Visited(graph, states), Best(best.path, values))
+        found = selected(wide.space, Visited(graph, states), Best(best.path, values))
     if not best.path or (first and best.stopped and first.objective < values):
         found = plan_by_then(first, KeyboardInterrupt() if watch.interrupted else StopError("time"))
     known = (*best.bounds, *[-np.inf] * (graph.goals - len(best.bounds)))
@@ -225,7 +132,8 @@ def plan_by_then(found: StatePath | None, stop: StopError | KeyboardInterrupt) -
     if found is None:
         raise _too_little(stop) from None
     none = (-np.inf,) * len(found.objective)
-    return StatePath(found.states, found.objective, none, stopped=str(stop) or "interrupt")
+    early = str(stop) or "interrupt"
+    return replace(found, bound=none, visited=(), prices=(), stopped=early)
 
 
 def _too_little(stop: StopError | KeyboardInterrupt) -> SeqoptError | KeyboardInterrupt:
@@ -246,11 +154,11 @@ def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
     if not margins[0]:
         return search(problem)
     try:
-        value, bound, rest, states = best_margin(problem, tell)
+        value, bound, rest, (order, states) = best_margin(problem, tell)
     except StopError as stop:
         raise _too_little(stop) from None
     if len(problem.goals) == 1:  # nothing else was wished
-        return StatePath(tuple(states), (value,), (bound,))
+        return StatePath(states, (value,), (bound,), order=order)
     try:
         after = after_margins(rest, search, tell)
     except InfeasibleError as error:
@@ -269,14 +177,17 @@ def narrow(
     tell: Watching,
     most: Sequence[float] | None = None,
     enough: float = -np.inf,
+    *,
+    every: bool = False,
 ) -> StatePath | None:
     """Return the best plan through a few states of every brick count, if there is one.
 
     Where states must stand it is asked of all of them only if the best paths fall; ``most``: what
-    goals may take of it, whether states stand or not; ``enough``: as of `Explorer`.
+    goals may take of it, whether states stand or not; ``enough``: as of `Explorer`; ``every``:
+    whether all orders that are sought are looked at, not the scene's own alone.
     """
     for standing in (False, True)[: 1 + bool(problem.demands)]:
-        space = FreeStates(problem, regrips=False, standing=standing)
+        space = build_space(problem, regrips=False, every=every, standing=standing)
         found = Explorer(space, width, tell, enough)
         with suppress(NothingFoundError):
             if found.rise(np.inf if most is None else most[0]):
@@ -284,32 +195,32 @@ def narrow(
                 if most is not None and not all(map(le, best.values, most)):
                     return None
                 if not problem.demands:
-                    return _selection(visited, best)
-                return best_standing(problem, found)
+                    return selected(space, visited, best)
+                return best_standing(found, problem.budgets)
     return None
 
 
-def best_standing(problem: States, found: Explorer) -> StatePath:
-    """Return the best path through visited states that stand as is demanded."""
+def best_standing(found: Explorer, budgets: Sequence[float] = ()) -> StatePath:
+    """Return the best path through visited states that pass what is asked of those on it alone."""
     while True:
-        visited, best = exact_best(found, problem.budgets)
-        if not close_fallen(problem, found, visited, best.path):
-            return _selection(visited, best)
+        visited, best = exact_best(found, budgets)
+        if not close_fallen(found, visited, best.path):
+            return selected(found.space, visited, best)
 
 
-def close_fallen(problem: States, found: Explorer, visited: Visited, path: Sequence[int]) -> bool:
-    """Exclude states of a path that are not proven to stand; return whether there are any.
+def close_fallen(found: Explorer, visited: Visited, path: Sequence[int]) -> bool:
+    """Exclude states of a path that do not pass what is expensive; return whether there are any.
 
-    With each go those of its part that are known to fall: none of these is asked.
+    With each go those of its part that are known to fail: none of these is asked.
     """
-    fallen = False
-    for level, key, state in visited.of(path) if problem.demands else ():
-        if not problem.stand(level, state[None])[0]:
+    fallen, space = False, found.space
+    for level, key, state in visited.of(path):
+        if not space.stand(key, state[None])[0]:
             fallen = True
             found.close((level, key), state[None])
             for *part, states in visited.states:
                 if part == [level, key]:
-                    found.close((level, key), states[problem.recalled(level, states) < 0])
+                    found.close((level, key), states[space.known(key, states) < 0])
     return fallen
 
 
@@ -330,13 +241,192 @@ def exact_best(found: Explorer, budgets: Sequence[float] = ()) -> tuple[Visited,
             return visited, best
 
 
-def _selection(visited: Visited, best: Best | Within) -> StatePath:
-    """Return a path as a plan, and with it the states that a better one could pass."""
+def selected(space: Space, visited: Visited, best: Best | Within) -> StatePath:
+    """Return a path as a plan, and with it the states that a better one could pass.
+
+    These are left out where an order was sought: rows of other orders mean other things.
+    """
     (graph, states), value = visited, best.values[0]
-    rows = tuple((level, *state.tolist()) for level, _, state in visited.of(best.path))
-    kept = graph.amounts[:, 0] <= tied(value) if graph.peaks[0] else None
-    parts = np.split(reached(graph, kept), np.cumsum([len(own) for *_, own in states])[:-1])
-    hint = tuple(own[inside] for (*_, own), inside in zip(states, parts, strict=True))
+    order, rows = space.path(visited.of(best.path))
+    hint = tuple[Ints, ...]()
+    if not order:
+        kept = graph.amounts[:, 0] <= tied(value) if graph.peaks[0] else None
+        parts = np.split(reached(graph, kept), np.cumsum([len(own) for *_, own in states])[:-1])
+        hint = tuple(own[inside] for (*_, own), inside in zip(states, parts, strict=True))
+    bounds, prices = best.values, tuple[tuple[float, ...], ...]()
     if isinstance(best, Within):
-        return StatePath(rows, best.values, best.bounds, hint, best.prices)
-    return StatePath(rows, best.values, best.values, hint)
+        bounds, prices = best.bounds, best.prices
+    path = rows, best.values, bounds, hint, prices
+    return StatePath(*path, order=order, effort=space.effort)
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to search; ``dear``: whether a first plan is worth its time only if it is the best."""
+
+    width: int
+    growth: float
+    dear: bool
+
+
+class ThresholdSearch:
+    """A search on its way: the incumbent, the lower bound of the first goal, and what is visited.
+
+    ``most``: how many sets of bricks there may be, where their order is sought. ``_cuts``: whether
+    a cut proves the first goal: it is a worst value, and there are no budgets.
+    """
+
+    def __init__(
+        self,
+        problem: States,
+        options: Options,
+        tell: Watching = lambda _: None,
+        most: int | None = None,
+    ) -> None:
+        self._problem, self._options, self.tell = problem, options, tell
+        self._peak = problem.goals[0].is_peak
+        self._cuts = self._peak and not problem.budgets
+        self.wide = Explorer(build_space(problem, most=most), tell=tell)
+        self.incumbent: StatePath | None = None
+        self.floors = tuple(map(tied, floors_of_goals(problem)))
+        self.bound = self.floors[0]
+
+    def run(self) -> StatePath:
+        """Return the best path, or the incumbent where the search is stopped."""
+        problem = self._problem
+        try:
+            # in a large problem a wider search may spare most of all states
+            sets = comb(2 * len(problem.network.inner), problem.space.robots)
+            many = sets * problem.space.levels > MANY
+            for wider in (1, WIDER):
+                if wider > 1 and not many and (self.incumbent or self._options.dear):
+                    break  # it is worth its time where the first one found nothing
+                plans = [self.incumbent, self._first(wider)]
+                self.incumbent = min(filter(None, plans), key=lambda p: p.objective, default=None)
+                if self.incumbent and self.is_best:
+                    return self.incumbent
+            if self.incumbent is None and problem.budgets:
+                _require_room(problem, self.tell)
+            return self.best()
+        except (StopError, KeyboardInterrupt) as stop:
+            return unproven(plan_by_then(self.incumbent, stop), self.wide, self.bound)
+
+    @property
+    def is_best(self) -> bool:
+        """Whether no plan is better than the incumbent, since it takes no more than all must."""
+        found = self.incumbent
+        within = found and not self._problem.budgets
+        return bool(within and found and all(map(le, found.objective, self.floors)))
+
+    def _first(self, wider: int) -> StatePath | None:
+        """Return a first plan; where that is expensive, only if it takes no more than floors."""
+        problem, width, floors = self._problem, wider * self._options.width, self.floors
+        enough = floors[0] if wider > 1 else -np.inf
+        most = floors if self._options.dear else None
+        if most and problem.each and not problem.demands:
+            found = _in_all(
+                problem, narrow(problem.each[0], width, self.tell, most, enough), floors
+            )
+            if found:
+                return found
+        return narrow(problem, width, self.tell, most, enough)
+
+    def best(self) -> StatePath:
+        """Return the best plan, by a threshold that rises until states below it reach an end."""
+        problem, threshold = self._problem, -np.inf
+        if self.incumbent or not self._peak:
+            threshold = max(self._ceiling / FAR_BELOW, self.bound)
+        if problem.each and self._peak:
+            threshold = max(_of_one(problem, self._options), self.bound)
+        below = self._ceiling if self._cuts else np.inf
+        while True:
+            if self._cuts and self._dives(threshold, below):
+                threshold = below = self._ceiling
+                continue
+            nothing = None
+            if self.wide.rise(threshold, below):
+                try:
+                    return best_standing(self.wide, problem.budgets)
+                except NothingFoundError as error:
+                    nothing = error
+            lower = self.wide.excluded
+            if self.incumbent and lower >= strictly_below(below):
+                if len(problem.goals) == 1:
+                    visited, effort = self.wide.visited(), self.wide.space.effort
+                    return replace(self.incumbent, visited=visited, effort=effort)
+                threshold, below = below, np.inf  # later goals need the states that take as much
+                continue
+            if lower == np.inf:
+                raise nothing or self.wide.without_plan("no plan is allowed")
+            # of a state that every plan would have to pass, or a larger
+            self.bound = max(self.bound, lower)
+            grown = threshold * self._options.growth if np.isfinite(threshold) else -np.inf
+            threshold = max(lower, min(self._ceiling, grown))
+
+    @property
+    def _ceiling(self) -> float:
+        return self.incumbent.objective[0] if self.incumbent else np.inf
+
+    def _dives(self, threshold: float, below: float) -> bool:
+        """Return whether a dive finds a better incumbent; what it visits in vain stays visited."""
+        if self.wide.passes == 0 or (np.isinf(below) and self.incumbent):
+            return False  # what lies below a first threshold is seldom all that a path needs
+        trial = self.wide.copy()
+        if trial.dive(threshold, below):
+            with suppress(InfeasibleError, NothingFoundError):  # of what stands
+                self.incumbent = best_standing(trial)
+                return True
+        self.wide = trial
+        return False
+
+
+def _require_room(problem: States, tell: Watching) -> None:
+    """Raise an `InfeasibleError` if every plan exceeds a budget, before thresholds are tried."""
+    totals = problem.goals[len(problem.aims) :]
+    every = Explorer(build_space(replace(problem, goals=totals, budgets=())), tell=tell)
+    if every.rise() and is_beyond(every.graph().graph, problem.budgets):
+        raise InfeasibleError("no plan is within all budgets")
+
+
+def _of_one(problem: States, options: Options) -> float:
+    """Return what the plan that is best in the first scenario takes in all; at least in that one.
+
+    What is below the former is enough to be looked at, where that plan is allowed in all.
+    """
+    first = replace(problem.each[0], goals=problem.aims, budgets=())  # budgets are of the scene
+    search = ThresholdSearch(first, options)
+    search.incumbent = narrow(first, WIDTH, lambda _: None)
+    one = search.best()
+    inside = _in_all(problem, one, (np.inf,) * len(problem.goals))
+    return (inside or one).objective[0]
+
+
+def _in_all(problem: States, one: StatePath | None, most: tuple[float, ...]) -> StatePath | None:
+    """Return a plan of one scenario, valued in all; None if in any it is not allowed.
+
+    Or if goals then take more of it than ``most``.
+    """
+    worst = np.full(len(problem.goals), -np.inf)
+    own = problem.at(one.order if one else ())
+    for level, same in groupby(one.states if one else (), key=itemgetter(0)):
+        values, allowed = own.values(level, np.array([state for _, *state in same]))
+        if not allowed.all():
+            return None
+        worst = np.maximum(worst, values.max(axis=0))
+    if one is None:
+        return None
+    pairs = zip(problem.goals, worst.tolist(), one.objective, strict=False)
+    objective = tuple(w if goal.is_peak else value for goal, w, value in pairs)
+    inside = all(map(le, objective, most))
+    return replace(one, objective=objective, bound=objective) if inside else None
+
+
+def unproven(found: StatePath, wide: Explorer, proven: float) -> StatePath:
+    """Return the first plan, and what thresholds and the levels reached prove of the first goal."""
+    bound = proven
+    if not wide.peaks[0] and wide.level:
+        graph, states = wide.graph()
+        least = distances(graph, graph.amounts[:, 0])
+        level = np.repeat([level for level, *_ in states], [len(rows) for *_, rows in states])
+        bound = float(least[level == wide.level].min(initial=np.inf))
+    return replace(found, bound=(min(bound, found.objective[0]), *found.bound[1:]))

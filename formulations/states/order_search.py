@@ -14,205 +14,175 @@ from the empty site to all bricks. A threshold rises, as for one order, until st
 connect both; the least value is among these. An arch of :math:`n` bricks that is built
 from its ends has some :math:`n^2` pairs :math:`(S, b)`, and any order of it is one of them.
 
-Where there are more than ``most`` pairs it goes on as a *heuristic*: from the best of a few orders
-it moves single bricks and runs of them to other places, as long as some schedule of the new order
-has a smaller worst step. The sets that were looked at leave a lower bound, and so does the whole
-structure, with which every order ends.
+Goals after the first are those of the best path, over all orders too. The search is that of
+`schedule_search`, from the best plan in the scene's own order. Where there are more than ``most``
+pairs it goes on as a *heuristic*: from the best of a few orders it moves single bricks and runs of
+them to other places, as long as some schedule of the new order has a smaller worst step. The sets
+that were looked at leave a lower bound, and so does the whole structure, which all orders pass.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
-from formulations.states._search import best_order, exact_best, shortest, watched
+from formulations.states._search import (
+    Options,
+    ThresholdSearch,
+    Watching,
+    plan_by_then,
+    unproven,
+    watched,
+)
 from formulations.states._totals import StopError
-from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
-from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph.formulation import Formulation, FormulationKind, Watch
-from seqopt.graph.orders import (
-    AllOrders,
-    OrderSelection,
-    OrderStates,
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
+from seqopt.graph._orders import (
+    OrderRules,
     TooManySetsError,
     Trial,
+    order_rules,
     order_value,
     trying,
-    whole_bound,
 )
-from seqopt.graph.paths import keep_best, lexicographic, reached
-from seqopt.responses.resources import HERE, Resources
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch, find_formulation
+from seqopt.graph.solution import StatePath
+from seqopt.graph.states.states import States
 from seqopt.scene.scene import ORDERS, Order
 from seqopt.work._workers import hire, map_ordered
-from seqopt.work.progress import Stage
+from seqopt.work.progress import Stage, Tell
 
-FAR_BELOW = 4.0  # the best order known, over the first threshold
-GROWTH = 1.1  # of the threshold
 BETTER = 1e-9  # share by which an order must be better
-
-
-@dataclass
-class _Search:
-    """What was found so far."""
-
-    problem: AllOrders
-    watch: Watch
-    resources: Resources
-    order: Order = ()
-    value: float = np.inf
-    bound: float = -np.inf
-    evaluated: int = 0
-    tries: int = 0  # of orders beside the best, and how many are left
-    left: int = 0
-
-    def tell(self, what: object) -> None:
-        """Say how far it is; end the search in time."""
-        if self.resources.progress is not None:
-            self.resources.progress(what)
-        if self.watch.over:
-            raise StopError("time")
-
-    def try_order(self, order: Order) -> None:
-        """Keep an order if it is allowed, and better than the best so far."""
-        if self.problem.allows(order):
-            self.take(order, order_value(self.problem, self.trial(order)))
-
-    def trial(self, order: Order) -> Trial:
-        """Return an order to be tried against the best so far; end the search in time."""
-        best = f", the best {self.value:.6g}" if self.order else ""
-        said: object = f"{self.evaluated} orders{best}"
-        if self.tries:
-            said = Stage("orders beside the best", 1 - self.left / self.tries)
-        self.tell(said)
-        return Trial(order, self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf)
-
-    def take(self, order: Order, value: float) -> bool:
-        """Return whether an order that was tried is better than the best so far, and keep it."""
-        self.evaluated += 1
-        self.left -= 1
-        better = value < self.value
-        if better:
-            self.order, self.value = order, value
-        return better
+HOW = Options(width=50, growth=1.1, dear=False)
 
 
 def solve(
-    problem: AllOrders,
+    problem: States,
     *,
     most: int = 5000,
     tries: int = 200,
     seed: int = 0,
     seconds: float = np.inf,
-    resources: Resources = HERE,
-) -> OrderSelection:
-    """Return the best order, or a good one and a bound.
+    max_memory: float = np.inf,
+    progress: Tell = lambda _: None,
+) -> StatePath:
+    """Return the best plan in any order, or one in a good order and a bound.
 
     ``most``: pairs of a set of bricks and a newest one, up to which all orders are looked at;
-    ``tries``: how many orders are tried where there are more; ``seed``: in which turn; ``seconds``:
-    after which the best order found is returned; ``resources``: what is found does not depend on
-    them. Raises `InfeasibleError`, `ProblemError`, `TimeUpError` if no order has a plan; a number
-    is none, or no plan was found by the end of the search.
+    ``tries``: how many orders are tried where there are more; ``seed``: in which turn; ``seconds``,
+    ``max_memory`` (bytes): after which, or above which, the best plan found is returned. Raises
+    `InfeasibleError`, `ProblemError`, `TimeUpError` if no order has a plan; a number is none, or no
+    plan was found by the end of the search.
     """
     if most < 0 or tries < 0:
         raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")
-    search = _Search(problem, Watch(seconds), resources)
-    states = problem.states
-    if states.totals or states.budgets or states.goals[0].margins:
-        tell = watched(states, search.watch, np.inf, resources.progress or (lambda _: None))
-        return best_order(problem, shortest, search.watch, tell)
+    first = problem.goals[0]
+    if not first.is_peak or first.margins or problem.budgets:
+        limits = {"seconds": seconds, "max_memory": max_memory, "progress": progress}
+        found: StatePath = find_formulation("schedule_search").solve(problem, **limits)
+        return found
+    watch = Watch(seconds)
+    search = ThresholdSearch(problem, HOW, watched(problem, watch, max_memory, progress), most)
+    own = problem.network.scene.build_order
     try:
-        why = _run(search, most, tries, np.random.default_rng(seed))
-    except StopError:
-        if not search.order:
-            raise TimeUpError("no order with a plan was found yet; give more") from None
-        why = "time"
-    except KeyboardInterrupt:
-        if not search.order:
-            raise
-        why = "interrupt"
-    if not search.order:
-        raise NothingFoundError("options most, tries: no order was found with a plan; give more")
-    bound = min(search.bound, search.value)
-    return OrderSelection(search.order, search.value, bound, search.evaluated, why)
-
-
-def _run(search: _Search, most: int, tries: int, rng: np.random.Generator) -> str:
-    """Search all orders, or try some; return why not all were looked at."""
-    scene = search.problem.scene
-    own, *named = dict.fromkeys([scene.build_order, *(make(scene) for make in ORDERS.values())])
-    search.try_order(own)
-    search.bound = whole_bound(search.problem)
-    if search.bound >= search.value * (1 - BETTER) or _all_orders(search, most):
-        return ""
-    for order in named:
-        search.try_order(order)
-    _neighbors(search, tries, rng)
-    return "size"
-
-
-def _all_orders(search: _Search, most: int) -> bool:
-    """Return whether all orders were looked at below a rising threshold; then the best is known."""
-    space = OrderStates(search.problem, most)
-    ceiling, threshold = search.value, -np.inf
-    if not space.peaks[0]:  # no state is too dear
-        ceiling = threshold = np.finfo(float).max
-    elif np.isfinite(ceiling):
-        threshold = max(ceiling / FAR_BELOW, search.bound)
-    found = Explorer(
-        space, tell=lambda it: search.tell(Stage("all orders", it.level / space.levels))
-    )
-    try:
-        while not found.rise(threshold):
-            search.bound = max(search.bound, min(found.excluded, ceiling))
-            if found.excluded == np.inf or threshold >= ceiling:
-                break
-            threshold = max(found.excluded, min(ceiling, threshold * GROWTH))
+        if order_rules(problem).allows(own):
+            quiet = watched(problem, watch, max_memory, lambda _: None)
+            search.incumbent = _plan_in(problem, own, quiet)
+        return search.incumbent if search.incumbent and search.is_best else search.best()
     except TooManySetsError:
-        return False
-    finally:
-        search.evaluated = max(search.evaluated, len(space.parts) - 1)
-    if found.whole:
-        visited, best = exact_best(found)
-        if best.values[0] < search.value * (1 - BETTER):
-            search.value = best.values[0]
-            search.order = search.problem.order_of(visited.of(_first_ending(visited)))
-    elif not search.order:
-        raise found.without_plan(
-            "no order of the bricks has a plan; extend a reach, loosen a rule or raise a limit"
-        )
-    search.bound = search.value
-    return True
+        tried = _Tried(problem, watch, progress, search.incumbent)
+        return tried.best(search, tries, np.random.default_rng(seed))
+    except (StopError, KeyboardInterrupt) as stop:
+        return unproven(plan_by_then(search.incumbent, stop), search.wide, search.bound)
 
 
-def _first_ending(visited: Visited) -> tuple[int, ...]:
-    """Return the best path that ends with the first brick: many orders are equally good."""
-    graph, states = visited
-    kept = keep_best(graph, 0)[0]
-    ends = graph.ends & reached(kept)
-    number = np.repeat([part[1] for _, part, _ in states], [len(rows) for _, _, rows in states])
-    return lexicographic(replace(kept, ends=ends & (number == number[ends].min()))).path
+def _plan_in(problem: States, order: Order, tell: Watching) -> StatePath | None:
+    """Return the best plan in an order, or the best by the end of the search; None without any."""
+    own = problem.at(order)
+    try:
+        found = ThresholdSearch(own, HOW, tell).run()
+    except (InfeasibleError, NothingFoundError):
+        return None
+    return replace(found, visited=(), order=order, effort=(1, own.models))
 
 
-def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:
-    """Try orders beside the best, until none of them is better or all tries are made."""
-    if not search.order:
-        return
-    search.tries = search.left = tries
-    better = True
-    with hire(search.resources.executor, search.resources.workers) as crew:
-        work = trying(search.problem, elsewhere=crew is not None)
-        while better and search.left > 0:
-            orders = [*islice(_beside(search.order, search.problem, rng), search.left)]
-            trials = map(search.trial, orders)
-            with closing(map_ordered(work, trials, crew)) as found:  # ends at the first better one
-                better = any(map(search.take, orders, found))
+class _Tried:
+    """Orders that are tried one by one: the best so far, the value of its plan, and how many."""
+
+    def __init__(
+        self, problem: States, watch: Watch, progress: Tell, first: StatePath | None
+    ) -> None:
+        self._problem, self._watch, self._progress = problem, watch, progress
+        self._rules = order_rules(problem)
+        self.order: Order = first.order if first else ()
+        self.value = first.objective[0] if first else np.inf
+        self.count = self._tries = self._left = 0
+
+    def best(self, search: ThresholdSearch, tries: int, rng: np.random.Generator) -> StatePath:
+        """Return the plan of the best order that is found, and what the search proved before."""
+        scene, why = self._problem.network.scene, "size"
+        try:
+            for order in dict.fromkeys(make(scene) for make in ORDERS.values()):
+                if self._rules.allows(order):
+                    self._take(order, order_value(self._problem, self._trial(order)))
+            self._neighbors(tries, rng)
+        except (StopError, KeyboardInterrupt) as stop:
+            why = str(stop) or "interrupt"
+            if not self.order:
+                plan_by_then(None, stop)  # says so
+        if not self.order:
+            raise NothingFoundError(
+                "options most, tries: no order was found with a plan; give more"
+            )
+        found = search.incumbent
+        if found is None or found.order != self.order:
+            found = _plan_in(self._problem, self.order, lambda _: None)
+        assert found is not None  # as it has a value
+        value = found.objective[0]
+        bound = min(search.bound, value)
+        bounds = (bound, *[-np.inf] * (len(found.objective) - 1))
+        closed = len(bounds) == 1 and bound >= value * (1 - BETTER)
+        sets, models = search.wide.space.effort
+        effort = max(self.count, sets), models + found.effort[1]
+        return replace(found, bound=bounds, stopped="" if closed else why, effort=effort)
+
+    def _trial(self, order: Order) -> Trial:
+        """Return an order to be tried against the best so far; end the search in time."""
+        best = f", the best {self.value:.6g}" if self.order else ""
+        said: object = f"{self.count} orders{best}"
+        if self._tries:
+            said = Stage("orders beside the best", 1 - self._left / self._tries)
+        self._progress(said)
+        if self._watch.over:
+            raise StopError("time")
+        return Trial(order, self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf)
+
+    def _take(self, order: Order, value: float) -> bool:
+        """Return whether an order that was tried is better than the best so far, and keep it."""
+        self.count += 1
+        self._left -= 1
+        better = value < self.value
+        if better:
+            self.order, self.value = order, value
+        return better
+
+    def _neighbors(self, tries: int, rng: np.random.Generator) -> None:
+        """Try orders beside the best, until none of them is better or all tries are made."""
+        self._tries = self._left = tries
+        better, means = bool(self.order), self._problem.resources
+        with hire(means.executor, means.workers) as crew:
+            work = trying(self._problem, elsewhere=crew is not None)
+            while better and self._left > 0:
+                orders = [*islice(_beside(self.order, self._rules, rng), self._left)]
+                trials = map(self._trial, orders)
+                with closing(map_ordered(work, trials, crew)) as found:  # ends at the first better
+                    better = any(map(self._take, orders, found))
 
 
-def _beside(order: Order, problem: AllOrders, rng: np.random.Generator) -> Iterator[Order]:
+def _beside(order: Order, rules: OrderRules, rng: np.random.Generator) -> Iterator[Order]:
     """Yield allowed orders in which one brick, or two or three in a row, stand elsewhere."""
     count = len(order)
     runs = [(a, size) for size in (1, 2, 3) for a in range(count - size + 1)]
@@ -221,7 +191,7 @@ def _beside(order: Order, problem: AllOrders, rng: np.random.Generator) -> Itera
         start, size, to = moves[i]
         run, rest = order[start : start + size], order[:start] + order[start + size :]
         changed = rest[:to] + run + rest[to:]
-        if problem.allows(changed):
+        if rules.allows(changed):
             yield changed
 
 

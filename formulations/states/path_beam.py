@@ -19,10 +19,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from formulations.choice import Choice
 from formulations.states._search import (
     after_margins,
-    best_order,
     best_standing,
     best_total,
     narrow,
@@ -34,53 +32,44 @@ from formulations.states._totals import StopError
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.formulation import Formulation, FormulationKind, Watch
-from seqopt.graph.orders import AllOrders, OrderSelection
-from seqopt.graph.paths import lexicographic
 from seqopt.graph.solution import StatePath
-from seqopt.graph.states._visits import FreeStates
+from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
-from seqopt.responses.resources import HERE, Resources
 from seqopt.work.progress import Tell
 
 
 def solve(
-    problem: States | AllOrders,
+    problem: States,
     *,
     width: int = 50,
     seconds: float = np.inf,
     max_memory: float = np.inf,
     progress: Tell = lambda _: None,
-    resources: Resources = HERE,
-) -> StatePath | OrderSelection:
+) -> StatePath:
     """Return a plan through the states of a beam.
 
     ``width``: how many new states of a brick count are kept, from 1; ``seconds``, ``max_memory``:
-    after which, or above how many bytes, it ends without a plan; ``progress``, or that of
-    ``resources``: told as a `seqopt.work.Stage` how far it is. Result: without a bound, but of
+    after which, or above how many bytes, it ends without a plan; ``progress``: told as a
+    `seqopt.work.Stage` how far it is. Result: without a bound, but of
     margins of stability. Raises `InfeasibleError` if no plan is allowed; `ProblemError`,
     `TimeUpError` if the width is not positive, or memory or time is up.
     """
     if width < 1:
         raise ProblemError(f"option width={width}: give a whole number from 1 on")
-    states = problem.states if isinstance(problem, AllOrders) else problem
     watch = Watch(seconds)
-    tell = watched(states, watch, max_memory, resources.progress or progress)
-    if isinstance(problem, AllOrders):
-        found = best_order(problem, lambda g, _: Choice(lexicographic(g).path), watch, tell, width)
-        return replace(found, bound=-np.inf)
-
-    if states.totals:
-        plan = best_total(states, shortest, watch, tell, width)
+    tell = watched(problem, watch, max_memory, progress)
+    if problem.totals:
+        plan = best_total(problem, shortest, watch, tell, width)
         return replace(plan, bound=(-np.inf,))
 
     def search(rest: States) -> StatePath:
         try:
-            found = narrow(rest, width, tell)
+            found = narrow(rest, width, tell, every=True)
             if found is None:
-                every = Explorer(FreeStates(rest), tell=tell)
+                every = Explorer(build_space(rest), tell=tell)
                 if not every.rise():
                     raise every.without_plan("no plan is allowed")
-                found = best_standing(rest, every)
+                found = best_standing(every, rest.budgets)
         except StopError as stop:
             return plan_by_then(None, stop)
         return replace(found, bound=(-np.inf,) * len(found.bound))

@@ -31,7 +31,8 @@ from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
 from seqopt.graph.solution import StatePath
-from seqopt.graph.states._visits import FreeStates, steps_of
+from seqopt.graph.states._visits import steps_of
+from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.sequence._robot_kinds import node_numbers
@@ -182,13 +183,13 @@ def _searched(
     first, waits, best = None, Waits(problem), list[StatePath]()
     try:
         first = narrow(problem, WIDTH, tell)
-        wide = Explorer(FreeStates(problem), tell=tell)
+        wide = Explorer(build_space(problem), tell=tell)
         wide.rise(_ceiling(problem, first, waits))
         while wide.whole:
             wide.refine()
             progress("makespan")
             visited, stages, found = _staged(problem, wide, choose, watch, waits)
-            if close_fallen(problem, wide, visited, found.path):
+            if close_fallen(wide, visited, found.path):
                 continue
             plan = _plan(problem, visited, stages, found, waits)
             best += [] if plan is None else [plan]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from itertools import accumulate
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,9 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError
 from seqopt.graph.graph import Graph, Rows
 from seqopt.graph.paths import strictly_below
+from seqopt.graph.space import Key, Moves, Space
 
 NEW, PENDING, OPEN, CLOSED = range(4)  # of a state: above the threshold, visited, not allowed
-Key: TypeAlias = Any  # which part, whatever a space calls it; it can be hashed
-
 
 Valued = Callable[[Ints], tuple[Floats, Bools, float]]
 """Returns values of states, which are allowed, and above which the first goal's are floors."""
@@ -103,78 +102,12 @@ TURNS = 2  # of a dive, over the number of levels
 BAND = 1e-5  # share of a value within which six digits do not decide
 
 
-class Moves(NamedTuple):
-    """Moves from states of one part to states of one part.
-
-    ``source`` (m,): row of the state that each leads from, among those that were asked for;
-    ``states`` (m, c): the states that they lead to; ``taken`` (m, k): what they take of amounts
-    that are about moves.
-    """
-
-    source: Ints
-    states: Ints
-    taken: Floats
-
-
-class _Space(Protocol):
-    """States and moves that an `Explorer` visits.
-
-    States stand in parts, rows of integers (n, c), and parts on levels; moves stay within a part or
-    lead to one of the next level.
-    """
-
-    @property
-    def first(self) -> int:
-        """The level on which builds begin, from 0."""
-
-    @property
-    def levels(self) -> int:
-        """The last level, on which builds may end."""
-
-    @property
-    def peaks(self) -> tuple[bool, ...]:
-        """By goal, whether the largest amount on a path counts."""
-
-    def start(self) -> tuple[Key, Ints]:
-        """Return the first part and its only state (1, c)."""
-
-    def codes(self, part: Key, states: Ints) -> Ints:
-        """Return a number (n,) for every state (n, c) that no other one of its part has."""
-
-    def within(self, part: Key, states: Ints) -> Moves:
-        """Return the moves of states (n, c) that stay within their part."""
-
-    def onward(self, part: Key, states: Ints) -> Iterator[tuple[Key, Moves]]:
-        """Yield the moves of states (n, c) that lead to the next level, by part."""
-
-    @property
-    def complete(self) -> bool:
-        """Whether these are all moves that are allowed."""
-
-    @property
-    def floors(self) -> bool:
-        """Whether values above those that count may be less than they are."""
-
-    def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
-        """Return what goals take of states (n, c), (n, g), and which of them are allowed (n,).
-
-        ``rough``: whether six digits are enough. ``most``: where there are floors, a state of which
-        the first goal takes more need not have values that are larger than this.
-        """
-
-    def amounts(self, values: Floats, taken: Floats) -> Floats:
-        """Return what goals take of moves (m, g): of the states they lead to, and as of `Moves`."""
-
-    def ended(self, part: Key, states: Ints) -> Bools:
-        """Return in which states (n, c) of the last level a build may end, (n,)."""
-
-
 class Explorer:
     """The states of a space that are reached through states below a threshold, which may rise.
 
     Parameters
     ----------
-    space : _Space
+    space : Space
     width : int, optional
         From how many new states of a level, those of least value, the search goes on, within parts
         only by moves that take nothing; from all by default.
@@ -185,6 +118,8 @@ class Explorer:
 
     Attributes
     ----------
+    space : Space
+        What is explored.
     threshold : float
         What the first goal takes of a visited state is no more, where it is about a peak.
     reached : int
@@ -199,12 +134,12 @@ class Explorer:
 
     def __init__(
         self,
-        space: _Space,
+        space: Space,
         width: int | None = None,
         tell: Callable[[Explorer], object] = lambda _: None,
         enough: float = -np.inf,
     ) -> None:
-        self._space, self._width, self._tell, self._enough = space, width, tell, enough
+        self.space, self._width, self._tell, self._enough = space, width, tell, enough
         self._draws = np.random.default_rng(0)
         key, states = space.start()
         self._parts: list[dict[Key, Part]] = [{} for _ in range(space.levels + 1)]
@@ -222,7 +157,7 @@ class Explorer:
     @property
     def peaks(self) -> tuple[bool, ...]:
         """By goal, whether the largest amount on a path counts."""
-        return self._space.peaks
+        return self.space.peaks
 
     def rise(self, threshold: float = np.inf, below: float = np.inf) -> bool:
         """Visit the states up to a threshold; return whether a build may end in one of them.
@@ -247,15 +182,15 @@ class Explorer:
         turns it gives up, since whole levels are visited in larger batches.
         """
         self._begin_pass(threshold, below)
-        level, deepest, few = self._space.levels, -1, FEW
-        turns = TURNS * self._space.levels
+        level, deepest, few = self.space.levels, -1, FEW
+        turns = TURNS * self.space.levels
         while not self.whole and turns:
             parts = self._parts[level].items()
             eligible = ((key, part, self._eligible(key, part)) for key, part in parts)
             found = next((each for each in eligible if len(each[2])), None)
             if found is None:
                 level -= 1
-                if level < self._space.first:
+                if level < self.space.first:
                     return False
                 continue
             turns -= 1
@@ -267,7 +202,7 @@ class Explorer:
             self._tell(self)
             few = FEW if level > deepest else 4 * few
             deepest = max(deepest, level)
-            level = min(level + 1, self._space.levels)
+            level = min(level + 1, self.space.levels)
         return self.whole
 
     def _begin_pass(self, threshold: float, below: float) -> None:
@@ -283,7 +218,7 @@ class Explorer:
 
     def visited(self) -> tuple[Ints, ...]:
         """Return the visited states, (n, c) each, level by level from the first."""
-        parts = (tuple(level.values()) for level in self._parts[self._space.first :])
+        parts = (tuple(level.values()) for level in self._parts[self.space.first :])
         none = np.zeros((0, self._shape[0]), dtype=self._shape[1])
         return tuple(
             np.concatenate([none, *(part.states[part.mark == OPEN] for part in level)])
@@ -294,7 +229,7 @@ class Explorer:
     def whole(self) -> bool:
         """Whether a build may end in a visited state."""
         parts = self._parts[-1].items()
-        return any(self._space.ended(k, p.states[p.mark == OPEN]).any() for k, p in parts)
+        return any(self.space.ended(k, p.states[p.mark == OPEN]).any() for k, p in parts)
 
     @property
     def excluded(self) -> float:
@@ -306,7 +241,7 @@ class Explorer:
     @property
     def complete(self) -> bool:
         """Whether no state was left out that is allowed and could be reached."""
-        return self._width is None and self._space.complete and self.excluded == np.inf
+        return self._width is None and self.space.complete and self.excluded == np.inf
 
     def without_plan(self, why: str) -> InfeasibleError | NothingFoundError:
         """Return the error that says that the visited states have no plan, and why.
@@ -342,14 +277,14 @@ class Explorer:
         part.mark[fresh] = OPEN
         self.reached = max(self.reached, level)
         if level:
-            moves = self._space.within(key, part.states[fresh])
+            moves = self.space.within(key, part.states[fresh])
             self._keep((level, key, key), fresh, moves, part)
 
     def _eligible(self, key: Key, part: Part) -> Ints:
         """Return the states that are to be visited, all new ones being valued."""
 
         def valued(states: Ints) -> tuple[Floats, Bools, float]:
-            return *self._space.values(key, states, rough=True, most=self._most), self._most
+            return *self.space.values(key, states, rough=True, most=self._most), self._most
 
         while True:
             part.value(np.flatnonzero(part.mark == NEW), valued)
@@ -358,7 +293,7 @@ class Explorer:
             if np.isfinite(below):
                 inside &= first < strictly_below(below)
             fresh = np.flatnonzero(inside)
-            if self._space.floors and part.value(fresh[part.floor[fresh]], valued):
+            if self.space.floors and part.value(fresh[part.floor[fresh]], valued):
                 continue
             close = fresh[:0]
             if np.isfinite(below):  # six digits do not say whether these lie below the cut
@@ -378,7 +313,7 @@ class Explorer:
             for key, part in parts.items():
                 close = ~part.exact & (part.mark == OPEN)
                 near = np.full(len(close), values is None)
-                for column, peak in enumerate(self._space.peaks):
+                for column, peak in enumerate(self.space.peaks):
                     if peak and values is not None:
                         gap = np.abs(part.values[:, column] - values[column])
                         near |= gap <= BAND * abs(values[column])
@@ -389,31 +324,31 @@ class Explorer:
         return found
 
     def _exact(self, key: Key, states: Ints) -> Floats:
-        return self._space.values(key, states, rough=False, most=np.inf)[0]
+        return self.space.values(key, states, rough=False, most=np.inf)[0]
 
     def close(self, part: tuple[int, Key], states: Ints) -> None:
         """Exclude visited states of a part, given by its level and key."""
         found = self._parts[part[0]][part[1]]
-        found.mark[found.add(self._space.codes(part[1], states), states)] = CLOSED
+        found.mark[found.add(self.space.codes(part[1], states), states)] = CLOSED
 
     @property
     def _most(self) -> float:
         """What the first goal may take of a visited state, up to the error of six digits."""
-        if not self._space.peaks[0]:
+        if not self.space.peaks[0]:
             return np.inf
         most = min(self.threshold, self.below)
         return most + (BAND * abs(most) if np.isfinite(most) else 0.0)
 
     def _go_on(self, level: int, key: Key, part: Part, fresh: Ints) -> None:
         """Add what visited states lead to on the next level."""
-        if level == self._space.levels or not len(fresh):
+        if level == self.space.levels or not len(fresh):
             return
-        for following, moves in self._space.onward(key, part.states[fresh]):
+        for following, moves in self.space.onward(key, part.states[fresh]):
             self._keep((level, key, following), fresh, moves, self._part(level + 1, following))
 
     def _keep(self, which: tuple[int, Key, Key], fresh: Ints, moves: Moves, to: Part) -> None:
         before = len(to.states)
-        rows = to.add(self._space.codes(which[2], moves.states), moves.states)
+        rows = to.add(self.space.codes(which[2], moves.states), moves.states)
         self._moves[which].append((fresh[moves.source].astype(np.int32), rows, moves.taken))
         self.nbytes += 2 * rows.nbytes + moves.taken.nbytes
         self.nbytes += (len(to.states) - before) * self._each
@@ -436,13 +371,13 @@ class Explorer:
             source, found = number[level, key][source], number[further, to][target]
             kept = (source >= 0) & (found >= 0)
             values = self._parts[further][to].values[target[kept]]
-            moves.append((source[kept], found[kept], self._space.amounts(values, taken[kept])))
+            moves.append((source[kept], found[kept], self.space.amounts(values, taken[kept])))
         ordered = [(*key, order) for key, order in zip(keys, orders, strict=True)]
         states = tuple((level, key, self._parts[level][key].states[o]) for level, key, o in ordered)
-        ends, last = np.zeros(sum(map(len, orders)), dtype=bool), self._space.levels
+        ends, last = np.zeros(sum(map(len, orders)), dtype=bool), self.space.levels
         for level, key, rows in states:
             if level == last:
                 first = firsts[level, key]
-                ends[first : first + len(rows)] = self._space.ended(key, rows)
+                ends[first : first + len(rows)] = self.space.ended(key, rows)
         source, target, taken = map(np.concatenate, zip(*moves, strict=True))
-        return Visited(Graph(source, target, taken, self._space.peaks, ends), states)
+        return Visited(Graph(source, target, taken, self.space.peaks, ends), states)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.graph.formulation import Finding
 from seqopt.graph.graph import LabelProof
+from seqopt.scene.scene import Order
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,7 +27,10 @@ class StatePath(FrozenValue):
     goals where there are budgets; ``starts``, ``ends``: where mortar cures, when steps start, s,
     and the last one ends; ``motions``: by which labels there are a proof: states fall in them, (b,
     6) in m and rad; ``trace``: what the first goal was known to be at which time;
-    ``compile_seconds``: part of the time that went into writing a program down for a solver, s.
+    ``compile_seconds``: part of the time that went into writing a program down for a solver, s;
+    ``order``: names of all bricks, where their order was sought, empty where it is given;
+    ``effort``: how many sets of bricks with a newest one, or orders, were looked at for it, and how
+    many grip sets were solved in these.
     """
 
     states: tuple[tuple[int, ...], ...]
@@ -42,3 +46,5 @@ class StatePath(FrozenValue):
     motions: tuple[Floats, ...] = field(default=(), repr=False)
     trace: tuple[Finding, ...] = field(default=(), compare=False, repr=False)
     compile_seconds: float = field(default=0.0, compare=False)
+    order: Order = ()
+    effort: tuple[int, int] = field(default=(0, 0), compare=False)

@@ -12,19 +12,17 @@ import numpy as np
 from seqopt._registry import offered
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph._explore import Explorer, Visited
+from seqopt.graph._explore import Explorer
 from seqopt.graph._timed import TimedGraph
 from seqopt.graph.formulation import as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
 from seqopt.graph.layers.compiled import compile_layers, on_paths
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
-from seqopt.graph.states._visits import FreeStates, ScenarioSums
+from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.plan.solving import graph_of, usual
 from seqopt.problem.problem import Aim, Problem
-from seqopt.sequence._robot_kinds import node_numbers
 
 
 def compile_instance(
@@ -89,12 +87,13 @@ def compile_instance(
     return replace(instance, facts={"seqopt": version("seqopt"), **(facts or {})})
 
 
-def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
+def _of_states(name: str, states: States, below: float) -> Instance:
     """Return the instance of states: bricks that stand, and nodes that robots hold."""
-    states = graph.states if isinstance(graph, AllOrders) else graph
     if below < np.inf and (states.totals or not states.goals[0].is_peak):
         raise ProblemError("below: the first aim is no worst step; leave it out")
-    found = Explorer(_space(graph, states))
+    demanded = bool(states.demands) or any(goal.margins for goal in states.goals)
+    space = build_space(states, standing=demanded)
+    found = Explorer(space)
     found.rise(below)
     if not found.whole:
         raise InfeasibleError(f"instance {name}: no plan is allowed")
@@ -106,7 +105,8 @@ def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
         asked: Any = [f"cost {k}" for k in range(count)], (tail,), ()
     else:
         asked = _asked(states)
-    rows, timed = _rows(graph, visited), None
+    rows = np.concatenate([space.rows(key, own) for _, key, own in visited.states])
+    timed = None
     whole = visited.graph
     if states.is_timed:
         if states.standing is not None and states.standing.curing is not None:
@@ -121,14 +121,6 @@ def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
     names, goals, caps = asked
     arrays = small.source, small.target, small.ends
     return Instance(name, *arrays, tuple(names), small.amounts, goals, caps, rows[kept], timed)
-
-
-def _space(graph: States | AllOrders, states: States) -> Any:
-    """Return states and moves, with all that is demanded of states asked."""
-    if isinstance(graph, AllOrders):
-        return OrderStates(graph, MOST_PARTS, every_goal=not states.totals)
-    asked = bool(states.demands) or any(goal.margins for goal in states.goals)
-    return (ScenarioSums if states.totals else FreeStates)(states, standing=asked)
 
 
 def _asked(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap, ...]]:
@@ -146,25 +138,6 @@ def _asked(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap, 
         else:
             caps.append(_Cap(str(goal), column, bound))
     return names, tuple(goals), tuple(caps)
-
-
-def _rows(graph: States | AllOrders, visited: Visited) -> Ints:
-    """Return what nodes stand for: the level, and the node that each robot holds, 0 for none.
-
-    Of all orders the brick that was placed last comes second. Robots of one kind stand together.
-    """
-    robots = (graph.states if isinstance(graph, AllOrders) else graph).space.robots
-    parts = []
-    for level, key, states in visited.states:
-        held = states[:, :robots].astype(np.int64)
-        if isinstance(graph, AllOrders):
-            newest = np.full((len(held), 1), key[1])
-            parts.append(np.column_stack([np.full(len(held), level), newest, held]))
-        else:
-            numbers = np.array([0, *node_numbers(graph.network)])
-            named = np.where(held > 0, numbers[held.clip(min=0)], 0)
-            parts.append(np.column_stack([np.full(len(held), level), named]))
-    return np.concatenate(parts)
 
 
 def _cut(timed: TimedGraph, whole: Graph, kept: Ints, graph: Graph) -> TimedGraph:

@@ -6,7 +6,7 @@ given, so that many are valued in one batch; those that it left out are found al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -22,6 +22,7 @@ from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import is_beyond
 from seqopt.judge._claims import budget_bounds
 from seqopt.judge._rule_moves import Transitions
+from seqopt.judge._spaces import OneSchedule, build_parts
 from seqopt.judge._states import Filter, Reachable, StateEvaluator
 from seqopt.judge._twin import PathTwin
 from seqopt.sequence._robot_kinds import node_numbers
@@ -30,48 +31,21 @@ BELOW = 1e-9  # by how much a plan must be better, over the size of the value
 Hint = Mapping[int, Ints]  # states that a search visited, by level
 
 
-class Space:
-    """The states of one schedule in parts, a part for every level; `levels`: after the start."""
-
-    def __init__(self, evaluator: StateEvaluator) -> None:
-        self._evaluator, tables = evaluator, evaluator.tables
-        self.levels = range(max(1, tables.first), tables.last + 1)
-
-    @property
-    def first(self) -> Any:
-        """The part in which builds begin."""
-        return self._evaluator.tables.first
-
-    def at(self, part: Any) -> tuple[int, StateEvaluator]:
-        """Return the level of a part, and what evaluates its states."""
-        return part, self._evaluator
-
-    def to_part(self, part: Any, evaluator: StateEvaluator, states: Ints) -> Ints:
-        """Return states that are passed from part to part as rows of one."""
-        return states
-
-    def from_part(self, part: Any, states: Ints) -> Ints:
-        """Return rows of a part as they are passed on."""
-        return states
-
-    def onward(self, part: Any, found: Reachable) -> Iterator[tuple[Any, Transitions]]:
-        """Yield the parts of later levels that follow, with the transitions that lead there."""
-        yield from ((move.level, move) for move in found.onward if move.level > part)
-
-
 class Rebuilt:
     """The states of a space that pass a filter, part by part, and the moves between them.
 
-    ``parts``, ``states``: in which builds begin, then all others; of schedules parts are levels.
+    ``parts``, ``levels``, ``evaluators``, ``states``: of the part in which builds begin, then of
+    all others; of one schedule parts are levels.
     """
 
-    def __init__(self, space: Space, asked: Filter, hint: Hint | None = None) -> None:
+    def __init__(self, space: OneSchedule, asked: Filter, hint: Hint | None = None) -> None:
         self._space, self._asked, self._hint = space, asked, hint or {}
         part = space.first
         level, evaluator = space.at(part)
         start = evaluator.tables.start()
         self._peaks = tuple(goal.is_peak for goal in evaluator.problem.goals)
         self.parts, self.states = [part], [start]  # the start passes whatever it takes
+        self.levels, self.evaluators = [level], [evaluator]
         self._ends, self._count = [np.zeros(1, dtype=bool)], 1
         none = np.zeros(0, dtype=np.int64)
         self._moves = [(none, none, np.zeros((0, len(self._peaks))))]
@@ -115,6 +89,8 @@ class Rebuilt:
         self._go_on(part, level, found, self._count)
         self._count += len(found.states)
         self.parts.append(part)
+        self.levels.append(level)
+        self.evaluators.append(evaluator)
         self.states.append(found.states)
         self._ends.append(evaluator.tables.ends(level, found.states))
 
@@ -131,28 +107,31 @@ class Rebuilt:
 
 
 class Proof:
-    """Lower bounds of all plans of a free schedule, and whether there is any plan.
+    """Lower bounds of all plans of a problem, and whether there is any plan.
 
-    ``hint`` (mapping of int to (n, c) int): states that are likely to be passed, by level, as of
-    `seqopt.sequence._rule_space.FreeSpace`; only time depends on them; ``states``: how many states
-    a better plan could pass.
+    ``hint`` (mapping of int to (n, c) int): states of its one order that are likely to be passed,
+    by level, as of `seqopt.sequence._rule_space.FreeSpace`; only time depends on them;
+    ``evaluator``: of its states, of all orders in the scene's own; ``states``: how many states a
+    better plan could pass. Raises `TooManyPartsError` where there are too many to be looked at.
     """
 
     def __init__(self, problem: States, hint: Hint | None = None) -> None:
-        self.evaluator = StateEvaluator(problem)
-        self._hint = {} if hint is None else as_rows(problem, self.evaluator, hint)
+        self._space = build_parts(problem)
+        self.evaluator = self._space.evaluator
+        given = hint if problem.orders is None else None
+        self._hint = {} if given is None else as_rows(problem, self.evaluator, given)
         self.states = 0
 
     def rebuilt(self, asked: Filter, *, hinted: bool = True) -> Rebuilt:
         """Return the states that pass a filter."""
-        return Rebuilt(Space(self.evaluator), asked, self._hint if hinted else None)
+        return Rebuilt(self._space, asked, self._hint if hinted else None)
 
     def bounds(self, values: Sequence[float]) -> tuple[float, ...]:
         """Return lower bounds, goal by goal, those before it being at their values.
 
         ``values``: of every goal; bounds of margins mean nothing. Infinite where there is no plan.
         """
-        least = self.evaluator.least()
+        least = self._space.least()
         if not self._leaves_room(values, least):
             self.states = 1  # a cut before the end alone
             return least
@@ -165,11 +144,23 @@ class Proof:
             out = self._where_states_stand(exact, values, bounds)
         return out
 
+    def bounds_first(self, value: float) -> bool:
+        """Return whether a value is a lower bound of the first goal, if that is a worst value."""
+        first = self.evaluator.problem.goals[0]
+        if not first.is_peak or first.margins:
+            return False
+        if not self._leaves_room((value,), self._space.least()):
+            return True
+        return self._reaches_no_end((value,))
+
     def _is_cut(self, values: Sequence[float]) -> bool:
         """Return whether states strictly below the one worst value there is reach no end."""
         goals = self.evaluator.problem.goals
         if len(goals) > 1 or not goals[0].is_peak:
             return False
+        return self._reaches_no_end(values)
+
+    def _reaches_no_end(self, values: Sequence[float]) -> bool:
         graph = self.rebuilt(Filter(values, strict=True)).graph()
         seen = reached(graph)
         self.states = int(seen.sum())
@@ -237,20 +228,21 @@ class Proof:
 
         Which are asked is of no account: without those that fall, no end may be reached.
         """
-        evaluator, rebuilt = self.evaluator, self.rebuilt(Filter(), hinted=False)
+        rebuilt = self.rebuilt(Filter(), hinted=False)
         graph, parts = rebuilt.graph(), rebuilt.part_of()
         starts = np.searchsorted(parts, np.arange(len(rebuilt.states)))
         known = np.zeros(graph.states, dtype=np.int64)
         known[0] = PASSES
 
         def states(part: int, rows: Ints) -> tuple[int, Ints, Sequence[float]]:
-            return rebuilt.parts[part], rebuilt.states[part][rows - starts[part]], margins
+            return rebuilt.levels[part], rebuilt.states[part][rows - starts[part]], margins
 
         def ask(part: int, rows: Ints) -> Ints:
-            return np.where(evaluator.may_stand(*states(part, rows)), PASSES, FAILS)
+            may = rebuilt.evaluators[part].may_stand(*states(part, rows))
+            return np.where(may, PASSES, FAILS)
 
         def known_before(part: int, rows: Ints) -> Ints:
-            return evaluator.known_to_stand(*states(part, rows))
+            return rebuilt.evaluators[part].known_to_stand(*states(part, rows))
 
         _lazy_path(graph, parts, known, ask, known_before)
         left = reached(graph, (known != FAILS)[graph.target])
@@ -272,10 +264,11 @@ class Proof:
         except InfeasibleError:
             return none
         out, first = [none], 0
-        for level, rows in zip(rebuilt.parts, rebuilt.states, strict=True):
+        parts = zip(rebuilt.evaluators, rebuilt.levels, rebuilt.states, strict=True)
+        for evaluator, level, rows in parts:
             own = path[(path >= first) & (path < first + len(rows))]
             if len(own):
-                out.append(own[~self.evaluator.may_stand(level, rows[own - first], margins)])
+                out.append(own[~evaluator.may_stand(level, rows[own - first], margins)])
             first += len(rows)
         return np.concatenate(out)
 

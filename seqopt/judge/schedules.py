@@ -15,10 +15,12 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError, StepError
+from seqopt.graph._orders import order_rules
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.judge._proof import BELOW, Hint, Proof
 from seqopt.judge._rule_moves import check_free
+from seqopt.judge._spaces import TooManyPartsError
 from seqopt.judge._step_checks import check_props, check_shape, proven_margins, require_margin
 from seqopt.judge._twin import PathTwin, exceeds, own_values, twin_of
 from seqopt.judge.certificate import Certificate
@@ -29,10 +31,12 @@ from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along, tol
 from seqopt.responses.quantities import CHOSEN_BY, PROP_EXCESS
 from seqopt.responses.table import _analyzed, _Columns, force_column
 from seqopt.scene._armed import check_postures
+from seqopt.scene.scene import Order
 from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
 
+ENDED = ("time", "memory", "interrupt")  # searches that were told to end: no bound is proven
 TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what the engine says
 Bounds = tuple[float, ...]
 
@@ -54,18 +58,67 @@ def judge_schedule(
     a limit or a budget is exceeded, or a plan is better than promised; `StepError` if a step breaks
     a rule.
     """
-    values, aims = _as_claimed(problem, selection, steps), len(problem.aims)
+    own, aims = ordered(problem, selection.order), len(problem.aims)
+    values = _as_claimed(own, selection, steps)
     for goal, spent, cap in zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True):
         if not spent <= cap + TOLERANCE * cap:
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
     twin = next((goal.twin for goal in problem.goals if goal.in_time), None)
     proves_time = twin is not None and bool(np.isfinite(selection.bound).any())
     is_claimed = not proves_time and (selection.stopped or problem.is_timed)
+    none = (-np.inf,) * len(values)
     if is_claimed or not _has_twins(problem):  # bounds are claimed alone
-        bounds = _with_counts(problem, twin, values, (-np.inf,) * len(values))
+        bounds = _with_counts(problem, twin, values, none)
+        if selection.stopped not in ENDED and not problem.is_timed:
+            bounds = _first_bound(problem, selection, bounds)
         gap = _gap(problem.aims, values, bounds)
         left = gap if is_claimed else _gap(problem.aims, values, selection.bound)
         return Certificate(values, bounds, gap, left)
+    try:
+        return _proven(problem, selection, values, hint, exact=exact)
+    except TooManyPartsError:
+        left = _gap(problem.goals, values, _closed(values, selection.bound))
+        return Certificate(values, none, np.inf, left)
+
+
+def ordered(problem: States, order: Order) -> States:
+    """Return the problem of an order that is claimed, which must be one of those that are sought.
+
+    Raises `SolverError` if it is none.
+    """
+    if problem.orders is None:
+        if order:
+            raise SolverError("an order of the bricks is claimed, where it is given")
+        return problem
+    if sorted(order) != sorted(problem.network.scene.build_order):
+        raise SolverError(f"the order {order} does not name every brick once")
+    if not order_rules(problem).allows(order):
+        raise SolverError("the order places a brick that nothing ties")
+    return problem.at(order)
+
+
+def _first_bound(problem: States, selection: StatePath, bounds: Bounds) -> Bounds:
+    """Return bounds with the one that is claimed of the first goal, where it can be proven.
+
+    Raises `SolverError` if a plan is better.
+    """
+    least, alone = selection.bound[0], replace(problem, budgets=(), goals=problem.goals[:1])
+    if not np.isfinite(least) or not _has_twins(alone):
+        return bounds
+    try:
+        if not Proof(alone).bounds_first(least):
+            raise SolverError(f"{least:.9g} is promised as the least; a plan has less")
+    except TooManyPartsError:
+        return bounds
+    return (least, *bounds[1:])
+
+
+def _proven(
+    problem: States, selection: StatePath, values: Bounds, hint: Hint | None, *, exact: bool
+) -> Certificate:
+    """Return the certificate of values by bounds that are proven."""
+    aims = len(problem.aims)
+    twin = next((goal.twin for goal in problem.goals if goal.in_time), None)
     proof, claimed = Proof(_weighed(problem, selection), hint), selection.bound
     margins = _margin_bounds(problem, proof, values)
     if twin is not None:

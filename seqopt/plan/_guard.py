@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, partial
 from numbers import Real
 from typing import Any, TypeVar
 
@@ -157,7 +157,10 @@ def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
         seconds = float(found.compile_seconds)
         if not 0 <= seconds < np.inf:
             raise ValueError(f"compile_seconds is {seconds}")
-        return StatePath(states, objective, bound, *told, compile_seconds=seconds)
+        order = tuple(map(_whole, found.order))
+        sets, models = map(_whole, found.effort)
+        own = partial(StatePath, compile_seconds=seconds, order=order, effort=(sets, models))
+        return own(states, objective, bound, *told)
 
 
 def _whole(given: object) -> int:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain, combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,20 +14,19 @@ from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
+from seqopt.graph._orders import TooManySetsError
 from seqopt.graph.duality import least_sum
 from seqopt.graph.instance import Instance, _Cap
 from seqopt.graph.paths import distances, tied
-from seqopt.graph.states._visits import barred
+from seqopt.graph.states.explored import barred
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import case_of, is_kept, least_within
 from seqopt.judge._proof import Proof
+from seqopt.judge._spaces import TooManyPartsError
 from seqopt.plan._remedies import LateError, Look, Remedies
 from seqopt.plan._stops import stops_of
 from seqopt.plan.search._margin_search import STEPS, WORST, with_margin
 from seqopt.problem.amounts import Amount
-
-if TYPE_CHECKING:
-    from seqopt.graph.orders import AllOrders
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
 
@@ -109,24 +107,20 @@ def confirmed(
                 return SolverError(f"formulation {name} {ALLOWED}")
             hint = {level: rows for level, _, rows in found.graph().states}
         proven = Proof(steps, hint).is_impossible()
-    except LateError:
+    except (LateError, TooManySetsError, TooManyPartsError):
         proven = False
-    bare = replace(problem, goals=problem.aims, budgets=())
+    bare = replace(problem, goals=problem.aims, budgets=(), orders=None)
     why = "no plan is allowed"
     if explain:
         why = _why_impossible(bare, end - time.perf_counter())
+    if problem.orders is not None:
+        why = f"no order of the bricks has a plan; in the scene's own, {why}"
     if proven:
         return InfeasibleError(why)
     undecided = sum(each.stability.undecided for each in steps.each or (steps,) if each.demands)
     if undecided:
         return NothingFoundError(f"{undecided} grip sets neither stand nor fall for sure: {why}")
     return claimed(name, why, exact=exact)
-
-
-def without_order(problem: AllOrders, name: str, seconds: float = np.inf) -> InfeasibleError:
-    """Return the error that no order has a plan, which is proven, and why the scene's has none."""
-    why = confirmed(problem.planned(problem.scene.build_order), name, seconds)
-    return InfeasibleError(f"no order of the bricks has a plan; in the scene's own, {why}")
 
 
 def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) -> SeqoptError:

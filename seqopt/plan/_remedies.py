@@ -19,7 +19,7 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.paths import least_peak
-from seqopt.graph.states._visits import barred, explore
+from seqopt.graph.states.explored import barred, explore
 from seqopt.graph.states.states import States
 from seqopt.plan._softer import HARD, ground_moves, softer_grips, whole_load
 from seqopt.plan._stops import Stops, stops_of

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from seqopt.graph.formulation import End
-from seqopt.judge.certificate import TOLERANCE, _known_gap
+from seqopt.judge.certificate import _known_gap
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import length_text
-
-if TYPE_CHECKING:
-    from seqopt.graph.orders import AllOrders, OrderSelection
 
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
@@ -51,54 +47,33 @@ def bare_summary(plan: Any) -> dict[str, object]:
     }
 
 
-@dataclass(frozen=True, repr=False)
-class FoundOrder:
-    """The build order of a plan, and what is known of all others.
+def order_bound(plan: Any) -> tuple[float, bool]:
+    """Return the lower bound of the first goal over all orders, and whether that is proven."""
+    proof, claimed = plan.certificate, plan.selection.bound[0]
+    proven = proof is not None and isfinite(proof.bounds[0])
+    return (proof.bounds[0], True) if proven else (claimed, False)
 
-    ``problem``: among which orders it was sought; ``selection``: what the formulation claims;
-    ``proven``: whether the lower bound of all orders is proven; else it is claimed.
-    """
 
-    problem: AllOrders
-    selection: OrderSelection
-    proven: bool
+def order_facts(plan: Any) -> dict[str, object]:
+    """Return what the summary of a plan says of its order, where that was sought, for JSON."""
+    bound, proven = order_bound(plan)
+    return {
+        "order": [*plan.order],
+        "orders": plan.problem.orders.value,
+        "order_status": str(plan.status),
+        "order_bound": bound if isfinite(bound) else None,
+        "order_bound_proven": proven,
+        "order_evaluated": plan.selection.effort[0],
+        "order_stopped": plan.selection.stopped,
+    }
 
-    def __repr__(self) -> str:
-        return f"<FoundOrder of {len(self.selection.order)} bricks: {self.bound_said}>"
 
-    @property
-    def gap(self) -> float:
-        """What the bound leaves open, over the value."""
-        value = self.selection.objective
-        return max(0.0, value - self.selection.bound) / max(abs(value), TOLERANCE)
-
-    @property
-    def status(self) -> Status:
-        """What is known of the order: whether none is better."""
-        if self.gap > TOLERANCE:
-            return Status.FEASIBLE
-        return Status.OPTIMAL if self.proven else Status.CLAIMED
-
-    def described(self) -> dict[str, object]:
-        """Return what the summary of a plan says of the order, ready for JSON."""
-        found = self.selection
-        return {
-            "order": [*found.order],
-            "orders": self.problem.among.value,
-            "order_status": str(self.status),
-            "order_bound": found.bound if isfinite(found.bound) else None,
-            "order_bound_proven": self.proven,
-            "order_evaluated": found.evaluated,
-            "order_stopped": found.stopped,
-        }
-
-    @property
-    def bound_said(self) -> str:
-        """The lower bound of all orders, and whether it is proven, in words."""
-        if not isfinite(self.selection.bound):
-            return "others are not looked at yet"
-        claimed = "" if self.proven else " (claimed, not proven)"
-        goal = self.problem.states.goals[0]
-        if is_tolerance(goal.name):  # of which more is better
-            return f"no order above {length_text(goal.shown(self.selection.bound))}{claimed}"
-        return f"no order below {self.selection.bound:.6g}{claimed}"
+def order_bound_said(plan: Any) -> str:
+    """Return the lower bound of all orders, and whether it is proven, in words."""
+    bound, proven = order_bound(plan)
+    if not isfinite(bound):
+        return "others are not looked at yet"
+    claimed, goal = "" if proven else " (claimed, not proven)", plan.graph.goals[0]
+    if is_tolerance(goal.name):  # of which more is better
+        return f"no order above {length_text(goal.shown(bound))}{claimed}"
+    return f"no order below {bound:.6g}{claimed}"

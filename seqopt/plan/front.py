@@ -13,20 +13,20 @@ import pandas as pd
 from seqopt.arrays import Floats, FrozenValue, Ints, Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError, did_you_mean
-from seqopt.graph._explore import Explorer, Key, Visited
+from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.graph.graph import Graph
-from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
-from seqopt.graph.states._visits import barred, explore, steps_of, steps_with, with_held
+from seqopt.graph.space import Space
+from seqopt.graph.states._visits import steps_of, steps_with, with_held
+from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import States
-from seqopt.judge._orders import finds_better_order
-from seqopt.judge.schedules import plan_values
+from seqopt.judge.schedules import ordered, plan_values
 from seqopt.plan._guard import called, readable, text
-from seqopt.plan._infeasible import confirmed, without_order
+from seqopt.plan._infeasible import confirmed
 from seqopt.plan._paths import PROOF
 from seqopt.plan._range import INTERRUPTED, RANGE, keeping, leaves
-from seqopt.plan.solving import graph_of, states_of
+from seqopt.plan.solving import states_of
 from seqopt.problem.amounts import REGRIPS, STEPS, Amount
 from seqopt.problem.problem import Problem
 from seqopt.responses._range import Moved, most_moved
@@ -96,22 +96,26 @@ class _StateFront:
         """The goals."""
         return tuple(map(str, self._problem.goals))
 
-    def _explored(self) -> Explorer:
-        """Return all states that are allowed; raise `InfeasibleError` if no build ends."""
-        found = explore(self._problem)
-        if not found.whole:
-            raise confirmed(self._problem, "the search")
-        return found
+    @cached_property
+    def _known(self) -> dict[Order, States]:
+        return {}
 
     @cached_property
-    def _visited(self) -> Visited:
-        found = self._explored()
+    def _explored(self) -> tuple[Visited, Space]:
+        """All states that are allowed, and their space; `InfeasibleError` if no build ends."""
+        found = explore(self._problem, tell=_require_memory)
+        if not found.whole:
+            raise confirmed(self._problem, "the search")
         found.refine()
         graph, states = found.graph()
         amounts = graph.amounts.copy()
         peaks = [k for k, peak in enumerate(graph.peaks) if peak]
         amounts[:, peaks] = _rounded_up(amounts[:, peaks], self._round[peaks])
-        return Visited(replace(graph, amounts=amounts), states)
+        return Visited(replace(graph, amounts=amounts), states), found.space
+
+    @property
+    def _visited(self) -> Visited:
+        return self._explored[0]
 
     @cached_property
     def _counted(self) -> list[int]:
@@ -132,11 +136,7 @@ class _StateFront:
             if not point[k] < bounds[k]:
                 return None
         assert graph is not None
-        return point, self._plan(self._visited.of(fewest_moves(graph)))
-
-    def _plan(self, found: Sequence[tuple[int, Key, Ints]]) -> object:
-        """Return the plan of level, part and state (c,) of its states."""
-        return tuple((level, *state.tolist()) for level, _, state in found)
+        return point, self._explored[1].path(self._visited.of(fewest_moves(graph)))
 
     def _below(self, bounds: Floats) -> Graph:
         """Return the moves to states whose values are all below bounds."""
@@ -188,8 +188,8 @@ class _StateFront:
         return np.concatenate(grips)
 
     def steps(self, plan: object) -> tuple[Step, ...]:
-        """Return the checked steps of a plan, which is its states."""
-        return steps_of(self._problem.space, plan)  # type: ignore[arg-type]
+        """Return the checked steps of a plan: its order, if that was sought, and its states."""
+        return steps_of(self._of_plan(plan).space, plan[1])  # type: ignore[index]
 
     def values(self, plan: object, claimed: Floats) -> Floats:
         """Return the goals' values (k,) of a plan, from its responses, rounded; SI units.
@@ -204,62 +204,18 @@ class _StateFront:
         return self._of_plan(plan).engine
 
     def _of_plan(self, plan: object) -> States:
-        return self._problem
-
-
-_Ordered = tuple[Order, tuple[tuple[int, ...], ...]]  # an order, and states in its places
-
-
-class _OrderFront(_StateFront):
-    """The same where the build order is free too: a plan is an order, and states."""
-
-    def __init__(self, orders: AllOrders, rounding: Mapping[str, float] | None = None) -> None:
-        super().__init__(orders.states, rounding)
-        self._orders = orders
-
-    @cached_property
-    def _space(self) -> OrderStates:
-        return OrderStates(self._orders, MOST_PARTS, every_goal=True)
-
-    @cached_property
-    def _known(self) -> dict[Order, States]:
-        return {}
-
-    def anew(self) -> _OrderFront:
-        """Return the same problem with nothing known of it, for its judge."""
-        states = replace(self._orders.states)
-        return _OrderFront(replace(self._orders, states=states), self._rounding)
-
-    def _explored(self) -> Explorer:
-        if self._orders.down is None and barred(self._orders.states) is not None:
-            raise confirmed(self._orders.states, "the search")  # all orders end so
-        found = Explorer(self._space, tell=_require_memory)
-        if found.rise():
-            return found
-        if finds_better_order(self._orders, np.inf) is False:
-            raise without_order(self._orders, "pareto")
-        raise SolverError("pareto: the search found no plan in any order, and that is not proven")
-
-    def _plan(self, found: Sequence[tuple[int, Key, Ints]]) -> _Ordered:
-        order, states = self._space.path(found)
-        rows = zip(found, states, strict=True)
-        return order, tuple((level, *state.tolist()) for (level, *_), state in rows)
-
-    def steps(self, plan: object) -> tuple[Step, ...]:
-        """Return the checked steps of a plan, bricks counted in its own order."""
-        return steps_of(self._of_plan(plan).space, plan[1])  # type: ignore[index]
-
-    def _of_plan(self, plan: object) -> States:
         order = tuple(plan[0])  # type: ignore[index]
         if order not in self._known:
-            self._known[order] = self._orders.at(order)
+            self._known[order] = ordered(self._problem, order)
         return self._known[order]
 
 
 def _require_memory(found: Explorer) -> None:
-    """Raise an error if the states of all orders, twice while they grow, do not fit."""
+    """Raise an error if states, twice while they grow, do not fit."""
     if found.nbytes > free_memory():
-        raise ProblemError("pareto: the states of all orders do not fit the memory; give an order")
+        raise ProblemError(
+            "pareto: the states do not fit the memory; give an order, or rules with fewer states"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -340,13 +296,10 @@ def find_front(
 
     def measured(asked: Problem) -> Front:
         with watch.needed("posing the problem"):
-            graph = graph_of(asked)
-            if not isinstance(graph, AllOrders):
-                posed = _StateFront(states_of(asked), rounding)
-            elif graph.down is None:
-                posed = _OrderFront(graph, rounding)
-            else:
+            states = states_of(asked)
+            if states.orders is not None and states.free_rules.takes_down:
                 raise ProblemError("a Pareto set of take-downs is of one order; give an order")
+            posed = _StateFront(states, rounding)
         left = max(0.0, end - time.perf_counter())
         front = _front_of(posed, formulation, left, progress, watch)
         return replace(front, moved=watch.spare(RANGE, partial(_moved, front), ()))

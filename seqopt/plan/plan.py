@@ -21,7 +21,7 @@ from seqopt.graph.layers.layers import Layers
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
-from seqopt.plan._status import ENDS, FoundOrder, Status, bare_summary
+from seqopt.plan._status import ENDS, Status, bare_summary, order_facts
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.amounts import judged_by
 from seqopt.problem.problem import Problem
@@ -39,6 +39,7 @@ from seqopt.responses.table import (
     _response_columns,
     _table_of,
 )
+from seqopt.scene.scene import Order
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.site import Site
@@ -47,7 +48,6 @@ from seqopt.stability.steps import stability_table
 
 if TYPE_CHECKING:
     from seqopt.graph.layers.ranking import Objectives
-    from seqopt.graph.orders import AllOrders
     from seqopt.plan.search._window_search import WindowSearch
 
 _UNCOMPARED = "not compared with the optimum"
@@ -78,8 +78,6 @@ class Plan(ShownBuild):
         The models solved by a search without proof; None if all were solved.
     looked_at : int or None
         How many models a lazy search solved; None if all were solved.
-    order : FoundOrder or None
-        The build order, where it was sought.
     arms : seqopt.arms._kept.KeptPostures or None
         The postures of arms; None where no robot has one, or a graph was solved.
     moved : Moved or None
@@ -98,7 +96,7 @@ class Plan(ShownBuild):
     (<Status.OPTIMAL: 'optimal'>, 0)
     """
 
-    problem: Problem | Layers | States | AllOrders | Instance
+    problem: Problem | Layers | States | Instance
     graph: Layers | States | Instance
     formulation: Formulation
     selection: StatePath
@@ -107,7 +105,6 @@ class Plan(ShownBuild):
     seconds: Mapping[str, float] = field(compare=False, hash=False)
     search: WindowSearch | None = None
     looked_at: int | None = None
-    order: FoundOrder | None = None
     arms: Any = None
     moved: Moved | None = None
     beyond: str = ""
@@ -183,9 +180,14 @@ class Plan(ShownBuild):
     @property
     def title(self) -> str:
         """The name of the plan where it is shown next to others."""
-        if self.order is not None:
+        if self.order:
             return "best order"
         return self.graph.title or self.formulation.name
+
+    @property
+    def order(self) -> Order:
+        """The names of all bricks in the order that was found; empty where it is given."""
+        return self.selection.order
 
     @property
     def goals(self) -> tuple[str, ...]:
@@ -210,8 +212,7 @@ class Plan(ShownBuild):
     @property
     def gap(self) -> float | None:
         """What is proven to be left between value and bound, over the value; None without proof."""
-        early = self.selection.stopped
-        if self.certificate is None or (early and not isfinite(self.certificate.gap)):
+        if self.certificate is None or not isfinite(self.certificate.gap):
             return None
         return _known_gap(self.certificate.gap)
 
@@ -223,8 +224,6 @@ class Plan(ShownBuild):
     @property
     def stopped(self) -> str:
         """Why a search of states or orders ended early: ``time``, ``memory``, ``size``, say."""
-        if self.order is not None and self.order.selection.stopped:
-            return self.order.selection.stopped
         return self.selection.stopped
 
     @property
@@ -244,8 +243,6 @@ class Plan(ShownBuild):
         A margin of stability is optimal within the gap, which ``result`` and the summary name.
         """
         proof, graph = self.certificate, self.graph
-        if self.order is not None and self.order.status is not Status.OPTIMAL:
-            return self.order.status
         if self.selection.stopped and (isinstance(graph, States) or proof is None):
             return Status.FEASIBLE
         if proof is None:
@@ -315,7 +312,8 @@ class Plan(ShownBuild):
         """How many different models were solved."""
         if self.looked_at is not None:
             return self.looked_at
-        return self.graph.models if self.search is None else self._window_models
+        own = self.graph.models if self.search is None else self._window_models
+        return own + self.selection.effort[1]
 
     @property
     def models_needed(self) -> int:
@@ -483,7 +481,7 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "payload_exceeded": [str(excess) for excess in plan.overloads],
         "models_evaluated": plan.models,
         "states_in_proof": 0 if proof is None else proof.states,
-        **({} if plan.order is None else plan.order.described()),
+        **(order_facts(plan) if plan.order else {}),
         "seconds": dict(plan.seconds),
         **provenance(plan.engine),
     }

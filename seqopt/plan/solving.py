@@ -31,9 +31,8 @@ from seqopt.sequence.schedule import Schedule
 
 if TYPE_CHECKING:
     from seqopt.graph.instance import Instance
-    from seqopt.graph.orders import AllOrders
 
-    Graph = Layers | States | AllOrders
+    Graph = Layers | States
 
 AIMS = {Aim.SUM: SUM, Aim.PEAK: MINMAX}
 CANDIDATES, STATES, ORDERS = "candidates", "states", "orders"  # graphs of a problem
@@ -141,11 +140,10 @@ def layers_of(problem: Problem) -> Layers:
 
 
 def states_of(problem: Problem) -> States:
-    """Return the states and moves of a problem; where its order is sought, in the scene's own."""
+    """Return the states and moves of a problem."""
     found = graph_of(problem, STATES if problem.orders is None else ORDERS)
-    states = getattr(found, "states", found)  # of all orders, or themselves
-    assert isinstance(states, States)
-    return states
+    assert isinstance(found, States)
+    return found
 
 
 def _scaled_criterion(problem: Problem) -> Criterion:
@@ -237,14 +235,14 @@ def _in_own_order(problem: Problem) -> States:
     return _states(problem)
 
 
-def _all_orders(problem: Problem) -> AllOrders:
+def _all_orders(problem: Problem) -> States:
     if problem.orders is None:
         raise ProblemError("an order is given; pose with orders='tied' to seek one")
     if problem.is_timed:
         raise ProblemError("makespan: it is found in one order; give an order, or leave it out")
-    from seqopt.graph.orders import AllOrders  # noqa: PLC0415  # few problems seek an order
+    from seqopt.graph._orders import among_orders  # noqa: PLC0415  # few problems seek an order
 
-    return AllOrders(_states(problem), problem.orders)
+    return among_orders(_states(problem), problem.orders)
 
 
 BUILDERS: dict[str, Callable[[Problem], Graph]] = {
@@ -258,13 +256,13 @@ def _solver(kind: str) -> Callable[[Any, Formulation, Run], Plan]:
     """Return what makes the plan of a formulation of some graph."""
     if kind == CANDIDATES:
         return solve_layers
-    from seqopt.plan._states import solve_orders, solve_states  # noqa: PLC0415  # with their proofs
+    from seqopt.plan._states import solve_states  # noqa: PLC0415  # with their proofs
 
-    return solve_orders if kind == ORDERS else solve_states
+    return solve_states
 
 
 def solve(
-    problem: Problem | Layers | States | AllOrders | Instance,
+    problem: Problem | Layers | States | Instance,
     formulation: Formulation | str | None = None,
     *,
     proof: bool = True,
@@ -374,17 +372,18 @@ def _kind_for(problem: Problem, formulation: Formulation) -> str:
 def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
     """Return the plan of a graph of choices that is given, or of an instance."""
     from seqopt.graph.instance import Instance  # noqa: PLC0415  # few are given
-    from seqopt.graph.orders import AllOrders  # noqa: PLC0415
     from seqopt.plan._states import solve_instance  # noqa: PLC0415
 
     if isinstance(problem, Instance):
         return solve_instance(problem, formulation, run)
     match problem:
         case States():
-            kind, questions = STATES, ("time" if problem.is_timed else "goals",)
-            name = "makespan_labels" if problem.is_timed else "schedule_search"
-        case AllOrders():
-            kind, questions, name = ORDERS, ("order",), "order_search"
+            kind, question, name = STATES, "goals", "schedule_search"
+            if problem.is_timed:
+                question, name = "time", "makespan_labels"
+            elif problem.orders is not None:
+                question, name = "order", "order_search"
+            questions: tuple[str, ...] = (question,)
         case Layers():
             totals = bool(problem.scenes) and problem.over.aim is Aim.SUM
             kind, questions = CANDIDATES, ("tail" if totals else "goals", "instance")

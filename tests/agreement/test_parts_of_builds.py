@@ -12,9 +12,11 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, SolverError, StepError
+from seqopt.graph._orders import order_rules
 from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
+from seqopt.plan.solving import graph_of
 from seqopt.problem.problem import Orders
 from seqopt.problem.requirements import Limit
 from seqopt.scene.parts import Robot
@@ -171,11 +173,11 @@ def test_orders_go_on_from_what_stands(aim):
     begin = Site(2, (nodes[2], nodes[1], None))
     rules = FreeRules(begin=begin)
     found = seqopt.solve(seqopt.pose(engine, rules, ONES, aim, orders=Orders.TIED))
-    assert {*found.order.selection.order[:2]} == {*scene.build_order[:2]}
-    every = []
+    assert {*found.order[:2]} == {*scene.build_order[:2]}
+    every, allowed = [], order_rules(graph_of(found.problem)).allows
     for rest in permutations(scene.build_order[2:]):
         order = (*scene.build_order[:2], *rest)
-        if found.order.problem.allows(order):
+        if allowed(order):
             own = seqopt.make_engine("compliance", in_order(scene, order))
             if (value := planned(own, rules, aim)) is not None:
                 every.append(value[0])

@@ -247,7 +247,7 @@ def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     [
         (["--schedule", "loop"], "orders, and steps or regrips in a Pareto set, go with the free"),
         (["--schedule", "free", "--formulation", "pareto_zones"], "or order_search"),
-        (["--schedule", "free", "--max-memory", "2GB"], "--max-memory: the search of orders has"),
+        (["--schedule", "free", "--max-memory", "1B"], "option max_memory: it is too little"),
         (["--schedule", "free", "--option", "depth=3"], "depth"),
     ],
 )

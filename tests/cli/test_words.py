@@ -121,7 +121,7 @@ LOADED = f"print(*[name for name in {HEAVY} if name in sys.modules], file=sys.st
 SELDOM = (
     *("networkx", "scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib"),
     *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
-    *("seqopt.engines.rigid._refinement", "seqopt.graph.orders"),
+    *("seqopt.engines.rigid._refinement", "seqopt.graph._orders"),
     *("seqopt.plan._states", "seqopt.judge._proof", "seqopt.scene.library"),
     *("seqopt.responses._calibration", "seqopt.sequence._rule_space"),
 )

@@ -19,7 +19,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpErro
 from seqopt.graph.formulation import FormulationKind, Watch, formulations
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import _on_paths, fewest_moves, lexicographic
-from seqopt.graph.states._visits import explore
+from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve

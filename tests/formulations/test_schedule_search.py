@@ -21,7 +21,8 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError, TimeUpError
 from seqopt.graph.paths import fewest_moves, keep_best, reached
-from seqopt.graph.states._visits import explore, steps_with, with_held
+from seqopt.graph.states._visits import steps_with, with_held
+from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge.schedules import judge_schedule, plan_values
 from seqopt.network.build import build_network

@@ -16,7 +16,6 @@ import seqopt
 from seqopt.errors import InfeasibleError, SolverError, StepError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.graph import Graph, LabelProof
-from seqopt.graph.orders import OrderSelection
 from seqopt.graph.paths import lexicographic
 from seqopt.sequence.rules import FreeRules, with_robots
 from tests.brute_force import ONES
@@ -106,8 +105,6 @@ def values(value=1.0, bound=1.0):
     """The values and bounds of all goals, times factors."""
 
     def change(s):
-        if isinstance(s, OrderSelection):
-            return replace(s, objective=value * s.objective, bound=bound * s.objective)
         scaled = [tuple(f * v for v in s.objective) for f in (value, bound)]
         return replace(s, objective=scaled[0], bound=scaled[1])
 
@@ -134,9 +131,16 @@ CLAIMS = {
     "infinite bound": values(1.0, np.inf),
     "infeasible": infeasible,
 }
+ORDERS = {
+    "no order": lambda s: replace(s, order=()),
+    "order turned round": lambda s: replace(s, order=s.order[::-1]),
+    "a brick twice": lambda s: replace(s, order=(s.order[0], *s.order[:-1])),
+    "a brick that nothing ties": lambda s: replace(s, order=(2, 1, 3, 4)),
+}
 REFUSED = [
     *((space, lie) for space in SPACES for lie in CLAIMS),
-    *((space, lie) for space in SPACES for lie in PATHS if space != "orders"),
+    *((space, lie) for space in SPACES for lie in PATHS),
+    *(("orders", lie) for lie in ORDERS),
 ]
 
 
@@ -150,7 +154,7 @@ def test_the_honest_answer_is_accepted(space):
 @pytest.mark.parametrize(("space", "lie"), REFUSED)
 def test_a_lie_is_refused(space, lie):
     with pytest.raises((SolverError, StepError)):
-        told(space, (PATHS | CLAIMS)[lie])
+        told(space, (PATHS | CLAIMS | ORDERS)[lie])
 
 
 def other_path(instance, best):

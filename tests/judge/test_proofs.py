@@ -12,15 +12,15 @@ import pytest
 import seqopt
 from seqopt.engines.interface import Want
 from seqopt.graph import Explorer
+from seqopt.graph._orders import OrderSpace, among_orders, whole_bound
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.orders import AllOrders, OrderStates, whole_bound
 from seqopt.graph.paths import keep_best, least_peak
-from seqopt.graph.states._visits import explore, floors_of_goals
+from seqopt.graph.states.explored import explore, floors_of_goals
 from seqopt.graph.states.states import build_states
 from seqopt.judge import _budget_proof as budget_proof
 from seqopt.judge._budget_proof import case_of, least_within
-from seqopt.judge._orders import finds_better_order
 from seqopt.judge._proof import Proof
+from seqopt.judge._spaces import TooManyPartsError
 from seqopt.judge._states import StateEvaluator
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
@@ -149,17 +149,19 @@ def test_what_is_set_aside_counts_and_prices_are_not_negative(monkeypatch, most,
     assert proven
 
 
-def test_what_was_left_out_for_a_threshold_bounds_all_orders():
+def test_what_was_left_out_for_a_threshold_bounds_all_orders(monkeypatch):
     """Whatever the threshold; and with few sets looked at nothing is proven."""
-    problem = AllOrders(posed("F_largest", count=4))
-    best = seqopt.solve(problem).order.selection.objective
+    problem = among_orders(posed("F_largest", count=4), "tied")
+    best = seqopt.solve(problem).certificate.objective
     for share in (0.0, 1e-3, 0.5, 0.99):
-        found = Explorer(OrderStates(problem, 5000))
+        found = Explorer(OrderSpace(problem))
         assert not found.rise(share * best)
         assert share * best < found.excluded <= best * (1 + 1e-6)
-    assert finds_better_order(problem, best) is False
-    assert finds_better_order(problem, best * 1.01)
-    assert finds_better_order(problem, best * 1.01, most=3) is None  # the whole arch is below that
+    assert Proof(problem).bounds_first(best)
+    assert not Proof(problem).bounds_first(best * 1.01)
+    monkeypatch.setattr("seqopt.judge._spaces.MOST", 3)
+    with pytest.raises(TooManyPartsError):
+        Proof(problem).bounds_first(best * 1.01)  # the whole arch is below that
 
 
 def test_a_soft_first_robot_does_not_raise_the_bound_of_the_whole():
@@ -167,10 +169,12 @@ def test_a_soft_first_robot_does_not_raise_the_bound_of_the_whole():
     scene, held = small_arch(3), FreeRules(ending=Ending.HELD)
     soft = replace(scene.robots[0], stiffness=(1e5,) * 3)
     softer = replace(scene, robots=(soft, *scene.robots[1:]))
-    problem, alike = (AllOrders(posed("D_max", each, rules=held)) for each in (softer, scene))
-    best = seqopt.solve(problem).order.selection.objective
-    assert finds_better_order(problem, best) is False
-    assert finds_better_order(problem, best * 1.01)
+    problem, alike = (
+        among_orders(posed("D_max", each, rules=held), "tied") for each in (softer, scene)
+    )
+    best = seqopt.solve(problem).certificate.objective
+    assert Proof(problem).bounds_first(best)
+    assert not Proof(problem).bounds_first(best * 1.01)
     assert whole_bound(problem) == pytest.approx(whole_bound(alike))  # two can hold it alone
 
 

@@ -13,12 +13,13 @@ import seqopt
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
 from seqopt.graph import Explorer
-from seqopt.graph.orders import AllOrders
-from seqopt.graph.states._visits import FreeStates, barred, explore
+from seqopt.graph._orders import among_orders
+from seqopt.graph.states._visits import StateSpace
+from seqopt.graph.states.explored import barred, explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge._proof import Proof
 from seqopt.network.build import build_network
-from seqopt.plan.front import _OrderFront, _StateFront, find_front
+from seqopt.plan.front import _StateFront, find_front
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.scene.scene_file import load_scene
@@ -80,11 +81,11 @@ def test_a_limit_that_the_whole_exceeds_is_named():
 def test_all_orders_and_fronts_end_in_it_too():
     problem = windy(0.6)
     with pytest.raises(InfeasibleError, match=END):
-        seqopt.solve(AllOrders(problem), "order_search")
+        seqopt.solve(among_orders(problem, "tied"), "order_search")
     with pytest.raises(InfeasibleError, match=END):
         find_front(_StateFront(problem, None))
     with pytest.raises(InfeasibleError, match=END):
-        find_front(_OrderFront(AllOrders(problem), None))
+        find_front(_StateFront(among_orders(problem, "tied"), None))
 
 
 def test_a_step_without_an_open_grip_is_asked_before_those_with_one():
@@ -112,7 +113,7 @@ def test_where_it_says_that_no_plan_is_there_is_none(build, limit):
     scene, rules = build
     engine = ComplianceEngine(build_network(scene))
     problem = build_states(engine, rules, ONES, "steps", [Limit("D_max", 10.0**limit)])
-    every = Explorer(FreeStates(replace(problem)))
+    every = Explorer(StateSpace(replace(problem)))
     found = every.rise()
     assert explore(problem).whole == found
     assert Proof(problem).is_impossible() == (not found)

@@ -10,7 +10,7 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph import orders
+from seqopt.graph._orders import TooManySetsError, order_rules
 from seqopt.graph.formulation import find_formulation
 from seqopt.plan import front as fronts
 from seqopt.plan.front import FrontSelection, find_front
@@ -40,7 +40,7 @@ def beaten(point, others):
 
 def of_every_order(aim):
     """What no plan of any order beats, one order after the other."""
-    allowed = graph_of(posed(aim, orders="tied"))
+    allowed = order_rules(graph_of(posed(aim, orders="tied")))
     found = [
         points(find_front(posed(aim, order)), aim)
         for order in permutations(allowed.scene.build_order)
@@ -94,6 +94,6 @@ def test_what_does_not_fit_is_one_line(monkeypatch):
     with pytest.raises(ProblemError, match="do not fit the memory; give an order"):
         find_front(posed(AIMS[0], orders="tied"))
     monkeypatch.setattr(fronts, "free_memory", lambda: np.inf)
-    monkeypatch.setattr(fronts, "MOST_PARTS", 3)
-    with pytest.raises(orders.TooManySetsError, match="more than 3 sets of bricks; give an order"):
+    monkeypatch.setattr("seqopt.graph.states.explored.MOST_PARTS", 3)
+    with pytest.raises(TooManySetsError, match="more than 3 sets of bricks; give an order"):
         find_front(posed(AIMS[0], orders="tied"))

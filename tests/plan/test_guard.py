@@ -14,7 +14,7 @@ from formulations.states.order_search import FORMULATION as ORDER
 from formulations.states.pareto_zones import FORMULATION as FRONT
 from formulations.states.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError, StepError
-from seqopt.graph.orders import AllOrders, OrderSelection
+from seqopt.graph._orders import among_orders
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import build_states
 from seqopt.plan.front import FrontSelection, _StateFront, find_front
@@ -36,7 +36,7 @@ def free(limits=(), rules=RULES, aim="F_largest,M_sup"):
 
 
 def order(**words):
-    return AllOrders(free(**words))
+    return among_orders(free(**words), "tied")
 
 
 def front(**words):
@@ -173,16 +173,19 @@ PLANS = {
     "bounds NaN where it was stopped": {"bound": (np.nan, np.nan), "stopped": "time"},
     "bounds above the values": {"bound": (np.inf, 1e9), "stopped": "time"},
     "stopped None": {"stopped": None},
+    "an order where it is given": {"order": (1, 2, 3, 4)},
 }
 ORDERS = {
     "order None": {"order": None},
     "order text": {"order": "abcd"},
     "order of floats": {"order": (1.5, 2, 3, 4)},
+    "order of another scene": {"order": (1, 2, 3, 5)},
+    "no order": {"order": ()},
     "value None": {"objective": None},
-    "value NaN": {"objective": np.nan},
+    "value NaN": {"objective": (np.nan, 1.0)},
     "bound None": {"bound": None},
-    "bound NaN where it was stopped": {"bound": np.nan, "stopped": "time"},
-    "evaluated None": {"evaluated": None},
+    "bound NaN where it was stopped": {"bound": (np.nan, np.nan), "stopped": "time"},
+    "effort None": {"effort": None},
     "stopped a number": {"stopped": 3},
 }
 FRONTS = {
@@ -196,7 +199,6 @@ FRONTS = {
     "plans of nothing": {"points": np.ones((1, 2)), "plans": (None,)},
     "stopped None": {"stopped": None},
 }
-CLASSES = {"plan": StatePath, "order": OrderSelection, "front": FrontSelection}
 NONSENSE = [
     *(("plan", what, change) for what, change in PLANS.items()),
     *(("order", what, change) for what, change in ORDERS.items()),
@@ -253,7 +255,7 @@ def empty(problem, **_):
     ("kind", "fake", "said"),
     [
         ("plan", denies, "fake says that no plan is allowed, and some are"),
-        ("order", denies, "fake says that no order has a plan, and some have"),
+        ("order", denies, "fake says that no plan is allowed, and some are"),
         ("front", denies, "fake found no plan, and some are allowed"),
         ("front", empty, "fake found no plan, and some are allowed"),
         ("loop's front", denies, "fake found no plan, and some are allowed"),

@@ -66,8 +66,8 @@ PROOFS = {
         *("judge/test_proofs", "judge/test_free_proof", "judge/test_free_judge"),
     ),
     "seqopt.judge._rule_moves": ("judge/test_free_proof", "judge/test_proofs"),
-    "seqopt.graph.orders": ("formulations/test_order_search",),
-    "seqopt.judge._orders": ("judge/test_proofs", "formulations/test_order_search"),
+    "seqopt.graph._orders": ("formulations/test_order_search",),
+    "seqopt.judge._spaces": ("judge/test_proofs", "formulations/test_order_search"),
     "seqopt.plan.search._pair_search": ("agreement/test_pair_search",),
 }  # what says that nothing is better, or that there is nothing
 MODULES = {

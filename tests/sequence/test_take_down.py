@@ -13,8 +13,8 @@ import seqopt
 from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.exchange._tasks import Action, plan_tasks
 from seqopt.exchange.exports import plan_csv
-from seqopt.graph.orders import AllOrders
-from seqopt.graph.states._visits import explore
+from seqopt.graph._orders import among_orders, order_rules
+from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge.schedules import judge_schedule
@@ -201,12 +201,20 @@ def test_best_order_is_that_of_all():
     engine = small_wall()
     scene, criterion = engine.network.scene, seqopt.CRITERIA["worst-ratio"]
     found = seqopt.solve(seqopt.pose(engine, DOWN, criterion, "minmax", orders="tied"))
-    among = AllOrders(build_states(engine, DOWN, found.problem.criterion, "minmax"))
-    orders = [*filter(among.allows, permutations(scene.build_order))]
-    values = [seqopt.solve(among.planned(order)).objective["minmax"] for order in orders]
+    among = among_orders(build_states(engine, DOWN, found.problem.criterion, "minmax"), "tied")
+    orders = [*filter(order_rules(among).allows, permutations(scene.build_order))]
+    values = [seqopt.solve(among.at(order)).objective["minmax"] for order in orders]
     assert len(orders) > 1
     assert found.objective["minmax"] == pytest.approx(min(values), rel=1e-9)
-    assert found.order.status == found.status == Status.OPTIMAL
+    assert found.summary()["order_status"] == found.status == Status.OPTIMAL
+    steps = seqopt.solve(seqopt.pose(engine, DOWN, criterion, "minmax,steps", orders="tied"))
+    least = min(
+        seqopt.solve(replace(among, goals=steps.graph.goals).at(o)).objective["steps"]
+        for o, value in zip(orders, values, strict=True)
+        if value <= min(values) * 1.000001
+    )
+    assert steps.status == Status.OPTIMAL
+    assert steps.objective["steps"] == len(steps.steps) == least
     assert found.steps[-1].bricks == 0
     assert max(values) > min(values) * 1.01  # orders differ
 
@@ -309,9 +317,9 @@ def test_robots_put_away_what_they_remove():
 def test_what_a_take_down_has_not():
     engine = arch()
     with pytest.raises(ProblemError, match="orders of a take-down are searched for its worst"):
-        AllOrders(build_states(engine, DOWN, ONES, "steps"))
+        among_orders(build_states(engine, DOWN, ONES, "steps"), "tied")
     with pytest.raises(ProblemError, match="orders of a take-down from or to a part"):
-        AllOrders(build_states(engine, replace(DOWN, finish=Site(2)), ONES, "minmax"))
+        among_orders(build_states(engine, replace(DOWN, finish=Site(2)), ONES, "minmax"), "tied")
     with pytest.raises(StepError, match="cannot end with 4; give fewer"):
         replace(DOWN, finish=Site(4)).span(engine.network.scene)
     with pytest.raises(StepError, match="did you mean take-down"):

@@ -14,7 +14,7 @@ from seqopt.arrays import Vector
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.states._visits import explore
+from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.problem.standing import Standing
 from seqopt.responses.table import analyze, force_column

@@ -41,12 +41,13 @@ from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import parse_options, parse_size, parse_time_limit
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
-from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, TimeUpError
+from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
 from seqopt.graph.formulation import End, Formulation, Run, as_formulation, trace_rows
 from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._range import at_sufficient_level
 from seqopt.plan._softer import _payload_advice
+from seqopt.plan._status import order_bound_said
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _solve_run, usual
 from seqopt.problem.problem import Problem
@@ -295,10 +296,6 @@ def _values(plan: Plan) -> str:
 def _how(asked: Optimize, formulation: Formulation) -> Run:
     """Return how a formulation is to be run, its own options among it."""
     how: dict[str, Any] = parse_options(formulation, asked.option)
-    if asked.max_memory is not None and formulation.answers == ("order",):
-        raise ProblemError(
-            "--max-memory: the search of orders has none; leave it out, or give --option most=N"
-        )
     if asked.max_memory is not None and "max_memory" in formulation.options:
         how["max_memory"] = parse_size(str(asked.max_memory))
     return Run(proof=asked.proof, lazy=asked.lazy, options=how)
@@ -313,7 +310,7 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
         "scene": scene_facts(scene),
         "summary": lambda: found.report,
         "proof": _proof(plan),
-        **({} if plan.order is None else {"order": plan.order.selection.order}),
+        **({"order": plan.order} if plan.order else {}),
     }
     ended = INTERRUPTED if early else "seqopt: interrupted; the plan was chosen by then"
     answer = Answer(
@@ -343,15 +340,15 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
     counts = [f"{len(plan.steps)} steps"]
     if isinstance(plan.graph, States):
         counts.append(f"{plan.regrips} regrip{'s' * (plan.regrips != 1)}")
-    counts += [] if plan.order is not None else [f"{plan.models:,} models"]
+    counts.append(f"{plan.models:,} models")
     search = f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"
     page = found.analyzed and PAGE not in found.clock.left_out
     yield f"{search}; {written_to(asked.path, page=page)}"
     yield from map(wrapped, waits_said(plan) if plan.certificate is not None else ())
     yield from (f"stability, {each}" for each in found.verdicts.get(plan.title, ()))
     yield from [wrapped(found.whole)] if found.whole else []
-    if plan.order is not None:
-        yield wrapped(", ".join(map(str, plan.order.selection.order)), first="order: ")
+    if plan.order:
+        yield wrapped(", ".join(map(str, plan.order)), first="order: ")
     yield from (f"payload exceeded: {excess}" for excess in over)
     if over and (loads := overloads(scene, plan._columns)):
         yield _payload_advice(plan.engine, plan.steps, loads)
@@ -381,9 +378,9 @@ def _notes(asked: Optimize, found: Found) -> Iterator[str]:
 def _value(found: Found) -> str:
     """Return what a plan was chosen by, and what is proven of that."""
     plan = found.plan
-    if plan.order is not None:
+    if plan.order:
         values = ", ".join(f"{name} {value_text(name, v)}" for name, v in plan.objective.items())
-        return f"{values}, {plan.status}, {plan.order.bound_said}"
+        return f"{values}, {plan.status}, {order_bound_said(plan)}"
     known = found.posed.known
     if known is None or isinstance(plan.graph, States):
         return plan._value

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
-from seqopt.graph._explore import Explorer, Moves, _Space
 from seqopt.graph.graph import Graph
+from seqopt.graph.space import Found, Moves, Space
 from seqopt.graph.states.states import States
 from seqopt.problem.amounts import MoveArrays
+from seqopt.scene.scene import Order
 from seqopt.sequence import _rule_space as free_space
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_space import FreeSpace
@@ -152,18 +153,21 @@ def with_held(problem: States, graph: Graph, held: Bools) -> Graph:
 
 
 @dataclass(frozen=True)
-class FreeStates(_Space):
-    """The states of a free schedule as an `Explorer` visits them, a part for every level.
+class StateSpace(Space):
+    """The states of one schedule, a part for every level: its open grips, or what rules allow.
 
-    Moves take a column each: whether they are regrips, and how far robots go, m.
+    Moves take a column each: whether they are regrips, and how far robots go, m. Where totals over
+    scenarios count, a column for every scenario stands in the place of the goal.
 
     ``regrips``: whether robots may take grips on bricks that stand; ``standing``: whether it is
-    asked of every state that it stands, and by which margins.
+    asked of every state that it stands, and by which margins; ``order``: of its bricks, if that was
+    sought.
     """
 
     problem: States
     regrips: bool = True
     standing: bool = False
+    order: Order = ()
 
     @property
     def levels(self) -> int:
@@ -175,7 +179,7 @@ class FreeStates(_Space):
 
     @property
     def peaks(self) -> tuple[bool, ...]:
-        return tuple(goal.is_peak for goal in self.problem.goals)
+        return scenario_peaks(self.problem)
 
     def start(self) -> tuple[int, Ints]:
         return self.first, self.problem.space.start()
@@ -201,53 +205,70 @@ class FreeStates(_Space):
 
     @property
     def complete(self) -> bool:
-        return self.regrips
+        return self.regrips and not self.order
 
     @property
     def floors(self) -> bool:
         """Whether a state that one scenario rules out is not asked of the next."""
-        return bool(self.problem.each)
+        return bool(self.problem.each) and not self.problem.totals
 
     def values(
         self, part: int, states: Ints, *, rough: bool, most: float = np.inf
     ) -> tuple[Floats, Bools]:
+        if self.problem.totals:
+            return self._totals(part, states)
         if self.standing:
             return self.problem.standing_values(part, states, most=most)
         return self.problem.values(part, states, rough=rough, most=most)
 
-    def amounts(self, values: Floats, taken: Floats) -> Floats:
-        return move_amounts(self.problem, values, taken)
-
-    def ended(self, part: int, states: Ints) -> Bools:
-        return self.problem.space.ended(states)
-
-
-class ScenarioSums(FreeStates):
-    """The same with a sum for every scenario in the place of the goal."""
-
-    @property
-    def peaks(self) -> tuple[bool, ...]:
-        return (False,) * len(self.problem.each)
-
-    @property
-    def floors(self) -> bool:
-        return False
-
-    def values(
-        self, part: int, states: Ints, *, rough: bool, most: float = np.inf
-    ) -> tuple[Floats, Bools]:
+    def _totals(self, level: int, states: Ints) -> tuple[Floats, Bools]:
         """Return what the goal takes of states in every scenario, and which are allowed in all."""
         out = np.full((len(states), len(self.peaks)), np.inf)
         rows = np.arange(len(states))
         for k, problem in enumerate(self.problem.each):
             asked = problem.standing_values if self.standing else problem.values
-            found, allowed = asked(part, states[rows])
+            found, allowed = asked(level, states[rows])
             out[rows, k] = found[:, 0]
             rows = rows[allowed]
         return out, np.isin(np.arange(len(states)), rows)
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
-        return values
+        return values if self.problem.totals else move_amounts(self.problem, values, taken)
+
+    def ended(self, part: int, states: Ints) -> Bools:
+        return self.problem.space.ended(states)
+
+    def stand(self, part: int, states: Ints) -> Bools:
+        asked = self.problem.demands and not self.standing
+        return self.problem.stand(part, states) if asked else super().stand(part, states)
+
+    def known(self, part: int, states: Ints) -> Ints:
+        return self.problem.recalled(part, states)
+
+    def schedule(self, part: int, asked: States) -> tuple[int, States]:
+        """Return the level of a part, and the problem whose states it has, by what is asked."""
+        return part, asked
+
+    def path(self, found: Found) -> tuple[Order, tuple[tuple[int, ...], ...]]:
+        return self.order, super().path(found)[1]
+
+    @property
+    def effort(self) -> tuple[int, int]:
+        return (1, self.problem.models) if self.order else (0, 0)
+
+    def rows(self, part: int, states: Ints) -> Ints:
+        """Return what states stand for: the level, and the node that each robot holds, 0: none."""
+        numbers = np.array([0, *node_numbers(self.problem.network)])
+        held = states[:, : self.problem.space.robots].astype(np.int64)
+        named = np.where(held > 0, numbers[held.clip(min=0)], 0)
+        return np.column_stack([np.full(len(held), part), named])
+
+
+def scenario_peaks(problem: States) -> tuple[bool, ...]:
+    """Return by goal whether the largest amount counts; of totals by scenario, of which none is."""
+    if problem.totals:
+        return (False,) * len(problem.each)
+    return tuple(goal.is_peak for goal in problem.goals)
 
 
 def move_amounts(problem: States, values: Floats, taken: Floats) -> Floats:
@@ -261,60 +282,6 @@ def move_amounts(problem: States, values: Floats, taken: Floats) -> Floats:
         if goal.moves is not None:
             out[:, k] = goal.moves(moves)
     return out
-
-
-def floors_of_goals(problem: States) -> tuple[float, ...]:
-    """Return what every plan takes at least of each goal, known before anything is searched.
-
-    No worst step is better than the end that all builds have in common, no build shorter than its
-    bricks and robots allow. Minus infinity where nothing is known.
-    """
-    space, out = problem.space, [-np.inf] * len(problem.goals)
-    values, within = np.zeros((1, len(out))), np.zeros(1, dtype=bool)
-    if space.ends_bare:
-        values, within = problem.values(space.levels, np.zeros_like(space.start()))
-    for k, goal in enumerate(problem.goals):
-        if within[0] and goal.is_peak:
-            out[k] = float(values[0, k])
-        if goal.least is not None:
-            out[k] = goal.least(space)
-    return tuple(out)
-
-
-def barred(problem: States) -> tuple[int, Ints] | None:
-    """Return a state that every plan passes and that is not allowed; None if there is none.
-
-    Of a free schedule that is the finished structure that nobody holds, of others every step in
-    which no grip is open. Result: its level, and the state (1, c). Without limits and demands
-    nothing is asked.
-    """
-    space = FreeStates(problem, standing=bool(problem.demands))
-    asked = problem.demands or problem.limits or problem.filters
-    for level, state in problem.space.without_choice() if asked else ():
-        if not space.values(level, state, rough=False)[1].all():
-            return level, state
-    return None
-
-
-def explore(
-    problem: States,
-    ceiling: float = np.inf,
-    width: int | None = None,
-    tell: Callable[[Explorer], object] = lambda _: None,
-) -> Explorer:
-    """Return the states of a free schedule below a ceiling that stand as is demanded.
-
-    ``ceiling``: the first goal must not take more of a state, where it is about a peak; ``width``:
-    from how many new states of a brick count the search goes on, and without regrips; ``tell``:
-    called after every level; may raise to end the search. Nothing is visited where a state that
-    every plan passes is not allowed.
-    """
-    asked = bool(problem.demands) or any(goal.margins for goal in problem.goals)
-    space = FreeStates(problem, regrips=width is None, standing=asked)
-    found = Explorer(space, width, tell)
-    if barred(problem) is None:
-        found.rise(ceiling)
-    return found
 
 
 def _joined(found: Sequence[tuple[free_space.Moves, bool]], states: Ints) -> Moves:

@@ -13,13 +13,14 @@ from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import engine_for
+from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph.states._checks import checked_limits, of_states
+from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.problem.amounts import LARGEST, NONE, STATE_RESPONSES, Amount, StateArrays
 from seqopt.problem.filters import Filter, filters_of
-from seqopt.problem.problem import WORST_PEAK, Aim, RobustAim, _goals, _require_for_curing
+from seqopt.problem.problem import WORST_PEAK, Aim, Orders, RobustAim, _goals, _require_for_curing
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets, _near
@@ -28,7 +29,7 @@ from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scenarios import require_alike
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Order, Scene
 from seqopt.sequence._durations import has_speeds, require_for_makespan
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
@@ -58,7 +59,8 @@ class States(Shown):
     sum in that goal, in place of the largest.
     ``resources``: who solves grip sets, and where answers are kept; the proof believes none of
     these; ``spares``: whether the whole that nobody holds costs nothing; ``filters``: what states
-    must pass beside limits.
+    must pass beside limits; ``orders``: among which orders of the bricks the best is sought, by
+    default the scene's own alone: values keep its scales.
     """
 
     engine: Engine
@@ -75,6 +77,7 @@ class States(Shown):
     resources: Resources = HERE
     spares: bool = False
     filters: tuple[Filter, ...] = ()
+    orders: Orders | None = None
 
     def __repr__(self) -> str:
         caps = zip(self.names[len(self.aims) :], self.budgets, strict=True)
@@ -85,6 +88,8 @@ class States(Shown):
             where += f", {self.rules.method!r}"
         if self.scenarios:
             where += f", {len(self.scenarios)} scenarios"
+        if self.orders is not None:
+            where += f", {self.orders.value} orders"
         return f"States({where}, {goals}, {len(self.limits)} limits)"
 
     @cached_property
@@ -96,7 +101,8 @@ class States(Shown):
     @property
     def totals(self) -> bool:
         """Whether totals of scenarios count, not the worst steps in any."""
-        return self.over.aim is Aim.SUM
+        first = self.goals[0]
+        return self.over.aim is Aim.SUM and first.states is not None and not first.is_peak
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -111,6 +117,17 @@ class States(Shown):
     def names_of(self, _: Aim | None) -> tuple[str, ...]:
         """Return what every goal is called, then what has a budget."""
         return self.names
+
+    def at(self, order: Order) -> States:
+        """Return the problem of one order of the bricks, by name; itself where it is given: ()."""
+        if not order:
+            return self
+        made = list[Engine]()
+        for engine in (self.engine, *self.scenarios):
+            recipe = recipe_of(engine)
+            assert recipe is not None  # as is required where orders are sought
+            made.append(recipe.make(build_network(engine.network.scene, order)))
+        return replace(self, engine=made[0], scenarios=tuple(made[1:]), orders=None)
 
     @property
     def network(self) -> Network:
@@ -369,6 +386,11 @@ class States(Shown):
         """What is known of how grip sets stand."""
         mortar = self.standing or Standing()
         return StandingSets(self.network, mortar, self._payloads, self.demands)
+
+    def share_proofs(self, other: States) -> None:
+        """Share what is proven of how states stand with a problem of the same scenes."""
+        for one, shared in zip(self.each or (self,), other.each or (other,), strict=True):
+            one.stability.share(shared.stability)
 
     @property
     def demands(self) -> tuple[Standing, ...]:

@@ -14,27 +14,28 @@ from seqopt.errors import InfeasibleError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
 from seqopt.graph.paths import FAILS, PASSES, _lazy_path
-from seqopt.graph.states._visits import FreeStates
+from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.problem.amounts import STEPS as COUNT
 from seqopt.problem.amounts import Amount
 from seqopt.problem.standing import Standing, slack
+from seqopt.scene.scene import Order
 from seqopt.stability.assessment import ROUGHEST
 
 WORST = {"bond": 1e9, "friction": ROUGHEST, "tilt": pi / 2}  # as goals count them
 FIRST = {"bond": 1e3, "friction": 0.5, "tilt": pi / 2 - 0.05}  # where the search begins
-State = tuple[int, ...]
+Ordered = tuple[Order, tuple[tuple[int, ...], ...]]  # an order, if it was sought, and states
 STEPS = (COUNT,)
 
 
 def best_margin(
     problem: States, tell: Callable[[Explorer], object] = lambda _: None
-) -> tuple[float, float, States, list[State]]:
+) -> tuple[float, float, States, Ordered]:
     """Return objective and lower bound of the first goal, a margin, and what is left at it.
 
     ``tell``: called with the states that are reached; may raise to end the search. Third, the
-    problem of the goals after it, all states standing with that margin; fourth, levels and states
-    of a plan that does. Raises `InfeasibleError` if no plan stands with any margin;
+    problem of the goals after it, all states standing with that margin; fourth, the order and
+    states of a plan that does. Raises `InfeasibleError` if no plan stands with any margin;
     `NothingFoundError` if it is open whether there is one within several budgets.
     """
     name, look = problem.goals[0].name, StandingLook(problem, tell)
@@ -52,9 +53,12 @@ class StandingLook:
         self._first: States | None = None  # with whom all others share their proofs
         self._budgets = problem.budgets
         steps = replace(problem, goals=(*STEPS, *problem.goals[len(problem.aims) :]))
-        self._found = Explorer(FreeStates(steps), tell=tell)
+        self._space = build_space(steps)
+        self._found = Explorer(self._space, tell=tell)
         self._found.rise()
-        self._tell, self.found = tell, list[State]()
+        self._tell: Callable[[Explorer], object] = tell
+        self.found: Ordered = ((), ())
+        self._schedules = dict[tuple[object, ...], tuple[int, States]]()
         self._visited = self._found.graph()
         self._graph, self._states = self._visited
         counts = [len(rows) for *_, rows in self._states]
@@ -69,8 +73,7 @@ class StandingLook:
     def proving(self, asked: States) -> States:
         """Return a problem with other demands that shares what was proven with those before."""
         first = self._first = self._first or asked
-        for one, other in zip(asked.each or (asked,), first.each or (first,), strict=True):
-            one.stability.share(other.stability)
+        asked.share_proofs(first)
         return asked
 
     def exists(self, asked: States) -> bool:
@@ -79,10 +82,12 @@ class StandingLook:
         known[0] = PASSES
 
         def ask(part: int, rows: Ints) -> Ints:
-            return np.where(asked.stand(*self._part(part, rows)), PASSES, FAILS)
+            level, problem, states = self._part(part, rows, asked)
+            return np.where(problem.stand(level, states), PASSES, FAILS)
 
         def recall(part: int, rows: Ints) -> Ints:
-            return asked.recalled(*self._part(part, rows))
+            level, problem, states = self._part(part, rows, asked)
+            return problem.recalled(level, states)
 
         tell = partial(self._tell, self._found)
         if self._budgets:
@@ -91,7 +96,7 @@ class StandingLook:
             path = _lazy_path(self._graph, self._parts, known, ask, recall, tell)
         if path is None:
             return False
-        self.found = [(level, *state.tolist()) for level, _, state in self._visited.of(path)]
+        self.found = self._space.path(self._visited.of(path))
         return True
 
     def _within(
@@ -111,9 +116,13 @@ class StandingLook:
             for row in open_.tolist():
                 known[row] = ask(int(self._parts[row]), np.array([row]))[0]
 
-    def _part(self, part: int, rows: Ints) -> tuple[int, Ints]:
-        level, _, states = self._states[part]
-        return level, states[rows - self._starts[part]]
+    def _part(self, part: int, rows: Ints, asked: States) -> tuple[int, States, Ints]:
+        """Return the level of states, the problem that they are of with its demands, and them."""
+        _, key, states = self._states[part]
+        own = (part, asked.standing, asked.settled)
+        if own not in self._schedules:
+            self._schedules[own] = self._space.schedule(key, asked)
+        return *self._schedules[own], states[rows - self._starts[part]]
 
 
 def bisected(name: str, exists: Callable[[float], bool]) -> tuple[float, float]:

@@ -1,27 +1,26 @@
-"""The proof that no build order is better: the states of all orders, rebuilt as those of one.
+"""The states that a proof rebuilds, in parts: of one schedule, or of all orders of its bricks.
 
-A part is a set of bricks that stand and the newest of them. Its rows are those of an order that
-begins with this set; between parts states have places in the scene's own order.
+Of all orders a part is a set of bricks that stand and the newest of them. Its rows are those of an
+order that begins with this set; between parts states have places in the scene's own order.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from math import comb
+from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Ints
-from seqopt.graph.orders import AllOrders
-from seqopt.graph.paths import distances, reached
+from seqopt.errors import ProblemError
+from seqopt.graph._orders import order_rules, upward
 from seqopt.graph.states.states import States
-from seqopt.judge._proof import BELOW, Rebuilt, Space
 from seqopt.judge._rule_moves import RuleTables, Transitions
-from seqopt.judge._states import Filter, Reachable, StateEvaluator, ask
+from seqopt.judge._states import Reachable, StateEvaluator, ask
 from seqopt.network.build import build_network
-from seqopt.problem.standing import slack
 from seqopt.scene._armed import can_hold
 from seqopt.scene.scene import Order, in_order
 from seqopt.sequence._robot_kinds import node_numbers
@@ -33,82 +32,97 @@ MOST = 5000  # sets of bricks that are looked at
 MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 
 
-def finds_better_order(
-    problem: AllOrders, value: float, *, most: int = MOST, end: float = np.inf
-) -> bool | None:
-    """Return whether some order has a plan whose first goal is below a value.
+class TooManyPartsError(ProblemError):
+    """There are more sets of bricks than a proof looks at."""
 
-    ``value``: of the first goal; ``most``: up to how many sets of bricks with a newest one are
-    looked at; ``end``: until when, as of `time.perf_counter`. Result: None where it is not known,
-    because there are more sets or time is over.
+
+class OneSchedule:
+    """The states of one schedule, a part for every level.
+
+    ``evaluator``: of its states; ``levels``: after the start.
     """
-    goal, demands = problem.states.goals[0], problem.states.demands
-    peak = goal.is_peak
-    if goal.margins:
-        value = max(0.0, value - slack(goal.name, value)) if np.isfinite(value) else value
-        if value == 0:
-            return False
-        asked = Filter((), (value,) if np.isfinite(value) else ())
-    else:
-        if peak and _bound_of_the_whole(problem) >= value:
-            return False
-        value -= 4 * BELOW * abs(value) if np.isfinite(value) else 0.0  # than what is tied with it
-        asked = Filter((value if peak else np.inf,), () if demands else None)
-    try:
-        graph = Rebuilt(_Orders(problem, most, end), asked).graph()
-    except _NotAllError:
-        return None
-    if peak:
-        return bool(graph.ends[reached(graph)].any())
-    return bool(distances(graph, graph.amounts[:, 0])[graph.ends].min(initial=np.inf) < value)
+
+    def __init__(self, problem: States) -> None:
+        self.evaluator = StateEvaluator(problem)
+        tables = self.evaluator.tables
+        self.levels = range(max(1, tables.first), tables.last + 1)
+
+    @property
+    def first(self) -> Any:
+        """The part in which builds begin."""
+        return self.evaluator.tables.first
+
+    def least(self) -> tuple[float, ...]:
+        """Return lower bounds of goals that are known before anything is rebuilt."""
+        return self.evaluator.least()
+
+    def at(self, part: Any) -> tuple[int, StateEvaluator]:
+        """Return the level of a part, and what evaluates its states."""
+        return part, self.evaluator
+
+    def to_part(self, part: Any, evaluator: StateEvaluator, states: Ints) -> Ints:
+        """Return states that are passed from part to part as rows of one."""
+        return states
+
+    def from_part(self, part: Any, states: Ints) -> Ints:
+        """Return rows of a part as they are passed on."""
+        return states
+
+    def onward(self, part: Any, found: Reachable) -> Iterator[tuple[Any, Transitions]]:
+        """Yield the parts of later levels that follow, with the transitions that lead there."""
+        yield from ((move.level, move) for move in found.onward if move.level > part)
 
 
-class _NotAllError(Exception):
-    """There are more sets of bricks than may be looked at, or time is over."""
+class AllOrders(OneSchedule):
+    """The states of all orders that are sought, of a take-down those of the build it reverses.
 
+    ``evaluator``: of the scene's own order: what all orders have in common.
+    """
 
-class _Orders(Space):
-    """The states of all orders, those of up to so many sets until some time."""
-
-    def __init__(self, problem: AllOrders, most: int, end: float) -> None:
-        self._problem, self._left, self._end = problem, most + 1, end  # the start is looked at too
-        self.levels = range(len(problem.stands), len(problem.scene.bricks) + 1)
-        self._nodes = {brick.name: brick.nodes for brick in problem.scene.bricks}
-        own = (node for name in problem.scene.build_order for node in self._nodes[name])
+    def __init__(self, problem: States) -> None:
+        self._problem = replace(upward(problem), resources=problem.resources.alone())
+        self._rules, scene = order_rules(problem), problem.network.scene
+        self.evaluator = StateEvaluator(replace(self._problem, orders=None))
+        self._known = dict[Key, StateEvaluator]()
+        self.levels = range(max(1, len(self._rules.stands)), len(scene.bricks) + 1)
+        self._nodes = {brick.name: brick.nodes for brick in scene.bricks}
+        own = (node for name in scene.build_order for node in self._nodes[name])
         self._place = {node: place for place, node in enumerate(own, start=1)}
 
     @property
     def first(self) -> Key:
-        """The bricks with which builds begin."""
-        stands = self._problem.stands
+        stands = self._rules.stands
         return frozenset(stands), stands[-1] if stands else 0
 
+    def least(self) -> tuple[float, ...]:
+        """Return the same, the whole structure among it, in which every order ends."""
+        first, *others = self.evaluator.least()
+        goal = self._problem.goals[0]
+        peak = goal.is_peak and not goal.margins
+        return max(first, _bound_of_the_whole(self._problem) if peak else -np.inf), *others
+
     def at(self, part: Key) -> tuple[int, StateEvaluator]:
-        """Return how many bricks stand, and what evaluates the states of an order."""
-        self._left -= 1
-        if self._left < 0 or time.perf_counter() > self._end:
-            raise _NotAllError
-        return len(part[0]), StateEvaluator(self._problem.judging(self._order(part)))
+        if part not in self._known:
+            if len(self._known) > MOST:  # the start is looked at too
+                raise TooManyPartsError(f"more than {MOST} sets of bricks; nothing is proven")
+            self._known[part] = StateEvaluator(self._problem.at(self._order(part)))
+        return len(part[0]), self._known[part]
 
     def to_part(self, part: Key, evaluator: StateEvaluator, states: Ints) -> Ints:
-        """Return states with places in the scene's own order as rows of a part."""
         rows = self._renumbered(self._order(part), states, back=True)
         return evaluator.tables.in_order(rows)
 
     def from_part(self, part: Key, states: Ints) -> Ints:
-        """Return rows of a part with places in the scene's own order."""
         return self._renumbered(self._order(part), states)
 
     def onward(self, part: Key, found: Reachable) -> Iterator[tuple[Key, Transitions]]:
-        """Yield what follows by placing each of the bricks that may come next."""
         problem, (stand, _) = self._problem, part
-        parks = problem.states.goals[0].needs_stays
         own = self.from_part(part, found.states)
-        for brick in problem.next_bricks(stand) if len(own) else ():
+        for brick in self._rules.next_bricks(stand) if len(own) else ():
             order = self._order(part, brick)
-            worlds = tuple(in_order(scene, order) for scene in problem.states.worlds)
-            book = RuleBook(build_network(problem.scene, order), problem.states.free_rules, worlds)
-            tables = RuleTables(book, [], parks=parks)
+            worlds = tuple(in_order(scene, order) for scene in problem.worlds)
+            book = RuleBook(build_network(self._rules.scene, order), problem.free_rules, worlds)
+            tables = RuleTables(book, [], parks=problem.parks)
             rows = self._renumbered(order, own, back=True)
             for move in tables.successors(len(stand), rows):
                 if move.level > len(stand) and len(move.states):
@@ -119,7 +133,7 @@ class _Orders(Space):
         """Return states with places in the scene's own order for those in another, or back."""
         place = np.array([0, *(self._place[n] for name in order for n in self._nodes[name])])
         place = np.argsort(place) if back else place
-        robots = len(self._problem.states.free_rules.team(self._problem.scene))
+        robots = len(self._problem.free_rules.team(self._rules.scene))
         out = states.copy()
         held = states[:, :robots]  # negative where a free robot was last
         out[:, :robots] = np.sign(held) * place[np.abs(held)]
@@ -127,19 +141,19 @@ class _Orders(Space):
 
     def _order(self, key: Key, following: int | None = None) -> Order:
         """Return an order that begins with a set, its newest brick last, and maybe another one."""
-        own, (stand, newest) = self._problem.scene.build_order, key
+        own, (stand, newest) = self._rules.scene.build_order, key
         first = [name for name in own if name in stand and name != newest]
         last = [newest] if stand else []
         last += [] if following is None else [following]
         return (*first, *last, *(n for n in own if n not in stand and n != following))
 
 
-def _bound_of_the_whole(problem: AllOrders) -> float:
+def _bound_of_the_whole(problem: States) -> float:
     """Return the lower bound from the finished structure, in which every order ends.
 
     Minus infinity where there are too many grip sets to look at.
     """
-    free, scene = problem.judging(problem.scene.build_order), problem.scene
+    free, scene = replace(problem, goals=problem.goals[:1]), problem.network.scene
     rules, kinds = free.free_rules, scene.grip_kinds
     taken = {*scene.blocked_nodes, *(prop.node for prop in scene.props)}
     nodes = [node for node in node_numbers(free.network) if node not in taken]
@@ -164,3 +178,8 @@ def _least(free: States, grips: list[int], count: int) -> float:
     sets = sets[(np.diff(nodes, axis=1) > 0).all(axis=1)]  # nobody holds what another one holds
     found = ask(free, len(free.network.inner), sets)
     return float(found.values[found.fit, 0].min(initial=np.inf))
+
+
+def build_parts(problem: States) -> OneSchedule:
+    """Return the states of a problem in parts, as a judge rebuilds them."""
+    return OneSchedule(problem) if problem.orders is None else AllOrders(problem)
