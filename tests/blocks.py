@@ -62,13 +62,12 @@ def with_shapes(scene):
     def shaped(brick):
         points, sides = vertices_of(brick)
         made = block_brick(
-            brick.name,
-            Polyhedron(as_vectors(points), sides),
-            brick.density,
-            nodes=brick.nodes,
-            grips=tuple(map(brick.node_position, brick.nodes)),
+            brick.name, Polyhedron(as_vectors(points), sides), brick.density, nodes=brick.nodes
         )
-        return replace(made, placing_node=brick.placing_node)
+        spots = [np.subtract(brick.node_position(n), made.position) for n in brick.nodes]
+        return replace(
+            made, placing_node=brick.placing_node, node_offsets=as_vectors(np.array(spots))
+        )
 
     assert all(isinstance(spring, Joint | Ground) for spring in sorted_springs)
     return replace(

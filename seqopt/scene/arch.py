@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,7 +119,6 @@ def arch_scene(
     name: str = "arch",
     *,
     robots: Sequence[Robot] | None = None,
-    line_nodes: Mapping[int, int] | None = None,
     provenance: str = "",
 ) -> Scene:
     """Return the scene of an arch that is built from its first brick to its last.
@@ -133,8 +132,6 @@ def arch_scene(
     name : str
     robots : sequence of Robot, optional
         By default `_robots_beside` the arch.
-    line_nodes : mapping of int to int, optional
-        Per brick that lies across: which of its nodes is on the arch line; 2b-2 by default.
     provenance : str
         Where the numbers come from.
 
@@ -148,7 +145,7 @@ def arch_scene(
     <Scene small: 5 bricks, 4 joints, 2 ground ends, 3 robots>
     """
     axes = tangent, _, ends = _axes(shape)
-    bricks = _bricks(shape, axes, line_nodes or {})
+    bricks = _bricks(shape, axes)
     bisector = tangent[:-1] + tangent[1:]
     joints = []
     for b, way in enumerate(bisector, start=1):
@@ -218,9 +215,7 @@ def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     return tangent, left, ends
 
 
-def _bricks(
-    shape: ArchShape, axes: tuple[Floats, Floats, Floats], line_nodes: Mapping[int, int]
-) -> tuple[Brick, ...]:
+def _bricks(shape: ArchShape, axes: tuple[Floats, Floats, Floats]) -> tuple[Brick, ...]:
     """Return all bricks, each in the middle between its ends and moved outward by its offset."""
     tangents, lefts, ends = axes
     offset = np.zeros(len(tangents)) if shape.offset is None else np.asarray(shape.offset, float)
@@ -233,8 +228,6 @@ def _bricks(
             length_axis = left if letter == "L" else -left
             width_axis = np.cross(np.cross(length_axis, tangent), length_axis)
             width_axis /= np.linalg.norm(width_axis)
-            if line_nodes.get(b) == nodes[1]:
-                nodes = nodes[::-1]
             placing = nodes[int((letter == "L") == (b % 2 == 1))]  # both sides take turns
         aside = 0.0 if letter == "V" else shape.overhang
         brick = Brick(

@@ -15,36 +15,24 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import frames, rows, short, vector, whole
+from seqopt.scene._checks import frames, short, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 
 
 def block_brick(
-    name: int,
-    shape: Polyhedron,
-    density: float,
-    *,
-    nodes: tuple[int, int] | None = None,
-    grips: tuple[Vector, Vector] | None = None,
+    name: int, shape: Polyhedron, density: float, *, nodes: tuple[int, int] | None = None
 ) -> Brick:
     """Return a brick of any shape, placed by its second node.
 
-    ``shape``: where it is in the scene, m. ``nodes``: twice the name, and one more, by default.
-    ``grips``: where these are, in the scene, m; `Polyhedron.nodes` by default.
+    ``shape``: where it is in the scene, m. ``nodes``: twice the name, and one more, by default;
+    they are where `Polyhedron.nodes` says.
     """
     if not isinstance(shape, Polyhedron):
         raise SceneError(f"brick {short(name)}: shape is {short(shape)}; give a Polyhedron")
     own = replace(shape, vertices=as_vectors(shape.points - shape.centroid))
     x, y, z = own.extents(own.axes).tolist()
     at, first, second = as_vectors(np.vstack([shape.centroid, own.axes[:2]]))
-    held: tuple[Vector, ...] = own.nodes()
-    if grips is not None:
-        where = f"brick {name}: grips"
-        found = [vector(where, row) for row in rows(where, grips)]
-        if len(found) != 2:
-            raise SceneError(f"{where} are {short(grips)}; give two points")
-        held = as_vectors(np.array(found) - shape.centroid)
     numbers = nodes or (2 * whole("brick: its name", name), 2 * name + 1)
     return Brick(
         name=name,
@@ -56,7 +44,7 @@ def block_brick(
         nodes=numbers,
         placing_node=numbers[-1],
         shape=own,
-        node_offsets=(held[0], held[1]),
+        node_offsets=own.nodes(),
     )
 
 

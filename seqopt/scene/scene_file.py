@@ -328,11 +328,6 @@ def _parse_scene(text: str, source: str = "text") -> Scene:
     return _scene_from_dict(document)
 
 
-def _scene_from_document(document: object, source: str) -> Scene:
-    """Return the scene of a document, such as `scene_to_dict` makes, if it obeys the schema."""
-    return _parse_scene(json.dumps(document), source)
-
-
 def _scene_from_dict(document: dict[str, Any]) -> Scene:
     """Return the scene of a document that obeys the schema."""
     content = {key: value for key, value in document.items() if key not in ("format", "version")}

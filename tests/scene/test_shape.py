@@ -127,8 +127,6 @@ def test_what_is_no_polyhedron_is_refused(vertices, faces, said):
     [
         (1, "box", {}, "brick 1: shape is 'box'; give a Polyhedron"),
         ("a", CUBE, {}, "its name is 'a'; give a whole number"),
-        (1, CUBE, {"grips": ((0, 0, 0),)}, r"grips are \(\(0, 0, 0\),\); give two points"),
-        (1, CUBE, {"grips": 3}, "grips is 3; give a list"),
         (1, CUBE, {"nodes": (1,)}, r"nodes are \[1\]; give two different numbers"),
     ],
 )

@@ -1,7 +1,7 @@
 """What `experiments.calibration.identify_arch25` fits: the numbers, and the scene of them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -12,6 +12,7 @@ from experiments.harness.yardstick import ROUNDING, errors, percentiles, tension
 from seqopt import ArchShape, Scene, analyze, arch_scene, build_network, load_scene
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.scene.parts import Brick
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import PUBLISHED, ROBOTS, as_printed, printed_steps, published_plan
 
@@ -90,7 +91,16 @@ def scene_of(numbers: Floats, groups: Sequence[Free]) -> Scene:
         translational_stiffness=(linear[0], linear[-1], linear[-1]),
         rotational_stiffness=(angular[0], angular[-1], angular[-1]),
     )
-    return arch_scene(shape, "arch25", robots=ROBOTS, line_nodes=LINE_NODES, provenance=PROVENANCE)
+    scene = arch_scene(shape, "arch25", robots=ROBOTS, provenance=PROVENANCE)
+    return replace(scene, bricks=tuple(map(_as_numbered, scene.bricks)))
+
+
+def _as_numbered(brick: Brick) -> Brick:
+    """Return a brick whose nodes have the paper's numbers: that on the arch line may be second."""
+    if LINE_NODES.get(brick.name, brick.nodes[0]) == brick.nodes[0]:
+        return brick
+    other = sum(brick.nodes) - brick.placing_node
+    return replace(brick, nodes=brick.nodes[::-1], placing_node=other)
 
 
 def _within_a_turn(angles: Floats) -> list[float]:
