@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt._cli.values import parse_options
+from seqopt._cli.grammar import parse_options
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine

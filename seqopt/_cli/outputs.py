@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from seqopt._cli.given import is_folder
-from seqopt._cli.options import Asked, Written
+from seqopt._cli import inputs, options
 from seqopt._files import (
     csv_text,
     require_apart,
@@ -40,7 +39,7 @@ def figure_notes() -> tuple[str, ...]:
     return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
 
 
-def _steps_table(plan: ShownBuild) -> pd.DataFrame:
+def steps_table(plan: ShownBuild) -> pd.DataFrame:
     """Return the steps of a plan without any response: as much as reading it again takes."""
     robots = plan.engine.network.scene.robots
     rows = [(s.number, s.kind.value, s.bricks, *s.grips) for s in plan.steps]
@@ -50,7 +49,7 @@ def _steps_table(plan: ShownBuild) -> pd.DataFrame:
     )
 
 
-def _bare_files(
+def bare_files(
     plan: ShownBuild, table: pd.DataFrame, report: Mapping[str, object]
 ) -> dict[str, bytes | str]:
     """Return what a plan is, by file name: a table of its steps, its scene, and its summary."""
@@ -61,7 +60,7 @@ def _bare_files(
     }
 
 
-def _plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
+def plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
     """Return tables and tasks of a plan by file name; ``choices``: with those of every choice."""
     tables = {"plan": plan.responses()}
     if not isinstance(plan.graph, States):
@@ -75,10 +74,10 @@ def _plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
     if plan.makespan is not None:
         tables["times"] = plan.times()
     files: dict[str, bytes | str] = {f"{n}.csv": csv_text(table) for n, table in tables.items()}
-    return {**files, **_task_files(plan), **_time_files(plan)}
+    return {**files, **task_files(plan), **time_files(plan)}
 
 
-def _time_files(plan: ShownBuild) -> dict[str, bytes]:
+def time_files(plan: ShownBuild) -> dict[str, bytes]:
     """Return the chart of a build over seconds, where it is known how long robots take."""
     if plan.makespan is None or figure_notes():
         return {}
@@ -87,7 +86,7 @@ def _time_files(plan: ShownBuild) -> dict[str, bytes]:
     return picture_files("times", plan.gantt())
 
 
-def _task_files(plan: Plan) -> dict[str, str]:
+def task_files(plan: Plan) -> dict[str, str]:
     """Return what robots do, for those who program them, by file name."""
     from seqopt.exchange._tasks import _in_postures, plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
 
@@ -122,7 +121,7 @@ def written_to(folder: Path | None, *, page: bool = True, what: str = "it step b
 
 
 def write_outputs(
-    asked: Written, files: Callable[[], Mapping[str, bytes | str]]
+    asked: options.Written, files: Callable[[], Mapping[str, bytes | str]]
 ) -> tuple[Path, ...]:
     """Write the folder that a command was asked for, whole, if it was asked for one; return it.
 
@@ -137,7 +136,7 @@ def write_outputs(
     return (asked.path,)
 
 
-def require_out(asked: Written, *names: str) -> None:
+def require_out(asked: options.Written, *names: str) -> None:
     """Raise `FileError`, before anything is computed, if the folder asked for cannot be made.
 
     Nor may what will have one of some names in it be what the command reads.
@@ -147,15 +146,15 @@ def require_out(asked: Written, *names: str) -> None:
         keep_apart(asked, *(asked.path / name for name in names))
 
 
-def keep_apart(asked: Asked, *outputs: Path | None) -> None:
+def keep_apart(asked: options.Asked, *outputs: Path | None) -> None:
     """Raise `FileError` if outputs are one file, or one that the command reads."""
     require_apart([path for path in outputs if path is not None], _inputs(asked))
 
 
-def _inputs(asked: Asked) -> list[Path]:
+def _inputs(asked: options.Asked) -> list[Path]:
     """Return the files that a command reads, those in the folder of a plan among them."""
     given = (getattr(asked, name, None) for name in ("scene", "plan", "schedule"))
     named = [Path(name) for name in given if isinstance(name, str | Path)]
-    folders = [path for path in named if is_folder(path)]
+    folders = [path for path in named if inputs.is_folder(path)]
     inside = [path / name for path in folders for name in ("scene.json", "plan.csv")]
     return [path for path in (*named, *inside) if str(path) not in builtin_scenes()]

@@ -6,17 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
-from seqopt._cli.asked import asked_engine, asked_scene, in_seconds
-from seqopt._cli.given import Place, asked_place, between, kept_place
-from seqopt._cli.options import Chosen, Numbers, Posed, Words
-from seqopt._cli.values import (
-    asked_criterion,
-    asked_resources,
-    asked_standing,
-    count_word,
-    parse_numbers,
-    parse_robots,
-)
+from seqopt._cli import grammar, inputs, options
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.graph.formulation import find_formulation
@@ -57,7 +47,9 @@ _WRONG = {
 }
 
 
-Change: TypeAlias = Callable[[Scene, Place], tuple[Scene, Place, str]]  # and who takes part
+Change: TypeAlias = Callable[
+    [Scene, inputs.Place], tuple[Scene, inputs.Place, str]
+]  # and who takes part
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,7 +63,7 @@ class PosedProblem:
     unseen: Scenarios | None = None
 
 
-def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
+def asked_problem(asked: options.Posed, change: Change | None = None) -> PosedProblem:
     """Return the problem that the command ``optimize`` or ``pareto`` is asked for.
 
     ``change``: what has changed where the build begins. Raises `ProblemError` or `StepError` if
@@ -82,50 +74,52 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
     _require_known(asked, choice, of_states=of_states)
     sought = asked.order == SEARCH
     asked = replace(asked, order=None) if sought else asked
-    criterion = asked_criterion(choice, DEFAULTS[FREE if of_states else "any other"].criterion)
-    scene = asked_scene(asked)
+    criterion = grammar.parse_criterion(
+        choice, DEFAULTS[FREE if of_states else "any other"].criterion
+    )
+    scene = inputs.find_scene(asked)
     scene, begin, end, robots = _asked_ends(asked, scene, change)
-    scene = in_seconds(choice, scene) if choice.durations else scene
+    scene = inputs.in_seconds(choice, scene) if choice.durations else scene
     find_postures(scene, choice.cache, asked.tell)
     words: dict[str, Any] = {"limits": parse_limits(asked.limits, scene, "--limit")}
     parse_budgets(choice.budgets, of_states=of_states)  # said before anything is built
-    words["resources"] = asked_resources(choice, None if of_states else asked.tell)
+    words["resources"] = grammar.parse_resources(choice, None if of_states else asked.tell)
     aim, known, unseen = _asked_scenarios(choice, scene)
     words |= {} if aim is None else {"scenarios": known, "over": aim}
-    engine = asked_engine(asked, build_network(scene))
+    engine = inputs.find_engine(asked, build_network(scene))
     rules = asked.rules if asked.schedule == FREE else None
-    names = parse_robots(robots) or None
+    names = grammar.parse_robots(robots) or None
     every = _find_moves(engine.network, asked.schedule, names, choice.candidates, rules, "--rule")
     if isinstance(every, FreeRules) and asked.direction is not None:
         every = replace(every, **dict[str, Any](direction=asked.direction))
-    words |= {"stands": asked_standing(asked), "budgets": choice.budgets}
+    words |= {"stands": grammar.parse_standing(asked), "budgets": choice.budgets}
     words |= {"orders": Orders.TIED} if sought else {}
     aims = None if asked.aim is None else str(asked.aim)
     filters = [each for each in words["limits"] if isinstance(each, Filter)]
     others = (aims, words["stands"], sought, filters)
 
-    def posed(begin: Place) -> Problem:
-        moves = between(every, begin, end)
+    def posed(begin: inputs.Place) -> Problem:
+        moves = inputs.between(every, begin, end)
         states = _chooses_states(moves, choice.formulation, others)
         what = _with_defaults(criterion, aims, aim or WORST_PEAK, states=states)
         return pose(engine, moves, *what, **words)
 
-    whole = posed(Place()) if begin.site is not None and change is None else None
+    whole = posed(inputs.Place()) if begin.site is not None and change is None else None
     return PosedProblem(posed(begin), whole, aim, known, unseen)
 
 
-def _choice(asked: Posed) -> Chosen:
+def _choice(asked: options.Posed) -> options.Chosen:
     """Return what is asked of a choice; of a Pareto set nothing is."""
-    return asked if isinstance(asked, Chosen) else Chosen()
+    return asked if isinstance(asked, options.Chosen) else options.Chosen()
 
 
-def _aged(asked: Posed, scene: Scene, begin: Place) -> Place:
+def _aged(asked: options.Posed, scene: Scene, begin: inputs.Place) -> inputs.Place:
     """Return where a build begins with the ages of bricks, where mortar cures: as the plan was."""
-    standing = asked_standing(asked) if begin.done else None
+    standing = grammar.parse_standing(asked) if begin.done else None
     if begin.site is None or not begin.done or standing is None or standing.curing is None:
         return begin
     choice = _choice(asked)
-    scene = in_seconds(choice, scene) if choice.durations else scene
+    scene = inputs.in_seconds(choice, scene) if choice.durations else scene
     waits = CuringBuilds(build_network(scene), standing.mortar, standing.curing).waits
     try:
         times = step_times(scene, begin.done, waits)
@@ -137,23 +131,23 @@ def _aged(asked: Posed, scene: Scene, begin: Place) -> Place:
 
 
 def _asked_ends(
-    asked: Posed, scene: Scene, change: Change | None
-) -> tuple[Scene, Place, Place, int | Words | None]:
+    asked: options.Posed, scene: Scene, change: Change | None
+) -> tuple[Scene, inputs.Place, inputs.Place, int | options.Words | None]:
     """Return where a build begins and ends, the scene after what has changed, who takes part."""
-    scene, begin = asked_place(asked.begin, "from", scene)
+    scene, begin = inputs.find_place(asked.begin, "from", scene)
     begin, robots = _aged(asked, scene, begin), asked.robots
     if change is not None:
         scene, begin, robots = change(scene, begin)
     if asked.keep is not None:
-        scene, end = kept_place(asked, str(asked.keep), scene, begin)
+        scene, end = inputs.kept_place(asked, str(asked.keep), scene, begin)
         return scene, begin, end, robots
-    found, end = asked_place(asked.to, "to", scene)
+    found, end = inputs.find_place(asked.to, "to", scene)
     if found != scene:
         raise StepError(f"--to {asked.to}: its bricks are not those that follow in this order")
     return scene, begin, end, robots
 
 
-def _wants_states(asked: Posed, choice: Chosen) -> bool:
+def _wants_states(asked: options.Posed, choice: options.Chosen) -> bool:
     """Return whether states of the build are to be chosen, and not candidates of moves."""
     if asked.schedule == FREE or asked.aim or asked.stands or asked.order == SEARCH:
         return True
@@ -161,7 +155,7 @@ def _wants_states(asked: Posed, choice: Chosen) -> bool:
     return named is not None and find_formulation(named).of_states
 
 
-def _require_known(asked: Posed, choice: Chosen, *, of_states: bool) -> None:
+def _require_known(asked: options.Posed, choice: options.Chosen, *, of_states: bool) -> None:
     """Raise an error if options are given that states, or candidates, do not have."""
     down, free = Direction.TAKE_DOWN.value, asked.schedule == FREE
     for name in ALONE:
@@ -180,7 +174,7 @@ def _require_known(asked: Posed, choice: Chosen, *, of_states: bool) -> None:
 
 
 def _asked_scenarios(
-    asked: Chosen, scene: Scene
+    asked: options.Chosen, scene: Scene
 ) -> tuple[RobustAim | None, Scenarios | None, Scenarios | None]:
     """Return the aim over scenarios, those to choose by, and those of the next seed that judge."""
     if asked.robust is None:
@@ -189,16 +183,16 @@ def _asked_scenarios(
         aim = parse_robust(asked.robust)
     except ProblemError as error:
         raise ProblemError(f"--robust: {error}") from error
-    count = count_word(asked.scenarios, "--scenarios", MOST, usual=COUNT)
-    seed, known = count_word(asked.seed, "--seed", MOST, least=0), asked.unseen
-    other = None if known is None else count_word(known, "--unseen", MOST)
+    count = grammar.parse_count(asked.scenarios, "--scenarios", MOST, usual=COUNT)
+    seed, known = grammar.parse_count(asked.seed, "--seed", MOST, least=0), asked.unseen
+    other = None if known is None else grammar.parse_count(known, "--unseen", MOST)
     drawn = _drawn(scene, asked.vary, count, seed)
     return aim, drawn, None if other is None else _drawn(scene, asked.vary, other, seed + 1)
 
 
-def _drawn(scene: Scene, vary: Numbers, count: int, seed: int) -> Scenarios:
+def _drawn(scene: Scene, vary: options.Numbers, count: int, seed: int) -> Scenarios:
     """Return samples of a scene."""
-    spread = parse_numbers("--vary", vary, SPREADS, zero=True, advice=", as stiffness=3")
+    spread = grammar.parse_numbers("--vary", vary, SPREADS, zero=True, advice=", as stiffness=3")
     factor, grips = spread.pop("stiffness", 3.0), spread.pop("grips", 1.0)
     for name, each in (("stiffness", factor), ("grips", grips)):
         if each < 1:

@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull
 
 import seqopt
 from seqopt._cli.main import main
-from seqopt._cli.outputs import _task_files
+from seqopt._cli.outputs import task_files
 from seqopt._files import csv_text
 from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
@@ -70,7 +70,7 @@ def test_tasks_have_the_joints_and_the_tool_of_the_posture(plan):
 
 
 def test_files_beside_a_plan_have_postures(plan):
-    files = _task_files(plan)
+    files = task_files(plan)
     told = [row for row in json.loads(files["tasks.json"])["tasks"] if row["posture"]]
     rows = [row for row in csv.DictReader(io.StringIO(files["tasks.csv"])) if row["joint_6"]]
     assert len(told) == len(rows) > 0
@@ -88,14 +88,14 @@ def folder(plan, tmp_path_factory):
 
 @pytest.mark.parametrize(("form", "name"), [("tasks", "tasks.json"), ("tasks_csv", "tasks.csv")])
 def test_what_is_exported_later_has_the_same_postures(plan, folder, form, name, capsys):
-    assert _task_files(plan)[name] == export_plan(
+    assert task_files(plan)[name] == export_plan(
         plan.engine.network.scene, read_folder(folder)[1], form
     )
     out = folder / name
     words = ["export", str(folder), "--format", form, "--out", str(out)]
     assert main([*words, "--cache", str(folder / "postures")]) == 0
     assert capsys.readouterr().err == ""
-    assert out.read_text(encoding="utf-8") == _task_files(plan)[name]
+    assert out.read_text(encoding="utf-8") == task_files(plan)[name]
     assert [*(folder / "postures").iterdir()]
 
 
@@ -104,12 +104,12 @@ def test_an_export_without_postures_is_of_proposals(plan, folder, monkeypatch, c
     scene, steps = read_folder(folder)
     proposed = tasks_json(scene, plan_tasks(scene, steps))
     assert export_plan(scene, steps, "tasks", postures={}) == proposed
-    assert proposed != _task_files(plan)["tasks.json"]  # the control
+    assert proposed != task_files(plan)["tasks.json"]  # the control
 
     def missing(*_):
         raise kind("arms need pinocchio and coal: pip install 'seqopt[arms]'")
 
-    monkeypatch.setattr("seqopt._cli.asked.find_postures", missing)
+    monkeypatch.setattr("seqopt._cli.inputs.find_postures", missing)
     out = folder / "proposed.json"
     assert main(["export", str(folder), "--format", "tasks", "--out", str(out)]) == 0
     assert "grips are proposals without postures; arms need pinocchio" in capsys.readouterr().err

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 import seqopt
+from seqopt._cli import outputs
 from seqopt._cli.arguments import request
 from seqopt._cli.commands import analyze, optimize, pareto, replan
 from seqopt._cli.main import main
@@ -137,7 +138,7 @@ def test_a_page_that_is_ended_is_left_out(tmp_path, monkeypatch, how, status):
     """Without its tables too a plan is there, and its folder can be read again."""
     monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
     in_the_midst(monkeypatch, seqopt.report._pages, "plan_page", how)
-    in_the_midst(monkeypatch, optimize, "_plan_files", how)
+    in_the_midst(monkeypatch, outputs, "plan_files", how)
     out = tmp_path / "out"
     assert main([*FREE, "--out", str(out)]) == status
     assert {p.name for p in out.iterdir()} == {"plan.csv", "scene.json", "summary.json"}

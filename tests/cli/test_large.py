@@ -13,8 +13,8 @@ from functools import partial
 
 import pytest
 
+from seqopt._cli.grammar import parse_size
 from seqopt._cli.main import main
-from seqopt._cli.values import parse_size
 from seqopt.errors import ProblemError
 from seqopt.plan import _paths as paths
 from seqopt.scene.scene_file import save_scene

@@ -83,7 +83,7 @@ def test_a_folder_of_a_plan_is_its_scene_and_its_steps(capsys, here, name):
 
 
 def test_where_no_method_fits_a_plan_is_made(capsys, here, monkeypatch):
-    monkeypatch.setattr("seqopt._cli.given.METHODS", {})
+    monkeypatch.setattr("seqopt._cli.inputs.METHODS", {})
     status, _, err = command(capsys, "analyze", "arch.json")
     assert status == 0
     assert err.startswith("steps: of the best free schedule, minmax")

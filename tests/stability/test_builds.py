@@ -10,8 +10,8 @@ import pytest
 
 import seqopt
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import held_to
 from seqopt._cli.main import main
+from seqopt._cli.remarks import held_to
 from seqopt.contact.faces import step_assembly
 from seqopt.report.comparison import compare
 from seqopt.report.page import Build, _build_data

@@ -11,21 +11,8 @@ from typing import Any
 
 import pandas as pd
 
+from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import (
-    _not_done,
-    arm_notes,
-    asked_engine,
-    asked_scene,
-    exceeded,
-    held_to,
-    level_notes,
-    scene_facts,
-)
-from seqopt._cli.given import asked_steps
-from seqopt._cli.options import Computed, File, Fixed, Number, Strict, word
-from seqopt._cli.outputs import keep_apart, put_table
-from seqopt._cli.values import parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
 from seqopt.arms.reach import find_postures
@@ -62,7 +49,7 @@ UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Analyze(Strict, Computed, Fixed):
+class Analyze(options.Strict, options.Computed, options.Fixed):
     """Compute how the structure responds in every step of one sequence, and write a table.
 
     It has the columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in
@@ -99,22 +86,22 @@ class Analyze(Strict, Computed, Fixed):
     seqopt analyze arch25 --method sequential --json
     """
 
-    staged: str | None = word(None, choices=[way.value for way in Placing])
-    tolerance: str | None = word(None, const="")
-    fields: File | None = None
-    time_limit: Number | None = None
+    staged: str | None = options.word(None, choices=[way.value for way in Placing])
+    tolerance: str | None = options.word(None, const="")
+    fields: options.File | None = None
+    time_limit: options.Number | None = None
 
 
 def run(asked: Analyze) -> Answer:
     """Analyze every step of a sequence."""
     archived = None if asked.fields is None else Path(asked.fields)
-    keep_apart(asked, asked.path, archived)
-    clock, faults = Clock(parse_time_limit(asked.time_limit)), dict[int, SeqoptError]()
+    outputs.keep_apart(asked, asked.path, archived)
+    clock, faults = Clock(grammar.parse_time_limit(asked.time_limit)), dict[int, SeqoptError]()
     with clock.needed("reading scene and steps"):
-        scene = asked_scene(asked)
+        scene = inputs.find_scene(asked)
         find_postures(scene, asked.cache, asked.tell)
         network = build_network(scene)
-        engine, named = asked_engine(asked, network), asked_steps(asked, network)
+        engine, named = inputs.find_engine(asked, network), inputs.find_steps(asked, network)
     network, within, steps = engine.network, LinearRange(engine), named.steps
     in_time = _InTime(_step_answers(asked, within, steps), clock)
     solved = _solved(engine, in_time, faults)
@@ -125,7 +112,7 @@ def run(asked: Analyze) -> Answer:
     failures, status = (*_faults_said(faults, reached), *late), _status_of(faults, ended)
     if table.empty:
         none = _with_faults(scene, table, steps, faults)
-        said = put_table(asked.path, none, _counted(none, faults)) if faults else {}
+        said = outputs.put_table(asked.path, none, _counted(none, faults)) if faults else {}
         how: dict[str, Any] = {"failures": failures, "status": status, "notes": named.notes}
         return Answer({"steps": none}, value=none, **how, **said)
     computed = [step for step in steps[:reached] if step.number not in faults]
@@ -135,23 +122,33 @@ def run(asked: Analyze) -> Answer:
     departures = partial(within.departures, table, staged)
     outside: tuple[Departure, ...] = clock.spare(RANGE, departures, ())
     whole = _with_faults(scene, table, steps, faults) if faults else table
-    said = put_table(asked.path, whole, _counted(whole, faults))
+    said = outputs.put_table(asked.path, whole, _counted(whole, faults))
     if archived is not None:
         write_bytes(archived, archive(network, answers))
         said["written"] = (*said.get("written", ()), archived)
     found = partial(what_was_enough, within, {"": table}, staged=staged is not None)
     enough = clock.spare("which model is enough", found, None)
-    facts = {"scene": scene_facts(scene), "units": UNITS, "steps": whole, **provenance(engine)}
+    facts = {
+        "scene": remarks.scene_facts(scene),
+        "units": UNITS,
+        "steps": whole,
+        **provenance(engine),
+    }
     answer = Answer(
         value=whole,
         facts={**facts, "enough": None if enough is None else enough.facts()},
-        notes=(*named.notes, *off, *_notes(asked, within, steps, table, enough), *_not_done(clock)),
+        notes=(
+            *named.notes,
+            *off,
+            *_notes(asked, within, steps, table, enough),
+            *remarks.not_done(clock),
+        ),
         failures=(*failures, *([INTERRUPTED] if clock.interrupted else ())),
         status=Status.INTERRUPTED if clock.interrupted else status,
         **said,
     )
-    unreached = arm_notes(scene, {"": computed})
-    return held_to(answer, exceeded(scene, table), outside, unreached=unreached)
+    unreached = remarks.arm_notes(scene, {"": computed})
+    return remarks.held_to(answer, remarks.exceeded(scene, table), outside, unreached=unreached)
 
 
 def _notes(
@@ -163,7 +160,7 @@ def _notes(
 ) -> Iterator[str]:
     """Yield levels, what is unchecked or enough, payloads and props exceeded, idle robots."""
     scene = within.engine.network.scene
-    yield from level_notes(asked, within.engine)
+    yield from remarks.level_notes(asked, within.engine)
     yield from within.unchecked
     yield from () if enough is None else enough.lines
     yield from (f"payload exceeded: {excess}" for excess in overloads(scene, table))

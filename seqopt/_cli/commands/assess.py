@@ -14,12 +14,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import _settlement_notes, asked_scene, carrying_notes, scene_facts
-from seqopt._cli.given import asked_steps
-from seqopt._cli.options import Fixed, Number, Words
-from seqopt._cli.outputs import keep_apart, put_table, require_out, write_outputs, written_to
-from seqopt._cli.values import MOST_WORKERS, count_word, mortar_word
 from seqopt._files import csv_text, read_text
 from seqopt._showing import PAGE
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar
@@ -38,7 +34,7 @@ from seqopt.work.progress import with_progress
 
 
 @dataclass(frozen=True, kw_only=True)
-class Assess(Fixed):
+class Assess(options.Fixed):
     """What must hold?
 
     mortar : MORTAR
@@ -77,11 +73,11 @@ class Assess(Fixed):
     """
 
     mortar: Mortar | str | None = None
-    margins: Words | None = None
+    margins: options.Words | None = None
     steps: str | None = None
     load_factor: bool = False
     map: str | None = None
-    holds: Words | None = None
+    holds: options.Words | None = None
     workers: int | str = 1
 
 
@@ -116,17 +112,17 @@ class AssessWords(Assess):
     seqopt assess arch:span=2,rise=0.8 --map friction --out map
     """
 
-    friction: Number | None = None
-    tensile_strength: Number | None = None
-    cohesion: Number | None = None
+    friction: options.Number | None = None
+    tensile_strength: options.Number | None = None
+    cohesion: options.Number | None = None
 
 
 def answer_load_factor(asked: AssessWords) -> Answer:
     """Answer how much load every step of a sequence bears."""
-    scene = asked_scene(asked)
-    require_out(asked)
+    scene = inputs.find_scene(asked)
+    outputs.require_out(asked)
     network, mortars = build_network(scene), _asked_mortars(asked)
-    (title, steps, taken), each, tables = asked_steps(asked, network), {}, []
+    (title, steps, taken), each, tables = inputs.find_steps(asked, network), {}, []
     for name, mortar in mortars.items():
         found = each[name] = load_factors(network, steps, mortar, asked.tell)
         tables.append(load_factor_table(steps, found).assign(mortar=name))
@@ -140,8 +136,8 @@ def answer_load_factor(asked: AssessWords) -> Answer:
         page = load_page(engine, title, steps, each, said)
         return {"load_factors.csv": csv_text(table), PAGE: page}
 
-    written = write_outputs(asked, files)
-    where = written_to(asked.path, what="how steps give way")
+    written = outputs.write_outputs(asked, files)
+    where = outputs.written_to(asked.path, what="how steps give way")
     lines = [f"{_with_mortar(name)}: {text}" for name, text in said.items()]
     last = tables[-1]  # the mortar that the build counts on
     failing = (last["load_factor"] < 1) | (last["unloaded"] != Verdict.STANDS.value)
@@ -149,12 +145,12 @@ def answer_load_factor(asked: AssessWords) -> Answer:
     unproven = f"seqopt: solver failed: {_steps_in_words([*dict.fromkeys(unsure)])}: not proven"
     status = Status.DOES_NOT_HOLD if np.any(failing) else Status.DONE
     return Answer(
-        facts={"scene": scene_facts(scene), "versions": versions, "steps": table},
+        facts={"scene": remarks.scene_facts(scene), "versions": versions, "steps": table},
         text="\n".join([*lines, where]) if written else "",
         data="" if written else csv_text(table),
         written=written,
         value=table,
-        notes=(*taken, *_settlement_notes(scene)),
+        notes=(*taken, *remarks.settlement_notes(scene)),
         failures=(unproven,) if len(unsure) else (),
         status=Status.FAILED if len(unsure) else status,
     )
@@ -232,16 +228,16 @@ def run(asked: AssessWords) -> Answer:
         return answer_map(asked, asked.map, str(asked.holds or "dry,epoxy").split(","))
     if asked.load_factor:
         return answer_load_factor(asked)
-    keep_apart(asked, asked.path)
-    scene, mortars = asked_scene(asked), _asked_mortars(asked)
+    outputs.keep_apart(asked, asked.path)
+    scene, mortars = inputs.find_scene(asked), _asked_mortars(asked)
     network = build_network(scene)
-    _, steps, taken = asked_steps(asked, network)
+    _, steps, taken = inputs.find_steps(asked, network)
     kept = _found(asked, network, steps, mortars)
     rows = kept.rows
     went_on = f"kept: {kept.taken_up} of {len(rows)} verdicts, found before, from {kept.path}"
     each = {name: [row for row in rows if row["mortar"] == name] for name in mortars}
     lines = [f"{_with_mortar(name)}: {format_rows(own)}" for name, own in each.items()]
-    answer = put_table(asked.path, rows, "\n".join(lines) + ";")
+    answer = outputs.put_table(asked.path, rows, "\n".join(lines) + ";")
     kept.done()
     found = {name: Counter(row["verdict"] for row in own) for name, own in each.items()}
     counts = {name: {v.value: own[v.value] for v in Verdict} for name, own in found.items()}
@@ -252,7 +248,7 @@ def run(asked: AssessWords) -> Answer:
     status = Status.DOES_NOT_HOLD if falls else Status.DONE
     return Answer(
         facts={
-            "scene": scene_facts(scene),
+            "scene": remarks.scene_facts(scene),
             "mortar": {name: asdict(mortar) for name, mortar in mortars.items()},
             "versions": versions,
             "verdicts": counts,
@@ -263,8 +259,8 @@ def run(asked: AssessWords) -> Answer:
         notes=(
             *taken,
             *((went_on,) if kept.taken_up else ()),
-            *_settlement_notes(scene),
-            *carrying_notes(scene, steps),
+            *remarks.settlement_notes(scene),
+            *remarks.carrying_notes(scene, steps),
         ),
         failures=(f"seqopt: solver failed: {said}",) if undecided else (),
         status=Status.FAILED if undecided else status,
@@ -282,7 +278,7 @@ def _asked_mortars(asked: AssessWords) -> dict[str, Mortar]:
         for name in ("friction", "tensile_strength", "cohesion")
         if (text := getattr(asked, name)) is not None
     }
-    own = replace(mortar_word(asked.mortar or "epoxy", "--mortar"), **given)
+    own = replace(grammar.parse_mortar(asked.mortar or "epoxy", "--mortar"), **given)
     dry = () if asked.mortar else (Mortar(friction=own.friction),)
     return {_mortar_name(mortar): mortar for mortar in (*dry, own)}
 
@@ -292,7 +288,7 @@ def _found(
 ) -> Rows:
     """Return the rows of all steps, mortar by mortar; those kept of an earlier run are taken up."""
     margins, at = _asked_margins(asked, steps)
-    workers = count_word(asked.workers, "--workers", MOST_WORKERS)
+    workers = grammar.parse_count(asked.workers, "--workers", grammar.MOST_WORKERS)
     kept = asked.path is not None  # else nobody takes them up
     same = (dump_scene(network.scene), steps, mortars, margins, at, versions()) if kept else ()
     rows = Rows(asked.path, same)
@@ -318,7 +314,7 @@ def _asked_margins(asked: AssessWords, steps: Sequence[Step]) -> tuple[tuple[str
     first, colon, last = asked.steps.partition(":")
     ends = (first or "1", (last or str(len(steps))) if colon else first)
     try:
-        start, end = (count_word(end, "--steps", len(steps)) for end in ends)
+        start, end = (grammar.parse_count(end, "--steps", len(steps)) for end in ends)
     except ProblemError as error:
         wrong = f"--steps {asked.steps}: give numbers from 1 to {len(steps)}, as 3:7"
         raise ProblemError(wrong) from error

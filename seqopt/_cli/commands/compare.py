@@ -9,21 +9,9 @@ from typing import NamedTuple
 
 import pandas as pd
 
+from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import (
-    asked_engine,
-    asked_prover,
-    asked_scene,
-    exceeded,
-    held_to,
-    level_notes,
-    refused,
-    scene_facts,
-)
-from seqopt._cli.options import Built, Judged, Number, Postures, Ranks, Strict, Team, Written, word
-from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import columns, wrapped
-from seqopt._cli.values import asked_criterion, parse_robots, speed_seconds
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.arms.reach import find_postures
@@ -42,7 +30,15 @@ SPEED = "Speed against accuracy"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Compare(Written, Strict, Postures, Judged, Ranks, Team, Built):
+class Compare(
+    options.Written,
+    options.Strict,
+    options.Postures,
+    options.Judged,
+    options.Ranks,
+    options.Team,
+    options.Built,
+):
     """Build a scene in every way that seqopt knows, on paper, and show all side by side.
 
     These are the fixed sequences, a loop of robots whose grips each formulation chooses, and the
@@ -68,7 +64,7 @@ class Compare(Written, Strict, Postures, Judged, Ranks, Team, Built):
     seqopt compare arch25 --speed 20 --out speed
     """
 
-    speed: Number | None = word(None, const="10")
+    speed: options.Number | None = options.word(None, const="10")
 
 
 def run(asked: Compare) -> Answer:
@@ -87,15 +83,15 @@ class Found(NamedTuple):
 
 def find(asked: Compare) -> Found:
     """Compare all ways to build a scene; with what it is compared by."""
-    seconds = speed_seconds(asked.speed)
-    scene = asked_scene(asked)
+    seconds = grammar.parse_speed(asked.speed)
+    scene = inputs.find_scene(asked)
     find_postures(scene, asked.cache, asked.tell)
-    engine = asked_engine(asked, build_network(scene))
+    engine = inputs.find_engine(asked, build_network(scene))
     usual = DEFAULTS["any other"].criterion
-    criterion = asked_criterion(asked, usual) or usual
-    require_out(asked)
-    prover = asked_prover(asked, engine.network)
-    robots = parse_robots(asked.robots)
+    criterion = grammar.parse_criterion(asked, usual) or usual
+    outputs.require_out(asked)
+    prover = inputs.find_prover(asked, engine.network)
+    robots = grammar.parse_robots(asked.robots)
     result = compare(engine, criterion, asked.tell, robots, prover, seconds)
     return Found(engine, criterion, prover, result)
 
@@ -115,27 +111,27 @@ def answered(asked: Compare, found: Found) -> Answer:
         asked.tell("drawing figures")
         files = _files(result) | {PAGE: comparison_page(engine, result)}
         files["summary.json"] = json.dumps(about, indent=2) + "\n"
-        written = write_outputs(asked, lambda: files)
+        written = outputs.write_outputs(asked, lambda: files)
         blocks.append(_where(asked.path, speed=result.speed is not None))
     else:
         blocks.append(wrapped("--out DIR writes tables, figures and a step viewer."))
     answer = Answer(
         facts=about
-        | {"scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)}
+        | {"scene": remarks.scene_facts(scene), "criterion": criterion.name, **_facts(result)}
         | ({} if result.speed is None else {"speed": result.speed.facts()}),
         text="\n\n".join(blocks),
         headings=(*headings, SPEED),
         written=written,
         notes=(
-            *level_notes(asked, simplest(engine)),
+            *remarks.level_notes(asked, simplest(engine)),
             *result.enough.lines,
-            *refused(prover),
-            *(figure_notes() if written else ()),
+            *remarks.refused(prover),
+            *(outputs.figure_notes() if written else ()),
         ),
     )
-    over = exceeded(scene, *result.tables.values())
+    over = remarks.exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)
-    return held_to(answer, over, left, result.verdicts)
+    return remarks.held_to(answer, over, left, result.verdicts)
 
 
 def _where(folder: Path, *, speed: bool) -> str:
@@ -146,7 +142,7 @@ def _where(folder: Path, *, speed: bool) -> str:
         "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
         "  summary.json: the criteria with their numbers, the engine, and versions of packages"
         f"{timed}"
-    ) + ("" if figure_notes() else "\n  *.png, *.svg: the figures")
+    ) + ("" if outputs.figure_notes() else "\n  *.png, *.svg: the figures")
 
 
 def _facts(result: Comparison) -> dict[str, object]:
@@ -182,7 +178,7 @@ def _files(result: Comparison) -> dict[str, bytes | str]:
         **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
     }
     files |= {} if speed is None else {"speed.csv": csv_text(speed.table)}
-    if figure_notes():
+    if outputs.figure_notes():
         return files
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
     from seqopt.report.charts import responses_figure  # noqa: PLC0415

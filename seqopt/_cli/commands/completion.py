@@ -15,9 +15,9 @@ from typing import Any
 
 import shtab
 
+from seqopt._cli import options
 from seqopt._cli.answer import Answer
 from seqopt._cli.arguments import COMMANDS, parser
-from seqopt._cli.options import Asked, word
 from seqopt.graph.formulation import formulation_names
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.scene.scene import ORDERS
@@ -32,7 +32,7 @@ SHORT = re.compile(r"[:;(]|, (?:as|if|or) ")  # where what matters of a help tex
 
 
 @dataclass(frozen=True, kw_only=True)
-class Completion(Asked):
+class Completion(options.Asked):
     """Print a script with which the shell completes words of seqopt.
 
     It completes commands, options, files, and the names of scenes, formulations, criteria, engines,
@@ -49,7 +49,7 @@ class Completion(Asked):
     seqopt completion fish > ~/.config/fish/completions/seqopt.fish
     """
 
-    shell: str = word(place=True, choices=("bash", "zsh", "fish"))
+    shell: str = options.word(place=True, choices=("bash", "zsh", "fish"))
 
 
 def run(asked: Completion) -> Answer:

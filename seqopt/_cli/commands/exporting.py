@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from seqopt._cli import options
+from seqopt._cli import inputs, options, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import posture_trouble, scene_facts
-from seqopt._cli.given import plan_folder
-from seqopt._cli.options import BuiltFrom, File, Number
 from seqopt._files import require_apart, write_text
 from seqopt.arms._kept import arm_faults
 from seqopt.exchange._tasks import Postures
@@ -45,25 +42,25 @@ class Export(options.Postures, options.Written):
     seqopt export best --format tasks --distance 0.15 --out tasks.json
     """
 
-    folder: BuiltFrom = field(kw_only=False, metadata={"place": True})
+    folder: options.BuiltFrom = field(kw_only=False, metadata={"place": True})
     format: str = field(default="csv", kw_only=False, metadata={"choices": EXPORTS})
-    source: File | None = None
-    distance: Number | None = None
+    source: options.File | None = None
+    distance: options.Number | None = None
 
 
 def run(asked: Export) -> Answer:
     """Write the plan of a folder in a format of others."""
-    folder, taken = plan_folder(asked, asked.folder)
-    inputs = [folder / name for name in ("scene.json", "plan.csv")]
+    folder, taken = inputs.plan_folder(asked, asked.folder)
+    read = [folder / name for name in ("scene.json", "plan.csv")]
     source = None if asked.source is None else Path(asked.source)
-    require_apart([*filter(None, [asked.path])], [*inputs, *filter(None, [source])])
+    require_apart([*filter(None, [asked.path])], [*read, *filter(None, [source])])
     scene, steps = read_folder(folder)
     given = asked.distance
     distance = None if given is None else number_word(str(given), f"--distance {given}")
     notes: tuple[str, ...] = ()
     postures: Postures | None = None  # of other formats than tasks
     if asked.format in TASKS and scene.has_arms:
-        if trouble := posture_trouble(asked, scene):
+        if trouble := inputs.posture_trouble(asked, scene):
             notes, postures = (f"arms: grips are proposals without postures; {trouble}",), {}
         else:
             notes = tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps))
@@ -73,7 +70,7 @@ def run(asked: Export) -> Answer:
         said = f"{len(scene.bricks)} blocks, without {', '.join(lost)},"
     elif lost is not None:
         said = f"the scene and its {len(steps)} steps"
-    facts = {"scene": scene_facts(scene), "steps": len(steps), "format": asked.format}
+    facts = {"scene": remarks.scene_facts(scene), "steps": len(steps), "format": asked.format}
     notes = (*taken, *notes)
     if asked.path is None:
         return Answer(facts=facts | {"text": text}, data=text, notes=notes, value=text)

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from seqopt._cli import grammar, options, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import scene_facts, size_line
-from seqopt._cli.options import Asked, word
-from seqopt._cli.values import count_word
 from seqopt._files import require_apart, write_text
 from seqopt.errors import ProblemError
 from seqopt.exchange._content import UNITS, UPS, Given
@@ -21,7 +19,7 @@ MOST_ROBOTS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class Import(Asked):
+class Import(options.Asked):
     """Read an assembly of others, say what was assumed, and write it as a scene.
 
     It is a file of Rhino, an assembly of COMPAS, meshes in a file or a folder, a table of boxes or
@@ -70,12 +68,12 @@ class Import(Asked):
     seqopt import blocks --unit m --density 2400 --supports 0 --out dome.json
     """
 
-    file: Path = word(place=True)
-    out: Path = word()
-    format: str | None = word(None, choices=FORMATS)
+    file: Path = options.word(place=True)
+    out: Path = options.word()
+    format: str | None = options.word(None, choices=FORMATS)
     name: str | None = None
-    unit: str | None = word(None, choices=UNITS)
-    up: str | None = word(None, choices=UPS)
+    unit: str | None = options.word(None, choices=UNITS)
+    up: str | None = options.word(None, choices=UPS)
     density: str | None = None
     supports: str | None = None
     robots: str | None = None
@@ -92,9 +90,9 @@ def run(asked: Import) -> Answer:
     scene = import_scene(asked.file, asked.format, _given(asked))
     write_text(asked.out, dump_scene(scene))
     assumed = scene.provenance.splitlines()
-    said = f"{size_line(scene)}; written to {asked.out}"
+    said = f"{remarks.size_line(scene)}; written to {asked.out}"
     return Answer(
-        facts={"scene": scene_facts(scene), "assumed": assumed},
+        facts={"scene": remarks.scene_facts(scene), "assumed": assumed},
         text="\n".join([*assumed, said]),
         written=(asked.out,),
     )
@@ -112,7 +110,7 @@ def _given(asked: Import) -> Given:
         gap=_positive("--gap", asked.gap),
         detect=asked.detect,
         accept_overlaps=asked.accept_overlaps,
-        robots=robots if robots is None else count_word(robots, "--robots", MOST_ROBOTS),
+        robots=robots if robots is None else grammar.parse_count(robots, "--robots", MOST_ROBOTS),
         name=asked.name,
         progress=asked.tell,
     )

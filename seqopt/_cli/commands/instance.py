@@ -7,13 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
+from seqopt._cli import grammar, inputs, options, outputs
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands.optimize import Optimize
-from seqopt._cli.given import file_name, given_scene
-from seqopt._cli.options import Choice, Number, Written
-from seqopt._cli.outputs import keep_apart
 from seqopt._cli.posing import asked_problem
-from seqopt._cli.values import parse_time_limit
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instance import Instance as Graph
@@ -27,7 +24,7 @@ SAID = ("--quiet", "--json")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Instance(Written, Choice):
+class Instance(options.Written, options.Choice):
     """What is written and printed?
 
     out : FILE
@@ -41,7 +38,7 @@ class Instance(Written, Choice):
     """
 
     name: str | None = None
-    below: Number | None = None
+    below: options.Number | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +65,7 @@ def run(asked: InstanceWords) -> Answer:
     """Write the instance of the problem that is asked for."""
     if asked.path is not None:
         return answered(asked, find(asked))
-    path = file_name(given_scene(asked).name, ".npz")
+    path = inputs.file_name(inputs.given_scene(asked).name, ".npz")
     asked = replace(asked, out=path)
     answer = answered(asked, find(asked))
     note = f"file: {path}; --out names another, or a folder for every format"
@@ -81,7 +78,7 @@ def find(asked: InstanceWords) -> Graph:
     if path and path.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
     below = inf if asked.below is None else number_word(str(asked.below), "--below")
-    clock = Clock(parse_time_limit(asked.time_limit))
+    clock = Clock(grammar.parse_time_limit(asked.time_limit))
     with clock.needed("posing the problem"):
         problem = asked_problem(asked).problem
     named = None if asked.formulation is None else find_formulation(asked.formulation)
@@ -98,7 +95,7 @@ def answered(asked: InstanceWords, found: Graph) -> Answer:
     path = asked.path
     assert path is not None
     asked.tell("writing the instance")
-    keep_apart(asked, path)
+    outputs.keep_apart(asked, path)
     save_instance(found, path)
     limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(found).limited)
     lines = [f"{found!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
+from seqopt._cli import options
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.options import Asked, word
 from seqopt.errors import SolverError
 from seqopt.graph.instance import Instance
 from seqopt.instances._files import read_instance
@@ -16,7 +16,7 @@ from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judge(Asked):
+class Judge(options.Asked):
     """Check a path through an instance, and bounds on all others, with arithmetic alone.
 
     No scene is needed. What is claimed without proof is called claimed. The exit status is 1 if
@@ -38,8 +38,8 @@ class Judge(Asked):
     seqopt judge arch25.npz mine.json --bound potentials.json
     """
 
-    instance: Path = word(place=True)
-    solution: Path = word(place=True)
+    instance: Path = options.word(place=True)
+    solution: Path = options.word(place=True)
     bound: Path | None = None
 
 

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import asked_scene, scene_facts
-from seqopt._cli.given import asked_steps, given_plan
-from seqopt._cli.options import Fixed
-from seqopt._cli.outputs import figure_notes, require_out, write_outputs, written_to
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import count_word, mortar_word
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.engines.registry import USUAL, make_engine, versions
@@ -29,30 +25,30 @@ SHARES = (0.5, 0.75, 1.0, 1.25, 1.5)  # of the bricks of a scene, by default
 STEEPEST = 45.0  # degrees
 
 
-def answer_map(asked: Fixed, over: str, holds: Sequence[str]) -> Answer:
+def answer_map(asked: options.Fixed, over: str, holds: Sequence[str]) -> Answer:
     """Answer where builds of a scene fail, over an axis and what holds their joints."""
-    scene = asked_scene(asked)
+    scene = inputs.find_scene(asked)
     axis, values = _asked_axis(over)
     for name in holds:
-        mortar_word(name, "--holds")
-    require_out(asked)
+        grammar.parse_mortar(name, "--holds")
+    outputs.require_out(asked)
     builds, notes = _asked_builds(asked, scene)
     if axis == BRICKS:
         scene, builds, found, more = _over_bricks(asked, scene, builds, (over, holds, values))
         notes += more
     else:
         found = failure_map(scene, builds, holds, axis, values, asked.tell)
-    written = write_outputs(asked, lambda: _files(scene, builds, found))
+    written = outputs.write_outputs(asked, lambda: _files(scene, builds, found))
     blocks = failure_blocks(scene, found, wrapped)
     if written:
-        where = written_to(asked.path, what="how steps fall")
-        notes += [*figure_notes()]
+        where = outputs.written_to(asked.path, what="how steps fall")
+        notes += [*outputs.figure_notes()]
     else:
         where = "--out DIR writes tables, a picture and a page that shows how steps fall"
     falls = found.cases["fall"].any()
     return Answer(
         facts={
-            "scene": scene_facts(scene),
+            "scene": remarks.scene_facts(scene),
             "versions": versions(),
             "cases": found.cases,
             "steps": found.steps,
@@ -74,7 +70,9 @@ def _asked_axis(text: str) -> tuple[str, tuple[float, ...]]:
         raise ProblemError(f"--map {text}: give {known}, with values as friction=0.3,0.6")
     if axis == BRICKS:
         words = values.split(",") if values else ()
-        return axis, tuple(sorted({count_word(n, "--map bricks", MOST_BRICKS) for n in words}))
+        return axis, tuple(
+            sorted({grammar.parse_count(n, "--map bricks", MOST_BRICKS) for n in words})
+        )
     numbers = [
         number_word(value, f"--map {text}", zero=True) for value in values.split(",") if values
     ]
@@ -86,7 +84,10 @@ def _asked_axis(text: str) -> tuple[str, tuple[float, ...]]:
 
 
 def _over_bricks(
-    asked: Fixed, scene: Scene, builds: Builds, over: tuple[str, Sequence[str], Sequence[float]]
+    asked: options.Fixed,
+    scene: Scene,
+    builds: Builds,
+    over: tuple[str, Sequence[str], Sequence[float]],
 ) -> tuple[Scene, Builds, FailureMap, list[str]]:
     """Return the map over the number of bricks, and why it is not possible, or not for all.
 
@@ -95,7 +96,7 @@ def _over_bricks(
     """
     (text, holds, counts), now = over, len(scene.bricks)
     try:
-        if (plan := given_plan(asked)) is not None:
+        if (plan := inputs.given_plan(asked)) is not None:
             raise SceneError(f"plan {plan}: it is for {now} bricks alone")
         scene_of_bricks(str(asked.scene), now)
     except SceneError as error:
@@ -120,11 +121,11 @@ def _over_bricks(
     return *scenes[usual], _brick_map(ordered, usual, holds, asked.tell), notes
 
 
-def _asked_builds(asked: Fixed, scene: Scene) -> tuple[Builds, list[str]]:
+def _asked_builds(asked: options.Fixed, scene: Scene) -> tuple[Builds, list[str]]:
     """Return the builds that are asked for, by name, and why others are not possible."""
-    if asked.method is None and given_plan(asked) is None:
+    if asked.method is None and inputs.given_plan(asked) is None:
         return usual_builds(scene, asked.tell)
-    name, steps, _ = asked_steps(asked, build_network(scene))
+    name, steps, _ = inputs.find_steps(asked, build_network(scene))
     return {name: steps}, []
 
 
@@ -136,7 +137,7 @@ def _files(scene: Scene, builds: Builds, found: FailureMap) -> dict[str, bytes |
         "map_steps.csv": csv_text(found.steps),
         PAGE: failure_page(engine, builds, found),
     }
-    if figure_notes():
+    if outputs.figure_notes():
         return files
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
     from seqopt.report.charts import failure_figure  # noqa: PLC0415

@@ -12,33 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import (
-    WHY,
-    _not_done,
-    asked_prover,
-    exceeded,
-    held_to,
-    kept_range,
-    level_notes,
-    refused,
-    rule_notes,
-    scene_facts,
-    waits_said,
-)
-from seqopt._cli.options import Chosen, Cured, Limited, Posed, Strict, Words, Written, word
-from seqopt._cli.outputs import (
-    ALWAYS,
-    _bare_files,
-    _plan_files,
-    _steps_table,
-    require_out,
-    write_outputs,
-    written_to,
-)
 from seqopt._cli.posing import Change, PosedProblem, asked_problem
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import parse_options, parse_size, parse_time_limit
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
@@ -68,7 +45,9 @@ VERDICTS, UNSEEN = "which steps stand", "its values in unseen scenarios"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Optimize(Written, Strict, Limited, Cured, Chosen, Posed):
+class Optimize(
+    options.Written, options.Strict, options.Limited, options.Cured, options.Chosen, options.Posed
+):
     """Choose where robots hold, over all steps of a sequence, by one formulation.
 
     With --schedule free, choose every step. The answer is checked from the problem's own data, and
@@ -115,10 +94,10 @@ class Optimize(Written, Strict, Limited, Cured, Chosen, Posed):
     seqopt optimize my.json --criteria worst-ratio --limit payload --out mine
     """
 
-    option: Words = ()
+    option: options.Words = ()
     proof: bool = True
     lazy: bool = False
-    tables: str = word("plan", choices=("plan", "all"))
+    tables: str = options.word("plan", choices=("plan", "all"))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -166,7 +145,7 @@ class Found:
         builds = {self.plan.title: self.plan.steps}
         found = self.clock.spare(VERDICTS, lambda: self.prover.of_builds(builds), None)
         if found is None:  # nobody is to ask again
-            self.prover.refusal = WHY[self.clock.left_out.pop(VERDICTS)]
+            self.prover.refusal = remarks.WHY[self.clock.left_out.pop(VERDICTS)]
         return found or {}
 
     def proving(self) -> AbstractContextManager[None]:
@@ -210,8 +189,8 @@ def run(asked: Optimize) -> Answer:
 
 def find(asked: Optimize, change: Change | None = None) -> Found:
     """Choose every open grip of a build, or every step; ``change``: what has changed before."""
-    clock = Clock(parse_time_limit(asked.time_limit))
-    require_out(asked, *ALWAYS)
+    clock = Clock(grammar.parse_time_limit(asked.time_limit))
+    outputs.require_out(asked, *outputs.ALWAYS)
     start = time.perf_counter()
     with clock.needed("posing the problem"):
         posed = asked_problem(asked, change)
@@ -235,7 +214,7 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
         return plan
 
     plan = at_sufficient_level(choose(posed.problem), choose, clock)
-    prover = asked_prover(asked, plan.engine.network)
+    prover = inputs.find_prover(asked, plan.engine.network)
     whole = _from_empty(posed.whole, plan, choose)
     return Found(posed, plan, assemble, prover, whole, clock)
 
@@ -244,10 +223,10 @@ def answered(asked: Optimize, found: Found) -> Answer:
     """Write a plan, and return what it is worth; what there is no time for is left out."""
     made: dict[str, bytes | str] = {}
     if found.analyzed and found.summary and asked.path is not None:  # what says most comes first
-        tables = partial(_plan_files, found.plan, choices=asked.tables == "all")
+        tables = partial(outputs.plan_files, found.plan, choices=asked.tables == "all")
         made = found.clock.spare("its tables", tables, made)
     _ = found.verdicts, found.trial
-    return _answer(asked, found, write_outputs(asked, lambda: _files(found, made)))
+    return _answer(asked, found, outputs.write_outputs(asked, lambda: _files(found, made)))
 
 
 def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes | str]:
@@ -264,8 +243,8 @@ def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes |
         made["scenarios.csv"] = csv_text(found.trial.table)
     if rows := trace_rows(plan.trace):
         made["trace.csv"] = csv_text(pd.DataFrame(rows))
-    table = plan.responses() if found.analyzed else _steps_table(plan)
-    return {**_bare_files(plan, table, found.report), **made, **tables}
+    table = plan.responses() if found.analyzed else outputs.steps_table(plan)
+    return {**outputs.bare_files(plan, table, found.report), **made, **tables}
 
 
 def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], Plan]) -> str:
@@ -295,9 +274,9 @@ def _values(plan: Plan) -> str:
 
 def _how(asked: Optimize, formulation: Formulation) -> Run:
     """Return how a formulation is to be run, its own options among it."""
-    how: dict[str, Any] = parse_options(formulation, asked.option)
+    how: dict[str, Any] = grammar.parse_options(formulation, asked.option)
     if asked.max_memory is not None and "max_memory" in formulation.options:
-        how["max_memory"] = parse_size(str(asked.max_memory))
+        how["max_memory"] = grammar.parse_size(str(asked.max_memory))
     return Run(proof=asked.proof, lazy=asked.lazy, options=how)
 
 
@@ -305,16 +284,16 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
     """Return what a plan is worth, once it is written."""
     plan, clock = found.plan, found.clock
     scene, early = plan.engine.network.scene, plan.ended is End.INTERRUPTED
-    over = exceeded(scene, plan._columns) if found.analyzed and not early else ()
+    over = remarks.exceeded(scene, plan._columns) if found.analyzed and not early else ()
     facts: dict[str, object] = {
-        "scene": scene_facts(scene),
+        "scene": remarks.scene_facts(scene),
         "summary": lambda: found.report,
         "proof": _proof(plan),
         **({"order": plan.order} if plan.order else {}),
     }
     ended = INTERRUPTED if early else "seqopt: interrupted; the plan was chosen by then"
     answer = Answer(
-        facts={**facts, "plan": plan.responses if found.analyzed else _steps_table(plan)},
+        facts={**facts, "plan": plan.responses if found.analyzed else outputs.steps_table(plan)},
         text="\n".join(_lines(asked, found, over)),
         written=written,
         notes=tuple(_notes(asked, found)),
@@ -323,9 +302,9 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
     )
     unreached = () if plan.arms is None else plan.arms.faults
     left = plan.departures if found.analyzed else ()
-    answer = held_to(answer, over, left, found.verdicts, unreached)
+    answer = remarks.held_to(answer, over, left, found.verdicts, unreached)
     far = plan.is_far and not found.posed.problem.lifts_range
-    return kept_range(answer, plan.beyond if far else None)
+    return remarks.kept_range(answer, plan.beyond if far else None)
 
 
 def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
@@ -343,8 +322,8 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
     counts.append(f"{plan.models:,} models")
     search = f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"
     page = found.analyzed and PAGE not in found.clock.left_out
-    yield f"{search}; {written_to(asked.path, page=page)}"
-    yield from map(wrapped, waits_said(plan) if plan.certificate is not None else ())
+    yield f"{search}; {outputs.written_to(asked.path, page=page)}"
+    yield from map(wrapped, remarks.waits_said(plan) if plan.certificate is not None else ())
     yield from (f"stability, {each}" for each in found.verdicts.get(plan.title, ()))
     yield from [wrapped(found.whole)] if found.whole else []
     if plan.order:
@@ -358,10 +337,10 @@ def _notes(asked: Optimize, found: Found) -> Iterator[str]:
     """Yield what is worth knowing of a plan: levels, rules, scales, proof, idle robots, time."""
     plan, problem = found.plan, found.posed.problem
     scene, criterion = plan.engine.network.scene, problem.criterion.name
-    yield from level_notes(asked, plan.engine)
+    yield from remarks.level_notes(asked, plan.engine)
     if criterion.endswith(OWN):
         yield f"criterion: {criterion}: no fixed method builds this scene to take scales from"
-    yield from rule_notes(problem.moves, scene)
+    yield from remarks.rule_notes(problem.moves, scene)
     if plan.arms is not None:
         yield f"arms: {plan.arms}"
     if plan.ended is not End.INTERRUPTED:
@@ -371,8 +350,8 @@ def _notes(asked: Optimize, found: Found) -> Iterator[str]:
     if plan.makespan is not None and "makespan" not in plan.goals:
         what = "the build" if plan.steps[0].number == 1 else "what is left"
         yield f"time: {what} takes {plan.makespan:.6g} s; --aim makespan makes it short"
-    yield from refused(found.prover)
-    yield from _not_done(found.clock)
+    yield from remarks.refused(found.prover)
+    yield from remarks.not_done(found.clock)
 
 
 def _value(found: Found) -> str:

@@ -12,29 +12,9 @@ from pathlib import Path
 
 import pandas as pd
 
+from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import (
-    _not_done,
-    asked_prover,
-    kept_range,
-    level_notes,
-    marked,
-    refused,
-    rule_notes,
-    scene_facts,
-)
-from seqopt._cli.options import Built, Judged, Moves, Numbers, Posed, Words, Written, word
-from seqopt._cli.outputs import (
-    _bare_files,
-    _steps_table,
-    _time_files,
-    figure_notes,
-    require_out,
-    write_outputs,
-    written_to,
-)
 from seqopt._cli.posing import asked_problem
-from seqopt._cli.values import parse_numbers
 from seqopt._files import csv_text, write_folder
 from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
@@ -67,7 +47,7 @@ FOUR = "F_largest,M_sup,T_max,D_max"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pareto(Written, Judged, Built, Moves):
+class Pareto(options.Written, options.Judged, options.Built, options.Moves):
     """Which steps may a build have?
 
     schedule : NAME|FILE
@@ -88,13 +68,13 @@ class Pareto(Written, Judged, Built, Moves):
     """
 
     schedule: str | Path | None = FREE
-    aim: Words | None = FOUR
-    rounding: Numbers = word((), flag="--round")
+    aim: options.Words | None = FOUR
+    rounding: options.Numbers = options.word((), flag="--round")
     seconds: float = inf
 
 
 @dataclass(frozen=True, kw_only=True)
-class ParetoWords(Posed, Pareto):
+class ParetoWords(options.Posed, Pareto):
     """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
 
     No other plan beats it in all aims at once (the Pareto set). Check each, and write a table, the
@@ -124,9 +104,9 @@ class ParetoWords(Posed, Pareto):
     """
 
     schedule: str | Path | None = FREE
-    aim: Words | None = FOUR
+    aim: options.Words | None = FOUR
     pick: str | None = None
-    under: Words = ()
+    under: options.Words = ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -186,16 +166,16 @@ def find(asked: ParetoWords) -> Found:
     """Find all plans that no other beats in every aim."""
     if not asked.seconds >= 0:
         raise ProblemError(f"--seconds {asked.seconds:g}: give a number from 0")
-    require_out(asked)
+    outputs.require_out(asked)
     clock = Clock(asked.seconds)
     with clock.needed("posing the problem"):
         problem = asked_problem(asked).problem
         free = states_of(problem)
-    rounding = parse_numbers("--round", asked.rounding, [str(goal) for goal in free.goals])
+    rounding = grammar.parse_numbers("--round", asked.rounding, [str(goal) for goal in free.goals])
     tell = within(asked.tell, clock.left)
     front = find_front(problem, rounding=rounding, progress=tell, clock=clock)
     clock.interrupted |= front.stopped == INTERRUPT
-    return Found(problem, front, clock, partial(asked_prover, asked))
+    return Found(problem, front, clock, partial(inputs.find_prover, asked))
 
 
 def answered(asked: ParetoWords, found: Found) -> Answer:
@@ -208,7 +188,7 @@ def answered(asked: ParetoWords, found: Found) -> Answer:
     _ = found.departures
     if asked.path is not None:
         pairs = zip(front.engines, front.steps, strict=True)
-        bare = _files(found, [_steps_table(_Picked(own, steps)) for own, steps in pairs], {})
+        bare = _files(found, [outputs.steps_table(_Picked(own, steps)) for own, steps in pairs], {})
         files = clock.spare(DETAILS, partial(_front_files, asked, found), bare)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
@@ -218,27 +198,29 @@ def answered(asked: ParetoWords, found: Found) -> Answer:
         chosen, picked, row = _chosen(asked, asked.pick, found)
         scene = front.engines[chosen].network.scene  # in the order of what is picked
         said += f"; picked row {chosen + 1}: {row}"
-    written = write_outputs(asked, lambda: {**files, "scene.json": dump_scene(scene)})
+    written = outputs.write_outputs(asked, lambda: {**files, "scene.json": dump_scene(scene)})
     shown = "" if written else f"{_numbered(front).to_string(max_rows=MOST_ROWS)}\n"
     if asked.path is not None and asked.pick and picked is not None:
         write = partial(_write_picked, asked.path / "pick", asked.pick, found, chosen, picked)
         clock.spare("the folder of the plan that is picked", write, None)
     points = {"points": shown_table(front.table), "picked": picked}
     answer = Answer(
-        facts={"scene": scene_facts(scene), **found.counts, **points},
-        text=f"{shown}{said}; {written_to(asked.path, page=DETAILS not in clock.left_out)}",
+        facts={"scene": remarks.scene_facts(scene), **found.counts, **points},
+        text=f"{shown}{said}; {outputs.written_to(asked.path, page=DETAILS not in clock.left_out)}",
         written=written,
         notes=(
-            *level_notes(asked, free.engine),
-            *rule_notes(free.rules, scene),
-            *refused(next(iter(found.provers.values()))),
-            *(figure_notes() if written else ()),
-            *_not_done(clock),
+            *remarks.level_notes(asked, free.engine),
+            *remarks.rule_notes(free.rules, scene),
+            *remarks.refused(next(iter(found.provers.values()))),
+            *(outputs.figure_notes() if written else ()),
+            *remarks.not_done(clock),
         ),
         failures=(INTERRUPTED,) if clock.interrupted else (),
         status=Status.INTERRUPTED if clock.interrupted else Status.DONE,
     )
-    return kept_range(marked(answer, builds_in_words(found.departures)), front.beyond or None)
+    return remarks.kept_range(
+        remarks.marked(answer, builds_in_words(found.departures)), front.beyond or None
+    )
 
 
 def _chosen(asked: ParetoWords, name: str, found: Found) -> tuple[int, dict[str, object], str]:
@@ -277,9 +259,9 @@ def _write_picked(
     report = {"scene": own.network.scene.name, "picked": picked, **provenance(own)}
     table, tasks = plan.responses(), task_texts(own.network.scene, plan.steps)
     files = {
-        **_bare_files(plan, table, report),
+        **outputs.bare_files(plan, table, report),
         **{f"tasks.{kind}": text for kind, text in tasks.items()},
-        **_time_files(plan),
+        **outputs.time_files(plan),
         PAGE: plan_page(plan, found.provers[own], table=table, tasks=tasks),
     }
     write_folder(folder, files)
@@ -342,7 +324,7 @@ def _numbered(front: Front) -> pd.DataFrame:
 
 def _picture(front: Front, methods: Mapping[str, pd.DataFrame]) -> Mapping[str, bytes | str]:
     """Return the chart of a Pareto set by file name, if it can be drawn."""
-    if figure_notes():
+    if outputs.figure_notes():
         return {}
     from seqopt.report._style import picture_files  # noqa: PLC0415
     from seqopt.report.charts import front_figure  # noqa: PLC0415  # matplotlib is an extra
@@ -359,7 +341,11 @@ def _under(texts: Sequence[str], found: Found) -> dict[str, float]:
             known = ", ".join(methods)
             why = f"no such method{did_you_mean(text, methods)}"
             raise ProblemError(f"--under {text}: {why}; give {known}, or a bound as F_largest=250")
-        bounds = _worst_of(methods[text]) if text in methods else parse_numbers("--under", [text])
+        bounds = (
+            _worst_of(methods[text])
+            if text in methods
+            else grammar.parse_numbers("--under", [text])
+        )
         for name, value in bounds.items():
             out[name] = min(value, out.get(name, value))
     return out

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from seqopt._cli import inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import asked_scene, scene_facts
-from seqopt._cli.options import Built, Postures, Written
-from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
 from seqopt.arms._permits import (
@@ -24,7 +22,7 @@ from seqopt.scene.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reach(Written, Postures, Built):
+class Reach(options.Written, options.Postures, options.Built):
     """Say which robots reach which nodes.
 
     Of those with arms, with how many postures, and up to how many bricks. Robots have arms in the
@@ -43,11 +41,11 @@ class Reach(Written, Postures, Built):
 
 def run(asked: Reach) -> Answer:
     """Say what arms reach, and write it if asked."""
-    scene = asked_scene(asked)
-    require_out(asked)
+    scene = inputs.find_scene(asked)
+    outputs.require_out(asked)
     find_postures(scene, asked.cache, asked.tell)
     table = reach_table(scene) if scene.has_arms else reach_without_arms(scene)
-    written = write_outputs(asked, lambda: _files(scene, table))
+    written = outputs.write_outputs(asked, lambda: _files(scene, table))
     lines = [*(reach_described if scene.has_arms else reach_covered)(scene, table)]
     if written:
         names = "reach.csv, postures.csv" if scene.has_arms else "reach.csv"
@@ -55,11 +53,11 @@ def run(asked: Reach) -> Answer:
     else:
         lines.append("--out DIR writes a row for every robot and node, and postures of arms")
     return Answer(
-        facts={"scene": scene_facts(scene), "reach": table},
+        facts={"scene": remarks.scene_facts(scene), "reach": table},
         text="\n".join(map(wrapped, lines)),
         written=written,
         value=table,
-        notes=figure_notes() if written and scene.has_arms else (),
+        notes=outputs.figure_notes() if written and scene.has_arms else (),
     )
 
 
@@ -69,7 +67,7 @@ def _files(scene: Scene, table: pd.DataFrame) -> dict[str, bytes | str]:
     if not scene.has_arms:
         return files
     files["postures.csv"] = csv_text(find_table(scene).table())
-    if figure_notes():
+    if outputs.figure_notes():
         return files
     from seqopt.report._pictures import reach_picture  # noqa: PLC0415  # matplotlib is an extra
     from seqopt.report._style import picture_files  # noqa: PLC0415

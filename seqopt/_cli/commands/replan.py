@@ -10,32 +10,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from seqopt._cli import inputs, options, outputs
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands import optimize
-from seqopt._cli.given import Place, plan_folder
-from seqopt._cli.options import (
-    Aimed,
-    Bricks,
-    BuiltFrom,
-    Cured,
-    Engined,
-    File,
-    Judged,
-    Judging,
-    Limited,
-    Number,
-    Numbers,
-    Postures,
-    Ranks,
-    Ruled,
-    Stands,
-    Strict,
-    Timed,
-    Words,
-    Written,
-    listed,
-)
-from seqopt._cli.outputs import ALWAYS, require_out
 from seqopt._cli.terminal import wrapped
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
@@ -54,7 +31,16 @@ from seqopt.study.published import CRITERIA
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replan(Written, Engined, Aimed, Limited, Judging, Stands, Timed, Ruled):
+class Replan(
+    options.Written,
+    options.Engined,
+    options.Aimed,
+    options.Limited,
+    options.Judging,
+    options.Stands,
+    options.Timed,
+    options.Ruled,
+):
     """Which plan, and where does it stand?
 
     plan : PLAN_DIR|SCENE
@@ -89,19 +75,21 @@ class Replan(Written, Engined, Aimed, Limited, Judging, Stands, Timed, Ruled):
         folder to write the new plan to
     """
 
-    plan: BuiltFrom = field(default="arch25", kw_only=False, metadata={"place": True})
+    plan: options.BuiltFrom = field(default="arch25", kw_only=False, metadata={"place": True})
     at: int | str = field(default=1, kw_only=False)
-    lost: Words = ()
-    payload: float | Numbers = ()
-    grips: Number | None = None
+    lost: options.Words = ()
+    payload: float | options.Numbers = ()
+    grips: options.Number | None = None
     robots: int | str | None = None
-    missing: Bricks = ()
-    measured: File | None = None
+    missing: options.Bricks = ()
+    measured: options.File | None = None
     to: int | str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReplanWords(Strict, Postures, Judged, Cured, Ranks, Replan):
+class ReplanWords(
+    options.Strict, options.Postures, options.Judged, options.Cured, options.Ranks, Replan
+):
     """Plan the rest of a build from one of its steps, after something has changed.
 
     A robot is lost, carries less or is new, a brick is missing. Any robot may release, hold or
@@ -147,8 +135,8 @@ def find(asked: ReplanWords) -> Found:
     for name, text in (("at", asked.at), ("robots", asked.robots or "0")):
         if not str(text).isdecimal():
             raise StepError(f"--{name} {text}: give a number")
-    require_out(asked, *ALWAYS)
-    folder, notes = plan_folder(asked, asked.plan, free=True)
+    outputs.require_out(asked, *outputs.ALWAYS)
+    folder, notes = inputs.plan_folder(asked, asked.plan, free=True)
     base, change = _as_optimize(asked, folder), partial(_changed, asked)
     try:
         return Found(folder, base, optimize.find(base, change), notes)
@@ -200,7 +188,7 @@ def _as_optimize(asked: ReplanWords, folder: Path) -> optimize.Optimize:
     given |= {name: told[name] for name in kept if told and not given[name]}
     given |= {"scene": str(folder / "scene.json"), "schedule": FREE}
     given |= {"begin": f"{folder}:{asked.at}", "direction": told.get("direction")}
-    given["rules"] = (*told.get("rules", ()), *listed(asked.rules))
+    given["rules"] = (*told.get("rules", ()), *options.listed(asked.rules))
     if given["direction"] and asked.missing:
         raise StepError("--missing: bricks are missing in a build; a take-down removes them anyway")
     return optimize.Optimize(**given)
@@ -237,10 +225,12 @@ def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
     }
 
 
-def _changed(asked: ReplanWords, scene: Scene, begin: Place) -> tuple[Scene, Place, str]:
+def _changed(
+    asked: ReplanWords, scene: Scene, begin: inputs.Place
+) -> tuple[Scene, inputs.Place, str]:
     """Return scene and place after what has changed, and the robots that take part, by name."""
     assert begin.site is not None
-    missing = listed(asked.missing)
+    missing = options.listed(asked.missing)
     if wrong := [text for text in missing if not text.isdecimal()]:
         raise StepError(f"--missing {wrong[0]}: give the number of a brick")
     if asked.measured is not None:
@@ -252,7 +242,7 @@ def _changed(asked: ReplanWords, scene: Scene, begin: Place) -> tuple[Scene, Pla
         scene = as_built(scene, found)
     scene, site = without(scene, begin.site, asked.lost, [*map(int, missing)])
     left = [robot.name for robot in scene.robots if robot.name not in asked.lost]
-    return scene, Place(site, None), ",".join(left) if asked.lost else ""
+    return scene, inputs.Place(site, None), ",".join(left) if asked.lost else ""
 
 
 def _in_words(facts: Mapping[str, Any]) -> Sequence[str]:

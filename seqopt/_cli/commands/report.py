@@ -6,11 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from seqopt._cli import inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import asked_engine, asked_prover, asked_scene, posture_trouble, scene_facts
-from seqopt._cli.given import file_name, plan_folder
-from seqopt._cli.options import Built, BuiltFrom, File, Judged, Postures, Written, word
-from seqopt._cli.outputs import figure_notes, keep_apart
 from seqopt._files import require_folder, write_folder, write_text
 from seqopt._showing import PAGE, display
 from seqopt.network.build import build_network
@@ -19,7 +16,7 @@ from seqopt.stability._builds import BuildProver
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report(Postures, Judged, Written):
+class Report(options.Postures, options.Judged, options.Written):
     """What is built, and by whom?
 
     folder : DIR
@@ -35,13 +32,13 @@ class Report(Postures, Judged, Written):
         build (needs matplotlib)
     """
 
-    folder: BuiltFrom = field(kw_only=False, metadata={"place": True})
-    film: File | None = None
-    figures: File | None = None
+    folder: options.BuiltFrom = field(kw_only=False, metadata={"place": True})
+    film: options.File | None = None
+    figures: options.File | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReportWords(Report, Built):
+class ReportWords(Report, options.Built):
     """Write a page with a step viewer of the plans in a folder.
 
     It shows the structure in three dimensions, who holds what, axial forces, displacements, and
@@ -56,7 +53,7 @@ class ReportWords(Report, Built):
     seqopt report best --film build.gif
     """
 
-    scene: BuiltFrom = word("arch25", place=True)
+    scene: options.BuiltFrom = options.word("arch25", place=True)
 
 
 def run(asked: ReportWords) -> Answer:
@@ -65,26 +62,26 @@ def run(asked: ReportWords) -> Answer:
     draws: Any = None if film is None else display("Film")
     if film is not None:
         draws.require(film)
-    folder, taken = plan_folder(asked, asked.folder)
+    folder, taken = inputs.plan_folder(asked, asked.folder)
     named = isinstance(asked.folder, str | Path)
     own = folder / "scene.json"
     if own.is_file():  # plans go with the scene that stands beside them
         asked = replace(asked, scene=own)
-    scene = asked_scene(asked)
+    scene = inputs.find_scene(asked)
     path = asked.path
     if path is None and named and folder == Path(str(asked.folder)):
         path = folder / PAGE
     elif path is None:
-        path = file_name(str(asked.folder) if named else scene.name, ".html")
-    keep_apart(asked, path, film)
+        path = inputs.file_name(str(asked.folder) if named else scene.name, ".html")
+    outputs.keep_apart(asked, path, film)
     written: tuple[Path, ...] = (path,)
     if figures is not None:
         require_folder(figures)
-        written += () if figure_notes() else (figures,)
-    trouble = posture_trouble(asked, scene)
+        written += () if outputs.figure_notes() else (figures,)
+    trouble = inputs.posture_trouble(asked, scene)
     asked.tell("analyzing plans and writing the page")
-    engine = asked_engine(asked, build_network(scene))
-    prover = asked_prover(asked, engine.network)
+    engine = inputs.find_engine(asked, build_network(scene))
+    prover = inputs.find_prover(asked, engine.network)
     write_text(path, folder_page(engine, folder, prover))
     if film is not None:
         asked.tell("drawing the film")
@@ -96,13 +93,13 @@ def run(asked: ReportWords) -> Answer:
         asked.tell("drawing figures")
         write_folder(figures, plan_figures(engine, folder_builds(engine, folder, prover)))
     return Answer(
-        facts={"scene": scene_facts(scene)},
+        facts={"scene": remarks.scene_facts(scene)},
         text=f"written to {' and '.join(map(str, written))}",
         written=written,
         value=written,
         notes=(
             *taken,
             *([f"arms: drawn without postures; {trouble}"] if trouble else ()),
-            *(() if figures is None else figure_notes()),
+            *(() if figures is None else outputs.figure_notes()),
         ),
     )

@@ -9,11 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from seqopt._cli import inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import asked_scene, posture_trouble, scene_facts, size_line
-from seqopt._cli.given import file_name
-from seqopt._cli.options import Built, Postures
-from seqopt._cli.outputs import keep_apart
 from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -26,7 +23,7 @@ from seqopt.work.progress import with_progress
 
 
 @dataclass(frozen=True, kw_only=True)
-class SceneAsked(Postures, Built):
+class SceneAsked(options.Postures, options.Built):
     """Check a scene, say what is in it, and write it as a JSON file if asked.
 
     Or list all built-in scenes and the words that make others.
@@ -57,18 +54,18 @@ def run(asked: SceneAsked) -> Answer:
     """Describe a scene and export it, or list all that there are."""
     if asked.list:
         return _list(asked)
-    keep_apart(asked, asked.export)
-    scene = asked_scene(asked)
-    facts = {**scene_facts(scene), **_network_facts(build_network(scene))}
+    outputs.keep_apart(asked, asked.export)
+    scene = inputs.find_scene(asked)
+    facts = {**remarks.scene_facts(scene), **_network_facts(build_network(scene))}
     lines = [*_described(scene, facts)]
     if asked.export is not None:
         save_scene(scene, asked.export)
         lines.append(f"written to {asked.export}")
     written = () if asked.export is None else (asked.export,)
     if asked.view:
-        page = file_name(scene.name, ".html")
-        keep_apart(asked, page)
-        trouble = posture_trouble(asked, scene)
+        page = inputs.file_name(scene.name, ".html")
+        outputs.keep_apart(asked, page)
+        trouble = inputs.posture_trouble(asked, scene)
         lines += [f"arms: their reach is not known; {trouble}"] if trouble else []
         asked.tell("writing the page")
         write_text(page, scene_page(scene))
@@ -109,7 +106,9 @@ def _list(asked: SceneAsked) -> Answer:
     ]
     lines += KINDS.values()
     facts = {
-        "scenes": [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()],
+        "scenes": [
+            {**remarks.scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()
+        ],
         "kinds": KINDS,
     }
     return Answer(facts=facts, text="\n".join(lines))
@@ -131,7 +130,7 @@ def _grip(robot: Robot | Prop) -> str:
 
 
 def _described(scene: Scene, facts: dict[str, Any]) -> Iterator[str]:
-    yield size_line(scene)
+    yield remarks.size_line(scene)
     yield f"network: {facts['nodes']} nodes, {facts['edges']} edges"
     for robot in scene.robots:
         at = "" if robot.arm is None else ", arm at ({:g}, {:g}, {:g})".format(*robot.arm.position)

@@ -7,22 +7,9 @@ from dataclasses import dataclass, replace
 
 import pandas as pd
 
+from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import (
-    arm_notes,
-    asked_scene,
-    carrying_notes,
-    exceeded,
-    in_seconds,
-    posture_trouble,
-    scene_facts,
-    waits_said,
-)
-from seqopt._cli.given import asked_steps
-from seqopt._cli.options import Cured, Fixed, Timed, Words
-from seqopt._cli.outputs import _time_files, figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import asked_standing
 from seqopt._files import csv_text
 from seqopt.contact.curing import _find_curing
 from seqopt.engines.registry import USUAL, make_engine
@@ -40,7 +27,7 @@ USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Times(Cured, Timed, Fixed):
+class Times(options.Cured, options.Timed, options.Fixed):
     """Say how long a build takes and who does what when.
 
     A robot that holds nothing prepares what it does next while others hold and act; actions come
@@ -75,41 +62,46 @@ class Times(Cured, Timed, Fixed):
     """
 
     reassign: bool = False
-    stiffens: Words = ()
+    stiffens: options.Words = ()
 
 
 def run(asked: Times) -> Answer:
     """Say how long a build takes, and write its times if asked."""
-    require_out(asked, "plan.csv", "times.csv")
-    scene, taken = asked_scene(asked), list[str]()
+    outputs.require_out(asked, "plan.csv", "times.csv")
+    scene, taken = inputs.find_scene(asked), list[str]()
     if not (asked.durations or has_durations(scene)):
         asked = replace(asked, durations=(USUAL_SECONDS,))
         taken.append(f"durations: not known, taken as {USUAL_SECONDS}; --durations says others")
-    scene = in_seconds(asked, scene)
+    scene = inputs.in_seconds(asked, scene)
     network = build_network(scene)
-    named = asked_steps(asked, network)
+    named = inputs.find_steps(asked, network)
     build, given, least = _asked_build(asked, network, named.steps)
     timed, aged = build.times(), _aged(asked, build)
     tables = {"plan.csv": build.responses, "times.csv": build.times}
     tables |= {} if aged is None else {"aged.csv": lambda: aged}
 
     def files() -> dict[str, bytes | str]:
-        return {**{name: csv_text(table()) for name, table in tables.items()}, **_time_files(build)}
+        return {
+            **{name: csv_text(table()) for name, table in tables.items()},
+            **outputs.time_files(build),
+        }
 
-    written = write_outputs(asked, files)
+    written = outputs.write_outputs(asked, files)
     busy = busy_table(scene, build.steps, build._waits)
     timed.attrs["robots"] = busy
     if build.standing is not None:
         check_cured(network, build.steps, build.standing, timed["start_s"].tolist())
     total = total_lines(scene.name, len(build.steps), given, least)
-    lines = [*total, *waits_said(build), *spent_lines(busy)]
+    lines = [*total, *remarks.waits_said(build), *spent_lines(busy)]
     if aged is not None:
-        lines += softer_lines(scene, build.responses(), aged, exceeded(scene, aged))
+        lines += softer_lines(scene, build.responses(), aged, remarks.exceeded(scene, aged))
     kept = f"written to {asked.path}: {', '.join(tables)}"
     lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
-    trouble = posture_trouble(asked, scene)
-    cannot = (f"not checked; {trouble}",) if trouble else arm_notes(scene, {"": build.steps})
-    facts = {"scene": scene_facts(scene), "makespan_s": given, "reassigned_s": least}
+    trouble = inputs.posture_trouble(asked, scene)
+    cannot = (
+        (f"not checked; {trouble}",) if trouble else remarks.arm_notes(scene, {"": build.steps})
+    )
+    facts = {"scene": remarks.scene_facts(scene), "makespan_s": given, "reassigned_s": least}
     facts |= {"robots": busy, "steps": timed}
     facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
@@ -120,10 +112,10 @@ def run(asked: Times) -> Answer:
         notes=(
             *taken,
             *named.notes,
-            *carrying_notes(scene, build.steps),
+            *remarks.carrying_notes(scene, build.steps),
             *_idle_note(scene, "robots", build.steps),
             *(f"arms: {each}" for each in cannot),
-            *(figure_notes() if written else ()),
+            *(outputs.figure_notes() if written else ()),
         ),
     )
 
@@ -132,7 +124,7 @@ def _asked_build(
     asked: Times, network: Network, steps: Sequence[Step]
 ) -> tuple[GivenSequence, float, float | None]:
     """Return a build, when it ends, s, and when it ends reassigned, if that is asked."""
-    standing = asked_standing(asked)
+    standing = grammar.parse_standing(asked)
     if standing is not None and not asked.curing:
         raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
     build = GivenSequence(make_engine(USUAL, network), (*steps,), standing=standing)

@@ -31,7 +31,7 @@ NAMED = (None, *CRITERIA)
 PROPS = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma push, capacity=300"
 
 
-def speed_seconds(text: Number | None) -> float:
+def parse_speed(text: Number | None) -> float:
     """Return how long each engine and formulation may take, s; zero if speed is not asked for."""
     if text is None:
         return 0.0
@@ -41,7 +41,7 @@ def speed_seconds(text: Number | None) -> float:
         raise ProblemError(f"{error}; give seconds, and the scene before it") from None
 
 
-def count_word(
+def parse_count(
     text: int | str | None, where: str, most: int, least: int = 1, usual: int = 0
 ) -> int:
     """Return a whole number within bounds, or the usual one; ``where``: argument, for messages."""
@@ -60,7 +60,7 @@ def parse_robots(robots: int | Words | None) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",")) if named else ()
 
 
-def parse_payload(text: str, scene: Scene) -> Scene:
+def with_payload(text: str, scene: Scene) -> Scene:
     """Return a scene with robots that carry what words say, ``250`` N each or ``rob1=250``."""
     name, equals, value = text.rpartition("=")
     names = [robot.name for robot in scene.robots]
@@ -72,7 +72,7 @@ def parse_payload(text: str, scene: Scene) -> Scene:
     return scene.with_robots(*said)
 
 
-def parse_grips(grips: Number, scene: Scene) -> Scene:
+def with_grips(grips: Number, scene: Scene) -> Scene:
     """Return a scene with grips as stiff as a word says, ``rigid``, ``1e6`` or ``1e6x1e6x5e5``.
 
     ``turning=1e4`` after a comma is the rotational stiffness.
@@ -145,7 +145,7 @@ def parse_options(formulation: Formulation | str, texts: Words) -> dict[str, Any
     return out
 
 
-def mortar_word(text: str | Mortar, where: str) -> Mortar:
+def parse_mortar(text: str | Mortar, where: str) -> Mortar:
     """Return a mortar by its words; ``where`` is the argument, for messages."""
     if isinstance(text, Mortar):  # of Python
         return text
@@ -157,7 +157,7 @@ def mortar_word(text: str | Mortar, where: str) -> Mortar:
         raise ProblemError(f"{where} {text}{hint}: {known}") from error
 
 
-def asked_standing(asked: Tilted) -> Standing | None:
+def parse_standing(asked: Tilted) -> Standing | None:
     """Return what is demanded of the stability of states, if anything is."""
     if isinstance(asked.stands, Standing):  # of Python
         return asked.stands
@@ -173,7 +173,7 @@ def asked_standing(asked: Tilted) -> Standing | None:
         for name in ("tilt", "friction")
         if said[name] is not None
     }
-    mortar = mortar_word(asked.stands, "--stands")
+    mortar = parse_mortar(asked.stands, "--stands")
     try:
         cures = _find_curing(" ".join(curing)) if curing else None
     except SceneError as error:
@@ -182,7 +182,7 @@ def asked_standing(asked: Tilted) -> Standing | None:
     return Standing(replace(mortar, **given), tilt, cures)
 
 
-def asked_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
+def parse_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
     """Return the criterion of the options; ``usual``: the one that options of ranks refine."""
     said = {"crown": asked.crown, "ranked": asked.ranked}
     given = {name: text for name, text in said.items() if text is not None}
@@ -202,9 +202,9 @@ def _crown(text: str) -> float:
     return NEVER if text == "none" else number_word(text, "--crown")
 
 
-def asked_resources(asked: Chosen, progress: Tell | None = None) -> Resources:
+def parse_resources(asked: Chosen, progress: Tell | None = None) -> Resources:
     """Return what a computation may use."""
-    workers = count_word(asked.workers, "--workers", MOST_WORKERS)
+    workers = parse_count(asked.workers, "--workers", MOST_WORKERS)
     most = None if asked.max_memory is None else parse_size(asked.max_memory)
     return Resources(workers, None, asked.cache, most, progress)
 

@@ -1,23 +1,17 @@
-"""What several commands are asked for, and what they say of it."""
+"""What several commands say beside their answers: levels, payloads, arms, waits, verdicts."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from seqopt._cli import options
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.given import given_scene
-from seqopt._cli.options import Built, Computed, Judged, Postures, Team, Tilted, Timed, listed
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_props
 from seqopt.arms._kept import arm_faults
-from seqopt.arms.reach import find_postures
-from seqopt.contact.mortar import Mortar, _mortar_name
 from seqopt.engines._kinds import ChoosingEngine, Level
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import DEFAULT, LIMITED, _chooser_of, make_engine, simplest
-from seqopt.errors import ExtraError, ProblemError, SceneError
-from seqopt.network.network import Network
+from seqopt.engines.registry import _chooser_of
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import (
     LIFTED,
@@ -27,8 +21,8 @@ from seqopt.problem.requirements import (
     overloads,
 )
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
-from seqopt.scene.scene import Scene, in_order
-from seqopt.sequence.rules import MOST_ROBOTS, FreeRules, _usual_grips, with_robots
+from seqopt.scene.scene import Scene
+from seqopt.sequence.rules import MOST_ROBOTS, FreeRules, _usual_grips
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import BuildProver, BuildVerdicts
@@ -54,57 +48,7 @@ def size_line(scene: Scene) -> str:
     return f"{scene.name}: {size}, {len(scene.grounds)} ground ends"
 
 
-def asked_scene(asked: Built) -> Scene:
-    """Return the scene that options describe; one of a range of --grips keeps its own."""
-    if asked.order == "search":
-        raise ProblemError(
-            "--order search: only the free schedule has it; give optimize --schedule free"
-        )
-    order = None if asked.order is None else str(asked.order)
-    scene = in_order(given_scene(asked), order)
-    for text in listed(asked.payload):
-        scene = parse_payload(text, scene)
-    if isinstance(asked, Team) and (count := str(asked.robots)).isdecimal():
-        scene = with_robots(scene, int(count))
-    if asked.props is not None:
-        scene = scene.with_props(*parse_props(str(asked.props), scene))
-    return scene if asked.grips is None else parse_grips(asked.grips, scene)
-
-
-def in_seconds(asked: Timed, scene: Scene) -> Scene:
-    """Return a scene with the durations of --durations."""
-    try:
-        return scene.with_durations(*asked.durations)
-    except SceneError as error:
-        raise SceneError(f"--{error}") from None
-
-
-def asked_engine(asked: Computed, network: Network) -> Engine:
-    """Return the engine that a command is asked for; where none is named, that of the scene."""
-    mortar = None if asked.mortar is None else mortar_word(asked.mortar, "--mortar")
-    proven = isinstance(asked, Judged) and asked.stability
-    of_verdicts = asked.engine not in LIMITED and proven
-    if asked.engine is None:
-        engine = make_engine(DEFAULT, network, None if of_verdicts else mortar)
-        # with a mortar of its own an engine is asked where joints open: set by set
-        return simplest(engine) if of_verdicts or mortar is None else engine
-    try:
-        return make_engine(asked.engine, network, None if of_verdicts else mortar)
-    except SceneError as error:
-        why = str(error).removeprefix(f"engine {asked.engine}: ")
-        raise SceneError(f"--engine {asked.engine}: {why}") from error
-
-
-def posture_trouble(asked: Postures, scene: Scene) -> str:
-    """Compute postures of arms, or take those that are kept; return why there are none, if so."""
-    try:
-        find_postures(scene, asked.cache, asked.tell)
-    except (ExtraError, SceneError) as error:
-        return str(error)
-    return ""
-
-
-def level_notes(asked: Computed, engine: Engine) -> tuple[str, ...]:
+def level_notes(asked: options.Computed, engine: Engine) -> tuple[str, ...]:
     """Return which levels a choosing engine took, and why; where none is named, only discrete."""
     named = asked.engine is not None
     if (chooser := _chooser_of(engine)) is not None:
@@ -169,23 +113,13 @@ def waits_said(build: ShownBuild) -> Iterator[str]:
     yield "every state is proven to stand with the bond that its joints have when it begins"
 
 
-def asked_prover(asked: Judged, network: Network) -> BuildProver:
-    """Return what says which steps of builds stand, with the mortars that a command shows."""
-    demanded = asked_standing(asked) if isinstance(asked, Tilted) else None
-    own = getattr(asked, "stands", None) or asked.mortar or "epoxy"
-    mortar = mortar_word(own, "--mortar") if demanded is None else demanded.mortar
-    name = own if isinstance(own, str) else _mortar_name(mortar)
-    shown = {"dry": Mortar(friction=mortar.friction), name: mortar}
-    return BuildProver(network, shown if asked.stability else {}, asked.tell)
-
-
 def refused(prover: BuildProver) -> tuple[str, ...]:
     """Return why verdicts are missing, if they are, and what they leave out."""
     said = (f"stability: not proven; {prover.refusal}",) if prover.refusal else ()
-    return (*said, *_settlement_notes(prover.scene)) if prover.asks else said
+    return (*said, *settlement_notes(prover.scene)) if prover.asks else said
 
 
-def _settlement_notes(scene: Scene) -> tuple[str, ...]:
+def settlement_notes(scene: Scene) -> tuple[str, ...]:
     """Return that movements of the ground enter no verdict, if it moves."""
     said = _settlement_said(scene)
     return (f"stability: {said}",) if said else ()
@@ -194,7 +128,7 @@ def _settlement_notes(scene: Scene) -> tuple[str, ...]:
 WHY = {TIME: "time is over", INTERRUPT: "interrupted"}
 
 
-def _not_done(clock: Clock) -> Iterator[str]:
+def not_done(clock: Clock) -> Iterator[str]:
     """Yield what was left out for lack of time, or at an interrupt, a line for each."""
     for why in dict.fromkeys(clock.left_out.values()):
         names = [name for name, reason in clock.left_out.items() if reason == why]

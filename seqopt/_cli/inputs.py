@@ -1,4 +1,4 @@
-"""What commands take as scene, steps and states: names, files, folders of plans, Python values."""
+"""What commands take as scene, steps, engine and states: names, files, folders, Python values."""
 
 from __future__ import annotations
 
@@ -13,25 +13,27 @@ from shutil import rmtree
 from tempfile import mkdtemp
 from typing import NamedTuple
 
-from seqopt._cli.options import BuiltFrom, Fixed, Posed, Postures, Scened
-from seqopt._cli.values import parse_robots
+from seqopt._cli import grammar, options
 from seqopt._files import csv_text, read_text, write_folder
 from seqopt.arms.reach import find_postures
-from seqopt.engines.registry import USUAL, make_engine
-from seqopt.errors import SceneError, SeqoptError, StepError
+from seqopt.contact.mortar import Mortar, _mortar_name
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import DEFAULT, LIMITED, USUAL, make_engine, simplest
+from seqopt.errors import ExtraError, ProblemError, SceneError, SeqoptError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence, ShownBuild
 from seqopt.plan.plan import Plan
-from seqopt.scene.scene import Scene, _parse_order
+from seqopt.scene.scene import Scene, _parse_order, in_order
 from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence._parts import _standing, read_site, what_is_left
-from seqopt.sequence.rules import FREE, FreeRules
+from seqopt.sequence.rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
+from seqopt.stability._builds import BuildProver
 from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 from seqopt.workflow import optimize
 
@@ -54,7 +56,7 @@ def is_folder(path: Path) -> bool:
     return (path / "scene.json").is_file() and (path / "plan.csv").is_file()
 
 
-def given_scene(asked: Scened) -> Scene:
+def given_scene(asked: options.Scened) -> Scene:
     """Return the scene that is given, also as a plan or the folder of one."""
     scene = asked.scene
     if isinstance(scene, ShownBuild):
@@ -64,7 +66,7 @@ def given_scene(asked: Scened) -> Scene:
     return load_scene(Path(scene) / "scene.json" if is_folder(Path(scene)) else scene)
 
 
-def given_plan(asked: Fixed) -> ShownBuild | Path | None:
+def given_plan(asked: options.Fixed) -> ShownBuild | Path | None:
     """Return the plan whose steps are asked for, if one is named or stands for the scene."""
     scene, plan = asked.scene, asked.plan
     if plan is not None:
@@ -82,7 +84,7 @@ def file_name(name: str | Path, end: str) -> Path:
 
 
 def plan_folder(
-    asked: Postures, given: BuiltFrom, *, free: bool = False
+    asked: options.Postures, given: options.BuiltFrom, *, free: bool = False
 ) -> tuple[Path, tuple[str, ...]]:
     """Return the folder of a plan, which is made where a plan, a scene or its name is given.
 
@@ -107,13 +109,13 @@ def plan_folder(
     return folder, notes
 
 
-def asked_steps(asked: Fixed, network: Network) -> NamedSteps:
+def find_steps(asked: options.Fixed, network: Network) -> NamedSteps:
     """Return the closed sequence that a command is asked for, or the usual one.
 
     Raises `SceneError`, `StepError` if the method is not for the scene, or robots are named beside
     a plan.
     """
-    robots = parse_robots(asked.robots)
+    robots = grammar.parse_robots(asked.robots)
     scene, plan, method = network.scene, given_plan(asked), asked.method
     if asked.robots and (plan is not None or method == PUBLISHED):
         raise StepError(
@@ -140,7 +142,7 @@ def asked_steps(asked: Fixed, network: Network) -> NamedSteps:
 
 
 def _usual(
-    asked: Postures, network: Network, robots: Sequence[str]
+    asked: options.Postures, network: Network, robots: Sequence[str]
 ) -> tuple[ShownBuild, tuple[str, ...]]:
     """Return the build by the first fixed method that fits, else a plan, and which one it is."""
     for name, method in METHODS.items():
@@ -152,7 +154,7 @@ def _usual(
     return _free(asked, network.scene)
 
 
-def _free(asked: Postures, scene: Scene) -> tuple[Plan, tuple[str, ...]]:
+def _free(asked: options.Postures, scene: Scene) -> tuple[Plan, tuple[str, ...]]:
     """Return the best free schedule, and that it is this."""
     plan = optimize(scene, FREE, progress=asked.tell)
     return plan, (f"steps: of the best free schedule, {plan.result}",)
@@ -166,7 +168,7 @@ class Place:
     done: tuple[Step, ...] | None = ()
 
 
-def asked_place(text: int | str | None, name: str, scene: Scene) -> tuple[Scene, Place]:
+def find_place(text: int | str | None, name: str, scene: Scene) -> tuple[Scene, Place]:
     """Return the place of --from or --to, and the scene in an order that begins with its bricks."""
     if text is None:
         return scene, Place()
@@ -176,7 +178,7 @@ def asked_place(text: int | str | None, name: str, scene: Scene) -> tuple[Scene,
         raise StepError(f"--{name} {text}: {error}") from None
 
 
-def kept_place(asked: Posed, keep: str, scene: Scene, begin: Place) -> tuple[Scene, Place]:
+def kept_place(asked: options.Posed, keep: str, scene: Scene, begin: Place) -> tuple[Scene, Place]:
     """Return where a take-down ends by --keep, and the scene in an order that begins with these."""
     where = f"--keep {keep}"
     if asked.to is not None:
@@ -239,3 +241,63 @@ def between(moves: Schedule | FreeRules, begin: Place, end: Place) -> Schedule |
             "PLAN:STEP, or --schedule free"
         )
     return what_is_left(moves, begin.done, end.site)
+
+
+def find_scene(asked: options.Built) -> Scene:
+    """Return the scene that options describe; one of a range of --grips keeps its own."""
+    if asked.order == "search":
+        raise ProblemError(
+            "--order search: only the free schedule has it; give optimize --schedule free"
+        )
+    order = None if asked.order is None else str(asked.order)
+    scene = in_order(given_scene(asked), order)
+    for text in options.listed(asked.payload):
+        scene = grammar.with_payload(text, scene)
+    if isinstance(asked, options.Team) and (count := str(asked.robots)).isdecimal():
+        scene = with_robots(scene, int(count))
+    if asked.props is not None:
+        scene = scene.with_props(*grammar.parse_props(str(asked.props), scene))
+    return scene if asked.grips is None else grammar.with_grips(asked.grips, scene)
+
+
+def in_seconds(asked: options.Timed, scene: Scene) -> Scene:
+    """Return a scene with the durations of --durations."""
+    try:
+        return scene.with_durations(*asked.durations)
+    except SceneError as error:
+        raise SceneError(f"--{error}") from None
+
+
+def find_engine(asked: options.Computed, network: Network) -> Engine:
+    """Return the engine that a command is asked for; where none is named, that of the scene."""
+    mortar = None if asked.mortar is None else grammar.parse_mortar(asked.mortar, "--mortar")
+    proven = isinstance(asked, options.Judged) and asked.stability
+    of_verdicts = asked.engine not in LIMITED and proven
+    if asked.engine is None:
+        engine = make_engine(DEFAULT, network, None if of_verdicts else mortar)
+        # with a mortar of its own an engine is asked where joints open: set by set
+        return simplest(engine) if of_verdicts or mortar is None else engine
+    try:
+        return make_engine(asked.engine, network, None if of_verdicts else mortar)
+    except SceneError as error:
+        why = str(error).removeprefix(f"engine {asked.engine}: ")
+        raise SceneError(f"--engine {asked.engine}: {why}") from error
+
+
+def posture_trouble(asked: options.Postures, scene: Scene) -> str:
+    """Compute postures of arms, or take those that are kept; return why there are none, if so."""
+    try:
+        find_postures(scene, asked.cache, asked.tell)
+    except (ExtraError, SceneError) as error:
+        return str(error)
+    return ""
+
+
+def find_prover(asked: options.Judged, network: Network) -> BuildProver:
+    """Return what says which steps of builds stand, with the mortars that a command shows."""
+    demanded = grammar.parse_standing(asked) if isinstance(asked, options.Tilted) else None
+    own = getattr(asked, "stands", None) or asked.mortar or "epoxy"
+    mortar = grammar.parse_mortar(own, "--mortar") if demanded is None else demanded.mortar
+    name = own if isinstance(own, str) else _mortar_name(mortar)
+    shown = {"dry": Mortar(friction=mortar.friction), name: mortar}
+    return BuildProver(network, shown if asked.stability else {}, asked.tell)
