@@ -75,6 +75,7 @@ class Answer:
     status: Status = Status.DONE
     faults: tuple[str, ...] = ()  # what --strict makes failures
     value: Any = None  # what Python gets
+    scene: Any = None  # of which it is
 
     def strictly(self) -> Answer:
         """Return the answer of --strict: what does not hold is its status."""
@@ -88,6 +89,7 @@ class Answer:
         said = {
             "command": command,
             "seqopt": version("seqopt"),
+            **({} if self.scene is None else {"scene": scene_facts(self.scene)}),
             **self.facts,
             "written": self.written,
             "notes": self.notes,
@@ -95,6 +97,17 @@ class Answer:
             "exit_status": self.status,
         }
         return plain(said)
+
+
+def scene_facts(scene: Any) -> dict[str, object]:
+    """Return what a scene is called, and how large it is."""
+    return {
+        "name": scene.name,
+        "bricks": len(scene.bricks),
+        "joints": len(scene.joints),
+        "ground_ends": len(scene.grounds),
+        "robots": [robot.name for robot in scene.robots],
+    }
 
 
 def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) -> Status:

@@ -31,17 +31,6 @@ from seqopt.stability.assessment import Verdict
 from seqopt.work._clock import INTERRUPT, TIME, Clock
 
 
-def scene_facts(scene: Scene) -> dict[str, object]:
-    """Return what a scene is called, and how large it is."""
-    return {
-        "name": scene.name,
-        "bricks": len(scene.bricks),
-        "joints": len(scene.joints),
-        "ground_ends": len(scene.grounds),
-        "robots": [robot.name for robot in scene.robots],
-    }
-
-
 def size_line(scene: Scene) -> str:
     """Return what a scene is called and how large it is, in words."""
     size = f"{len(scene.bricks)} bricks, {len(scene.joints)} joints"
@@ -128,11 +117,16 @@ def settlement_notes(scene: Scene) -> tuple[str, ...]:
 WHY = {TIME: "time is over", INTERRUPT: "interrupted"}
 
 
-def not_done(clock: Clock) -> Iterator[str]:
-    """Yield what was left out for lack of time, or at an interrupt, a line for each."""
-    for why in dict.fromkeys(clock.left_out.values()):
-        names = [name for name, reason in clock.left_out.items() if reason == why]
-        yield f"not done, {WHY[why]}: {', '.join(names)}"
+def in_time(answer: Answer, clock: Clock, interrupted: str) -> Answer:
+    """Return an answer that names what there was no time for, or that was interrupted."""
+    left = clock.left_out.values()
+    each = {why: [what for what, own in clock.left_out.items() if own == why] for why in left}
+    said = (f"not done, {WHY[why]}: {', '.join(names)}" for why, names in each.items())
+    answer = replace(answer, notes=(*answer.notes, *said))
+    if not clock.interrupted:
+        return answer
+    failures = (*answer.failures, interrupted)
+    return replace(answer, failures=failures, status=Status.INTERRUPTED)
 
 
 def marked(answer: Answer, outside: Sequence[object]) -> Answer:

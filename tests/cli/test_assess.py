@@ -11,10 +11,9 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt._cli.commands.assess import Rows
 from seqopt._cli.main import main
-from seqopt.errors import FileError
 from seqopt.scene.scene_file import load_scene, save_scene
+from seqopt.stability._step_verdicts import stability_row
 
 ARCH = "arch:span=1,rise=0.4,pattern=VLR"
 WORDS = ["assess", ARCH, "--method", "sequential", "--mortar", "dry"]
@@ -24,46 +23,34 @@ def contents(path):
     return path.read_text(encoding="utf-8")
 
 
-def test_a_run_goes_on_where_it_was_ended(capsys, tmp_path, monkeypatch):
+def ended_in(row):
+    """What makes rows of verdicts, and is interrupted in one."""
+    made = []
+
+    def until(step, result):
+        if len(made) == row - 1:
+            raise KeyboardInterrupt
+        made.append(step)
+        return stability_row(step, result)
+
+    return until
+
+
+def test_what_was_found_before_an_interrupt_is_written(capsys, tmp_path, monkeypatch):
     whole, out = tmp_path / "whole.csv", tmp_path / "out.csv"
     assert main([*WORDS, "--out", str(whole)]) == 1
-    add, end = Rows.add, 5
-
-    def until(self, row):
-        if len(self.rows) == end:
-            raise KeyboardInterrupt
-        add(self, row)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Rows, "add", until)
-        assert main([*WORDS, "--out", str(out)]) == 130
-    part = tmp_path / "out.csv.part"
-    said = (
-        f"seqopt: interrupted; 5 of 17 verdicts are in {part}; the same command goes on from there"
-    )
-    assert capsys.readouterr().err == f"{said}\n"
-    assert not out.exists()
-    with part.open("a", encoding="utf-8") as stream:
-        stream.write('{"step": 6, "ty')  # cut short
-    asked = []
-    monkeypatch.setattr(Rows, "add", lambda self, row: asked.append(row) or add(self, row))
-    assert main([*WORDS, "--out", str(out)]) == 1
-    assert capsys.readouterr().err == f"kept: 5 of 17 verdicts, found before, from {part}\n"
-    assert len(asked) == 12
-    own, other = (pd.read_csv(path) for path in (out, whole))
-    pd.testing.assert_frame_equal(own.drop(columns="proof"), other.drop(columns="proof"))
-    assert not part.exists()
+    monkeypatch.setattr("seqopt._cli.commands.assess.stability_row", ended_in(6))
+    assert main([*WORDS, "--out", str(out)]) == 130
+    assert capsys.readouterr().err == "seqopt: interrupted; 5 of 17 verdicts were found\n"
+    own, other = pd.read_csv(out), pd.read_csv(whole).head(5)
+    pd.testing.assert_frame_equal(own[other.columns[:5]], other[other.columns[:5]])
 
 
-def test_rows_of_something_else_are_not_taken_up(tmp_path):
-    out = tmp_path / "out.csv"
-    Rows(out, "one thing").add({"step": 1})
-    assert Rows(out, "one thing").rows == [{"step": 1}]
-    assert Rows(out, "another").rows == []
-    (tmp_path / "out.csv.part").write_text("", encoding="utf-8")
-    assert Rows(out, "one thing").rows == []
-    with pytest.raises(FileError, match="cannot write"):
-        Rows(tmp_path / "none" / "out.csv", "one thing").add({"step": 1})
+def test_an_interrupt_before_any_verdict_writes_nothing(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("seqopt._cli.commands.assess.stability_row", ended_in(1))
+    assert main([*WORDS, "--out", str(tmp_path / "out.csv")]) == 130
+    assert capsys.readouterr().err == "seqopt: interrupted\n"
+    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize(("words", "known"), [("4:6", [4, 5, 6]), ("16:", [16, 17]), ("3", [3])])
@@ -202,24 +189,13 @@ def test_what_falls_with_the_mortar_of_the_build_is_status_1(capsys, tmp_path):
     assert all(each["does not stand"] for each in found["verdicts"].values())
 
 
-def test_both_verdicts_go_on_where_they_were_ended(capsys, tmp_path, monkeypatch):
-    out, add = tmp_path / "out.csv", Rows.add
-
-    def until(self, row):
-        if len(self.rows) == 20:
-            raise KeyboardInterrupt
-        add(self, row)
-
-    words = ["assess", ARCH, "--method", "sequential", "--out", str(out)]
-    with monkeypatch.context() as patch:
-        patch.setattr(Rows, "add", until)
-        assert main(words) == 130
-    assert "20 of 34 verdicts are in" in capsys.readouterr().err
-    assert main(words) == 0
-    assert "kept: 20 of 34 verdicts" in capsys.readouterr().err
-    table = pd.read_csv(out)
-    assert table["mortar"].tolist() == ["dry"] * 17 + ["epoxy"] * 17
-    assert table["step"].tolist() == [*range(1, 18)] * 2
+def test_both_mortars_are_assessed_up_to_an_interrupt(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("seqopt._cli.commands.assess.stability_row", ended_in(21))
+    words = ["assess", ARCH, "--method", "sequential", "--json"]
+    assert main(words) == 130
+    found = json.loads(capsys.readouterr().out)
+    assert found["failures"] == ["seqopt: interrupted; 20 of 34 verdicts were found"]
+    assert [row["mortar"] for row in found["steps"]] == ["dry"] * 17 + ["epoxy"] * 3
 
 
 @pytest.mark.parametrize(("fall", "said"), [(-0.005, "leaves their balance"), (-0.5, "not small")])

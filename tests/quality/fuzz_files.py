@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 import seqopt
-from seqopt._cli.commands.assess import Rows
 from seqopt._cli.commands.replan import _told
 from seqopt.arms._postures import PostureTable
 from seqopt.arms._reached import Site as ArmSite
@@ -165,14 +164,7 @@ def _of_caches() -> Iterator[tuple[str, File]]:
     assert {*table} == {each.name for each in fields(PostureTable)}
     yield "postures", ("postures.npz", _npz(**table), lambda path: read_postures(path, site))
 
-    def rows(path: Path) -> object:
-        return Rows(path.with_name("out.csv"), "asked").rows
-
     with TemporaryDirectory() as folder:
-        kept = Rows(Path(folder, "out.csv"), "asked")
-        for step in (1, 2):
-            kept.add({"step": step, "verdict": "stands"})
-        yield "rows", ("out.csv.part", kept.path.read_bytes(), rows)
         yield "answers", _answers(Path(folder), engine)
 
 

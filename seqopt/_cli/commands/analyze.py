@@ -128,25 +128,17 @@ def run(asked: Analyze) -> Answer:
         said["written"] = (*said.get("written", ()), archived)
     found = partial(what_was_enough, within, {"": table}, staged=staged is not None)
     enough = clock.spare("which model is enough", found, None)
-    facts = {
-        "scene": remarks.scene_facts(scene),
-        "units": UNITS,
-        "steps": whole,
-        **provenance(engine),
-    }
+    facts = {"units": UNITS, "steps": whole, **provenance(engine)}
     answer = Answer(
+        facts | {"enough": None if enough is None else enough.facts()},
+        scene=scene,
         value=whole,
-        facts={**facts, "enough": None if enough is None else enough.facts()},
-        notes=(
-            *named.notes,
-            *off,
-            *_notes(asked, within, steps, table, enough),
-            *remarks.not_done(clock),
-        ),
-        failures=(*failures, *([INTERRUPTED] if clock.interrupted else ())),
-        status=Status.INTERRUPTED if clock.interrupted else status,
+        notes=(*named.notes, *off, *_notes(asked, within, steps, table, enough)),
+        failures=failures,
+        status=status,
         **said,
     )
+    answer = remarks.in_time(answer, clock, INTERRUPTED)
     unreached = remarks.arm_notes(scene, {"": computed})
     return remarks.held_to(answer, remarks.exceeded(scene, table), outside, unreached=unreached)
 

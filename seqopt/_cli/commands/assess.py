@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,16 +12,15 @@ import pandas as pd
 
 from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._files import csv_text, read_text
+from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar
 from seqopt.engines.registry import USUAL, make_engine, versions
-from seqopt.errors import FileError, ProblemError
+from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.problem._limit_words import number_word
 from seqopt.responses.quantities import _steps_in_words
-from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.steps import Step
 from seqopt.stability._load_factor import format_load_factors, load_factor_table, load_factors
 from seqopt.stability._step_verdicts import each_stability, find_margins, format_rows, stability_row
@@ -145,7 +140,8 @@ def answer_load_factor(asked: AssessWords) -> Answer:
     unproven = f"seqopt: solver failed: {_steps_in_words([*dict.fromkeys(unsure)])}: not proven"
     status = Status.DOES_NOT_HOLD if np.any(failing) else Status.DONE
     return Answer(
-        facts={"scene": remarks.scene_facts(scene), "versions": versions, "steps": table},
+        {"versions": versions, "steps": table},
+        scene=scene,
         text="\n".join([*lines, where]) if written else "",
         data="" if written else csv_text(table),
         written=written,
@@ -154,70 +150,6 @@ def answer_load_factor(asked: AssessWords) -> Answer:
         failures=(unproven,) if len(unsure) else (),
         status=Status.FAILED if len(unsure) else status,
     )
-
-
-Row = dict[str, Any]
-
-
-class Rows:
-    """Rows beside the file that they are for, until it is written.
-
-    ``asked``: what determines the rows; those of anything else are not taken up.
-    """
-
-    def __init__(self, out: Path | None, asked: object) -> None:
-        self.path = None if out is None else out.with_name(f"{out.name}.part")
-        self._mark = sha256(repr(asked).encode()).hexdigest()
-        self.rows = [*self._earlier()]
-        self.taken_up = len(self.rows)
-
-    def _earlier(self) -> Iterator[Row]:
-        """Yield the rows of an earlier run that asked the same; a damaged line ends them."""
-        if self.path is None or not self.path.exists():
-            return
-        mark, *lines = read_text(self.path).splitlines() or [""]
-        if mark != self._mark:
-            return
-        for line in lines:
-            mark, _, text = line.partition(" ")
-            if mark != self._checksum(text):
-                return
-            yield json.loads(text)  # our own
-
-    def _checksum(self, text: str) -> str:
-        return sha256(f"{self._mark} {text}".encode()).hexdigest()[:16]
-
-    def add(self, row: Row) -> None:
-        """Add a row, and keep it."""
-        self.rows.append(row)
-        if self.path is None:
-            return
-        fresh = len(self.rows) == self.taken_up + 1
-        kept = self.rows if fresh else [row]
-        texts = [json.dumps(each, default=lambda number: number.item()) for each in kept]
-        lines = [f"{self._checksum(text)} {text}" for text in texts]
-        try:
-            if fresh:  # what was cut short is not kept
-                self.path.write_text("\n".join([self._mark, *lines, ""]), encoding="utf-8")
-            else:
-                with self.path.open("a", encoding="utf-8") as stream:
-                    stream.write(f"{lines[0]}\n")
-        except OSError as error:
-            wrong = f"cannot write {self.path}: {error.strerror or error}"
-            raise FileError(wrong) from error
-
-    def where(self, total: int, what: str) -> str:
-        """Return how many rows are kept and where, as a message; empty if there are none."""
-        if self.path is None or not self.rows:
-            return ""
-        found = f"{len(self.rows)} of {total} {what}"
-        return f"{found} are in {self.path}; the same command goes on from there"
-
-    def done(self) -> None:
-        """Let go of what was kept: the table is written."""
-        if self.path is not None:
-            with suppress(OSError):
-                self.path.unlink(missing_ok=True)
 
 
 def run(asked: AssessWords) -> Answer:
@@ -232,13 +164,18 @@ def run(asked: AssessWords) -> Answer:
     scene, mortars = inputs.find_scene(asked), _asked_mortars(asked)
     network = build_network(scene)
     _, steps, taken = inputs.find_steps(asked, network)
-    kept = _found(asked, network, steps, mortars)
-    rows = kept.rows
-    went_on = f"kept: {kept.taken_up} of {len(rows)} verdicts, found before, from {kept.path}"
+    rows, early = list[dict[str, Any]](), tuple[str, ...]()
+    try:
+        for row in _verdicts(asked, network, steps, mortars):
+            rows.append(row)
+    except KeyboardInterrupt:
+        if not rows:
+            raise
+        total = len(mortars) * len(steps)
+        early = (f"seqopt: interrupted; {len(rows)} of {total} verdicts were found",)
     each = {name: [row for row in rows if row["mortar"] == name] for name in mortars}
-    lines = [f"{_with_mortar(name)}: {format_rows(own)}" for name, own in each.items()]
+    lines = [f"{_with_mortar(name)}: {format_rows(own)}" for name, own in each.items() if own]
     answer = outputs.put_table(asked.path, rows, "\n".join(lines) + ";")
-    kept.done()
     found = {name: Counter(row["verdict"] for row in own) for name, own in each.items()}
     counts = {name: {v.value: own[v.value] for v in Verdict} for name, own in found.items()}
     undecided = [row["step"] for row in rows if row["verdict"] == Verdict.UNDECIDED.value]
@@ -247,8 +184,8 @@ def run(asked: AssessWords) -> Answer:
     falls = counts[[*mortars][-1]][Verdict.FALLS.value]
     status = Status.DOES_NOT_HOLD if falls else Status.DONE
     return Answer(
+        scene=scene,
         facts={
-            "scene": remarks.scene_facts(scene),
             "mortar": {name: asdict(mortar) for name, mortar in mortars.items()},
             "versions": versions,
             "verdicts": counts,
@@ -256,14 +193,9 @@ def run(asked: AssessWords) -> Answer:
         },
         **answer,
         value=rows,
-        notes=(
-            *taken,
-            *((went_on,) if kept.taken_up else ()),
-            *remarks.settlement_notes(scene),
-            *remarks.carrying_notes(scene, steps),
-        ),
-        failures=(f"seqopt: solver failed: {said}",) if undecided else (),
-        status=Status.FAILED if undecided else status,
+        notes=(*taken, *remarks.settlement_notes(scene), *remarks.carrying_notes(scene, steps)),
+        failures=(*([f"seqopt: solver failed: {said}"] if undecided else []), *early),
+        status=Status.INTERRUPTED if early else Status.FAILED if undecided else status,
     )
 
 
@@ -283,27 +215,17 @@ def _asked_mortars(asked: AssessWords) -> dict[str, Mortar]:
     return {_mortar_name(mortar): mortar for mortar in (*dry, own)}
 
 
-def _found(
+def _verdicts(
     asked: AssessWords, network: Network, steps: Sequence[Step], mortars: Mapping[str, Mortar]
-) -> Rows:
-    """Return the rows of all steps, mortar by mortar; those kept of an earlier run are taken up."""
+) -> Iterator[dict[str, Any]]:
+    """Yield the rows of all steps, mortar by mortar."""
     margins, at = _asked_margins(asked, steps)
     workers = grammar.parse_count(asked.workers, "--workers", grammar.MOST_WORKERS)
-    kept = asked.path is not None  # else nobody takes them up
-    same = (dump_scene(network.scene), steps, mortars, margins, at, versions()) if kept else ()
-    rows = Rows(asked.path, same)
-    try:
-        for before, (name, mortar) in enumerate(mortars.items()):
-            if not (left := steps[max(0, len(rows.rows) - before * len(steps)) :]):
-                continue
-            told = with_progress(f"assessing steps, {_with_mortar(name)}", left, asked.tell)
-            found = each_stability(network, left, mortar, margins, at, (None, workers))
-            for step, result in zip(told, found, strict=True):
-                rows.add({"mortar": name, **stability_row(step, result)})
-    except KeyboardInterrupt:
-        total = len(mortars) * len(steps)
-        raise KeyboardInterrupt(rows.where(total, "verdicts")) from None
-    return rows
+    for name, mortar in mortars.items():
+        told = with_progress(f"assessing steps, {_with_mortar(name)}", steps, asked.tell)
+        found = each_stability(network, steps, mortar, margins, at, (None, workers))
+        for step, result in zip(told, found, strict=True):
+            yield {"mortar": name, **stability_row(step, result)}
 
 
 def _asked_margins(asked: AssessWords, steps: Sequence[Step]) -> tuple[tuple[str, ...], range]:

@@ -117,11 +117,12 @@ def answered(asked: Compare, found: Found) -> Answer:
         blocks.append(wrapped("--out DIR writes tables, figures and a step viewer."))
     answer = Answer(
         facts=about
-        | {"scene": remarks.scene_facts(scene), "criterion": criterion.name, **_facts(result)}
+        | {"criterion": criterion.name, **_facts(result)}
         | ({} if result.speed is None else {"speed": result.speed.facts()}),
         text="\n\n".join(blocks),
         headings=(*headings, SPEED),
         written=written,
+        scene=scene,
         notes=(
             *remarks.level_notes(asked, simplest(engine)),
             *result.enough.lines,

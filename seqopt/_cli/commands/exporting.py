@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from seqopt._cli import inputs, options, remarks
+from seqopt._cli import inputs, options
 from seqopt._cli.answer import Answer
 from seqopt._files import require_apart, write_text
 from seqopt.arms._kept import arm_faults
@@ -70,10 +70,10 @@ def run(asked: Export) -> Answer:
         said = f"{len(scene.bricks)} blocks, without {', '.join(lost)},"
     elif lost is not None:
         said = f"the scene and its {len(steps)} steps"
-    facts = {"scene": remarks.scene_facts(scene), "steps": len(steps), "format": asked.format}
+    facts = {"steps": len(steps), "format": asked.format}
     notes = (*taken, *notes)
+    answer = Answer(facts, notes=notes, value=text, scene=scene)
     if asked.path is None:
-        return Answer(facts=facts | {"text": text}, data=text, notes=notes, value=text)
+        return replace(answer, facts=facts | {"text": text}, data=text)
     write_text(asked.path, text)
-    said = f"{said} written to {asked.path}"
-    return Answer(facts=facts, text=said, written=(asked.path,), notes=notes, value=text)
+    return replace(answer, text=f"{said} written to {asked.path}", written=(asked.path,))

@@ -92,7 +92,8 @@ def run(asked: Import) -> Answer:
     assumed = scene.provenance.splitlines()
     said = f"{remarks.size_line(scene)}; written to {asked.out}"
     return Answer(
-        facts={"scene": remarks.scene_facts(scene), "assumed": assumed},
+        facts={"assumed": assumed},
+        scene=scene,
         text="\n".join([*assumed, said]),
         written=(asked.out,),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from seqopt._cli import grammar, inputs, options, outputs, remarks
+from seqopt._cli import grammar, inputs, options, outputs
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
@@ -47,15 +47,11 @@ def answer_map(asked: options.Fixed, over: str, holds: Sequence[str]) -> Answer:
         where = "--out DIR writes tables, a picture and a page that shows how steps fall"
     falls = found.cases["fall"].any()
     return Answer(
-        facts={
-            "scene": remarks.scene_facts(scene),
-            "versions": versions(),
-            "cases": found.cases,
-            "steps": found.steps,
-        },
+        facts={"versions": versions(), "cases": found.cases, "steps": found.steps},
         text="\n\n".join([*blocks, wrapped(where)]),
         headings=tuple(block.splitlines()[0] for block in blocks),
         written=written,
+        scene=scene,
         value=found.cases,
         notes=tuple(notes),
         status=Status.DOES_NOT_HOLD if falls else Status.DONE,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from seqopt._cli import grammar, inputs, options, outputs, remarks
-from seqopt._cli.answer import Answer, Status
+from seqopt._cli.answer import Answer
 from seqopt._cli.posing import Change, PosedProblem, asked_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
@@ -282,24 +282,23 @@ def _how(asked: Optimize, formulation: Formulation) -> Run:
 
 def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
     """Return what a plan is worth, once it is written."""
-    plan, clock = found.plan, found.clock
+    plan = found.plan
     scene, early = plan.engine.network.scene, plan.ended is End.INTERRUPTED
     over = remarks.exceeded(scene, plan._columns) if found.analyzed and not early else ()
     facts: dict[str, object] = {
-        "scene": remarks.scene_facts(scene),
         "summary": lambda: found.report,
         "proof": _proof(plan),
         **({"order": plan.order} if plan.order else {}),
     }
     ended = INTERRUPTED if early else "seqopt: interrupted; the plan was chosen by then"
     answer = Answer(
+        scene=scene,
         facts={**facts, "plan": plan.responses if found.analyzed else outputs.steps_table(plan)},
         text="\n".join(_lines(asked, found, over)),
         written=written,
         notes=tuple(_notes(asked, found)),
-        failures=(ended,) if early or clock.interrupted else (),
-        status=Status.INTERRUPTED if clock.interrupted else Status.DONE,
     )
+    answer = remarks.in_time(answer, found.clock, ended)
     unreached = () if plan.arms is None else plan.arms.faults
     left = plan.departures if found.analyzed else ()
     answer = remarks.held_to(answer, over, left, found.verdicts, unreached)
@@ -351,7 +350,6 @@ def _notes(asked: Optimize, found: Found) -> Iterator[str]:
         what = "the build" if plan.steps[0].number == 1 else "what is left"
         yield f"time: {what} takes {plan.makespan:.6g} s; --aim makespan makes it short"
     yield from remarks.refused(found.prover)
-    yield from remarks.not_done(found.clock)
 
 
 def _value(found: Found) -> str:

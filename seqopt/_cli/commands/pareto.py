@@ -13,7 +13,7 @@ from pathlib import Path
 import pandas as pd
 
 from seqopt._cli import grammar, inputs, options, outputs, remarks
-from seqopt._cli.answer import Answer, Status
+from seqopt._cli.answer import Answer
 from seqopt._cli.posing import asked_problem
 from seqopt._files import csv_text, write_folder
 from seqopt._showing import PAGE
@@ -205,7 +205,8 @@ def answered(asked: ParetoWords, found: Found) -> Answer:
         clock.spare("the folder of the plan that is picked", write, None)
     points = {"points": shown_table(front.table), "picked": picked}
     answer = Answer(
-        facts={"scene": remarks.scene_facts(scene), **found.counts, **points},
+        facts={**found.counts, **points},
+        scene=scene,
         text=f"{shown}{said}; {outputs.written_to(asked.path, page=DETAILS not in clock.left_out)}",
         written=written,
         notes=(
@@ -213,14 +214,11 @@ def answered(asked: ParetoWords, found: Found) -> Answer:
             *remarks.rule_notes(free.rules, scene),
             *remarks.refused(next(iter(found.provers.values()))),
             *(outputs.figure_notes() if written else ()),
-            *remarks.not_done(clock),
         ),
-        failures=(INTERRUPTED,) if clock.interrupted else (),
-        status=Status.INTERRUPTED if clock.interrupted else Status.DONE,
     )
-    return remarks.kept_range(
-        remarks.marked(answer, builds_in_words(found.departures)), front.beyond or None
-    )
+    answer = remarks.marked(answer, builds_in_words(found.departures))
+    answer = remarks.in_time(answer, clock, INTERRUPTED)
+    return remarks.kept_range(answer, front.beyond or None)
 
 
 def _chosen(asked: ParetoWords, name: str, found: Found) -> tuple[int, dict[str, object], str]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from seqopt._cli import inputs, options, outputs, remarks
+from seqopt._cli import inputs, options, outputs
 from seqopt._cli.answer import Answer
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
@@ -53,7 +53,8 @@ def run(asked: Reach) -> Answer:
     else:
         lines.append("--out DIR writes a row for every robot and node, and postures of arms")
     return Answer(
-        facts={"scene": remarks.scene_facts(scene), "reach": table},
+        {"reach": table},
+        scene=scene,
         text="\n".join(map(wrapped, lines)),
         written=written,
         value=table,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from seqopt._cli import inputs, options, outputs, remarks
+from seqopt._cli import inputs, options, outputs
 from seqopt._cli.answer import Answer
 from seqopt._files import require_folder, write_folder, write_text
 from seqopt._showing import PAGE, display
@@ -93,7 +93,8 @@ def run(asked: ReportWords) -> Answer:
         asked.tell("drawing figures")
         write_folder(figures, plan_figures(engine, folder_builds(engine, folder, prover)))
     return Answer(
-        facts={"scene": remarks.scene_facts(scene)},
+        {},
+        scene=scene,
         text=f"written to {' and '.join(map(str, written))}",
         written=written,
         value=written,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from seqopt._cli import inputs, options, outputs, remarks
-from seqopt._cli.answer import Answer
+from seqopt._cli.answer import Answer, scene_facts
 from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -56,7 +56,7 @@ def run(asked: SceneAsked) -> Answer:
         return _list(asked)
     outputs.keep_apart(asked, asked.export)
     scene = inputs.find_scene(asked)
-    facts = {**remarks.scene_facts(scene), **_network_facts(build_network(scene))}
+    facts = {**scene_facts(scene), **_network_facts(build_network(scene))}
     lines = [*_described(scene, facts)]
     if asked.export is not None:
         save_scene(scene, asked.export)
@@ -106,9 +106,7 @@ def _list(asked: SceneAsked) -> Answer:
     ]
     lines += KINDS.values()
     facts = {
-        "scenes": [
-            {**remarks.scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()
-        ],
+        "scenes": [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()],
         "kinds": KINDS,
     }
     return Answer(facts=facts, text="\n".join(lines))

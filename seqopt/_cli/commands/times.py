@@ -81,10 +81,8 @@ def run(asked: Times) -> Answer:
     tables |= {} if aged is None else {"aged.csv": lambda: aged}
 
     def files() -> dict[str, bytes | str]:
-        return {
-            **{name: csv_text(table()) for name, table in tables.items()},
-            **outputs.time_files(build),
-        }
+        texts = {name: csv_text(table()) for name, table in tables.items()}
+        return {**texts, **outputs.time_files(build)}
 
     written = outputs.write_outputs(asked, files)
     busy = busy_table(scene, build.steps, build._waits)
@@ -101,11 +99,11 @@ def run(asked: Times) -> Answer:
     cannot = (
         (f"not checked; {trouble}",) if trouble else remarks.arm_notes(scene, {"": build.steps})
     )
-    facts = {"scene": remarks.scene_facts(scene), "makespan_s": given, "reassigned_s": least}
-    facts |= {"robots": busy, "steps": timed}
+    facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": timed}
     facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
-        facts=facts,
+        facts,
+        scene=scene,
         text="\n".join(map(wrapped, lines)),
         written=written,
         value=timed,
