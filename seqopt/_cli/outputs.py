@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
 
 
-def figure_notes() -> tuple[str, ...]:
-    """Return why figures are left out, if they are: what draws them is an extra."""
-    if find_spec("matplotlib") is not None:
+def figure_notes(written: object = True) -> tuple[str, ...]:  # noqa: FBT002  # what is written
+    """Return why figures are left out of what is written: what draws them is an extra."""
+    if not written or find_spec("matplotlib") is not None:
         return ()
     return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
 

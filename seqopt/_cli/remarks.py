@@ -8,7 +8,6 @@ from dataclasses import replace
 from seqopt._cli import options
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
-from seqopt.arms._kept import arm_faults
 from seqopt.engines._kinds import ChoosingEngine, Level
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import _chooser_of
@@ -73,12 +72,6 @@ def rule_notes(rules: FreeRules | Schedule, scene: Scene) -> tuple[str, ...]:
         return ()
     robots = "1 robot takes" if team == 1 else f"{team} robots take"
     return (f"rules: least_grips={least}, as {robots} part",)
-
-
-def arm_notes(scene: Scene, builds: Mapping[str, Sequence[Step]]) -> tuple[str, ...]:
-    """Return which steps of builds arms cannot be in, in words. ``builds``: by what they are."""
-    faults = ((name, fault) for name, steps in builds.items() for fault in arm_faults(scene, steps))
-    return tuple(f"{name}{': ' * bool(name)}{fault}" for name, fault in faults)
 
 
 def waits_said(build: ShownBuild) -> Iterator[str]:
@@ -158,7 +151,7 @@ def held_to(
 ) -> Answer:
     """Return an answer, `marked`, with payloads that are `exceeded` and the faults of --strict.
 
-    ``verdicts``: by build, with the mortar of the scene last; ``unreached``: as of `arm_notes`.
+    ``verdicts``: by build, with the mortar of the scene last; ``unreached``: why arms cannot be in steps.
     """
     answer, falls = marked(answer, outside), list[str]()
     facts = {**answer.facts, "payloads_exceeded": list(over)}

@@ -5,17 +5,14 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from contextlib import suppress
 
 from seqopt._cli.terminal import columns, harmless, is_terminal
 from seqopt.work.progress import Stage, duration
 
-if TYPE_CHECKING:
-    from tqdm import tqdm
-
 PATIENCE = 1.0  # s for which a command says nothing
 TICK = 0.5  # s between two looks at the clock
-KNOWN = "{desc}: {percentage:3.0f} % |{bar:20}|"
+WIDE = 20  # of a bar
 TAIL = ": 100 % |12345678901234567890| about 100 min left "  # beside which words have to find room
 
 
@@ -36,7 +33,7 @@ class Watcher:
         self._start = self._told = time.perf_counter()
         self._began: dict[str, tuple[float, float]] = {}  # of each stage, and its last share
         self._stage = Stage("working", -1.0)  # no share is below zero
-        self._bar: tqdm[None] | None = None
+        self._wide = 0  # what is shown, in columns
         self._lock = threading.Lock()
         self._over = threading.Event()
         self._clock = threading.Thread(target=self._tick, daemon=True)
@@ -51,8 +48,9 @@ class Watcher:
         self._over.set()
         self._shows = False
         if self._lock.acquire(timeout=TICK):  # an interrupt may have met whoever has it
-            if self._bar is not None:
-                self._bar.close()
+            if self._wide:
+                self._put("")
+                self._put("")  # back at the begin of the line
             self._lock.release()
 
     def __call__(self, told: object) -> None:
@@ -81,24 +79,24 @@ class Watcher:
         now = time.perf_counter()
         if self._over.is_set() or now - self._start < PATIENCE:
             return
-        if self._bar is None:
-            # of a command that is done within a second nobody needs it
-            from tqdm import tqdm  # noqa: PLC0415
-
-            tqdm.monitor_interval = 0  # its own clock leaves the bar alone
-            tqdm.set_lock(threading.RLock())  # its own would start a process
-            how: dict[str, Any] = {"leave": False, "dynamic_ncols": True, "bar_format": "{desc}"}
-            self._bar = tqdm(total=1.0, file=sys.stderr, **how)
-        stage, bar = self._stage, self._bar
-        what, left = harmless(stage.what), self._left(now)
+        stage, left = self._stage, self._left(now)
+        what = harmless(stage.what)
         if stage.share > 0 and left > 0:
-            said = f"about {duration(max(left, 1.0))} left"
-            bar.n, bar.bar_format = min(stage.share, 1.0), f"{KNOWN} {said}"
-            bar.desc = what[: columns() - len(TAIL)]
+            share = min(stage.share, 1.0)
+            bar = "#" * round(WIDE * share)
+            about = f"about {duration(max(left, 1.0))} left"
+            what = what[: columns() - len(TAIL)]
+            self._put(f"{what}: {100 * share:3.0f} % |{bar:{WIDE}}| {about}")
         else:
-            bar.bar_format = "{desc}"
-            bar.desc = f"{what[: columns() - 24]} … {duration(now - self._start)} so far"
-        bar.refresh()
+            what = what[: columns() - 24]
+            self._put(f"{what} … {duration(now - self._start)} so far")
+
+    def _put(self, line: str) -> None:
+        """Show a line in the place of the one before."""
+        with suppress(OSError, ValueError):  # nobody looks any more
+            sys.stderr.write(f"\r{line:{self._wide}}")
+            sys.stderr.flush()
+        self._wide = len(line)
 
     def _left(self, now: float) -> float:
         """Return how long the stage will still take, s; nothing where that is not known."""

@@ -114,7 +114,7 @@ def test_every_option_stands_in_a_group_with_a_title():
         assert loose == ["help", "help_all"], command.prog
 
 
-HEAVY = ("numpy", "pandas", "scipy", "networkx", "tqdm", "shtab")
+HEAVY = ("numpy", "pandas", "scipy", "networkx", "shtab")
 LOADED = f"print(*[name for name in {HEAVY} if name in sys.modules], file=sys.stderr)"
 
 

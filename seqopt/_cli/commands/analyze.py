@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -15,6 +14,7 @@ from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
+from seqopt.arms._kept import arm_faults
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines._kinds import ChoosingEngine, Level, OpeningEngine
@@ -110,11 +110,11 @@ def run(asked: Analyze) -> Answer:
     reached = len(table) + len(faults)
     late, ended = _late(asked, reached, len(steps), engine, in_time)
     failures, status = (*_faults_said(faults, reached), *late), _status_of(faults, ended)
+    answer = Answer({}, scene=scene, notes=named.notes, failures=failures, status=status)
     if table.empty:
         none = _with_faults(scene, table, steps, faults)
         said = outputs.put_table(asked.path, none, _counted(none, faults)) if faults else {}
-        how: dict[str, Any] = {"failures": failures, "status": status, "notes": named.notes}
-        return Answer({"steps": none}, value=none, **how, **said)
+        return replace(answer, facts={"steps": none}, value=none, **said)
     computed = [step for step in steps[:reached] if step.number not in faults]
     tolerances = partial(_with_tolerances, asked, engine, computed, table)
     table, off = clock.spare("tolerances", tolerances, (table, tuple[str, ...]()))
@@ -129,18 +129,12 @@ def run(asked: Analyze) -> Answer:
     found = partial(what_was_enough, within, {"": table}, staged=staged is not None)
     enough = clock.spare("which model is enough", found, None)
     facts = {"units": UNITS, "steps": whole, **provenance(engine)}
-    answer = Answer(
-        facts | {"enough": None if enough is None else enough.facts()},
-        scene=scene,
-        value=whole,
-        notes=(*named.notes, *off, *_notes(asked, within, steps, table, enough)),
-        failures=failures,
-        status=status,
-        **said,
-    )
+    facts |= {"enough": None if enough is None else enough.facts()}
+    notes = (*named.notes, *off, *_notes(asked, within, steps, table, enough))
+    answer = replace(answer, facts=facts, value=whole, notes=notes, **said)
     answer = remarks.in_time(answer, clock, INTERRUPTED)
-    unreached = remarks.arm_notes(scene, {"": computed})
-    return remarks.held_to(answer, remarks.exceeded(scene, table), outside, unreached=unreached)
+    over, cannot = remarks.exceeded(scene, table), arm_faults(scene, computed)
+    return remarks.held_to(answer, over, outside, unreached=cannot)
 
 
 def _notes(

@@ -127,7 +127,7 @@ def answered(asked: Compare, found: Found) -> Answer:
             *remarks.level_notes(asked, simplest(engine)),
             *result.enough.lines,
             *remarks.refused(prover),
-            *(outputs.figure_notes() if written else ()),
+            *outputs.figure_notes(written),
         ),
     )
     over = remarks.exceeded(scene, *result.tables.values())

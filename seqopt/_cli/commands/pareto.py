@@ -213,7 +213,7 @@ def answered(asked: ParetoWords, found: Found) -> Answer:
             *remarks.level_notes(asked, free.engine),
             *remarks.rule_notes(free.rules, scene),
             *remarks.refused(next(iter(found.provers.values()))),
-            *(outputs.figure_notes() if written else ()),
+            *outputs.figure_notes(written),
         ),
     )
     answer = remarks.marked(answer, builds_in_words(found.departures))

@@ -58,7 +58,7 @@ def run(asked: Reach) -> Answer:
         text="\n".join(map(wrapped, lines)),
         written=written,
         value=table,
-        notes=outputs.figure_notes() if written and scene.has_arms else (),
+        notes=outputs.figure_notes(written and scene.has_arms),
     )
 
 

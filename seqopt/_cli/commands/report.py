@@ -101,6 +101,6 @@ def run(asked: ReportWords) -> Answer:
         notes=(
             *taken,
             *([f"arms: drawn without postures; {trouble}"] if trouble else ()),
-            *(() if figures is None else outputs.figure_notes()),
+            *outputs.figure_notes(figures),
         ),
     )

@@ -11,6 +11,7 @@ from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
+from seqopt.arms._kept import arm_faults
 from seqopt.contact.curing import _find_curing
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
@@ -96,9 +97,7 @@ def run(asked: Times) -> Answer:
     kept = f"written to {asked.path}: {', '.join(tables)}"
     lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
     trouble = inputs.posture_trouble(asked, scene)
-    cannot = (
-        (f"not checked; {trouble}",) if trouble else remarks.arm_notes(scene, {"": build.steps})
-    )
+    cannot = (f"not checked; {trouble}",) if trouble else arm_faults(scene, build.steps)
     facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": timed}
     facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
@@ -113,7 +112,7 @@ def run(asked: Times) -> Answer:
             *remarks.carrying_notes(scene, build.steps),
             *_idle_note(scene, "robots", build.steps),
             *(f"arms: {each}" for each in cannot),
-            *(outputs.figure_notes() if written else ()),
+            *outputs.figure_notes(written),
         ),
     )
 
