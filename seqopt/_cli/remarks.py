@@ -151,7 +151,7 @@ def held_to(
 ) -> Answer:
     """Return an answer, `marked`, with payloads that are `exceeded` and the faults of --strict.
 
-    ``verdicts``: by build, with the mortar of the scene last; ``unreached``: why arms cannot be in steps.
+    ``verdicts``: by build, with the mortar of the scene last; ``unreached``: what arms cannot do.
     """
     answer, falls = marked(answer, outside), list[str]()
     facts = {**answer.facts, "payloads_exceeded": list(over)}

@@ -98,6 +98,8 @@ def run(asked: Times) -> Answer:
     lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
     trouble = inputs.posture_trouble(asked, scene)
     cannot = (f"not checked; {trouble}",) if trouble else arm_faults(scene, build.steps)
+    notes = (*taken, *named.notes, *remarks.carrying_notes(scene, build.steps))
+    notes += (*_idle_note(scene, "robots", build.steps),)
     facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": timed}
     facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
@@ -106,14 +108,7 @@ def run(asked: Times) -> Answer:
         text="\n".join(map(wrapped, lines)),
         written=written,
         value=timed,
-        notes=(
-            *taken,
-            *named.notes,
-            *remarks.carrying_notes(scene, build.steps),
-            *_idle_note(scene, "robots", build.steps),
-            *(f"arms: {each}" for each in cannot),
-            *outputs.figure_notes(written),
-        ),
+        notes=(*notes, *(f"arms: {each}" for each in cannot), *outputs.figure_notes(written)),
     )
 
 
