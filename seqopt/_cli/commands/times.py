@@ -100,7 +100,8 @@ def run(asked: Times) -> Answer:
     cannot = (f"not checked; {trouble}",) if trouble else arm_faults(scene, build.steps)
     notes = (*taken, *named.notes, *remarks.carrying_notes(scene, build.steps))
     notes += (*_idle_note(scene, "robots", build.steps),)
-    facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": timed}
+    facts: dict[str, object] = {"makespan_s": given, "reassigned_s": least}
+    facts |= {"robots": busy, "steps": timed}
     facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
         facts,
