@@ -136,7 +136,9 @@ class StateEvaluator:
     def __init__(self, problem: States) -> None:
         self.problem = problem
         robots = range(len(problem.network.scene.robots))
-        most, own = ([_load(problem, r, stand=stand) for r in robots] for stand in (False, True))
+        most, own = (
+            [largest_load(problem, r, stand=stand) for r in robots] for stand in (False, True)
+        )
         self.tables = _tables(problem, most)
         self.margins = sum(goal.margins is not None for goal in problem.goals)
         self._most = np.array([most[r] for r in self.tables.team])
@@ -301,7 +303,7 @@ class StateEvaluator:
         return out
 
 
-def _load(problem: States, robot: int, *, stand: bool) -> float:
+def largest_load(problem: States, robot: int, *, stand: bool) -> float:
     """Return the most that a robot of the scene may carry, or has to hold with, N."""
     rules, own = problem.rules, problem.network.scene.robots[robot]
     kept = stand if isinstance(rules, Schedule) else rules.payload is Payload.KEPT

@@ -21,6 +21,7 @@ from seqopt.graph.states.states import States
 from seqopt.judge._proof import BELOW, Hint, Proof
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._spaces import TooManyPartsError
+from seqopt.judge._states import largest_load
 from seqopt.judge._step_checks import check_props, check_shape, proven_margins, require_margin
 from seqopt.judge._twin import PathTwin, exceeds, own_values, twin_of
 from seqopt.judge.certificate import Certificate
@@ -271,6 +272,7 @@ def plan_values(
         if limit.response in columns and exceeds(limit, columns[limit.response]).any():
             at = int(np.argmax(columns[limit.response])) + 1
             raise SolverError(f"step {at} exceeds the limit on {limit.label}")
+    _check_forces(problem, forces, steps)
     levels = [*_by_bricks(problem, columns, forces, steps)]
     _check_filters(problem, levels, steps)
     margins, moves, out = proven_margins(problem, steps), _moves(problem, steps), list[float]()
@@ -287,6 +289,17 @@ def plan_values(
 
 
 Levels = Sequence[tuple[Ints, StateArrays]]  # rows of steps, and the states that they lead to
+
+
+def _check_forces(problem: States, forces: Floats, steps: Sequence[Step]) -> None:
+    """Raise a `SolverError` if a robot holds with more than its payload, or a limit of its own."""
+    robots = problem.network.scene.robots
+    most = np.array([largest_load(problem, r, stand=False) for r in range(len(robots))])
+    for row, robot in np.argwhere(forces > most + TOLERANCE * most).tolist():
+        raise SolverError(
+            f"step {steps[row].number}: {robots[robot].name} holds {forces[row, robot]:.6g} N, "
+            f"more than the {most[robot]:.6g} N that are allowed"
+        )
 
 
 def _check_filters(problem: States, levels: Levels, steps: Sequence[Step]) -> None:

@@ -211,11 +211,15 @@ def _is_bare_end(problem: States, level: int, state: Ints) -> bool:
 
 def _excess_said(problem: States, level: int, state: Ints) -> str:
     """Return which limits a state exceeds, in words."""
-    found = problem.responses(level, state)[0].responses
+    states, _ = problem.responses(level, state)
+    found = states.responses
     named = ((each, found[each.response]) for each in problem.limits if each.response in found)
     over = [
         f"{each.label}={each.shown(float(value[0])):.6g} instead of {each.shown(each.bound):g}"
         for each, value in named
         if each.exceeded(value).any()
     ]
+    own = [each.name for each in problem.filters if not each.passes(states).all()]
+    if own and not over:
+        return f"does not pass the filter {own[0]}"
     return f"has {' and '.join(over)}" if over else "asks more of robots than they carry"

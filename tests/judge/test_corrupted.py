@@ -1,0 +1,265 @@
+"""Every amount and every filter is corrupted in the search alone: the judge objects each time.
+
+Of amounts a constant is added, or another column is taken. A filter lets a state through, or leaves
+one out of the best plan. Without a corruption the same questions are answered and proven.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.errors import SeqoptError
+from seqopt.graph.states.states import States
+from seqopt.plan.search._margin_search import bisected
+from seqopt.problem import Amount, Filter, filters
+from seqopt.problem.amounts import BUILT_IN, find_amount, worst
+from seqopt.problem.requirements import Limit
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.sequence._rule_space import FreeSpace
+from seqopt.sequence.rules import FreeRules
+from tests.brute_force import ONES
+from tests.builders import small_arch
+
+HELD = FreeRules(ending="held")
+
+
+def few(states):
+    """How many robots hold, and a penalty where the first does nothing."""
+    return (states.nodes >= 0).sum(axis=1) + 0.25 * (states.bricks % 2)
+
+
+OWN = Amount("held", few, twin=lambda states: few(states) * 1.0)
+AMOUNTS = {
+    **{name: BUILT_IN[name] for name in ("minmax", "sum", "steps", "regrips", "travel")},
+    **{name: worst(name) for name in ("T_max", "C_max", "D_max", "F_largest")},
+    **{name: BUILT_IN[name] for name in ("sum(M_sup)", "sum(F_largest)", "bond", "friction")},
+    OWN.name: OWN,
+}
+OTHERS = {
+    "minmax": lambda states: states.responses["T_max"],
+    "sum": lambda states: states.responses["M_sup"],
+    "steps": lambda moves: moves.regrips,
+    "regrips": lambda moves: np.ones(len(moves.regrips)),
+    "travel": lambda moves: moves.regrips,
+    "held": lambda states: 0.5 * np.ones(len(states.possible)),
+}  # columns that are taken in their place; of a response the next one
+SPACES = {"loop": (5, None, {}), "free": (4, HELD, {}), "orders": (4, HELD, {"orders": "tied"})}
+
+
+@cache
+def posed(space, amount):
+    bricks, rules, words = SPACES[space]
+    engine = seqopt.make_engine("compliance", small_arch(bricks))
+    moves = rules or seqopt.three_robot_loop(engine.network)
+    found = AMOUNTS[amount]
+    goals = (found,) if found.is_peak else (found, BUILT_IN["minmax"])
+    return seqopt.pose(engine, moves, ONES, goals, **words)
+
+
+def corrupted(amount, how):
+    """An amount of the same name with another function, as a search with an error has it."""
+    part = next(n for n in ("states", "moves", "margins") if getattr(amount, n))
+    own, next_one = getattr(amount, part), "M_sup" if amount.name == "D_max" else "D_max"
+    if how == "a constant added":
+        return replace(amount, **{part: lambda *of: own(*of) + 0.5})
+    other = OTHERS.get(amount.name, lambda states: 1e5 * states.responses[next_one])
+    wanted = {*amount.responses, "T_max", "M_sup", next_one} if amount.states else ()
+    return replace(amount, responses=tuple(sorted(wanted)), **{part: other})
+
+
+def solved(problem):
+    """The plan, which an exact search promises to be the best."""
+    return seqopt.solve(problem, proof=True)
+
+
+def is_refused(problem):
+    """Whether the judge objects, or the search says that nothing is feasible without a proof."""
+    try:
+        solved(problem)
+    except SeqoptError as error:
+        return "failed" not in str(error)
+    return False
+
+
+SHIFTS = {"bond": (1e3,), "friction": (-0.1, 0.1)}
+MARGINS = [(space, name) for space in SPACES for name in SHIFTS][:-1]  # the last one is slow
+PLAIN = [(s, a) for s in SPACES for a in AMOUNTS if s != "loop" or a not in ("steps", "regrips")]
+PLAIN = [each for each in PLAIN if each[1] not in ("bond", "friction")]
+
+
+@pytest.mark.parametrize(("space", "amount"), PLAIN + MARGINS)
+def test_what_is_not_corrupted_is_proven(space, amount):
+    plan = solved(posed(space, amount))
+    assert str(plan.status) == "optimal"
+
+
+@pytest.mark.parametrize("how", ["a constant added", "another column"])
+@pytest.mark.parametrize(("space", "amount"), PLAIN)
+def test_a_corrupted_amount_is_seen(space, amount, how):
+    problem = posed(space, amount)
+    wrong = corrupted(problem.goals[0], how)
+    assert is_refused(replace(problem, goals=(wrong, *problem.goals[1:])))
+
+
+@pytest.mark.parametrize(
+    ("space", "amount", "shift"), [(*each, by) for each in MARGINS for by in SHIFTS[each[1]]]
+)
+def test_a_margin_that_the_search_gets_wrong_is_seen(space, amount, shift, monkeypatch):
+    def wrong(name, exists):
+        return tuple(value + shift for value in bisected(name, exists))
+
+    for module in ("seqopt.plan.search._margin_search", "formulations.states._search"):
+        monkeypatch.setattr(f"{module}.bisected", wrong)
+    assert is_refused(posed(space, amount))
+
+
+def test_every_amount_is_attacked():
+    """Those that are left out are like others, or of time, which is judged with times."""
+    left = {*BUILT_IN} - {*AMOUNTS} - {f"sum({name})" for name in BUILT_IN}
+    assert left == {"M_sup", "tilt", "tolerance"}
+    assert find_amount("makespan").in_time
+
+
+# filters: each decides a question, is then forgotten, or refuses one state of the best plan
+
+
+FREE_NODE = {"loop": 3, "free": 6, "orders": 3}  # that best plans hold
+TOTAL = "sum(F_largest)"  # of which there are few plans as good
+STANDS = {"loop": "bond=3500", "free": "dry", "orders": "dry"}
+KINDS = ("limit", "own", "stands", "payload", "rules")
+SLOW = {("loop", "stands"), ("orders", "stands"), ("orders", "payload"), ("orders", "limit")}
+FILTERS = [
+    pytest.param(s, k, marks=[pytest.mark.slow] * ((s, k) in SLOW))
+    for s in SPACES
+    for k in KINDS
+    if s != "loop" or k not in ("payload", "rules")
+]
+
+
+def base(space, aim="F_largest"):
+    """The best plan that no filter rules out."""
+    return solved(scened(space).but(goals=aim))
+
+
+@cache
+def scened(space, payload=None):
+    scene, (_, rules, words) = small_arch(6 if space == "loop" else 4), SPACES[space]
+    if space == "orders":  # the mirrored order is as good in one that is symmetric
+        scene = arch_scene(ArchShape(pitch=[1.3, 0.5, -0.3, -1.2]))
+    if payload is not None:
+        scene = scene.with_robots(*(replace(robot, payload=payload) for robot in scene.robots))
+    engine = seqopt.make_engine("compliance", scene)
+    moves = rules or seqopt.three_robot_loop(engine.network)
+    return seqopt.pose(engine, moves, ONES, "F_largest", **words)
+
+
+@cache
+def filtered(space, kind):
+    """A question that the filter of a kind decides."""
+    problem = scened(space)
+    if kind == "limit":
+        return problem.but(limits=(Limit("T_max", 0.999 * largest(base(space), "F_max_N")),))
+    if kind == "stands":
+        return problem.but(stands=STANDS[space])
+    if kind == "payload":
+        force = base(space, TOTAL).responses().filter(regex="F_rob").abs().max(axis=None)
+        return scened(space, 0.999 * force).but(goals=TOTAL)
+    node = FREE_NODE[space]
+    own = Filter("a node is free", partial(is_free, node), twin=partial(is_held, node))
+    return replace(problem, filters=(own,)) if kind == "own" else problem
+
+
+def largest(plan, column):
+    return float(plan.responses()[column].max())
+
+
+def is_free(node, states):
+    return (states.nodes != node).all(axis=1)
+
+
+def is_held(node, states):
+    """The same refused, written a second time."""
+    return np.count_nonzero(states.nodes == node, axis=1) > 0
+
+
+def found(problem):
+    plan = solved(problem)
+    return plan.certificate.values[0], plan.steps
+
+
+def alike(step, bricks, nodes):
+    """Which states with so many bricks hold the nodes of a step, whoever does."""
+    if step.bricks != bricks:
+        return np.zeros(len(nodes), dtype=bool)
+    held = [node for node in step.grips if node is not None]
+    here = np.isin(nodes, held).sum(axis=1) == len(held)
+    return here & ((nodes != -1).sum(axis=1) == len(held))
+
+
+def corrupt(monkeypatch, problem, kind, change):
+    """Change what the search asks; ``change``: of what passes, bricks and nodes (n, r)."""
+
+    def of_filter(part):
+        own = part.passes
+        return replace(part, passes=lambda s: change(own(s), s.bricks, s.nodes))
+
+    def of_method(holder, name, bricks_at):
+        own = getattr(holder, name)
+
+        def changed(self, at, states, *more):
+            numbers = np.array([-1, *self.network.scene.placed_nodes])
+            robots = (getattr(self, "space", None) or self).robots
+            nodes = numbers[states[:, :robots].clip(min=0)]
+            return change(own(self, at, states, *more), bricks_at(self, at), nodes)
+
+        monkeypatch.setattr(holder, name, changed)
+
+    if kind == "own":
+        return replace(problem, filters=tuple(map(of_filter, problem.filters)))
+    if kind in ("limit", "payload"):
+        name = f"_{kind}s_filter" if kind == "payload" else f"_{kind}_filter"
+        own = getattr(filters, name)
+        monkeypatch.setattr(filters, name, lambda *of: of_filter(own(*of)))
+    elif kind == "stands":
+        of_method(States, "stand", lambda self, level: self.space.bricks_at(level))
+        monkeypatch.setattr(States, "recalled", lambda self, level, states: np.zeros(len(states)))
+    else:
+        of_method(FreeSpace, "_lawful", lambda self, bricks: bricks)
+    return replace(problem)
+
+
+@pytest.mark.parametrize(("space", "kind"), FILTERS)
+def test_each_filter_decides_and_is_kept(space, kind):
+    """A control: with it another plan is best, which the judge accepts."""
+    value = found(filtered(space, kind))[0]
+    free = found(filtered(space, kind).but(limits=(), stands=None))[0]
+    assert value > free if kind in ("limit", "stands") else value > 0
+
+
+@pytest.mark.parametrize(("space", "kind"), FILTERS)
+def test_a_state_that_is_let_through_is_seen(space, kind, monkeypatch):
+    problem = corrupt(monkeypatch, filtered(space, kind), kind, lambda ok, *_: np.ones_like(ok))
+    assert is_refused(problem)
+
+
+@pytest.mark.parametrize(("space", "kind"), FILTERS)
+def test_a_state_that_is_left_out_is_missed(space, kind, monkeypatch):
+    """Whatever state of the best plan: a plan as good is found, or the judge finds a better."""
+    value, steps = found(filtered(space, kind))
+    for step in steps[:0:-1]:
+        with monkeypatch.context() as patch:
+            own = corrupt(
+                patch,
+                filtered(space, kind),
+                kind,
+                lambda ok, bricks, nodes, step=step: ok & ~alike(step, bricks, nodes),
+            )
+            if is_refused(own):
+                return
+            assert found(own)[0] == pytest.approx(value, rel=1e-9)
+    raise AssertionError("no state of the best plan was missed")
