@@ -32,7 +32,11 @@ print("figures shown:", counts, "left:", len(plt.get_fignums()))
 downloads, equations = extension("downloads"), extension("equations")
 
 
-RUN = ("adding_formulation", "comparing_formulations")  # others: when the site is built
+RUN = (
+    "adding_formulation",
+    "comparing_formulations",
+    "own_amount",
+)  # others: when the site is built
 
 
 def told():

@@ -1,0 +1,154 @@
+"""Amounts and filters of users: asked for by name, judged by their twins, claimed without one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt._registry import ADDED
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.problem import Amount, Filter
+from seqopt.problem.amounts import BUILT_IN, find_amount
+from seqopt.sequence.rules import FreeRules
+from tests.brute_force import ONES
+from tests.builders import small_arch
+
+PACKAGE = """
+import numpy as np
+from seqopt.problem import Amount, Filter
+
+BUSY = Amount("busy", lambda states: (states.nodes >= 0).sum(axis=1))
+AWAY = Filter("away", lambda states: (states.nodes != 3).all(axis=1))
+"""
+
+
+def busy(states):
+    return (states.nodes >= 0).sum(axis=1)
+
+
+@pytest.fixture(autouse=True)
+def alone():
+    """What one test registers no other one finds."""
+    before = {**ADDED}
+    yield
+    ADDED.clear()
+    ADDED.update(before)
+
+
+def posed(goals, limits=(), schedule=None, **words):
+    engine = seqopt.make_engine("compliance", small_arch(5 if schedule else 4))
+    moves = schedule(engine.network) if schedule else FreeRules(ending="held")
+    return seqopt.pose(engine, moves, ONES, goals, limits, **words)
+
+
+def held(plan):
+    return sum(len(step.held) for step in plan.steps)
+
+
+@pytest.mark.parametrize("schedule", [None, seqopt.three_robot_loop])
+def test_a_registered_amount_is_an_aim_and_a_budget(schedule):
+    seqopt.register(Amount("busy", busy, twin=lambda states: busy(states) * 1.0))
+    plan = seqopt.solve(posed("busy,minmax", schedule=schedule))
+    assert plan.objective["busy"] == held(plan)
+    assert str(plan.status) == "optimal"
+    assert plan.certificate.bounds[0] == held(plan)
+    most = seqopt.solve(posed("minmax", schedule=schedule, budgets=f"busy={held(plan)}"))
+    assert held(most) == held(plan)
+    assert most.objective["minmax"] == pytest.approx(plan.objective["minmax"])
+    with pytest.raises(InfeasibleError, match="busy is at least"):
+        seqopt.solve(posed("minmax", schedule=schedule, budgets=f"busy={held(plan) - 1}"))
+
+
+def test_without_a_twin_a_plan_is_claimed():
+    own = Amount("busy", busy)
+    plan = seqopt.solve(posed((own,)))
+    assert str(plan.status) == "claimed optimal"
+    assert plan.certificate.bounds == (-np.inf,)
+    proven = seqopt.solve(posed((replace(own, twin=busy),)))
+    assert (str(proven.status), proven.objective) == ("optimal", plan.objective)
+
+
+def test_the_largest_of_moves_counts_where_it_is_a_peak():
+    """The farthest that robots go in a step, of which the sum is their travel."""
+    own = Amount("far", moves=lambda moves: moves.distances, is_peak=True, needs_stays=True)
+    own = replace(own, twin=lambda moves: np.array([*moves.distances]))
+    plan = seqopt.solve(posed((own, BUILT_IN["travel"]), schedule=seqopt.three_robot_loop))
+    assert str(plan.status) == "optimal"
+    assert 0 < plan.objective["far"] < plan.objective["travel"]
+
+
+@pytest.mark.parametrize("schedule", [None, seqopt.three_robot_loop])
+def test_a_registered_filter_is_a_limit(schedule):
+    node = 5
+    seqopt.register(
+        Filter(
+            "away",
+            lambda states: (states.nodes != node).all(axis=1),
+            twin=lambda states: (states.nodes == node).any(axis=1),
+        )
+    )
+    free = seqopt.solve(posed("F_largest", schedule=schedule))
+    kept = seqopt.solve(posed("F_largest", "away", schedule=schedule))
+    assert any(node in step.held for step in free.steps)
+    assert not any(node in step.held for step in kept.steps)
+    assert kept.objective["F_largest"] >= free.objective["F_largest"]
+    assert str(kept.status) == "optimal"
+
+
+def test_a_filter_that_leaves_nothing_is_named():
+    none = Filter(
+        "none",
+        lambda states: np.full(len(states.nodes), states.bricks < 3),
+        twin=lambda states: np.full(len(states.nodes), states.bricks > 2),
+    )
+    with pytest.raises(InfeasibleError, match=r"becomes possible with the filter none left out"):
+        seqopt.solve(posed("minmax", [none]))
+
+
+def test_an_expensive_filter_is_asked_of_what_passes_all_others():
+    asked = []
+
+    def passes(states):
+        asked.append(states.responses["F_largest"].max(initial=0.0))
+        return np.ones(len(states.nodes), dtype=bool)
+
+    dear = Filter("dear", passes, ("F_largest",), expensive=True)
+    limit = seqopt.Limit("F_largest", 60.0)
+    seqopt.solve(posed("minmax", [dear, limit]), proof=False)
+    assert 0 < max(asked) <= 60.0
+    asked.clear()
+    seqopt.solve(posed("minmax", [replace(dear, expensive=False), limit]), proof=False)
+    assert max(asked) > 60.0
+
+
+def test_a_package_adds_both_by_entry_points(tmp_path, monkeypatch):
+    (tmp_path / "page_parts.py").write_text(PACKAGE, encoding="utf-8")
+    about = tmp_path / "parts-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: parts\nVersion: 1\n")
+    entries = "busy = page_parts:BUSY\naway = page_parts:AWAY\n"
+    (about / "entry_points.txt").write_text(f"[seqopt.parts]\n{entries}")
+    with pytest.raises(ProblemError, match="aim 'busy' does not exist"):
+        find_amount("busy")
+    monkeypatch.syspath_prepend(tmp_path)
+    plan = seqopt.solve(posed("busy", "away"))
+    assert plan.objective["busy"] == held(plan)
+    assert not any(3 in step.held for step in plan.steps)
+
+
+@pytest.mark.parametrize("name", ["minmax", "sum(T_max)", "payload", "linear_range", "stands"])
+def test_names_that_mean_something_are_refused(name):
+    for part in (Amount(name, busy), Filter(name, busy)):
+        with pytest.raises(ProblemError, match="has a meaning already; give another one"):
+            seqopt.register(part)
+
+
+def test_what_is_neither_is_refused():
+    with pytest.raises(ProblemError, match="give an Amount or a Filter"):
+        seqopt.register("busy")
+    with pytest.raises(ProblemError, match=r"did you mean regrips\?"):
+        find_amount("regrip")
+    assert find_amount("steps") is BUILT_IN["steps"]
