@@ -115,6 +115,7 @@ def test_compare_in_python_is_the_command(capsys, arch):
     same = seqopt.compare(arch, stability=False, criterion="worst-ratio")
     assert [row["name"] for row in found["rows"]] == [*same.table.index]
     assert [row["F_rob"] for row in found["rows"]] == [*same.table["F_rob"]]
+    assert (found["scene"]["bricks"], found["criterion"]) == (6, "worst-ratio")
 
 
 def test_pareto_in_python_is_the_command(capsys, arch, tmp_path):

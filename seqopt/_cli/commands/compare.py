@@ -101,7 +101,7 @@ def answered(asked: Compare, found: Found) -> Answer:
     engine, criterion, prover, result = found
     scene = engine.network.scene
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
-    about = {"scene": scene.name, "criteria": criteria, **provenance(engine)}
+    about = {"criteria": criteria, **provenance(engine)}
     blocks = comparison_blocks(result, scene, criterion, columns())
     headings = [block.partition("\n")[0] for block in blocks]
     if result.speed is not None:
@@ -110,7 +110,7 @@ def answered(asked: Compare, found: Found) -> Answer:
     if asked.path is not None:
         asked.tell("drawing figures")
         files = _files(result) | {PAGE: comparison_page(engine, result)}
-        files["summary.json"] = json.dumps(about, indent=2) + "\n"
+        files["summary.json"] = json.dumps({"scene": scene.name, **about}, indent=2) + "\n"
         written = outputs.write_outputs(asked, lambda: files)
         blocks.append(_where(asked.path, speed=result.speed is not None))
     else:
