@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 from dataclasses import replace
 from itertools import pairwise
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
@@ -15,9 +16,9 @@ from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import End, find_formulation
-from seqopt.graph.layers.compiled import compile_costs
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.paths import lexicographic
 from seqopt.graph.solution import StatePath
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.network.build import build_network
@@ -159,47 +160,53 @@ def test_what_some_pairs_prove(problem, data, aim):
     first = np.zeros((1, sums.sizes[0]))
     costs = LayeredCosts(single, (first, *(shared + lift for shared in sums.shared[1:])))
     best = costs.least(aim)
-    seen = [np.ones(first.shape, dtype=bool)]
-    for shared in costs.shared[1:]:
-        drawn = data.draw(st.lists(st.booleans(), min_size=shared.size, max_size=shared.size))
-        seen.append(np.array(drawn, dtype=bool).reshape(shared.shape))
-    floors = tuple(np.where(at, own, 0.0) for at, own in zip(seen, costs.shared, strict=True))
-    part = KnownCosts(replace(costs, shared=floors), tuple(seen), aim)
+    none = tuple(np.zeros(0, dtype=np.int64) for _ in single[1:])
+    nothing = KnownCosts(
+        single, none, tuple(np.zeros((0, len(own))) for own in single[1:]), 0.0, aim
+    )
+    rows = [
+        (k, before, row)
+        for k, shared in enumerate(costs.shared)
+        for before, row in enumerate(shared)
+        if k
+    ]
+    some = []
+    for k, before, row in rows:
+        if data.draw(st.booleans()):
+            drawn = data.draw(st.lists(st.booleans(), min_size=len(row), max_size=len(row)))
+            some.append((k, before, np.where(drawn, row, np.nan)))
+    part, everything = nothing.learned(some), nothing.learned(rows)
     close = {"rel": 1e-9, "abs": 1e-9}
     assert part.bound <= best + 1e-9 * abs(best) or np.isinf(best)
     assert part.best >= best - 1e-9 * abs(best) or np.isinf(part.best)
-    for through, known in zip(part.through, seen, strict=True):
-        assert np.isinf(through[known]).all()
-        assert (through >= part.bound * (1 - 1e-9)).all()
-    rows = [
-        (k, before, np.arange(len(row)), row)
-        for k, shared in enumerate(costs.shared)
-        for before, row in enumerate(shared)
-    ]
-    everything = part.learned(rows)
+    for move in range(1, len(single)):
+        assert (part.through(move) >= part.bound * (1 - 1e-9)).all()
+        assert np.isinf(part.through(move)[part.before[move - 1]]).all()
     assert everything.bound == pytest.approx(best, **close)
     assert everything.best == pytest.approx(best, **close)
     assert everything.proven == np.isfinite(best)
-    if np.isfinite(best):
-        plan = answer(Costs(costs), "overlap_dp" if aim is Aim.SUM else "minimax")
-        assert plan.certificate.objective == pytest.approx(best, **close)
+    if np.isinf(best):
+        return
+    for known, unknown, least in ((part, True, part.bound), (everything, False, best)):
+        instance, _ = known.compiled(unknown=unknown)
+        assert lexicographic(instance.graph) == (ANY, (pytest.approx(least, **close),))
+    plan = answer(Costs(costs), "overlap_dp" if aim is Aim.SUM else "minimax")
+    assert plan.certificate.objective == pytest.approx(best, **close)
 
 
 @pytest.mark.parametrize(("aim", "best", "bound"), [(Aim.SUM, 6.0, 4.0), (Aim.PEAK, 3.0, 2.0)])
 def test_the_judge_holds_a_plan_against_the_graph_with_floors(aim, best, bound):
     """The first move costs 2, the second 1 or 1.5, a pair that is known 3, others at least 1."""
     single = np.full(2, 2.0), np.array([1.0, 1.5])
-    shared = np.zeros((1, 2)), np.array([[3.0, 1.0], [1.0, 1.0]])
-    seen = np.ones((1, 2), dtype=bool), np.array([[True, False], [False, False]])
-    part = KnownCosts(LayeredCosts(single, shared), seen, aim)
+    part = KnownCosts(single, (np.array([0]),), (np.array([[3.0, np.nan]]),), 1.0, aim)
     assert (part.best, part.bound) == (best, bound)
-    compiled = compile_costs("floors", part.floors, aim)
-    nodes = tuple((node,) for node in compiled.nodes((0, 0)))
-    good = StatePath(nodes, (best,), (bound,), stopped="time")
+    instance, nodes = part.compiled(unknown=True)
+    path = tuple((node,) for node in np.searchsorted(nodes, [1, 3]).tolist())
+    good = StatePath(path, (best,), (bound,), stopped="time")
     exact = find_formulation("overlap_dp" if aim is Aim.SUM else "minimax")
-    proof = judged(compiled.instance, exact, good)
+    proof = judged(instance, exact, good)
     assert (proof.bound, proof.gap) == (bound, (best - bound) / best)
-    judged(compiled.instance, exact, replace(good, bound=(bound + 0.9 * TOLERANCE * best,)))
+    judged(instance, exact, replace(good, bound=(bound + 0.9 * TOLERANCE * best,)))
     for wrong in (
         *(replace(good, bound=(bound + more,)) for more in (1.1 * TOLERANCE * best, 0.1, np.inf)),
         replace(good, objective=(best - 1,)),
@@ -207,7 +214,7 @@ def test_the_judge_holds_a_plan_against_the_graph_with_floors(aim, best, bound):
         replace(good, stopped=""),
     ):
         with pytest.raises(SolverError):
-            judged(compiled.instance, exact, wrong)
+            judged(instance, exact, wrong)
 
 
 def test_a_criterion_that_lies_about_its_least_cost_is_refused(engine25):

@@ -76,15 +76,15 @@ def windows(
     return replace(schedule, steps=tuple(steps), moves=tuple(moves))
 
 
-def possible_after(schedule: Schedule, move: int) -> Bools:
-    """Return which pairs (C_{k-1}, C_k) of a move and the one before are two nodes.
+def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
+    """Return which candidates (C_k,) of a move are other nodes than the one before it.
 
     Responses do not tell where all candidates are impossible: then nothing is known of any.
     """
-    before, now = (np.array(schedule.moves[k].candidates) for k in (move - 1, move))
+    candidates = np.array(schedule.moves[move].candidates)
     if (move - 1, move) not in schedule.steps_of:
-        return np.ones((len(before), len(now)), dtype=bool)
-    return np.asarray(before[:, None] != now)
+        return np.ones(len(candidates), dtype=bool)
+    return np.asarray(candidates != schedule.moves[move - 1].candidates[before])
 
 
 def _window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:

@@ -23,17 +23,19 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from seqopt._interrupts import answered
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Watch
-from seqopt.graph.instance import Instance
-from seqopt.graph.layers.compiled import compile_costs
-from seqopt.graph.layers.costs import Joined, LayeredCosts
+from seqopt.graph.graph import Graph
+from seqopt.graph.instance import PEAK, SUM, Instance, _Target
+from seqopt.graph.layers.compiled import on_paths
+from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.layers import Layers, possible_after, windows
 from seqopt.graph.solution import StatePath
 from seqopt.plan._paths import find_path
@@ -56,31 +58,60 @@ EQUAL = 1e-9  # of a value: two that differ by less are one, found in another or
 
 @dataclass(frozen=True, eq=False, repr=False)
 class KnownCosts(FrozenValue):
-    """Costs of pairs of which some are known.
+    """Costs of single choices, and of those pairs that were looked at.
 
-    ``floors``: those of all pairs, at their floor where they are not known; ``known`` (tuple of
-    (C_{k-1}, C_k) bool): which pairs are; ``aim``: whether costs add up or the largest counts.
+    ``single`` (tuple of (C_k,) float): of candidates alone; infinite where not allowed; ``before``
+    (tuple of (R_k,) int): the candidates of the move before whose pairs were looked at, ``rows``
+    (tuple of (R_k, C_k) float): what these cost; infinite where not allowed, NaN where they were
+    passed over; ``floor``: what any other pair costs at least; ``aim``: whether costs add up or the
+    largest counts.
     """
 
-    floors: LayeredCosts
-    known: tuple[Bools, ...]
+    single: tuple[Floats, ...]
+    before: tuple[Ints, ...]
+    rows: tuple[Floats, ...]
+    floor: float
     aim: Aim
 
     @cached_property
-    def met(self) -> LayeredCosts:
-        """The same with no choices but those of which all pairs are known."""
-        pairs = zip(self.known, self.floors.shared, strict=True)
-        return replace(self.floors, shared=tuple(np.where(at, own, np.inf) for at, own in pairs))
+    def reached(self) -> tuple[Floats, ...]:
+        """Lower bounds of the build up to every candidate, (C_k,) each."""
+        return self._forward(self.floor)
 
     @cached_property
+    def arrived(self) -> tuple[Floats, ...]:
+        """The least cost up to every candidate by pairs that are known, (C_k,) each."""
+        return self._forward(np.inf)
+
+    def _forward(self, unknown: float) -> tuple[Floats, ...]:
+        out, join = [self.single[0]], self.aim.join
+        for own, before, rows in zip(self.single[1:], self.before, self.rows, strict=True):
+            known = join(out[-1][before, None], np.where(np.isnan(rows), unknown, rows))
+            other = join(np.delete(out[-1], before).min(initial=np.inf), unknown)
+            out.append(join(own, np.minimum(known.min(axis=0, initial=np.inf), other)))
+        return tuple(out)
+
+    @cached_property
+    def to_go(self) -> tuple[Floats, ...]:
+        """Lower bounds from every candidate to the end, its own cost included, (C_k,) each."""
+        out, join = [self.single[-1]], self.aim.join
+        for own, before, rows in zip(
+            self.single[-2::-1], self.before[::-1], self.rows[::-1], strict=True
+        ):
+            ahead = np.full(len(own), join(self.floor, out[0].min()))
+            ahead[before] = join(np.where(np.isnan(rows), self.floor, rows), out[0]).min(axis=1)
+            out.insert(0, join(own, ahead))
+        return tuple(out)
+
+    @property
     def bound(self) -> float:
         """Lower bound of any choice."""
-        return self.floors.least(self.aim)
+        return float(self.to_go[0].min())
 
-    @cached_property
+    @property
     def best(self) -> float:
         """The least that a choice costs of which all pairs are known; infinite if there is none."""
-        return self.met.least(self.aim)
+        return float(self.arrived[-1].min())
 
     @property
     def proven(self) -> bool:
@@ -88,25 +119,68 @@ class KnownCosts(FrozenValue):
         size = max(abs(self.best), abs(self.bound))
         return math.isfinite(self.best) and self.best - self.bound <= EQUAL * size
 
-    @cached_property
-    def through(self) -> tuple[Floats, ...]:
-        """Lower bounds of choices by every pair (C_{k-1}, C_k); infinite where it is known."""
-        join, after = self.aim.join, self.floors.to_go(self.aim)
-        before = (np.zeros(1), *self.floors.reached(self.aim))
-        parts = zip(before[:-1], self.floors.shared, after, self.known, strict=True)
-        return tuple(
-            np.where(at, np.inf, join(join(a[:, None], own), b)) for a, own, b, at in parts
-        )
+    def through(self, move: int, before: int | slice = slice(None)) -> Floats:
+        """Return lower bounds of choices by pairs of a move that were not looked at.
 
-    def learned(self, rows: Sequence[tuple[int, int, Ints, Floats]]) -> KnownCosts:
-        """Return what is known with rows: a move, a candidate before, candidates, their costs."""
-        shared = [own.copy() for own in self.floors.shared]
-        known = [own.copy() for own in self.known]
-        for move, before, some, costs in rows:
-            possible = ~known[move][before, some]  # others are known to be no pairs
-            shared[move][before, some[possible]] = costs[possible]
-            known[move][before, some] = True
-        return replace(self, floors=replace(self.floors, shared=tuple(shared)), known=tuple(known))
+        ``before``: a candidate of the move before: by each of the move, (C_k,); or all: by any of
+        the move, (C_{k-1},), infinite where they were looked at.
+        """
+        join, after = self.aim.join, self.to_go[move]
+        if not isinstance(before, slice):
+            return np.asarray(join(self.reached[move - 1][before], join(self.floor, after)))
+        out = join(self.reached[move - 1], join(self.floor, after.min()))
+        out[self.before[move - 1]] = np.inf
+        return np.asarray(out)
+
+    def learned(self, found: Sequence[tuple[int, int, Floats]]) -> KnownCosts:
+        """Return what is known with rows (C_k,) of a move and a candidate of the one before."""
+        before, rows = [*self.before], [*self.rows]
+        for move in {move for move, *_ in found}:
+            own = [(at, row) for k, at, row in found if k == move]
+            before[move - 1] = np.append(before[move - 1], [at for at, _ in own])
+            rows[move - 1] = np.vstack([rows[move - 1], *(row for _, row in own)])
+        return replace(self, before=tuple(before), rows=tuple(rows))
+
+    def compiled(self, *, unknown: bool) -> tuple[Instance, Ints]:
+        """Return the graph of pairs that are known, or of all, and which nodes it has of all.
+
+        Nodes are the start, the candidates of every move, and by move the one that leads on from
+        all candidates of which no pair was looked at, at the floor.
+        """
+        sizes = [len(own) for own in self.single]
+        levels = np.repeat(np.arange(len(sizes) + 1), [1, *sizes])
+        ends = np.append(levels == len(sizes), np.zeros(len(sizes) - 1, dtype=bool))
+        levels = np.append(levels, np.arange(2, len(sizes) + 1))
+        source, target, costs = self._arcs(unknown=unknown)
+        able, peak = np.isfinite(costs), self.aim is Aim.PEAK
+        ends_of = source[able].astype(np.int32), target[able].astype(np.int32)
+        graph, kept = on_paths(Graph(*ends_of, costs[able, None], (peak,), ends))
+        arrays = graph.source, graph.target, graph.ends, ("cost",), graph.amounts
+        goal = _Target("cost", PEAK if peak else SUM, (0,))
+        return Instance("pairs", *arrays, (goal,), states=levels[kept, None]), kept
+
+    def _arcs(self, *, unknown: bool) -> tuple[Ints, Ints, Floats]:
+        sizes = [len(own) for own in self.single]
+        firsts = np.cumsum([1, *sizes])
+        every = [first + np.arange(size) for first, size in zip(firsts, sizes, strict=False)]
+        arcs = [(np.zeros(sizes[0], dtype=np.int64), every[0], self.single[0])]
+        for k, (before, rows) in enumerate(zip(self.before, self.rows, strict=True), start=1):
+            found = np.where(np.isnan(rows), self.floor if unknown else np.inf, rows)
+            arcs.append(
+                (
+                    np.repeat(every[k - 1][before], sizes[k]),
+                    np.tile(every[k], len(before)),
+                    self.aim.join(found, self.single[k]).ravel(),
+                )
+            )
+            others, through = np.delete(every[k - 1], before), firsts[-1] + k - 1
+            if unknown and len(others):
+                arcs.append(
+                    (others, np.full(len(others), through), np.full(len(others), self.floor))
+                )
+                arcs.append((np.full(sizes[k], through), every[k], self.single[k]))
+        source, target, costs = (np.concatenate(each) for each in zip(*arcs, strict=True))
+        return source, target, costs
 
 
 class PairSearch(NamedTuple):
@@ -138,21 +212,24 @@ def search_pairs(problem: Layers, formulation: Formulation, watch: Watch) -> Pai
         if watch.over:
             raise TimeUpError("no choice was found yet; give more")
         raise InfeasibleError("no choice is allowed; relax a limit or widen a reach")
-    met, floors = (compile_costs("pairs", own, costs.aim) for own in (costs.met, costs.floors))
-    found = find_path(met.instance, formulation, Run(proof=False)).selection
-    choice = met.choice([node for (node,) in found.states])
+    met, nodes = costs.compiled(unknown=False)
+    found = find_path(met, formulation, Run(proof=False)).selection
+    passed = nodes[[node for (node,) in found.states]]
+    firsts = np.cumsum([1, *map(len, costs.single[:-1])])
+    choice = tuple((passed - firsts).tolist())
+    floors, nodes = costs.compiled(unknown=True)
     along = search.along(choice)
     value = _value(along, costs.aim, problem.given_costs)
     watch.tell(value, costs.bound)
     claimed = replace(
         found,
-        states=tuple((node,) for node in floors.nodes(choice)),
+        states=tuple((node,) for node in np.searchsorted(nodes, passed).tolist()),
         objective=(value,),
         bound=(min(value, costs.bound),),
         stopped="" if costs.proven else "interrupt" if watch.interrupted else "time",
         trace=watch.trace,
     )
-    return PairSearch(floors.instance, claimed, along, search.models)
+    return PairSearch(floors, claimed, along, search.models)
 
 
 def _value(along: WindowSearch, aim: Aim, given: Floats) -> float:
@@ -191,18 +268,16 @@ class _Search:
         single = [*aim.costs(self._alone).single]
         for cost in problem.given_costs.tolist():
             single[0] = aim.join(single[0], cost)
-        shared, known = [np.zeros((1, len(single[0])))], [np.ones((1, len(single[0])), dtype=bool)]
-        for k in range(1, len(single)):
-            possible, meets = (
-                possible_after(self._schedule, k),
-                (k - 1, k) in self._schedule.steps_of,
-            )
-            shared.append(np.where(possible, floor if meets else 0.0, np.inf))
-            known.append(~possible if meets else np.ones(possible.shape, dtype=bool))
-        costs = KnownCosts(LayeredCosts(tuple(single), tuple(shared)), tuple(known), aim)
-        pairs = zip(first.choice, first.shared[1:], strict=False)
-        rows = [(k, i, aim.costs(part).single[0]) for k, (i, part) in enumerate(pairs, start=1)]
-        self.costs = costs.learned([(k, i, np.arange(len(own)), own) for k, i, own in rows])
+        before, rows = list[Ints](), list[Floats]()
+        for k, (last, own) in enumerate(pairwise(single), start=1):
+            free = (k - 1, k) not in self._schedule.steps_of  # no step is shared: nothing to pay
+            before.append(np.arange(len(last) * free))
+            rows.append(np.broadcast_to(0.0, (len(last) * free, len(own))))
+        costs = KnownCosts(tuple(single), tuple(before), tuple(rows), floor, aim)
+        pairs = enumerate(zip(first.choice, first.shared[1:], strict=False), start=1)
+        met = [(k, at, aim.costs(part).single[0]) for k, (at, part) in pairs]
+        shared = [row for row in met if (row[0] - 1, row[0]) in self._schedule.steps_of]
+        self.costs = costs.learned([self._allowed(*row) for row in shared])
 
     def look_until_proven(self, watch: Watch) -> None:
         """Look at more and more pairs until none could be better, or time is over."""
@@ -210,35 +285,28 @@ class _Search:
         for count in itertools.count():
             if self.costs.proven or watch.over:
                 return
-            most = math.ceil(FIRST * MORE**count)
-            ends = self._aim is Aim.PEAK and count >= BROAD
-            asked = self._where_it_ends(AT_END * most) if ends else self._everywhere(most)
+            asked = self._promising(count)
             if not asked:
                 return
             self._look(asked, watch)
             watch.tell(self.costs.best, self.costs.bound)
 
-    def _everywhere(self, most: int) -> list[tuple[int, int]]:
-        """Return the rows of every move with the lowest bounds."""
-        out, reached = [], self.costs.floors.reached(self._aim)
-        for k in range(1, len(self._schedule.moves)):
-            promise = self.costs.through[k].min(axis=1)
-            order = np.lexsort((reached[k - 1], promise))[:most]
-            out += [(k, int(i)) for i in order if promise[i] < self.costs.best]
-        return out
+    def _promising(self, count: int) -> list[tuple[int, int]]:
+        """Return the rows of every move with the lowest bounds, more in every round.
 
-    def _where_it_ends(self, most: int) -> list[tuple[int, int]]:
-        """Return rows of the candidates that known pairs lead to below the best, the last first.
-
-        If all such rows are known, no choice has a lower peak than the best.
+        Of the least peak later only those that known pairs lead to below the best, the last first:
+        if all such rows are known, no choice has a lower peak.
         """
-        out: list[tuple[int, int]] = []
-        arrived = self.costs.met.reached(self._aim)
+        costs, most = self.costs, math.ceil(FIRST * MORE**count)
+        ends, out = self._aim is Aim.PEAK and count >= BROAD, list[tuple[int, int]]()
         for k in range(len(self._schedule.moves) - 1, 0, -1):
-            promise = self.costs.through[k].min(axis=1)
-            below = (arrived[k - 1] < self.costs.best) & (promise < self.costs.best)
-            order = np.argsort(promise, kind="stable")
-            out += [(k, int(i)) for i in order if below[i]][: most - len(out)]
+            promise = costs.through(k)
+            able = promise < costs.best
+            if ends:
+                able &= costs.arrived[k - 1] < costs.best
+            order = np.lexsort((costs.reached[k - 1] * (not ends), promise))
+            rows = [(k, int(i)) for i in order if able[i]]
+            out += rows[: AT_END * most - len(out) if ends else most]
         return out
 
     def _look(self, asked: Sequence[tuple[int, int]], watch: Watch) -> None:
@@ -256,15 +324,24 @@ class _Search:
                     self.models += len(schedule.moves[choices.moves[0]].candidates)
                 if watch.over:
                     break
-        rows = enumerate(zip(asked, wanted, strict=True))
-        done = [(*row, some, joined.single(n)) for n, (row, some) in rows if not left[n]]
+        done = []
+        for n, ((k, before), some) in enumerate(zip(asked, wanted, strict=True)):
+            row = np.full(len(self._schedule.moves[k].candidates), np.nan)
+            row[some] = joined.single(n)
+            done += [self._allowed(k, before, row)] if not left[n] else []
         self.costs = self.costs.learned(done)
+
+    def _allowed(self, move: int, before: int, row: Floats) -> tuple[int, int, Floats]:
+        """Return a row of pairs, infinite where both would be one node, and where it belongs."""
+        possible = possible_after(self._schedule, move, before)
+        return move, before, np.where(possible, row, np.inf)
 
     def _wanted(self, move: int, before: int) -> Ints:
         """Return the candidates of a move that are looked at after one of the move before."""
         if not self._each:  # what one costs depends on the others
             return np.arange(len(self._schedule.moves[move].candidates))
-        return np.flatnonzero(self.costs.through[move][before] < self.costs.best)
+        possible = possible_after(self._schedule, move, before)
+        return np.flatnonzero(possible & (self.costs.through(move, before) < self.costs.best))
 
     def along(self, choice: tuple[int, ...]) -> WindowSearch:
         """Return the steps that a choice meets, as a search move by move would have."""

@@ -118,7 +118,7 @@ class _Walk:
         move = self._schedule.moves[k]
         costs = self._own.single(k) + self.shared[k].sums.single[0]
         if k:
-            costs = np.where(possible_after(self._schedule, k)[self.choice[-1]], costs, np.inf)
+            costs = np.where(possible_after(self._schedule, k, self.choice[-1]), costs, np.inf)
         if not np.isfinite(costs).any():
             raise NothingFoundError(
                 f"move {k + 1}, step {move.step}: {move.robot} has no allowed grip after the "
