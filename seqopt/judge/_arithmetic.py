@@ -9,8 +9,8 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError
-from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
-from seqopt.judge._claims import ABOVE, Claim, first_stage, next_stage, proven, within_caps
+from seqopt.graph.instance import PEAK, TAIL, TIME, Instance, _Target, _target_sums
+from seqopt.judge._claims import ABOVE, Claim, first_stage, next_stage, proven
 from seqopt.judge._twin import path_twin
 from seqopt.judge.certificate import TOLERANCE, Certificate
 
@@ -143,8 +143,6 @@ def _bounds(
     for k, (goal, value) in enumerate(zip(instance.goals, values, strict=True)):
         claim = claims[k] if k < len(claims) else Claim()
         bound = proven(instance, stage, goal, claim, value)
-        if _lays_down(instance, claim) and bound < value - BELOW * abs(value):
-            bound = max(bound, within_caps(instance, value, claim.prices))
         proofs = claim.potentials, claim.cut, claim.weights, claim.shares, claim.labels
         bare = not claim.prices and all(proof is None for proof in proofs)
         _require_modest(goal, claim, (value, bound), bare=bare)
@@ -155,14 +153,6 @@ def _bounds(
         said.append(min(value, max(bound, claimed)))
         stage = next_stage(stage, goal, value)
     return tuple(out), tuple(said)
-
-
-def _lays_down(instance: Instance, claim: Claim) -> bool:
-    """Return whether partial paths may say more than prices do."""
-    one = len(instance.goals) == 1 and instance.goals[0].kind == SUM
-    columns = all(cap.column is not None for cap in instance.caps)
-    known = claim.potentials is None and bool(instance.caps)
-    return one and columns and known and instance.is_layered
 
 
 def _require_modest(goal: _Target, claim: Claim, found: tuple[float, float], *, bare: bool) -> None:

@@ -41,18 +41,23 @@ NEIGHBORS = (1, 2, 3, 5, 8, 13, 21, 34)  # with which a partial path is compared
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
-    """What is judged: what moves cost (m,) and take of caps (m, B), over the size of each.
+class _Case:
+    """What is judged: what moves cost (m,) and take of caps (m, B), over the ``sizes`` of these.
 
-    ``value``: of a path within the caps; no higher bound is looked for; ``scale``: its size.
+    ``value``: of a path within the caps; no higher bound is looked for.
     """
 
     graph: Graph
     costs: Floats
     takes: Floats
     caps: Floats
+    sizes: Floats
     value: float
-    scale: float
+
+    @property
+    def slack(self) -> float:
+        """By how much costs may be off."""
+        return SLACK * max(abs(self.value), TINY)
 
 
 class _Parts(NamedTuple):
@@ -69,45 +74,47 @@ class _Parts(NamedTuple):
         return _Parts._make(each[rows] for each in self)
 
 
-def case_of(
-    graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]], value: float
-) -> tuple[Case, Floats]:
-    """Return what is judged, and by what the amounts of columns are divided.
-
-    ``limited``: columns of the graph and what may be taken of them.
-    """
+def _case(graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]], value: float) -> _Case:
     taken = graph.amounts[:, [column for column, _ in limited]]
     most = np.array([cap for _, cap in limited])
     sizes = np.maximum(np.maximum(np.abs(most), np.abs(taken).max(axis=0, initial=0.0)), TINY)
-    scale = max(abs(value), TINY)
-    return Case(graph, costs, taken / sizes, most / sizes + SLACK, value, scale), sizes
+    return _Case(graph, costs, taken / sizes, most / sizes + SLACK, sizes, value)
 
 
-def least_within(case: Case, prices: Floats, *, laid_down: bool) -> tuple[float, Floats]:
-    """Return a bound on what any path within the caps costs, at most the value; its multipliers.
+def least_within(
+    graph: Graph,
+    costs: Floats,
+    limited: Sequence[tuple[int, float]],
+    value: float,
+    *,
+    prices: Sequence[float] = (),
+    laid_down: bool = False,
+) -> tuple[float, Floats]:
+    """Return a bound on what any path within caps costs, at most a value; its multipliers (B,).
 
-    ``prices`` (B,): tried first, as the case has them; ``laid_down``: whether what multipliers
-    leave open is closed by partial paths; the graph has a level for every move.
+    ``limited``: columns and what may be taken of them; ``value``: of a path within the caps;
+    ``prices``: multipliers that are tried first, by default none; ``laid_down``: whether what
+    multipliers leave open is closed by partial paths; the graph has a level for every move.
     """
-    best, bound, _ = _best_multipliers(case, prices)
-    if laid_down and case.value - bound > SLACK * case.scale:
+    case = _case(graph, costs, limited, value)
+    begin = np.array(prices) if len(prices) else np.zeros(len(limited))
+    best, bound, _ = _best_multipliers(case, begin * case.sizes)
+    if laid_down and value - bound > case.slack:
         bound = max(bound, _laid_down(case, best)[0])
-    return (case.value if case.value - bound <= SLACK * case.scale else bound), best
+    return (value if value - bound <= case.slack else bound), best / case.sizes
 
 
 def is_kept(graph: Graph, limited: Sequence[tuple[int, float]], *, laid_down: bool) -> bool:
     """Return whether a path is found that keeps all caps; ``laid_down``: as of `least_within`."""
-    case, sizes = case_of(graph, np.zeros(len(graph.source)), limited, 1.0)
-    met = _best_multipliers(case, np.zeros_like(sizes)).met
-    return met or (laid_down and _laid_down(case, np.zeros_like(sizes))[1])
+    case, none = _case(graph, np.zeros(len(graph.source)), limited, 1.0), np.zeros(len(limited))
+    return _best_multipliers(case, none).met or (laid_down and _laid_down(case, none)[1])
 
 
 def is_beyond(graph: Graph, limited: Sequence[tuple[int, float]]) -> bool:
     """Return whether potentials or multipliers prove that no path keeps all caps."""
     if any(least_sum(graph, graph.amounts[:, column]) > tied(most) for column, most in limited):
         return True
-    case, sizes = case_of(graph, np.zeros(len(graph.source)), limited, 1.0)
-    return least_within(case, np.ones_like(sizes), laid_down=False)[0] >= 1.0
+    return least_within(graph, np.zeros(len(graph.source)), limited, 1.0)[0] >= 1.0
 
 
 class _Ascent(NamedTuple):
@@ -118,28 +125,28 @@ class _Ascent(NamedTuple):
     met: bool
 
 
-def _best_multipliers(case: Case, prices: Floats) -> _Ascent:
+def _best_multipliers(case: _Case, prices: Floats) -> _Ascent:
     best, paths, ask = _Ascent(prices, -np.inf, met=False), list[tuple[float, Floats]](), prices
     for _ in range(MIXTURES):
         bound, cost, over = _least(case, ask)
         best = best._replace(met=best.met or bool((over <= 0).all()))
         if bound > best.bound:
             best = best._replace(multipliers=ask, bound=bound)
-        if case.value - best.bound <= SLACK * case.scale:
+        if case.value - best.bound <= case.slack:
             break
         paths.append((cost, over))
         ask, mixed = _mixed(case, paths)
         if mixed - best.bound <= SLACK * abs(mixed):
             break
-    return best._replace(bound=best.bound - SLACK**1.5 * case.scale)
+    return best._replace(bound=best.bound - SLACK**0.5 * case.slack)
 
 
-def _mixed(case: Case, paths: Sequence[tuple[float, Floats]]) -> tuple[Floats, float]:
+def _mixed(case: _Case, paths: Sequence[tuple[float, Floats]]) -> tuple[Floats, float]:
     """Return the multipliers of the cheapest mixture of paths, and what that costs."""
     from scipy.optimize import linprog  # noqa: PLC0415  # slow to import, for budgets only
 
     costs, over = np.array([cost for cost, _ in paths]), np.array([own for _, own in paths])
-    most = np.full(over.shape[1], DEAREST * case.scale)
+    most = np.full(over.shape[1], DEAREST * case.slack / SLACK)
     found = linprog(
         np.concatenate([costs, most]),
         A_ub=np.hstack([over.T, -np.eye(len(most))]),
@@ -153,7 +160,7 @@ def _mixed(case: Case, paths: Sequence[tuple[float, Floats]]) -> tuple[Floats, f
     return np.clip(-found.ineqlin.marginals, 0.0, most), float(found.fun)
 
 
-def _least(case: Case, prices: Floats) -> tuple[float, float, Floats]:
+def _least(case: _Case, prices: Floats) -> tuple[float, float, Floats]:
     """Return the least priced cost of any path, what that path costs, and its excess of caps."""
     graph, costs = case.graph, case.costs + case.takes @ prices
     matrix: Any = graph.matrix(costs)
@@ -171,7 +178,7 @@ def _least(case: Case, prices: Floats) -> tuple[float, float, Floats]:
     return least, float(case.costs[moves].sum()), case.takes[moves].sum(axis=0) - case.caps
 
 
-def _laid_down(case: Case, prices: Floats) -> tuple[float, bool]:
+def _laid_down(case: _Case, prices: Floats) -> tuple[float, bool]:
     """Return the least that a path within the caps costs, or bounds it, from the ends back.
 
     And whether one was found that costs less than the answer.
@@ -193,7 +200,7 @@ def _laid_down(case: Case, prices: Floats) -> tuple[float, bool]:
         bound, taken = behind + begun[to], now.taken[row] + case.takes[move]
         grown = _Parts(to, behind, now.cost[row] + case.costs[move], taken, bound)
         fits = (taken + spared[to] <= case.caps).all(axis=1)
-        now = grown.of(fits & (bound < case.value - SLACK * case.scale))
+        now = grown.of(fits & (bound < case.value - case.slack))
         now = now.of(_undominated(now.at, now.cost, now.taken))
         if len(now.at) > MOST:
             ranked = np.argsort(now.bound, kind="stable")

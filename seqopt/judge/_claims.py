@@ -21,7 +21,7 @@ from seqopt.graph.duality import ROUNDING, cut, least_sum
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Target
 from seqopt.graph.paths import TIED, tied
-from seqopt.judge._budget_proof import case_of, least_within
+from seqopt.judge._budget_proof import least_within
 from seqopt.judge._twin import path_twin
 
 Labels = tuple[Ints, Floats]  # nodes (N,), and values (N, 1 + c + q)
@@ -86,8 +86,8 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value:
         return _peak(stage, goal, claim, limited)
     if goal.kind == SUM:
         costs = stage.graph.amounts[:, goal.columns[0]]
-        if not claim.prices and claim.potentials is None:
-            return _own_sum(stage, goal, value)
+        if stage.limited and claim.potentials is None:
+            return _capped_sum(instance, stage, costs, claim, value)
     elif goal.kind == TAIL:
         costs = stage.graph.amounts[:, list(goal.columns)] @ _weights(goal, claim)
     else:
@@ -140,16 +140,21 @@ def _kept(graph: Graph, costs: Floats, potentials: Floats) -> float:
     return float(potentials[graph.ends].min(initial=np.inf))
 
 
-def _own_sum(stage: Stage, goal: _Target, value: float) -> float:
-    """Return the lower bound of a sum by multipliers that the judge finds."""
-    costs = stage.graph.amounts[:, goal.columns[0]]
-    if not stage.limited:
-        return least_sum(stage.graph, costs)
-    limited = [(c, most) for _, c, most in stage.limited]
-    case, sizes = case_of(stage.graph, costs, limited, value)
-    prices = least_within(case, np.zeros(len(sizes)), laid_down=False)[1] / sizes
+def _capped_sum(
+    instance: Instance, stage: Stage, costs: Floats, claim: Claim, value: float
+) -> float:
+    """Return the lower bound of a sum by multipliers that the judge finds, from those claimed on.
+
+    Where paths have a node on every level, partial paths close what these leave open.
+    """
+    limited, known = [(c, most) for _, c, most in stage.limited], claim.prices
+    begin, by_parts = [known.get(name, 0.0) for name, *_ in stage.limited], instance.is_layered
+    bound, prices = least_within(
+        stage.graph, costs, limited, value, prices=begin, laid_down=by_parts
+    )
     pairs = zip(prices.tolist(), limited, strict=True)
-    return _sum(stage, costs, Claim(), [(price, *cap) for price, cap in pairs])
+    checked = _sum(stage, costs, Claim(), [(price, *cap) for price, cap in pairs])
+    return max(checked, bound) if by_parts else checked
 
 
 def budget_bounds(
@@ -179,18 +184,6 @@ def budget_bounds(
             out.append(_sum(stage, stage.graph.amounts[:, k], Claim(), limited))
             stage = stage._replace(limited=(*stage.limited, ("", k, values[k])))
     return tuple(out)
-
-
-def within_caps(instance: Instance, value: float, prices: Mapping[str, float]) -> float:
-    """Return what the one sum of a layered instance is at least within its caps.
-
-    Partial paths are laid down from the end, as where grips are chosen in layers.
-    """
-    limited = [(cap.column or 0, cap.most) for cap in instance.caps]
-    costs = instance.amounts[:, instance.goals[0].columns[0]]
-    case, sizes = case_of(instance.graph, costs, limited, value)
-    begin = np.array([prices.get(cap.name, 0.0) for cap in instance.caps]) * sizes
-    return least_within(case, begin, laid_down=True)[0]
 
 
 def _peak(
@@ -223,12 +216,11 @@ def _worst_within(
     while low < high:
         middle = (low + high) // 2
         part = graph.only(graph.amounts[:, column] <= levels[middle])
-        case, sizes = case_of(part, np.zeros(len(part.source)), limited, 1.0)
-        bound, found = least_within(case, np.ones(len(limited)), laid_down=False)
+        bound, found = least_within(part, np.zeros(len(part.source)), limited, 1.0)
         if bound < 1.0:
             high = middle
         else:
-            low, prices = middle + 1, found / sizes
+            low, prices = middle + 1, found
     return float(levels[min(low, len(levels) - 1)]), prices
 
 

@@ -20,7 +20,7 @@ from seqopt.graph.instance import Instance, _Cap
 from seqopt.graph.paths import distances, tied
 from seqopt.graph.states.explored import barred
 from seqopt.graph.states.states import States
-from seqopt.judge._budget_proof import case_of, is_kept, least_within
+from seqopt.judge._budget_proof import is_kept, least_within
 from seqopt.judge._proof import Proof
 from seqopt.judge._spaces import TooManyPartsError
 from seqopt.plan._remedies import LateError, Look, Remedies
@@ -35,9 +35,8 @@ def smallest_conflict(instance: Instance) -> tuple[_Cap, ...]:
     """Return the fewest caps of an instance proven to conflict: no path keeps all; or none."""
     counts, nothing = range(1, len(instance.caps) + 1), np.zeros(instance.arcs)
     for some in chain.from_iterable(combinations(instance.caps, count) for count in counts):
-        case, sizes = case_of(instance.graph, nothing, _limited(some), 1.0)
-        bound, _ = least_within(case, np.zeros_like(sizes), laid_down=instance.is_layered)
-        if bound >= PROVEN:
+        own = instance.graph, nothing, _limited(some), 1.0
+        if least_within(*own, laid_down=instance.is_layered)[0] >= PROVEN:
             return some
     return ()
 

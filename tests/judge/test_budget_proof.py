@@ -17,7 +17,7 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.judge import _budget_proof as budget_proof
-from seqopt.judge._budget_proof import case_of, least_within
+from seqopt.judge._budget_proof import least_within
 from seqopt.judge._claims import budget_bounds
 from seqopt.plan._infeasible import smallest_conflict
 from seqopt.plan.solving import solve
@@ -33,9 +33,9 @@ def bounded(problem, value, claimed):
     instance = compiled.instance
     limited = [(cap.column, cap.most) for cap in instance.caps]
     costs = instance.amounts[:, 0]
-    case, sizes = case_of(instance.graph, costs, limited, value - compiled.offset)
-    prices = np.array([claimed.get(cap.name, 0.0) for cap in instance.caps]) * sizes
-    return least_within(case, np.maximum(prices, 0.0), laid_down=True)[0] + compiled.offset
+    prices = [max(0.0, claimed.get(cap.name, 0.0)) for cap in instance.caps]
+    own = instance.graph, costs, limited, value - compiled.offset
+    return least_within(*own, prices=prices, laid_down=True)[0] + compiled.offset
 
 
 @pytest.mark.parametrize("most", [1, 5_000])

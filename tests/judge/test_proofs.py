@@ -18,7 +18,7 @@ from seqopt.graph.paths import keep_best, least_peak
 from seqopt.graph.states.explored import explore, floors_of_goals
 from seqopt.graph.states.states import build_states
 from seqopt.judge import _budget_proof as budget_proof
-from seqopt.judge._budget_proof import case_of, least_within
+from seqopt.judge._budget_proof import least_within
 from seqopt.judge._proof import Proof
 from seqopt.judge._spaces import TooManyPartsError
 from seqopt.judge._states import StateEvaluator
@@ -141,9 +141,9 @@ def test_what_is_set_aside_counts_and_prices_are_not_negative(monkeypatch, most,
         graph, costs = compiled.instance.graph, compiled.instance.amounts[:, 0]
         limited = [(cap.column, cap.most) for cap in compiled.instance.caps]
         for price, value in product((-3.0, 0.0, 5.0), found[:3]):
-            case, sizes = case_of(graph, costs, limited, value - compiled.offset)
-            claimed = np.maximum([price, -price], 0.0) * sizes  # as the judge of paths reads them
-            bound = least_within(case, claimed, laid_down=True)[0] + compiled.offset
+            claimed = np.maximum([price, -price], 0.0)  # as the judge of paths reads them
+            own = graph, costs, limited, value - compiled.offset
+            bound = least_within(*own, prices=claimed, laid_down=True)[0] + compiled.offset
             assert bound <= found[0] + 1e-6
             proven += bound > found[0] - 0.5
     assert proven
