@@ -37,16 +37,6 @@ class Optimum:
     stopped: bool = False
 
 
-@dataclass(frozen=True)
-class Size:
-    """How large a program is, as it is handed to a solver."""
-
-    rows: int
-    columns: int
-    nonzeros: int
-    binaries: int
-
-
 def minimize(program: cp.Problem, *, feasible: bool, time_limit: float = math.inf) -> Optimum:
     """Solve a linear program by Clarabel; its variables take the values of the optimum.
 
@@ -114,18 +104,6 @@ def minimize_by_highs(
     return Optimum(value, seconds, bound if whole else value, nodes, stopped)
 
 
-def anatomy(program: cp.Problem) -> tuple[Size, float]:
-    """Return how large an integer program is, and its relaxation's bound, or a `SolverError`."""
-    data, _, inverse = program.get_problem_data(cp.HIGHS)
-    solver = _loaded(data, whole=False)
-    _require_optimum(HIGHS_ENDS.get(_end(solver, math.inf), ""), cp.HIGHS, feasible=True)
-    matrix = data["A"].tocsc()
-    rows, columns = matrix.shape
-    size = Size(rows, columns, int(matrix.nnz), len(data["bool_vars_idx"]))
-    value = float(solver.getInfo().objective_function_value)
-    return size, value + float(inverse[-1].get("offset", 0.0))
-
-
 def _require_optimum(status: str, solver: str, *, feasible: bool) -> None:
     """Raise an error unless a solver ended with an optimum."""
     if status == cp.INFEASIBLE and feasible:
@@ -187,15 +165,3 @@ def _end(solver: highspy.Highs, seconds: float) -> str:
         solver.setOptionValue("time_limit", seconds)
     solver.run()
     return str(solver.getModelStatus().name)
-
-
-def _solve_file(path: str, seconds: float) -> tuple[str, float, float, list[float]]:
-    """Solve a program in a file by HiGHS as it comes; return its end, value, bound and values."""
-    solver = highspy.Highs()
-    for name, value in {"log_to_console": False, "time_limit": float(seconds)}.items():
-        solver.setOptionValue(name, value)
-    solver.readModel(path)
-    end = _end(solver, seconds)
-    info = solver.getInfo()
-    found = list(solver.getSolution().col_value)
-    return end, float(info.objective_function_value), float(info.mip_dual_bound), found

@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.placement.parts.program_size import anatomy
 from formulations import beam, rank_search
-from formulations.solvers import anatomy, minimize, minimize_by_highs
+from formulations.solvers import minimize, minimize_by_highs
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.formulation import formulations as registered
