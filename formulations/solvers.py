@@ -165,3 +165,15 @@ def _end(solver: highspy.Highs, seconds: float) -> str:
         solver.setOptionValue("time_limit", seconds)
     solver.run()
     return str(solver.getModelStatus().name)
+
+
+def _solve_file(path: str, seconds: float) -> tuple[str, float, float, list[float]]:
+    """Solve a program in a file by HiGHS as it comes; return its end, value, bound and values."""
+    solver = highspy.Highs()
+    for name, value in {"log_to_console": False, "time_limit": float(seconds)}.items():
+        solver.setOptionValue(name, value)
+    solver.readModel(path)
+    end = _end(solver, seconds)
+    info = solver.getInfo()
+    found = list(solver.getSolution().col_value)
+    return end, float(info.objective_function_value), float(info.mip_dual_bound), found

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import seqopt
+from formulations.solvers import _solve_file
 from seqopt._cli.main import main
 from seqopt.errors import FileError, ProblemError, SolverError
 from seqopt.graph.instance import Instance, _Target
@@ -142,10 +143,7 @@ def test_a_solver_reads_its_program_back(compiled, tmp_path, kind, suffix):
     solver = highspy.Highs()
     solver.setOptionValue("log_to_console", False)  # noqa: FBT003
     assert solver.readModel(str(path)) == highspy.HighsStatus.kOk
-    solver.setOptionValue("time_limit", 1.0 if kind == "time" else 60.0)
-    solver.run()
-    end, found = str(solver.getModelStatus().name), list(solver.getSolution().col_value)
-    value, bound = solver.getInfo().objective_function_value, solver.getInfo().mip_dual_bound
+    end, value, bound, found = _solve_file(str(path), 1.0 if kind == "time" else 60.0)
     least = seqopt.solve(one).certificate.objective
     assert bound <= least * (1 + 1e-6)
     assert value >= least * (1 - 1e-6)

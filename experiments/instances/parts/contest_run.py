@@ -11,10 +11,10 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import highspy
 import numpy as np
 
 from experiments.instances.parts.library import instance
+from formulations.solvers import _solve_file
 from seqopt import judge_instance, save_instance, solve
 from seqopt.errors import SeqoptError
 from seqopt.graph.formulation import find_formulation
@@ -64,18 +64,6 @@ def _own(one: Instance, solver: str, seconds: float) -> dict[str, object]:
     }
 
 
-def _by_highs(path: str, seconds: float) -> tuple[str, float, float, list[float]]:
-    """Solve a program in a file by HiGHS as it comes; return its end, value, bound and values."""
-    solver = highspy.Highs()
-    for name, value in {"log_to_console": False, "time_limit": float(seconds)}.items():
-        solver.setOptionValue(name, value)
-    solver.readModel(path)
-    solver.run()
-    info, found = solver.getInfo(), list(solver.getSolution().col_value)
-    end = str(solver.getModelStatus().name)
-    return end, float(info.objective_function_value), float(info.mip_dual_bound), found
-
-
 def _plain(claim) -> dict[str, object]:
     """Return a claim as JSON holds it."""
     out: dict[str, object] = {"prices": dict(claim.prices)} if claim.prices else {}
@@ -110,7 +98,7 @@ def _outside(one: Instance, solver: str, seconds: float) -> dict[str, object]:
 
 def _highs(one: Instance, folder: Path, seconds: float):
     save_instance(one, folder / "x.mps")
-    end, value, bound, found = _by_highs(str(folder / "x.mps"), seconds)
+    end, value, bound, found = _solve_file(str(folder / "x.mps"), seconds)
     count = one.arcs if not one.asks_time else len(one.timed.move)
     known = math.isfinite(value) and len(found) > 0 and abs(value) < 1e30
     return end.removeprefix("k"), bound, found[:count] if known else None

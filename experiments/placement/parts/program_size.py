@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import cvxpy as cp
 import numpy as np
 from scipy.optimize import linprog
 
@@ -19,9 +18,9 @@ class Size:
     binaries: int
 
 
-def anatomy(program: cp.Problem) -> tuple[Size, float]:
-    """Return how large a program is, and its relaxation's bound, or a `SolverError`."""
-    data, _, inverse = program.get_problem_data(cp.HIGHS)
+def anatomy(program) -> tuple[Size, float]:
+    """Return how large a program of cvxpy is, and its relaxation's bound, or a `SolverError`."""
+    data, _, inverse = program.get_problem_data("HIGHS")
     matrix, right, equations = data["A"].tocsr(), data["b"], data["dims"].zero
     rows, columns = matrix.shape
     low, high = (data.get(f"{side}_bounds") for side in ("lower", "upper"))
