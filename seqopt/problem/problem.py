@@ -14,6 +14,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from seqopt._registry import registered
 from seqopt._showing import Shown
 from seqopt.arrays import Floats
 from seqopt.contact.mortar import find_mortar
@@ -21,7 +22,7 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.problem._limit_words import parse_limits
-from seqopt.problem.amounts import Amount, parse_goals, worst
+from seqopt.problem.amounts import BUILT_IN, Amount, parse_goals, worst
 from seqopt.problem.filters import Filter
 from seqopt.problem.requirements import (
     LINEAR_RANGE,
@@ -188,7 +189,6 @@ BUDGET = re.compile(
     r"=((?P<level>[^:=]+):)?(?P<bound>[^:=]+?)(?P<unit>[msx]?)"
 )
 COUNTED = ("steps_over", "robot_use")  # a response or a robot, and a level
-UNITS = {"travel": "m", "makespan": "s"}
 CAPS = "travel=3.5m, makespan=600s, regrips=2, steps=50 or sum(T_max)=900, say"
 FORMS = "travel=0.8, travel=3.5m, steps_over:F_largest=250:10 or robot_use:rob1=100:5"
 
@@ -229,7 +229,8 @@ def _parse(text: str, *, of_states: bool) -> AskedBudget:
     name = found["name"] if found else re.split("[=:]", text)[0]
     whole = found is not None and not (found["of"] or found["level"])
     unit = found["unit"] if found else ""
-    if of_states and not (whole and unit == UNITS.get(name, "")):
+    amount = BUILT_IN.get(name) or registered(Amount).get(name) if of_states else None
+    if of_states and not (whole and unit == (amount.unit if amount else "")):
         raise ProblemError(f"budget {short(text)} of states does not exist; give {CAPS}")
     counted = found is not None and name in COUNTED and bool(found["of"] and found["level"])
     if found is None or not (of_states or counted or (whole and name == "travel" and unit != "s")):

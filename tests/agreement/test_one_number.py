@@ -21,10 +21,12 @@ from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.instances.compiled import compile_instance
 from seqopt.judge.schedules import plan_values
 from seqopt.plan.solving import layers_of, states_of
+from seqopt.problem import Amount, Filter
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim
 from seqopt.responses.quantities import RESPONSES
 from seqopt.sequence import three_robots
+from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import EQUATIONS
 from tests.brute_force import ONES
 from tests.builders import small_arch
@@ -220,6 +222,110 @@ def test_steps_are_counted_alike(schedule):
     for name in exact():
         plan = seqopt.solve(problem.but(goals="steps"), name)
         assert plan.objective["steps"] == len(plan.steps) == count
+
+
+# one question in other words: as a criterion, a response, an amount or a filter of one's own
+
+
+def largest_force(states):
+    return states.responses["F_largest"]
+
+
+FORCE = StepCost("force", ("F_largest",), lambda responses, bricks: responses["F_largest"])
+OWN = {
+    Aim.SUM: Amount("own", largest_force, responses=("F_largest",), twin=largest_force),
+    Aim.PEAK: Amount(
+        "own", largest_force, is_peak=True, responses=("F_largest",), twin=largest_force
+    ),
+}
+ONE = Amount(
+    "one", lambda states: np.ones(len(states.nodes)), twin=lambda s: 1.0 + 0 * s.forces[:, 0]
+)
+RULES = FreeRules(ending="held")
+
+
+def in_scene(free, payload=None):
+    """A loop of five bricks, or the free schedule of four."""
+    scene = small_arch(4 if free else 5)
+    if payload is not None:
+        scene = scene.with_robots(*(replace(robot, payload=payload) for robot in scene.robots))
+    engine = seqopt.make_engine("compliance", scene)
+    return seqopt.pose(engine, RULES if free else seqopt.three_robot_loop(engine.network), FORCE)
+
+
+@pytest.mark.parametrize("aim", Aim)
+@pytest.mark.parametrize("free", [False, True])
+def test_a_response_is_one_number_in_all_words(free, aim):
+    problem = in_scene(free)
+    words = {Aim.SUM: "sum(F_largest)", Aim.PEAK: "F_largest"}[aim]
+    found = {
+        f"{name}, {goals}": seqopt.solve(problem.but(goals=goals), name).certificate.values[0]
+        for goals in (GOALS[aim], words, (OWN[aim],))
+        for name in exact()
+    }
+    if not free:
+        found |= dict(by_layers(problem, aim))
+    assert len(found) > 5
+    assert found == pytest.approx(dict.fromkeys(found, next(iter(found.values()))), rel=1e-6)
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_steps_are_one_number_in_all_words(free):
+    problem = in_scene(free)
+    counted = problem.but(
+        criterion=StepCost("one", ("F_largest",), lambda r, _: 1 + 0 * r["F_largest"])
+    )
+    asked = {"steps": problem.but(goals="steps"), "own": problem.but(goals=(ONE,))}
+    asked["sum"] = counted.but(goals="sum")
+    found = {name: seqopt.solve(each).certificate.values[0] for name, each in asked.items()}
+    assert found == pytest.approx(dict.fromkeys(found, found["steps"]))
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_a_largest_force_is_one_bound_in_all_words(free):
+    """As a limit, a filter, infinite costs, and where grips keep payloads as a payload."""
+    problem = in_scene(free).but(goals="D_max")
+    forces = seqopt.solve(problem).responses().filter(regex="F_rob").abs()
+    most = 0.99 * float(forces.max(axis=None))
+
+    def kept(states):
+        return states.responses["F_largest"] <= most
+
+    def broken(states):
+        return states.responses["F_largest"] > most
+
+    def forbidden(responses, bricks):
+        return np.where(responses["F_largest"] <= most, responses["D_max"], np.inf)
+
+    own = Filter("own", kept, ("F_largest",), twin=broken)
+    costs = StepCost("costs", ("F_largest", "D_max"), forbidden)
+    asked = {
+        "limit": problem.but(limits=(seqopt.Limit("F_largest", most),)),
+        "words": problem.but(limits=f"F_largest={most!r}"),
+        "filter": problem.but(limits=[own]),
+        "costs": problem.but(criterion=costs, goals="minmax"),
+    }
+    if free:
+        asked["payload"] = in_scene(free, most).but(goals="D_max")
+    else:
+        asked["layers"] = problem.but(criterion=costs, goals=())
+    found = {
+        name: seqopt.solve(each, "minimax" if name == "layers" else None).certificate.objective
+        for name, each in asked.items()
+    }
+    assert found == pytest.approx(dict.fromkeys(found, found["limit"]), rel=1e-6)
+    assert found["limit"] > seqopt.solve(problem).certificate.objective
+
+
+def test_a_budget_of_travel_is_one_of_layers_and_of_states():
+    problem = posed("three-robot")
+    most = 1.1 * seqopt.solve(problem.but(goals="travel")).objective["travel"]
+    words = f"travel={most!r}m"
+    layers = seqopt.solve(problem.but(budgets=words), "labels").certificate.objective
+    states = seqopt.solve(problem.but(goals="sum", budgets=words)).objective["sum"]
+    free = seqopt.solve(problem, "overlap_dp").certificate.objective
+    assert layers == pytest.approx(states, rel=1e-6)
+    assert layers > free
 
 
 @pytest.mark.slow
