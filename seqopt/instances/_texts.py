@@ -38,13 +38,13 @@ def _switched(found: Program) -> Program:
     return found._replace(matrix=sparse.csr_array(found.matrix + off), low=low)
 
 
-def _said(instance: Instance) -> list[str]:
+def _comments(instance: Instance) -> list[str]:
     goals = ", ".join(goal.name for goal in instance.goals)
     return [f"seqopt instance {instance.name}: {goals}", f"{instance.facts.get('made_by', '')}"]
 
 
 def _mps(instance: Instance, found: Program) -> Iterator[str]:
-    yield from (f"* {line}" for line in _said(instance) if line)
+    yield from (f"* {line}" for line in _comments(instance) if line)
     yield "NAME " + "".join(c if c.isalnum() else "_" for c in instance.name)
     yield "ROWS"
     yield " N goal_0"
@@ -90,7 +90,7 @@ def _kinds(found: Program) -> list[str]:
 
 
 def _lp(instance: Instance, found: Program) -> Iterator[str]:
-    yield from (f"\\ {line}" for line in _said(instance) if line)
+    yield from (f"\\ {line}" for line in _comments(instance) if line)
     for k in range(found.later.shape[0]):
         row = found.later[[k]]
         yield f"\\ goal {k + 1}: {instance.goals[k + 1].name}, {row.nnz} terms; see the MPS file"
@@ -148,7 +148,7 @@ def _parts(found: Program) -> float:
 
 
 def _cp_sat(instance: Instance, found: Program, parts: float) -> Iterator[str]:
-    yield from (f"# {line}" for line in _said(instance) if line)
+    yield from (f"# {line}" for line in _comments(instance) if line)
     yield f"# a unit is {parts:.17g} parts"
     most = _most(found, parts)
     for name, upper, whole in zip(found.names, found.upper, found.whole, strict=True):

@@ -104,7 +104,7 @@ def _of_states(name: str, states: States, below: float) -> Instance:
         tail = _Target(str(states.over), TAIL, tuple(range(count)), states.over.most(count))
         asked: Any = [f"cost {k}" for k in range(count)], (tail,), ()
     else:
-        asked = _asked(states)
+        asked = _targets(states)
     rows = np.concatenate([space.rows(key, own) for _, key, own in visited.states])
     timed = None
     whole = visited.graph
@@ -123,7 +123,7 @@ def _of_states(name: str, states: States, below: float) -> Instance:
     return Instance(name, *arrays, tuple(names), small.amounts, goals, caps, rows[kept], timed)
 
 
-def _asked(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap, ...]]:
+def _targets(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap, ...]]:
     """Return names of columns, goals and caps."""
     names, goals, caps = list[str](), list[_Target](), list[_Cap]()
     bounds = (*[None] * len(states.aims), *states.budgets)

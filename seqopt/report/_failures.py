@@ -116,7 +116,7 @@ def load_page(
 
 
 def _cases_shown(found: FailureMap, axis: str) -> pd.DataFrame:
-    """Return the cases of a map as people read them: only what is known."""
+    """Return the cases of a map in display units, unknown numbers left empty."""
     table = found.cases.assign(bond_needed_Pa=found.cases["bond_needed_Pa"] / 1e3)
     falls = table["fall"] > 0
     for name in ("bond_needed_Pa", "friction_needed"):

@@ -132,7 +132,7 @@ class SpeedTable:
         }
 
     def rows(self) -> pd.DataFrame:
-        """Return the table in words, gaps in percent, with a mark for what nobody beats."""
+        """Return the table in words, gaps in percent, with a mark for what is not dominated."""
         table = self.table
         columns = {
             "engine": table["engine"],
