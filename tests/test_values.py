@@ -33,7 +33,6 @@ from seqopt.network.build import build_network
 from seqopt.scene._overlaps import _faces
 from seqopt.scene.arm import HeldPostures
 from seqopt.scene.boxes import boxes
-from seqopt.scene.library.common import _overlaps
 from seqopt.scene.shape import Surface
 from seqopt.sequence.two_robots import sequential
 from seqopt.stability._held_states import _HoldingForces, _Known
@@ -60,12 +59,11 @@ def values(arch25):
     plane = _Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
     maps, operator = scene_maps(network), OperatorBuilder(network, tree).operator(2)
     shapes = boxes(arch25.bricks)
-    joined = _overlaps(shapes, [(0, 1)])
     cube = box((1, 1, 1))
     (touching,) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
     every = (
         *(maps, ResponseMaps(maps, 2)),
-        *(shapes, joined, joined.shared, joined.faces[0]),
+        shapes,
         *_faces(np.array(cube.vertices), cube),
         *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, network.compliances, build_statics(network)),

@@ -18,6 +18,7 @@ from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.parts import THICKEST, Brick
+from seqopt.scene.shape import clip
 
 _OVERLAP = 0.05  # by which bricks may interpenetrate, over their smallest dimension
 _BESIDE = 0.5  # by which a joint's position may lie beside the faces, over the same
@@ -190,7 +191,7 @@ def _contact(
 def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Floats:
     """Return the corners (m, 2) of the overlap of the bricks' faces in a contact's plane."""
     flat = [_face(brick, axes, point) for brick in between]
-    common = flat[0] if len(flat) == 1 else _clip(*flat)
+    common = flat[0] if len(flat) == 1 else clip(*flat)
     size = min(map(_polygon_area, flat))
     if len(common) < 3 or not _polygon_area(common) > _SLIVER * size:
         raise SceneError(
@@ -211,22 +212,6 @@ def _face(brick: Brick, axes: Floats, point: Floats) -> Floats:
     flat = (corners - point) @ axes[1:].T
     spread = flat - flat.mean(axis=0)
     return np.asarray(flat[np.argsort(np.arctan2(spread[:, 1], spread[:, 0]))])
-
-
-def _clip(polygon: Floats, other: Floats) -> Floats:
-    """Return the common part of two convex polygons, edge by edge of the second."""
-    for start, end in zip(other, np.roll(other, -1, axis=0), strict=True):
-        across = np.array([start[1] - end[1], end[0] - start[0]])
-        inside = (polygon - start) @ across
-        kept = []
-        for i in range(len(polygon)):
-            if inside[i - 1] * inside[i] < 0:
-                share = inside[i - 1] / (inside[i - 1] - inside[i])
-                kept.append(polygon[i - 1] + share * (polygon[i] - polygon[i - 1]))
-            if inside[i] >= 0:
-                kept.append(polygon[i])
-        polygon = np.array(kept).reshape(-1, 2)
-    return polygon
 
 
 def _polygon_area(polygon: Floats) -> float:

@@ -22,7 +22,7 @@ from seqopt.scene._overlaps import TOLERATED, bounds_of, near_pairs
 from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.library.common import DOWN, JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
-from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes
+from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes, polygon_moments
 from seqopt.work.progress import Progress, Tell
 
 _Shape = Polyhedron | Surface
@@ -258,7 +258,7 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> _FlatFace:
     sides[1] = np.cross(across, sides[0])
     middle = corners.mean(axis=0)
     flat = (corners - middle) @ sides.T
-    area, shift, spread = _moments(flat)
+    area, shift, spread = polygon_moments(flat)
     first = np.linalg.eigh(spread)[1][:, 1]
     turned = np.array([first, [-first[1], first[0]]])  # axes of the largest and least moment
     if not np.linalg.det(spread) > 0:
@@ -289,18 +289,6 @@ def face_ground(brick: int, face: _FlatFace, law: JointLaw, stub: float = _STUB)
     """Return the ground end of a brick over a face whose normal points into it; ``stub`` in m."""
     anchor = as_vector(face.center - stub * face.axes[0])
     return Ground(brick=brick, anchor=anchor, **_fields(face, law))
-
-
-def _moments(flat: Floats) -> tuple[float, Floats, Floats]:
-    """Return area, centroid (2,), and integrals of squares about it (2, 2) of a polygon (m, 2)."""
-    after = np.roll(flat, -1, axis=0)
-    turn = flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]
-    area = 0.5 * float(turn.sum())
-    center = turn @ (flat + after) / (6 * area)
-    one, two = flat - center, after - center
-    turn = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    squares = sum(np.einsum("e,ea,eb->ab", turn, arm, arm) for arm in (one, two, one + two))
-    return area, center, np.asarray(squares / 24)
 
 
 _OFF = 0.05  # of a face from a block that it joins, over the size of the block

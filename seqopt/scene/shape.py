@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import frames, rows, settle, short, vector, wholes
 
+_Corner = TypeVar("_Corner")
 FLAT = 1e-4  # by how much a face may leave its plane, over the size of the block
 _EVEN = 1e-12  # share of the second moments by which axes of equal length are told apart
 _NEAR = (1.0, 0.75, 0.5, 0.25, 0.1)  # of a quarter of the extent: where a node is tried
@@ -138,7 +140,7 @@ class Surface(FrozenValue):
     faces: tuple[tuple[int, ...], ...]  # places among the vertices
 
 
-def edges(face: Sequence[int]) -> Iterator[tuple[int, int]]:
+def edges(face: Sequence[_Corner]) -> Iterator[tuple[_Corner, _Corner]]:
     """Return the corners of a face, each with the next one, once around."""
     return zip(face, (*face[1:], *face[:1]), strict=True)
 
@@ -168,6 +170,37 @@ def bend(corners: Floats) -> float:
     if not size > 0:
         return np.inf
     return float(np.abs((corners - corners.mean(axis=0)) @ normal).max() / size)
+
+
+def clip(polygon: Floats, other: Floats) -> Floats:
+    """Return the common part (m, 2) of two convex polygons, edge by edge of the second.
+
+    Corners are counterclockwise.
+    """
+    kept: list[list[float]] = polygon.tolist()
+    for (x, y), (u, v) in edges(other.tolist()):
+        before, kept = kept, []
+        inside = [(u - x) * (q - y) - (v - y) * (p - x) for p, q in before]
+        for k, (p, q) in enumerate(before):
+            last, here = inside[k - 1], inside[k]
+            if last * here < 0:
+                share, (r, s) = last / (last - here), before[k - 1]
+                kept.append([r + share * (p - r), s + share * (q - s)])
+            if here >= 0:
+                kept.append([p, q])
+    return np.array(kept).reshape(-1, 2)
+
+
+def polygon_moments(flat: Floats) -> tuple[float, Floats, Floats]:
+    """Return area, centroid (2,), and integrals of squares about it (2, 2) of a polygon (m, 2)."""
+    after = np.roll(flat, -1, axis=0)
+    turn = flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]
+    area = 0.5 * float(turn.sum())
+    center = turn @ (flat + after) / (6 * area)
+    one, two = flat - center, after - center
+    turn = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    squares = sum(np.einsum("e,ea,eb->ab", turn, arm, arm) for arm in (one, two, one + two))
+    return area, center, np.asarray(squares / 24)
 
 
 def _require_corners(count: int, faces: tuple[tuple[int, ...], ...]) -> None:

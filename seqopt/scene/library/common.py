@@ -7,10 +7,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from heapq import heapify, heappop, heappush
+from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Vector
+from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
     MOST_BRICKS,
@@ -23,9 +24,10 @@ from seqopt.scene._checks import (
     unless_none,
 )
 from seqopt.scene.arch import STANDARD_GRAVITY
-from seqopt.scene.boxes import Boxes, as_vector, boxes, spring_fields
+from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
+from seqopt.scene.shape import clip, polygon_moments
 
 _Pairs = Sequence[tuple[int, int]]
 
@@ -187,172 +189,78 @@ def _bond_pairs(columns: int, bricks: int) -> list[tuple[int, int]]:
     return out
 
 
-_ON_EDGE = 1e-12  # distance treated as zero, over the size of the faces
-_PARALLEL = 1e-12  # sine of an angle between edges treated as zero
+_SLIVER = 1e-9  # overlap treated as none, over the smaller of two faces
+_STUB = 0.05  # m; of a ground end that does not say
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _ContactAreas(FrozenValue):
-    """The overlaps of P pairs of faces."""
+class _Overlap(NamedTuple):
+    """Where two boxes look at each other, seen along the mean normal of their faces.
 
-    area: Floats  # (P,); m²; 0 where faces do not overlap
-    centroid: Floats  # (P, 2); m
-    moments: Floats  # (P, 2); second moments of area about the two axes through the centroid, m⁴
-
-
-def _contact_areas(first: Floats, second: Floats) -> _ContactAreas:
-    """Return the overlaps of convex polygons (P, m, 2), counterclockwise, m."""
-    near = first.mean(axis=1, keepdims=True)
-    one, other = first - near, second - near
-    slack = _ON_EDGE * np.abs(one).max(initial=0.0)  # an edge that both have is counted once
-    start, end = (
-        np.concatenate(parts, axis=1)
-        for parts in zip(_inside(one, other, slack), _inside(other, one, -slack), strict=True)
-    )
-    turn = _cross(start, end)
-    area = 0.5 * turn.sum(axis=1)
-    real = area > slack**2
-    size = np.where(real, area, 1.0)[:, None]
-    centroid = (turn[:, :, None] * (start + end)).sum(axis=1) / (6 * size)
-    start, end = start - centroid[:, None], end - centroid[:, None]
-    squares = start**2 + start * end + end**2
-    moments = (_cross(start, end)[:, :, None] * squares).sum(axis=1)[:, ::-1] / 12
-    return _ContactAreas(
-        np.where(real, area, 0.0), centroid + near[:, 0], np.where(real[:, None], moments, 0.0)
-    )
-
-
-def _inside(polygon: Floats, other: Floats, slack: float) -> tuple[Floats, Floats]:
-    """Return where the part of each edge in another polygon starts and ends, each (P, m, 2)."""
-    start, step = polygon, np.roll(polygon, -1, axis=1) - polygon
-    side = units(np.roll(other, -1, axis=1) - other)
-    height = _cross(side[:, None], start[:, :, None] - other[:, None])  # (P, m, m)
-    slope = _cross(side[:, None], step[:, :, None])
-    flat = np.abs(slope) <= _PARALLEL * np.linalg.norm(step, axis=2)[:, :, None]
-    crossing = -height / np.where(flat, 1.0, slope)
-    outside = flat & (height + slack < 0)
-    enters = np.where(outside, np.inf, np.where(flat | (slope < 0), 0.0, crossing))
-    leaves = np.where(flat | (slope > 0), 1.0, crossing)
-    low = np.maximum(enters.max(axis=2), 0.0)
-    high = np.maximum(np.minimum(leaves.min(axis=2), 1.0), 0.0)
-    low = np.minimum(low, high)
-    return start + low[:, :, None] * step, start + high[:, :, None] * step
-
-
-def _cross(first: Floats, second: Floats) -> Floats:
-    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Faces(FrozenValue):
-    """The faces of boxes that look at others: box, axis across the face, unit vectors outward."""
-
-    which: Ints
-    axis: Ints
-    out: Floats
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Overlaps(FrozenValue):
-    """Where pairs of boxes look at each other, seen along mean normals into the second.
-
-    ``sides`` (P, 2, 3): unit vectors across the normals, the first most nearly an edge of the first
-    box.
+    ``axes`` (3, 3): this normal, into the second box, and two directions across it, the first most
+    nearly an edge of the first box; ``faces``: the corners (4, 3) and the outward normal of each;
+    ``share``: of the smaller face that the other covers; ``area``, m², ``center`` (2,), m, and
+    second moments of area about the two directions, m⁴, of what both cover.
     """
 
-    faces: tuple[_Faces, _Faces]
-    along: Floats
-    sides: Floats
-    shared: _ContactAreas
+    axes: Floats
+    faces: tuple[tuple[Floats, Floats], tuple[Floats, Floats]]
+    share: float
+    area: float = 0.0
+    center: Floats = np.zeros(2)
+    moments: tuple[float, float] = (0.0, 0.0)
 
 
-def _overlaps(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _Overlaps:
-    """Return where boxes look at each other, by default with the faces that do so most."""
-    a, b = np.array(pairs, dtype=np.int64).T
-    step = shapes.place[b] - shapes.place[a]
-    if normals is None:  # of the first's faces, each with the most nearly parallel one of the
+def _overlap(first: Brick, second: Brick, normal: Floats | None = None) -> _Overlap:
+    """Return where two boxes look at each other, by default with the faces that do so most."""
+    step = np.subtract(second.position, first.position)
+    if normal is None:  # of the first's faces, each with the most nearly parallel one of the
         # second, those beyond which the other box lies farthest, in its size
-        turned = shapes.frame[a] @ shapes.frame[b].transpose(0, 2, 1)
-        partner = np.abs(turned).argmax(axis=2)
-        second = np.take_along_axis(_beyond(shapes, b, a), partner, axis=1)
-        facing = (_beyond(shapes, a, b) + second).argmax(axis=1)
-        axes = facing, partner[np.arange(len(a)), facing]
-    else:  # across the faces that look most nearly along given directions
-        size = (np.abs(shapes.frame[i] @ normals[:, :, None])[..., 0] for i in (a, b))
-        axes = next(size).argmax(axis=1), next(size).argmax(axis=1)
-    one, other = _towards(shapes, a, axes[0], step), _towards(shapes, b, axes[1], -step)
-    along = units(one.out - other.out)
-    across = shapes.frame[a, (one.axis + 1) % 3]
-    across = units(across - along * (along * across).sum(axis=1, keepdims=True))
-    sides = np.stack([across, np.cross(along, across)], axis=1)
-    shared = _contact_areas(_corners(shapes, one, sides), _corners(shapes, other, sides))
-    return _Overlaps((one, other), along, sides, shared)
+        turned = np.abs(first.frame @ second.frame.T)
+        partner = turned.argmax(axis=1)
+        half = [0.5 * np.array(brick.dimensions) for brick in (first, second)]
+        beyond = np.abs(first.frame @ step) / (half[0] + turned @ half[1])
+        beyond += (np.abs(second.frame @ step) / (half[1] + turned.T @ half[0]))[partner]
+        i = int(beyond.argmax())
+        j = int(partner[i])
+    else:  # across the faces that look most nearly along the direction
+        i, j = (int(np.abs(brick.frame @ normal).argmax()) for brick in (first, second))
+    faces = _face(first, i, step), _face(second, j, -step)
+    along = units(faces[0][1] - faces[1][1])
+    across = first.frame[(i + 1) % 3]
+    across = units(across - along * (along @ across))
+    axes = np.stack([along, across, np.cross(along, across)])
+    flat = [_counterclockwise(corners @ axes[1:].T) for corners, _ in faces]
+    whole = zip((first, second), (i, j), strict=True)
+    smaller = min(math.prod(b.dimensions) / b.dimensions[axis] for b, axis in whole)
+    shared = clip(*flat)
+    if len(shared) < 3:
+        return _Overlap(axes, faces, 0.0)
+    area, center, spread = polygon_moments(shared)
+    if not area > _SLIVER * smaller:
+        return _Overlap(axes, faces, 0.0)
+    moments = float(spread[1, 1]), float(spread[0, 0])
+    return _Overlap(axes, faces, area / smaller, area, center, moments)
+
+
+def _face(brick: Brick, axis: int, step: Floats) -> tuple[Floats, Floats]:
+    """Return corners (4, 3) and outward normal of the face across an axis that looks that way."""
+    half = 0.5 * np.array(brick.dimensions)[:, None] * brick.frame
+    sign = np.sign(brick.frame[axis] @ step)
+    middle = brick.position + sign * half[axis]
+    side, other = half[axis - 2], half[axis - 1]
+    corners = [middle + a * side + b * other for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return np.array(corners), sign * brick.frame[axis]
+
+
+def _counterclockwise(flat: Floats) -> Floats:
+    first, second = flat[1] - flat[0], flat[2] - flat[1]
+    return flat if first[0] * second[1] > first[1] * second[0] else flat[::-1]
 
 
 def _shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
     """Return how much of the smaller of two faces the other covers, (P,), from 0 to 1."""
-    if not pairs:
-        return np.zeros(0)
-    shapes = boxes(bricks)
-    found = _overlaps(shapes, pairs, normals)
-    whole = []
-    for face in found.faces:
-        side, other = (shapes.half[face.which, (face.axis + k) % 3] for k in (1, 2))
-        whole.append(4 * side * other)
-    return np.asarray(found.shared.area / np.minimum(*whole))
-
-
-def _between(shapes: Boxes, pairs: _Pairs, found: _Overlaps) -> tuple[Floats, list[float]]:
-    """Return the points (P, 3) halfway between faces, and the widths of joints that are thick."""
-    middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
-    heights, slopes = [], []  # of faces, along the normals
-    for face in found.faces:
-        lean = (found.along * face.out).sum(axis=1)
-        away = ((shapes.place[face.which] - middle) * face.out).sum(axis=1)
-        heights.append((away + shapes.half[face.which, face.axis]) / lean)
-        slopes.append((found.sides @ face.out[:, :, None])[..., 0] / lean[:, None])
-    start, end = heights
-    area = np.maximum(found.shared.area, np.finfo(float).tiny)[:, None]
-    reach = np.sqrt(3 * found.shared.moments[:, ::-1] / area)  # half the sides of a rectangle
-    taper = (np.abs(slopes[1] - slopes[0]) * reach).sum(axis=1)  # at the ends of the overlap
-    place = middle + 0.5 * (start + end)[:, None] * found.along
-    thin = 2 * shapes.half[np.array(pairs)].min(axis=(1, 2))
-    widest = end - start + taper
-    thick: list[float] = np.where(widest > THICKEST * thin, widest, 0.0).tolist()
-    return place, thick
-
-
-def _beyond(shapes: Boxes, which: Ints, other: Ints) -> Floats:
-    """Return how far other boxes lie along the axes of some, (P, 3), over where they touch."""
-    frame = shapes.frame[which]
-    away = (frame @ (shapes.place[other] - shapes.place[which])[:, :, None])[:, :, 0]
-    turned = np.abs(frame @ shapes.frame[other].transpose(0, 2, 1))
-    reach = (turned @ shapes.half[other][:, :, None])[:, :, 0]
-    return np.asarray(np.abs(away) / (shapes.half[which] + reach))
-
-
-def _towards(shapes: Boxes, which: Ints, axis: Ints, step: Floats) -> _Faces:
-    """Return the faces across some axes that look along steps (P, 3)."""
-    normal = shapes.frame[which, axis]
-    return _Faces(which, axis, np.sign((normal * step).sum(axis=1))[:, None] * normal)
-
-
-def _corners(shapes: Boxes, face: _Faces, sides: Floats) -> Floats:
-    """Return the corners (P, 4, 2) of faces along two axes each (P, 2, 3), counterclockwise."""
-    row = np.arange(len(face.which))
-    edges = [(face.axis + k) % 3 for k in (1, 2)]
-    frame, half = shapes.frame[face.which], shapes.half[face.which]
-    flat = [
-        half[row, edge][:, None] * (sides @ frame[row, edge][:, :, None])[:, :, 0] for edge in edges
-    ]
-    flat[1] *= np.sign(flat[0][:, :1] * flat[1][:, 1:] - flat[0][:, 1:] * flat[1][:, :1])
-    center = shapes.place[face.which] + half[row, face.axis][:, None] * face.out
-    middle = (sides @ center[:, :, None])[:, :, 0]
-    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    return np.stack([middle + a * flat[0] + b * flat[1] for a, b in signs], axis=1)
-
-
-_STUB = 0.05  # m; of a ground end that does not say
+    found = zip(pairs, normals, strict=True)
+    return np.array([_overlap(bricks[i], bricks[j], normal).share for (i, j), normal in found])
 
 
 def _joints_between(
@@ -363,34 +271,36 @@ def _joints_between(
     They are in the middle of the overlap, halfway between the faces; axes are the faces' mean
     normal and the edge of the first brick that is most nearly across it. One that is thick says so.
     """
-    if not pairs:
-        return ()
-    shapes = boxes(bricks)
-    found = _overlaps(shapes, pairs, normals)
-    apart = np.flatnonzero(found.shared.area == 0)
-    if len(apart):
-        i, j = pairs[apart[0]]
-        raise SceneError(
-            f"joint ({bricks[i].name}, {bricks[j].name}): the faces of its bricks do not overlap; "
-            "move the bricks to each other"
-        )
-    place, thick = _between(shapes, pairs, found)
-    stiff = map(law.stiffness, found.shared.area.tolist(), found.shared.moments.tolist())
-    fields = map(spring_fields, place, found.along, found.sides[:, 0], stiff)
-    return tuple(
-        Joint(bricks=(bricks[i].name, bricks[j].name), thickness=width or None, **held)
-        for (i, j), held, width in zip(pairs, fields, thick, strict=True)
-    )
+    out = []
+    for k, (i, j) in enumerate(pairs):
+        ends = bricks[i], bricks[j]
+        found = _overlap(*ends, None if normals is None else normals[k])
+        if not found.area:
+            raise SceneError(
+                f"joint ({ends[0].name}, {ends[1].name}): the faces of its bricks do not overlap; "
+                "move the bricks to each other"
+            )
+        along, sides = found.axes[0], found.axes[1:]
+        middle = found.center @ sides
+        heights = [(face[0] - middle) @ out_ / (along @ out_) for face, out_ in found.faces]
+        slopes = [sides @ out_ / (along @ out_) for _, out_ in found.faces]
+        reach = np.sqrt(3 * np.array(found.moments[::-1]) / found.area)  # half a rectangle's sides
+        taper = float(np.abs(slopes[1] - slopes[0]) @ reach)  # at the ends of the overlap
+        widest = float(heights[1] - heights[0]) + taper
+        thin = min(min(brick.dimensions) for brick in ends)
+        place = middle + 0.5 * (heights[0] + heights[1]) * along
+        fields = spring_fields(place, along, sides[0], law.stiffness(found.area, found.moments))
+        thickness = widest if widest > THICKEST * thin else None
+        out.append(Joint(bricks=(ends[0].name, ends[1].name), thickness=thickness, **fields))
+    return tuple(out)
 
 
 def _ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = _STUB) -> Ground:
     """Return the ground end in the middle of the face of a brick that looks down (3,) most."""
-    shapes = boxes([brick])
-    frame, half = shapes.frame[0], shapes.half[0]
-    i = int(np.abs(frame @ down).argmax())
-    out = np.sign(frame[i] @ down) * frame[i]
-    place = shapes.place[0] + half[i] * out
-    side, other = (i + 1) % 3, (i + 2) % 3
-    stiff = law.over_rectangle(2 * float(half[side]), 2 * float(half[other]))
-    fields = spring_fields(place, -out, frame[side], stiff)
+    axis = int(np.abs(brick.frame @ down).argmax())
+    corners, out = _face(brick, axis, down)
+    place = corners.mean(axis=0)
+    side, other = (axis + 1) % 3, (axis + 2) % 3
+    stiff = law.over_rectangle(brick.dimensions[side], brick.dimensions[other])
+    fields = spring_fields(place, -out, brick.frame[side], stiff)
     return Ground(brick=brick.name, anchor=as_vector(place + stub * out), **fields)
