@@ -8,8 +8,8 @@ from dataclasses import replace
 from seqopt._cli import options
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
-from seqopt.engines._kinds import ChoosingEngine, Level
-from seqopt.engines.interface import Engine
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines.interface import Engine, Level
 from seqopt.engines.registry import _chooser_of
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import (
@@ -42,7 +42,7 @@ def level_notes(asked: options.Computed, engine: Engine) -> tuple[str, ...]:
     if (chooser := _chooser_of(engine)) is not None:
         choice = chooser.choice
         return (f"engine: {choice.level.value}: {choice.reason}",) if named else ()
-    if not isinstance(engine, ChoosingEngine):
+    if not isinstance(engine, AutoEngine):
         return ()
     said = [
         f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}"

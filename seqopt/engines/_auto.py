@@ -21,11 +21,13 @@ from seqopt.arrays import Bools, Floats
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines._grip_compliance import compliance_by_kind, read_compliance
-from seqopt.engines._kinds import ChoosingEngine, Level, LevelChoice, OpeningEngine
 from seqopt.engines._planar import _leaves_plane, _mixes, find_plane, off_plane
 from seqopt.engines.interface import (
     Fields,
+    Level,
+    LevelChoice,
     NamedEngine,
+    OpeningEngine,
     Want,
     grip_columns,
     keep_wanted,
@@ -110,20 +112,24 @@ def _of(moved: ArrayLike | None, which: Bools) -> Floats | None:
     return None if moved is None else np.asarray(moved, dtype=float)[which]
 
 
-class AutoEngine(ChoosingEngine):
-    """Computes every grip set at the cheapest level whose condition it meets."""
+class AutoEngine(NamedEngine):
+    """Computes every grip set at the cheapest level whose condition it meets.
+
+    ``mortar``: of joints; ``tally``: how many grip sets of all calls were answered at which level,
+    and why.
+    """
 
     def __init__(self, network: Network | Scene, mortar: Mortar = EPOXY) -> None:
         super().__init__(network)
         self.mortar, self.tally = mortar, Counter[LevelChoice]()
 
     @cached_property
-    def choice(self) -> LevelChoice:  # type: ignore[override]
+    def choice(self) -> LevelChoice:
         """The level that alone answers all grip sets of a problem, and why."""
         return find_level(self.network)
 
     @cached_property
-    def rigid(self) -> _RigidBricks:  # type: ignore[override]
+    def rigid(self) -> _RigidBricks:
         """Bricks on springs that never break."""
         return _RigidBricks(self.network)
 

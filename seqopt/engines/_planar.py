@@ -14,7 +14,6 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._grip_compliance import GripCompliance
-from seqopt.engines._kinds import FlatEngine
 from seqopt.engines.interface import Basis
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
@@ -159,7 +158,7 @@ def _spring(network: Network, index: int) -> str:
 _ELSE = "use the compliance engine"
 
 
-class PlanarEngine(FlatEngine, ComplianceEngine):
+class PlanarEngine(ComplianceEngine):
     """Computes any batch of grip sets on any partial structure of a planar scene.
 
     Raises `SceneError` if bricks, springs, gravity, loads or movements of the ground leave the
@@ -171,12 +170,12 @@ class PlanarEngine(FlatEngine, ComplianceEngine):
         plane = find_plane(found)
         if isinstance(plane, str):
             raise SceneError(f"{plane}; {_ELSE}")
-        ComplianceEngine.__init__(self, found, plane.basis)
+        super().__init__(found, plane.basis)
         away = off_plane(found, plane)
         self._plane, self._away = plane, away if away.any() else None
 
     @cached_property
-    def in_space(self) -> ComplianceEngine:  # type: ignore[override]
+    def in_space(self) -> ComplianceEngine:
         """The same bricks and joints, free to leave the plane."""
         return ComplianceEngine(self.network)
 

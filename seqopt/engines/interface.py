@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from enum import Flag, auto
+from enum import Enum, Flag, auto
 from functools import cache, cached_property, wraps
 from itertools import combinations
 from math import isfinite
@@ -112,6 +112,30 @@ class Fields(FrozenValue):
         if self.grip_moment is None:
             settle(self, grip_moment=np.zeros_like(self.grip_force))
         super().__post_init__()
+
+
+class Level(Enum):
+    """Levels of detail of a model, cheapest first; values are the engines' names."""
+
+    PLANAR = "planar"
+    RIGID = "compliance"
+    DISCRETE = "discrete"
+
+
+@dataclass(frozen=True)
+class LevelChoice:
+    """A level and why it was taken."""
+
+    level: Level
+    reason: str  # a clause that goes into a sentence
+
+
+FAR = 0.1  # motion over a brick's length beyond which a structure has gone
+
+
+def linear_limit(scene: Scene) -> float:
+    """Return the displacement up to which a linear model holds, m: a tenth of the smallest side."""
+    return FAR * min(min(brick.dimensions) for brick in scene.bricks)
 
 
 class Engine(Protocol):
@@ -364,3 +388,7 @@ class SerialEngine(NamedEngine, ABC):
     @abstractmethod
     def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance) -> Fields:
         """Return the fields of one grip set, whose columns are (r,)."""
+
+
+class OpeningEngine(SerialEngine):
+    """Base of the engine whose joints open, slip and break."""

@@ -11,7 +11,7 @@ import platform
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,8 @@ import numpy as np
 import scipy
 
 from seqopt.contact.mortar import Mortar, find_mortar
-from seqopt.engines._kinds import ChoosingEngine
+from seqopt.engines._auto import AutoEngine, find_level
+from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SceneError
@@ -60,8 +61,6 @@ class Recipe:
         """The name of what answers grip sets."""
         if not self.simplest:
             return self.engine
-        from seqopt.engines._auto import find_level  # noqa: PLC0415  # slow to import
-
         return find_level(self.network).level.value
 
     @cached_property
@@ -132,31 +131,24 @@ def engine_for(engine: Engine, scene: Scene) -> Engine:
     return recipe_for(engine, scene).make()
 
 
-def _loaded(name: str, network: Network | Scene, **options: Any) -> Engine:
-    """Return an engine whose module waits until it is asked for: it loads much, or is rare."""
-    if name == "auto":
-        from seqopt.engines._auto import AutoEngine  # noqa: PLC0415
+def _frame(network: Network | Scene) -> Engine:
+    from seqopt.engines.frame import FrameEngine  # noqa: PLC0415  # SciPy's sparse solvers load long
 
-        return AutoEngine(network, **options)
-    if name == "planar":
-        from seqopt.engines._planar import PlanarEngine  # noqa: PLC0415
+    return FrameEngine(network)
 
-        return PlanarEngine(network, **options)
-    if name == "frame":
-        from seqopt.engines.frame import FrameEngine  # noqa: PLC0415
 
-        return FrameEngine(network, **options)
-    from seqopt.engines.discrete.engine import DiscreteEngine  # noqa: PLC0415
+def _discrete(network: Network | Scene, **options: Any) -> Engine:
+    from seqopt.engines.discrete.engine import DiscreteEngine  # noqa: PLC0415  # as does the frame
 
     return DiscreteEngine(network, **options)
 
 
 ENGINES: dict[str, Callable[..., Engine]] = {
-    "auto": partial(_loaded, "auto"),
-    "planar": partial(_loaded, "planar"),
+    "auto": AutoEngine,
+    "planar": PlanarEngine,
     "compliance": ComplianceEngine,
-    "frame": partial(_loaded, "frame"),
-    "discrete": partial(_loaded, "discrete"),
+    "frame": _frame,
+    "discrete": _discrete,
 }
 USUAL = "compliance"  # the engine of what is only drawn, or compared with itself
 DEFAULT = "auto"  # the engine where none is asked for
@@ -215,7 +207,7 @@ def simplest(engine: Engine) -> Engine:
     Planar where nothing leaves one plane, else exactly rigid bricks; whether that was enough is to
     be asked of the steps that are chosen. Any other engine is returned as it is.
     """
-    if not isinstance(engine, ChoosingEngine):
+    if not isinstance(engine, AutoEngine):
         return engine
     found: Any = make_engine(engine.choice.level.value, engine.network)
     found.chooser, recipe = engine, recipe_of(engine)
@@ -225,10 +217,10 @@ def simplest(engine: Engine) -> Engine:
     return made
 
 
-def _chooser_of(engine: Engine) -> ChoosingEngine | None:
+def _chooser_of(engine: Engine) -> AutoEngine | None:
     """Return the engine that chooses for every grip set, of which this one is `simplest`."""
     found = getattr(engine, "chooser", None)
-    return found if isinstance(found, ChoosingEngine) else None
+    return found if isinstance(found, AutoEngine) else None
 
 
 def provenance(engine: Engine) -> dict[str, object]:
@@ -247,7 +239,7 @@ def provenance(engine: Engine) -> dict[str, object]:
     if (chooser := _chooser_of(engine)) is not None:
         choice = chooser.choice
         said["level"] = {"engine": choice.level.value, "reason": choice.reason}
-    elif isinstance(engine, ChoosingEngine):
+    elif isinstance(engine, AutoEngine):
         said["levels"] = [
             {"engine": choice.level.value, "sets": sets, "reason": choice.reason}
             for choice, sets in engine.tally.items()

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from seqopt.contact.mortar import Mortar
-from seqopt.engines._kinds import OpeningEngine
-from seqopt.engines.interface import Engine, Want
+from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind

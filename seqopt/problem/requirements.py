@@ -14,8 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Terse
-from seqopt.engines._kinds import linear_limit
-from seqopt.engines.interface import Engine
+from seqopt.engines.interface import Engine, linear_limit
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network

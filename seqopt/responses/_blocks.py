@@ -34,8 +34,7 @@ import numpy as np
 
 from seqopt._files import HIDDEN, make_folder, require_folder, write_bytes
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.engines._kinds import Level, LevelChoice
-from seqopt.engines.interface import Engine, Want
+from seqopt.engines.interface import Engine, Level, LevelChoice, Want
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, MemoryShortError, SceneError

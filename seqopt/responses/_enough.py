@@ -10,7 +10,9 @@ import numpy as np
 
 from seqopt.arrays import Terse
 from seqopt.contact.mortar import _mortar_name, _with_mortar
-from seqopt.engines._kinds import ChoosingEngine, FlatEngine, OpeningEngine
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines._planar import PlanarEngine
+from seqopt.engines.interface import OpeningEngine
 from seqopt.engines.registry import recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses._tolerance import each_tolerance, is_linear, is_tied
@@ -18,7 +20,7 @@ from seqopt.responses.quantities import RESPONSES, _plain, length_text
 from seqopt.responses.table import LinearRange, _Columns, _node, force_column, held_in_table
 
 _FEW = 100  # bricks up to which tolerances take less than a second
-_KNOWN = ChoosingEngine, FlatEngine, ComplianceEngine, OpeningEngine
+_KNOWN = AutoEngine, PlanarEngine, ComplianceEngine, OpeningEngine
 
 
 @dataclass(frozen=True, repr=False)
@@ -80,7 +82,7 @@ def _others(within: LinearRange, below: float, where: str) -> str:
     if not isinstance(engine, _KNOWN):
         return "what another one would change is not known"
     flat = "compliance would change nothing, as nothing leaves the plane; "
-    said = flat if isinstance(engine, FlatEngine) else ""
+    said = flat if isinstance(engine, PlanarEngine) else ""
     if np.isnan(below):
         unchecked = "; ".join(within.unchecked) or str(getattr(engine, "unchecked", ""))
         why = unchecked or "steps build on earlier ones"
@@ -88,9 +90,9 @@ def _others(within: LinearRange, below: float, where: str) -> str:
     if below >= 0:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
         own = f" {_with_mortar(_mortar_name(within.mortar))}"  # whose limits they are
-        own = "" if isinstance(engine, ChoosingEngine) else own
+        own = "" if isinstance(engine, AutoEngine) else own
         return f"{said}discrete elements{own} would change nothing in these steps: {close}"
-    if isinstance(engine, ChoosingEngine):
+    if isinstance(engine, AutoEngine):
         return "discrete elements were taken where joints open, elsewhere they change nothing"
     asks = f"{where} leaves its limits; the engine discrete says it"
     return f"{said}what discrete elements would change is not known: {asks}"

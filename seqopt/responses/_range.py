@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.engines._kinds import linear_limit
-from seqopt.engines.interface import Engine
+from seqopt.engines.interface import Engine, linear_limit
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import solve_sets
 from seqopt.sequence.steps import Step

@@ -15,8 +15,9 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._kinds import ChoosingEngine, FlatEngine, OpeningEngine
-from seqopt.engines.interface import Engine, Want, grip_columns, select_sets
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines._planar import PlanarEngine
+from seqopt.engines.interface import Engine, OpeningEngine, Want, grip_columns, select_sets
 from seqopt.engines.registry import USUAL, Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
@@ -142,9 +143,9 @@ def _linear(engine: Engine) -> Engine:
             f"tolerance: a {type(engine).__name__} is not linear in where grips are; take the "
             "engine compliance or auto"
         )
-    if isinstance(engine, FlatEngine):  # grips may be off in any direction
+    if isinstance(engine, PlanarEngine):  # grips may be off in any direction
         return engine.in_space
-    return engine.rigid if isinstance(engine, ChoosingEngine) else engine
+    return engine.rigid if isinstance(engine, AutoEngine) else engine
 
 
 def _groups(
@@ -246,7 +247,7 @@ def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
 
 def is_linear(engine: Engine) -> bool:
     """Return whether an engine is known to be linear in where grips are, in all directions."""
-    known = isinstance(engine, ChoosingEngine | FlatEngine)
+    known = isinstance(engine, AutoEngine | PlanarEngine)
     return known or type(engine) is ComplianceEngine
 
 

@@ -21,8 +21,16 @@ import pandas as pd
 from seqopt.arrays import Floats, Ints
 from seqopt.contact._elastic_limits import _STRESS_MARGIN, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, _mortar_name
-from seqopt.engines._kinds import ChoosingEngine, OpeningEngine, linear_limit
-from seqopt.engines.interface import Engine, Fields, Want, _empty_site, select_sets
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines.interface import (
+    Engine,
+    Fields,
+    OpeningEngine,
+    Want,
+    _empty_site,
+    linear_limit,
+    select_sets,
+)
 from seqopt.engines.registry import _chooser_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.network import Network
@@ -82,14 +90,14 @@ class LinearRange:
 
     def __init__(self, engine: Engine) -> None:
         self.engine, self._network = engine, engine.network
-        self._breaks = isinstance(engine, ChoosingEngine | OpeningEngine)
-        self._engine = engine.rigid if isinstance(engine, ChoosingEngine) else engine
+        self._breaks = isinstance(engine, AutoEngine | OpeningEngine)
+        self._engine = engine.rigid if isinstance(engine, AutoEngine) else engine
         self._known: dict[_Key, Floats] = {}
         self.offs: dict[_Key, float] = {}
         thickness = engine.network.springs.thickness
         self._thickness = np.where(np.isnan(thickness) | self._breaks, np.inf, thickness)
         self.unchecked: tuple[str, ...] = ()
-        chooser = engine if isinstance(engine, ChoosingEngine) else _chooser_of(engine)
+        chooser = engine if isinstance(engine, AutoEngine) else _chooser_of(engine)
         self.mortar = EPOXY if chooser is None else chooser.mortar
         self._limits = None if chooser is None else chooser.limits
         try:

@@ -11,8 +11,8 @@ import seqopt
 from seqopt._cli.main import main
 from seqopt.contact.mortar import bond_mortar
 from seqopt.engines._auto import AutoEngine, find_level
-from seqopt.engines._kinds import FlatEngine, Level
-from seqopt.engines.interface import Want
+from seqopt.engines._planar import PlanarEngine
+from seqopt.engines.interface import Level, Want
 from seqopt.engines.registry import (
     _chooser_of,
     engine_for,
@@ -44,7 +44,7 @@ def test_it_chooses_as_rigid_bricks_do_and_asks_no_joint(scene, level, schedule,
     monkeypatch.setattr(AutoEngine, "solve", lambda *_: pytest.fail("set by set"))
     plan = seqopt.optimize(scene, schedule)
     assert not any(want & (Want.JOINTS | Want.BRICKS) for want in wanted)
-    assert isinstance(plan.engine, FlatEngine) == (level is Level.PLANAR)
+    assert isinstance(plan.engine, PlanarEngine) == (level is Level.PLANAR)
     other = seqopt.optimize(scene, schedule, engine="compliance")
     assert plan.objective == pytest.approx(other.objective, rel=1e-9)
     assert [step.grips for step in plan.steps] == [step.grips for step in other.steps]
@@ -82,7 +82,7 @@ def test_it_chooses_anew_where_it_is_made_anew():
     )
     assert find_level(seqopt.build_network(bent)).level is Level.RIGID
     assert type(engine_for(level, bent)) is ComplianceEngine
-    assert isinstance(unpacked(packed(level)), FlatEngine)
+    assert isinstance(unpacked(packed(level)), PlanarEngine)
     planar, rigid = (recipe_of(make_engine(name, WALL)).key for name in ("planar", "compliance"))
     assert recipe_of(level).key == planar != rigid
 

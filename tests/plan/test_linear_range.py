@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.engines._kinds import linear_limit
+from seqopt.engines.interface import linear_limit
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError, TimeUpError
 from seqopt.judge._step_checks import check_shape
 from seqopt.judge.schedules import judge_schedule

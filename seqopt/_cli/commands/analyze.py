@@ -17,9 +17,9 @@ from seqopt._interrupts import ending
 from seqopt.arms._kept import arm_faults
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._kinds import ChoosingEngine, Level, OpeningEngine
+from seqopt.engines._auto import AutoEngine
 from seqopt.engines.diagnosis import Finding, diagnose
-from seqopt.engines.interface import Engine, Fields, Want
+from seqopt.engines.interface import Engine, Fields, Level, OpeningEngine, Want
 from seqopt.engines.registry import USUAL, provenance, recipe_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
@@ -170,7 +170,7 @@ def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:
     if isinstance(error, MechanismError):
         return error
     recipe = recipe_of(engine)
-    if isinstance(engine, ChoosingEngine | OpeningEngine):
+    if isinstance(engine, AutoEngine | OpeningEngine):
         mortar = EPOXY if recipe is None else recipe.options.get("mortar", EPOXY)
         assert isinstance(mortar, Mortar)  # as `make_engine` keeps it
         with suppress(SceneError):  # faces that are not known prove nothing
@@ -244,7 +244,7 @@ def _late(
     if computed == steps:
         return (), Status.DONE
     so_far = f"{computed} of {steps} steps computed" if computed else "no step computed"
-    levels = engine.tally if isinstance(engine, ChoosingEngine) else {}
+    levels = engine.tally if isinstance(engine, AutoEngine) else {}
     dear = sum(sets for choice, sets in levels.items() if choice.level is Level.DISCRETE)
     if dear:
         so_far += f", {dear} by discrete elements, which are what takes long"

@@ -10,8 +10,8 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, frozen
-from seqopt.engines._kinds import FAR
 from seqopt.engines.discrete._system import System
+from seqopt.engines.interface import FAR
 
 _ITERATIONS = 60
 _BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
