@@ -27,10 +27,11 @@ from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25
+from experiments.study.parts.ranks import rank_choice
 from seqopt import three_robot_loop
 from seqopt.arrays import Floats
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.layers.ranking import TIED, rank_choice, rank_of
+from seqopt.graph.layers.ranking import TIED, rank_of
 from seqopt.problem.criteria import RankSum, _mean_ranks, equal
 from seqopt.report._style import BLUE, GRAY, GREEN, PURPLE, VERMILION, dress, styled
 from seqopt.responses._choices import StepChoices

@@ -145,31 +145,6 @@ def _share_out(
 
 
 @dataclass(frozen=True, repr=False)
-class GivenSteps(Terse):
-    """Steps without an open grip, in which bricks stand; their responses are computed once."""
-
-    engine: Engine
-    schedule: Schedule
-
-    @cached_property
-    def steps(self) -> tuple[Step, ...]:
-        """The steps, in order."""
-        some = (step for step in self.schedule.steps if not step.moves and step.bricks)
-        return tuple(Step(s.number, s.kind, s.bricks, cast(Grips, s.grips)) for s in some)
-
-    @cached_property
-    def _table(self) -> pd.DataFrame:
-        return analyze(self.engine, self.steps)
-
-    def table(self, names: Iterable[str] = ()) -> pd.DataFrame:
-        """Return their table of `seqopt.analyze`, with the tolerances among some responses."""
-        table = self._table
-        for name in {*filter(is_tolerance, names)}:
-            table = with_tolerances(self.engine, self.steps, table, name)
-        return table
-
-
-@dataclass(frozen=True, repr=False)
 class Evaluation(Terse):
     """The responses of all choices of a schedule, computed when they are first asked for.
 
@@ -194,9 +169,21 @@ class Evaluation(Terse):
     more_work: float = 0.0
 
     @cached_property
-    def given(self) -> GivenSteps:
-        """The steps without an open grip."""
-        return GivenSteps(self.engine, self.schedule)
+    def given(self) -> tuple[Step, ...]:
+        """The steps without an open grip in which bricks stand, in order."""
+        some = (step for step in self.schedule.steps if not step.moves and step.bricks)
+        return tuple(Step(s.number, s.kind, s.bricks, cast(Grips, s.grips)) for s in some)
+
+    @cached_property
+    def _given_table(self) -> pd.DataFrame:
+        return analyze(self.engine, self.given)
+
+    def table_of_given(self, names: Iterable[str]) -> pd.DataFrame:
+        """Return the table of `seqopt.analyze` of given steps, with tolerances among responses."""
+        table = self._given_table
+        for name in {*filter(is_tolerance, names)}:
+            table = with_tolerances(self.engine, self.given, table, name)
+        return table
 
     @property
     def work(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from seqopt.graph.layers.ranking import rank_choice
+from experiments.study.parts.ranks import rank_choice
 from seqopt.plan.solving import solve
 from seqopt.study.published import published_choice, published_plan
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
+from experiments.study.parts.ranks import rank_choice
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.layers.ranking import rank_choice
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import CLOSEST, printed_steps, published_choice
 

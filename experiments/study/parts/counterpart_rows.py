@@ -16,12 +16,12 @@ import pandas as pd
 
 from experiments.calibration.parts.barrel_vaults import BED, chain, fit, laws, vaults
 from experiments.harness.yardstick import ROUNDING, STEPS, VALUES, error, inner_nodes, moved
+from experiments.study.parts.ranks import rank_choice
 from seqopt.arrays import Floats
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.layers.ranking import rank_choice
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report.comparison import Comparison, compare

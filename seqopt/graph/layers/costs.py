@@ -89,23 +89,12 @@ class LayeredCosts(FrozenValue):
         """Return the largest cost that a choice meets; infinite if it is not allowed."""
         return max(self.parts(choice))
 
-    def to_go(self, aim: Aim) -> list[Floats]:
-        """Return the least cost from each candidate (C_k,) to the end, its own included."""
-        out, join = [self.single[-1]], aim.join
-        for own, pairs in zip(self.single[-2::-1], self.shared[:0:-1], strict=True):
-            out.insert(0, join(own, join(pairs, out[0]).min(axis=1)))
-        return out
-
-    def reached(self, aim: Aim) -> list[Floats]:
-        """Return the least cost up to each candidate (C_k,), its own included."""
-        out, join = [aim.join(self.single[0], self.shared[0][0])], aim.join
-        for own, pairs in zip(self.single[1:], self.shared[1:], strict=True):
-            out.append(join(own, join(out[-1][:, None], pairs).min(axis=0)))
-        return out
-
     def least(self, aim: Aim) -> float:
         """Return the least total, or largest cost, of any choice; infinite if there is none."""
-        return float(self.reached(aim)[-1].min())
+        reached, join = np.zeros(1), aim.join
+        for k, arcs in enumerate(self.arcs(aim)):
+            reached = (join(reached[:, None], arcs) if k else arcs).min(axis=0)
+        return float(reached.min())
 
 
 def _copied(costs: Floats) -> Floats:

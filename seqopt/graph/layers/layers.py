@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain, pairwise
 
 import numpy as np
@@ -204,12 +204,13 @@ class Layers(Shown):
     def _in_scenarios(self) -> tuple[tuple[ScenarioCosts, ...], float]:
         """The costs in every scenario, and what they took from the first to the last, s."""
         start, resources = time.perf_counter(), self.evaluation.resources
-        tasks = _scenarios_of(self)
-        progress = Progress("scenarios", len(tasks), resources.progress)
+        asked, recipes = self._in_all, [recipe_for(self.engine, scene) for scene in self.scenes]
+        progress = Progress("scenarios", len(recipes), resources.progress)
         with hire(resources.executor, resources.workers) as crew:
             if crew is not None:
-                pickled(tasks[0], self.criterion)  # says if tasks cannot be sent
-            done = map_ordered(_Scenario.costs, tasks, crew, done=lambda *_: progress.add(1))
+                pickled((asked, recipes[0]), self.criterion)  # says if tasks cannot be sent
+            tasks, each = enumerate(recipes, start=1), partial(_costs_in, asked)
+            done = map_ordered(each, tasks, crew, done=lambda *_: progress.add(1))
             with closing(done) as found:
                 return tuple(found), time.perf_counter() - start
 
@@ -217,8 +218,19 @@ class Layers(Shown):
     def from_cache(self) -> Iterator[Layers]:
         """The problems whose responses may come from files, one for every scenario."""
         if self.evaluation.resources.cache is None:
-            return iter(())
-        return (each.problem for each in _scenarios_of(self)) if self.scenes else iter((self,))
+            return
+        for scene in self.scenes:
+            yield _in_scenario(self._in_all, recipe_for(self.engine, scene))
+        if not self.scenes:
+            yield self
+
+    @property
+    def _in_all(self) -> _Asked:
+        """What is asked in every scenario, by a criterion with the numbers of the nominal scene."""
+        evaluation = self.evaluation
+        also = getattr(evaluation.wanted, "also", ())
+        wanted = ResponsesAsked(self.criterion, self.limits, also)
+        return evaluation.schedule, wanted, evaluation.resources.alone()
 
     @cached_property
     def _sums(self) -> tuple[LayeredCosts, float]:
@@ -247,11 +259,11 @@ class Layers(Shown):
     @property
     def given(self) -> tuple[Step, ...]:
         """The steps without an open grip, in which bricks stand."""
-        return self.evaluation.given.steps
+        return self.evaluation.given
 
     def given_values(self, response: str) -> Floats:
         """Return a response of every given step (n,), SI units; NaN where a robot does not grip."""
-        table = self.evaluation.given.table([response])
+        table = self.evaluation.table_of_given([response])
         return _response_along(self.schedule.scene, table, response)
 
     @cached_property
@@ -347,7 +359,7 @@ class Layers(Shown):
         _require_carried(self.schedule, [self.engine.network.scene, *self.scenes])
         if self.scenes or not (self.limits and self.given):
             return
-        table = self.evaluation.given.table(limit.response for limit in self.limits)
+        table = self.evaluation.table_of_given(limit.response for limit in self.limits)
         for excess in _excesses(self.schedule.scene, table, self.limits):
             raise InfeasibleError(
                 f"{excess}, where no grip is left to choose; relax the limit or change the schedule"
@@ -371,48 +383,27 @@ class Layers(Shown):
         return self.schedule.fill(self.nodes(choice))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _Scenario:
-    """One scenario, as it is sent to a worker.
-
-    ``schedule``: the nominal one, whose steps and candidates hold in every scenario; ``asked``: by
-    a criterion with the numbers of the nominal scene, by limits, and beside these.
-    """
-
-    number: int
-    recipe: Recipe
-    schedule: Schedule
-    asked: ResponsesAsked
-    resources: Resources
-
-    @property
-    def problem(self) -> Layers:
-        """The placement problem of this scenario."""
-        evaluation = Evaluation(self.recipe.make(), self.schedule, self.asked, self.resources)
-        return Layers(self.asked.criterion, self.asked.limits, evaluation)
-
-    def costs(self) -> ScenarioCosts:
-        """Return what choices cost in it."""
-        problem = self.problem
-        evaluation = problem.evaluation
-        try:
-            problem.require_possible()
-            return ScenarioCosts(problem.sums, problem.peaks, evaluation.models, evaluation.seconds)
-        except MechanismError as error:
-            raise MechanismError(f"scenario {self.number}: {error}", error.mode) from error
-        except SolverError as error:
-            raise SolverError(f"scenario {self.number}: {error}") from error
+_Asked = tuple[Schedule, ResponsesAsked, Resources]  # the same in every scenario
 
 
-def _scenarios_of(problem: Layers) -> tuple[_Scenario, ...]:
-    also = getattr(problem.evaluation.wanted, "also", ())
-    asked = ResponsesAsked(problem.criterion, problem.limits, also)
-    alone = problem.evaluation.resources.alone()
-    recipes = (recipe_for(problem.engine, scene) for scene in problem.scenes)
-    return tuple(
-        _Scenario(number, recipe, problem.schedule, asked, alone)
-        for number, recipe in enumerate(recipes, start=1)
-    )
+def _in_scenario(asked: _Asked, recipe: Recipe) -> Layers:
+    """Return the problem of one scenario, by the recipe of its engine."""
+    schedule, wanted, resources = asked
+    evaluation = Evaluation(recipe.make(), schedule, wanted, resources)
+    return Layers(wanted.criterion, wanted.limits, evaluation)
+
+
+def _costs_in(asked: _Asked, numbered: tuple[int, Recipe]) -> ScenarioCosts:
+    """Return what choices cost in one scenario, which is named where that fails."""
+    number, problem = numbered[0], _in_scenario(asked, numbered[1])
+    evaluation = problem.evaluation
+    try:
+        problem.require_possible()
+        return ScenarioCosts(problem.sums, problem.peaks, evaluation.models, evaluation.seconds)
+    except MechanismError as error:
+        raise MechanismError(f"scenario {number}: {error}", error.mode) from error
+    except SolverError as error:
+        raise SolverError(f"scenario {number}: {error}") from error
 
 
 def in_scenarios(nominal: Layers, scenes: Sequence[Scene], over: RobustAim) -> Layers:

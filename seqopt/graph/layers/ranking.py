@@ -1,12 +1,10 @@
-"""Where chosen candidates rank, and what the two ways to rank pairs make of a choice."""
+"""Where candidates rank, and what the two ways to rank pairs make of a choice."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
-import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.graph.layers.compiled import best_in_order
@@ -90,29 +88,3 @@ def rank_of(costs: Floats, chosen: int) -> int:
     """
     tie = TIED * float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
     return int((costs < costs[chosen] - tie).sum()) + 1
-
-
-def rank_choice(problem: Layers, choice: Sequence[int]) -> pd.DataFrame:
-    """Return where chosen nodes rank, move by move, the choice before each being fixed.
-
-    ``choice``: a candidate for every move. Result: a row per move. Columns: ``move``, ``step``,
-    ``bricks``, ``robot``, ``node``, ``candidates`` (how many there are), ``first_in_window`` (the
-    node that ranks first), and three ranks: ``rank_in_window`` of the move alone, ``rank_overlap``
-    with the least sum of costs to the end of the build added, ``rank_peak`` with the least worst
-    cost to the end.
-    """
-    sums, peaks = problem.sums.to_go(Aim.SUM), problem.peaks.to_go(Aim.PEAK)
-    rows = []
-    for k, (before, now) in enumerate(pairwise((0, *choice))):
-        move, window = problem.schedule.moves[k], move_costs(problem, k, before)
-        what = {"move": k + 1, "step": move.step, "bricks": move.bricks, "robot": move.robot}
-        ranks = {
-            "node": move.candidates[now],
-            "candidates": len(move.candidates),
-            "first_in_window": move.candidates[int(window.argmin())],
-            "rank_in_window": rank_of(window, now),
-            "rank_overlap": rank_of(problem.sums.shared[k][before] + sums[k], now),
-            "rank_peak": rank_of(np.maximum(problem.peaks.shared[k][before], peaks[k]), now),
-        }
-        rows.append(what | ranks)
-    return pd.DataFrame(rows)
