@@ -247,7 +247,7 @@ def _legend(figure: Figure, speeds: Sequence[SpeedTable], across: int) -> None:
     marks += [
         Line2D([], [], **plain_mark, label="proves its plan"),
         Line2D([], [], **plain_mark, mfc="white", label="heuristic"),
-        Line2D([], [], **plain_mark, alpha=PALE, label="beaten by another"),
+        Line2D([], [], **plain_mark, alpha=PALE, label="dominated"),
         Line2D([], [], **plain_mark | {"mfc": "none", "ms": 11}, label="take this"),
         Line2D([], [], marker="s", ls="none", ms=9, color=GREEN, alpha=0.2, label="best corner"),
     ]

@@ -141,7 +141,7 @@ class SpeedTable:
             "above the best, %": 100 * table["gap"],
             "error of responses": table["error"],
             "how it ended": table["status"],
-            "not beaten": np.where(self.kept, "yes", ""),
+            "not dominated": np.where(self.kept, "yes", ""),
         }
         return pd.DataFrame(columns)
 
