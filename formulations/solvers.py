@@ -84,8 +84,9 @@ def minimize_by_highs(
         seconds = time.perf_counter() - start
         offset = float(inverse[-1].get("offset", 0.0))
         _listen(solver, watch, lambda value: told(value + offset))
-        for name in ("primal", "dual", "mip") if tolerance is not None else ():
-            solver.setOptionValue(f"{name}_feasibility_tolerance", tolerance)
+        if tolerance is not None:
+            for name in ("primal", "dual", "mip"):
+                solver.setOptionValue(f"{name}_feasibility_tolerance", tolerance)
         if not whole:
             solver.setOptionValue("solver", "ipm")  # ends in a vertex, on large graphs far sooner
         status = _end(solver, watch.left)

@@ -93,7 +93,7 @@ def by_weights(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) 
 def _by_labels(graph: Graph, aim: RobustAim, known: LeastTotal, watch: Watch) -> LeastTotal:
     """Return the best path by labels, vectors of totals that weights bound."""
     before = LabelSearch(None, known.value, known.bound)
-    found = widening(_Totals(graph, aim, known.weights), (), before, watch, LABELS)
+    found = widening(_Totals(graph, aim, known.weights), np.zeros(0), before, watch, LABELS)
     path = known.path if found.arcs is None else tuple(graph.target[found.arcs].tolist())
     return LeastTotal(path, found.cost, found.bound, known.weights)
 

@@ -168,7 +168,8 @@ class Sweep:
         others = np.delete(fits, self._aim, axis=1).all(axis=1)
         late = bounds[others & ~fits[:, self._aim], self._aim]
         self._found.left_out = min(self._found.left_out, float(late.min(initial=np.inf)))
-        return labels.only(fits.all(axis=1))
+        within: Bools = np.asarray(fits.all(axis=1))
+        return labels.only(within)
 
     def _at_end(self, labels: Labels) -> tuple[float, int]:
         """Return the least value of labels at ends, and which it is."""
@@ -251,7 +252,7 @@ class LabelSearch(NamedTuple):
 
 def widening(
     growth: Growth,
-    caps: Sequence[float],
+    caps: Floats,
     best: LabelSearch,
     watch: Watch,
     most: int,

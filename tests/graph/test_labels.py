@@ -31,11 +31,11 @@ def test_the_cheapest_path_within_two_caps_is_found(graph, caps):
         growth = CappedSums(
             graph, graph.amounts[:, 0], graph.amounts[:, 1:], np.array(caps), multipliers
         )
-        found = widening(growth, caps, NONE, Watch(), 10_000)
+        found = widening(growth, np.array(caps), NONE, Watch(), 10_000)
         assert (found.cost, found.bound) == pytest.approx((least, least))
         if np.isfinite(least):
             assert (graph.amounts[found.arcs, 1:].sum(axis=0) <= caps).all()
-        one = widening(growth, caps, NONE, Watch(), 1)
+        one = widening(growth, np.array(caps), NONE, Watch(), 1)
         assert one.bound <= least * (1 + 1e-9) <= one.cost * (1 + 2e-9)
 
 
@@ -44,9 +44,9 @@ def test_the_cheapest_path_within_two_caps_is_found(graph, caps):
 def test_the_least_total_over_scenarios_is_found(graph, aim):
     least = min((aim.value(totals) for totals in taken(graph)), default=np.inf)
     growth = _Totals(graph, aim, np.full(3, 1 / 3))
-    found = widening(growth, (), NONE, Watch(), 10_000)
+    found = widening(growth, np.zeros(0), NONE, Watch(), 10_000)
     assert (found.cost, found.bound) == pytest.approx((least, least))
-    one = widening(growth, (), NONE, Watch(), 1)
+    one = widening(growth, np.zeros(0), NONE, Watch(), 1)
     assert one.bound <= least * (1 + 1e-9) <= one.cost * (1 + 2e-9)
 
 
