@@ -168,8 +168,7 @@ class Sweep:
         others = np.delete(fits, self._aim, axis=1).all(axis=1)
         late = bounds[others & ~fits[:, self._aim], self._aim]
         self._found.left_out = min(self._found.left_out, float(late.min(initial=np.inf)))
-        within: Bools = np.asarray(fits.all(axis=1))
-        return labels.only(within)
+        return labels.only(np.flatnonzero(fits.all(axis=1)))
 
     def _at_end(self, labels: Labels) -> tuple[float, int]:
         """Return the least value of labels at ends, and which it is."""
@@ -194,7 +193,7 @@ class Sweep:
             arc = arc + np.arange(len(row))
             taken = self._growth.follow(labels.only(row), arc)
             after = Labels(self._growth.target[arc], taken, arc, first + row)
-            yield self._within(after.only(np.isfinite(taken).all(axis=1)))
+            yield self._within(after.only(np.flatnonzero(np.isfinite(taken).all(axis=1))))
 
     def _trace(self, number: int) -> None:
         """Note the path of a label, its start left out."""
