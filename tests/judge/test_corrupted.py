@@ -113,8 +113,7 @@ def test_a_margin_that_the_search_gets_wrong_is_seen(space, amount, shift, monke
     def wrong(name, exists):
         return tuple(value + shift for value in bisected(name, exists))
 
-    for module in ("seqopt.plan.search._margin_search", "formulations.states._search"):
-        monkeypatch.setattr(f"{module}.bisected", wrong)
+    monkeypatch.setattr("seqopt.plan.search._margin_search.bisected", wrong)
     assert is_refused(posed(space, amount))
 
 
