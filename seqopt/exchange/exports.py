@@ -274,11 +274,11 @@ _BLOCKS: dict[str, Callable[[Scene], str]] = {"boxes": _boxes_csv, "obj": _block
 TASKS = tuple(_TASKS)
 """Formats of what robots do, with postures where they have arms."""
 EXPORTS = (*_PLAIN, *_TASKS, _ASSEMBLY, *_BLOCKS)
-_NEVER = ("nodes", "joints", "ground ends", "robots", "loads", "steps")
+_NEVER = ("nodes", "joints", "ground ends", "robots", "loads")
 LOST: dict[str, tuple[str, ...]] = {
     _ASSEMBLY: ("densities", *_NEVER),
-    "boxes": ("shapes other than boxes", *_NEVER),
-    "obj": ("densities", "the order", *_NEVER),
+    "boxes": ("shapes other than boxes", *_NEVER, "steps"),
+    "obj": ("densities", "the order", *_NEVER, "steps"),
 }
 """What a scene is without, once it was exported and imported again; other formats are no scenes."""
 

@@ -67,9 +67,8 @@ def run(asked: Export) -> Answer:
     text = export_plan(scene, steps, asked.format, source, distance, postures)
     said, lost = f"{len(steps)} steps", LOST.get(asked.format)
     if lost:
-        said = f"{len(scene.bricks)} blocks, without {', '.join(lost)},"
-    elif lost is not None:
-        said = f"the scene and its {len(steps)} steps"
+        plan = "" if "steps" in lost else f" and {said}"
+        said = f"{len(scene.bricks)} blocks{plan}, without {', '.join(lost)},"
     facts = {"steps": len(steps), "format": asked.format}
     notes = (*taken, *notes)
     answer = Answer(facts, notes=notes, value=text, scene=scene)
