@@ -17,7 +17,7 @@ from seqopt.graph.formulation import End
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE
-from seqopt.responses._range import Moved, most_moved
+from seqopt.responses._grip_sets import Moved, most_moved
 from seqopt.work._clock import INTERRUPT, Clock
 
 RANGE = "how far it leaves the linear range"  # what it is called where there was no time for it

@@ -29,7 +29,7 @@ from seqopt.plan._range import INTERRUPTED, RANGE, keeping, leaves
 from seqopt.plan.solving import states_of
 from seqopt.problem.amounts import REGRIPS, STEPS, Amount
 from seqopt.problem.problem import Problem
-from seqopt.responses._range import Moved, most_moved
+from seqopt.responses._grip_sets import Moved, most_moved
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene import Order
 from seqopt.sequence.rules import Ending

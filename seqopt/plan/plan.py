@@ -27,7 +27,7 @@ from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
 from seqopt.problem.standing import Standing
 from seqopt.responses._choices import window_models
-from seqopt.responses._range import Moved
+from seqopt.responses._grip_sets import Moved
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import (
     FAR_OFF,

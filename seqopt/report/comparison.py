@@ -28,7 +28,7 @@ from seqopt.problem.requirements import LINEAR_RANGE, Criterion, Limit, _prop_fa
 from seqopt.report._speed._measure import speed_accuracy
 from seqopt.report._speed._table import SpeedTable
 from seqopt.responses._enough import Enough, what_was_enough
-from seqopt.responses._range import Moved
+from seqopt.responses._grip_sets import Moved
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources

@@ -38,7 +38,6 @@ from seqopt.engines.interface import Engine, Level, LevelChoice, Want
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, MemoryShortError, SceneError
-from seqopt.responses._possible import for_arms
 from seqopt.responses._props import excess_of, with_props
 from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits
 from seqopt.responses.quantities import (
@@ -49,6 +48,8 @@ from seqopt.responses.quantities import (
     require_finite,
     robot_response,
 )
+from seqopt.scene._armed import go_together
+from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.work._threads import one_thread
 from seqopt.work._workers import free_memory
@@ -102,6 +103,13 @@ class Answers(FrozenValue):
     values: Mapping[str, Floats]
     forces: Floats
     tally: _Tally = ()
+
+
+def join_answers(parts: Sequence[Answers]) -> Answers:
+    """Return the answers to blocks one after the other, one at least."""
+    values = {name: np.concatenate([a.values[name] for a in parts]) for name in parts[0].values}
+    tally = sum((Counter(dict(part.tally)) for part in parts), Counter[object]())
+    return Answers(values, np.concatenate([part.forces for part in parts]), tuple(tally.items()))
 
 
 def answer(engine: Engine, block: Block) -> Answers:
@@ -342,8 +350,8 @@ class Batch(FrozenValue):
 
     def choices(self, answers: Sequence[Answers]) -> list[StepChoices]:
         """Return the responses of every step's choices. ``answers``: to the blocks."""
-        values = {k: np.concatenate([a.values[k] for a in answers]) for k in answers[0].values}
-        forces = np.concatenate([a.forces for a in answers])
+        whole = join_answers(answers)
+        values, forces = whole.values, whole.forces
         ends = np.cumsum([ok.sum() for ok in self.possible])
         out = []
         for step, mine, ok, end in zip(self.steps, self.names, self.possible, ends, strict=True):
@@ -402,6 +410,21 @@ def batch_of(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> B
     rows = np.concatenate([_grip_rows(schedule, step, nodes[ok]) for step, nodes, ok in parts])
     states, state = distinct(np.sort(rows, axis=1))
     return Batch(schedule, tuple(steps), names, rows, possible, states, state)
+
+
+def for_arms(scene: Scene, step: OpenStep, rows: Ints) -> Bools:
+    """Return which choices (P,) of a step arms can be in.
+
+    ``rows`` (P, r): nodes held, by the robots that hold any, in their order.
+    """
+    if not scene.has_arms:
+        return np.ones(len(rows), dtype=bool)
+    nodes = scene.placed_nodes
+    order = np.argsort(nodes)
+    held = np.zeros((len(rows), len(scene.robots)), dtype=np.int64)
+    robots = [robot for robot, grip in enumerate(step.grips) if grip is not None]
+    held[:, robots] = 1 + order[np.searchsorted(nodes, rows, sorter=order)]
+    return go_together(scene, step.bricks, held)
 
 
 def distinct(rows: Ints) -> tuple[Ints, Ints]:

@@ -15,9 +15,9 @@ from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import chain, islice
-from typing import NamedTuple, cast
+from typing import cast
 
 import numpy as np
 import pandas as pd
@@ -27,121 +27,31 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import MemoryShortError
 from seqopt.responses._blocks import (
     COMPILED,
-    Answers,
     Batch,
     Block,
     StepChoices,
-    Store,
     Wanted,
     _grip_rows,
-    answer,
     batch_of,
     choices_of,
     combinations,
     distinct,
     no_node_twice,
     open_store,
-    packed,
     require_memory,
     steps_of_batches,
-    tally_of,
-    unpacked,
     work,
 )
+from seqopt.responses._grip_sets import answer_blocks
 from seqopt.responses._tolerance import is_tolerance, with_tolerances
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Grips, Step
-from seqopt.work._workers import hire, map_ordered
-from seqopt.work.progress import Progress
 
 CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot
 
 __all__ = ["CHOICE_RESPONSES", "Evaluation", "StepChoices", "Wanted"]
-
-_SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
-_PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
-
-
-class _Portion(NamedTuple):
-    """Blocks that are answered together, and their answers if they are stored."""
-
-    blocks: tuple[Block, ...]
-    stored: list[Answers] | None = None
-
-    @property
-    def work(self) -> float:
-        """About how much work they are, stored or not."""
-        return sum(block.work for block in self.blocks)
-
-
-def _answer_blocks(
-    engine: Engine, blocks: Iterable[Block], total: float, resources: Resources
-) -> Generator[Answers, None, None]:
-    """Return the answers to blocks of states, in their order.
-
-    ``blocks``: taken as they are needed; ``total``: about how much work they are.
-    """
-    store, tally = open_store(resources.cache, engine), tally_of(engine)
-    progress = Progress("responses", total, resources.progress)
-
-    def count(answers: list[Answers]) -> None:
-        for what, sets in chain.from_iterable(found.tally for found in answers):
-            tally[what] = tally.get(what, 0) + sets
-
-    def stored(portion: _Portion) -> list[Answers] | None:
-        if portion.stored is not None:
-            count(portion.stored)
-            progress.add(portion.work)
-        return portion.stored
-
-    def done(portion: _Portion, answers: list[Answers]) -> None:
-        if store is not None:
-            for block, found in zip(portion.blocks, answers, strict=True):
-                store.keep(block, found)
-        if crew is not None:  # else the engine itself has counted
-            count(answers)
-        progress.add(portion.work)
-
-    with hire(resources.executor, resources.workers) as crew:
-        task = partial(_answer_all, engine if crew is None else packed(engine))
-        enough = None if crew is None else total / (_PORTIONS * crew.workers)
-        portions = _share_out(blocks, store, enough)
-        with closing(map_ordered(task, portions, crew, stored, done)) as results:
-            for answers in results:
-                yield from answers
-
-
-def _answer_all(engine: Engine | bytes, portion: _Portion) -> list[Answers]:
-    return [answer(unpacked(engine), block) for block in portion.blocks]
-
-
-def _share_out(
-    blocks: Iterable[Block], store: Store | None, enough: float | None
-) -> Iterator[_Portion]:
-    """Return portions of about equal work, each of neighboring blocks; stored ones apart.
-
-    Engines that grow with the structure serve ascending brick counts best, and what all states of
-    one share they prepare once: portions keep the order of the blocks, and end between brick counts
-    unless one has several portions' work.
-
-    ``enough``: work of a portion; None where each block is one.
-    """
-    mine: list[Block] = []
-    for block in blocks:
-        found = None if store is None else store.find(block)
-        if mine and enough is not None:
-            several = 1 if block.bricks != mine[-1].bricks else _SEVERAL
-            if found is not None or sum(each.work for each in mine) >= several * enough:
-                yield _Portion(tuple(mine))
-                mine = []
-        if found is not None or enough is None:
-            yield _Portion((block,), None if found is None else [found])
-        else:
-            mine.append(block)
-    if mine:
-        yield _Portion(tuple(mine))
 
 
 @dataclass(frozen=True, repr=False)
@@ -277,7 +187,8 @@ def _by_level(evaluation: Evaluation) -> Generator[tuple[list[StepChoices], int]
 
     total = evaluation.work
     engine, resources = evaluation.engine, evaluation.resources
-    with closing(_answer_blocks(engine, blocks(), total, resources)) as answers:
+    store = open_store(resources.cache, engine)
+    with closing(answer_blocks(engine, blocks(), total, resources, store)) as answers:
         for first in answers:  # blocks, and so `under_way`, are taken no earlier
             groups, here = under_way.popleft(), chain([first], answers)
             yield (  # in no variable: what is not kept is free while the next ones are computed

@@ -6,14 +6,18 @@ solved in batches, each of them once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import cached_property, partial
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.interface import Engine
+from seqopt.engines.interface import Engine, linear_limit
 from seqopt.errors import MechanismError
 from seqopt.responses._blocks import (
     BLOCK,
@@ -22,13 +26,17 @@ from seqopt.responses._blocks import (
     Block,
     Store,
     answer,
+    join_answers,
     open_store,
     packed,
+    tally_of,
     unpacked,
     work,
 )
 from seqopt.responses.resources import HERE, Resources
+from seqopt.sequence.steps import Step
 from seqopt.work._workers import hire, map_ordered
+from seqopt.work.progress import Progress
 
 
 class KnownRows:
@@ -176,37 +184,153 @@ def solve_sets(
     shared = max(64, len(grips) // 32)  # sets of a task
     most = BLOCK if alone and store is None else min(BLOCK, shared)
     parts = [replace(sets, grips=grips[at : at + most]) for at in range(0, len(grips), most)]
-    workers = (resources.executor, resources.workers) if len(parts) > 1 else (None, 1)
-
-    def known(part: Block) -> Floats | None:
-        found = None if store is None else store.find(part)
-        return None if found is None else _columns(part, found)
-
-    def done(part: Block, rows: Floats) -> None:
-        if store is not None and np.isfinite(rows).all():
-            values = dict(zip(part.names, rows.T, strict=False))
-            store.keep(part, Answers(values, rows[:, len(values) :]))
-
-    with hire(*workers) as crew:
-        solved = partial(_solved, engine if crew is None else packed(engine))
-        rows = [*map_ordered(solved, parts, crew, known, done)]
-    return np.concatenate([np.zeros((0, len(sets.names) + grips.shape[1])), *rows])
-
-
-def _solved(engine: Engine | bytes, part: Block) -> Floats:
-    """Return what is known of a few sets; those that leave something loose are found by halving."""
-    try:
-        return _columns(part, answer(unpacked(engine), part))
-    except MechanismError:
-        count = len(part.grips)
-        if count == 1:
-            return np.full((1, len(part.names) + part.grips.shape[1]), np.inf)
-        halves = part.grips[: count // 2], part.grips[count // 2 :]
-        return np.concatenate([_solved(engine, replace(part, grips=half)) for half in halves])
+    quiet = replace(resources, progress=None) if len(parts) > 1 else resources.alone()
+    found = answer_blocks(engine, parts, sets.work, quiet, store, loose=True)
+    none = np.zeros((0, len(sets.names) + grips.shape[1]))
+    return np.concatenate([none, *(_columns(sets, part) for part in found)])
 
 
 def _columns(part: Block, found: Answers) -> Floats:
     return np.column_stack([*(found.values[name] for name in part.names), found.forces])
+
+
+_SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
+_PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
+
+
+class _Portion(NamedTuple):
+    """Blocks that are answered together, and their answers if they are stored."""
+
+    blocks: tuple[Block, ...]
+    stored: list[Answers] | None = None
+
+    @property
+    def work(self) -> float:
+        """About how much work they are, stored or not."""
+        return sum(block.work for block in self.blocks)
+
+
+def answer_blocks(
+    engine: Engine,
+    blocks: Iterable[Block],
+    total: float,
+    resources: Resources,
+    store: Store | None = None,
+    *,
+    loose: bool = False,
+) -> Generator[Answers, None, None]:
+    """Return the answers to blocks of states, in their order.
+
+    ``blocks``: taken as they are needed; ``total``: about how much work they are; ``store``: what
+    is known; ``loose``: whether states that leave something loose have infinite answers, which are
+    not stored; else a `MechanismError` is raised.
+    """
+    tally = tally_of(engine)
+    progress = Progress("responses", total, resources.progress)
+
+    def count(answers: list[Answers]) -> None:
+        for what, sets in chain.from_iterable(found.tally for found in answers):
+            tally[what] = tally.get(what, 0) + sets
+
+    def stored(portion: _Portion) -> list[Answers] | None:
+        if portion.stored is not None:
+            count(portion.stored)
+            progress.add(portion.work)
+        return portion.stored
+
+    def done(portion: _Portion, answers: list[Answers]) -> None:
+        if store is not None:
+            for block, found in zip(portion.blocks, answers, strict=True):
+                if not loose or np.isfinite(_columns(block, found)).all():
+                    store.keep(block, found)
+        if crew is not None:  # else the engine itself has counted
+            count(answers)
+        progress.add(portion.work)
+
+    with hire(resources.executor, resources.workers) as crew:
+        task = partial(_answer_all, engine if crew is None else packed(engine), loose=loose)
+        enough = None if crew is None else total / (_PORTIONS * crew.workers)
+        portions = _share_out(blocks, store, enough)
+        with closing(map_ordered(task, portions, crew, stored, done)) as results:
+            for answers in results:
+                yield from answers
+
+
+def _answer_all(engine: Engine | bytes, portion: _Portion, *, loose: bool) -> list[Answers]:
+    solve = _answer_loose if loose else answer
+    return [solve(unpacked(engine), block) for block in portion.blocks]
+
+
+def _answer_loose(engine: Engine, block: Block) -> Answers:
+    """Return answers, infinite of sets that leave something loose: these are found by halving."""
+    count = len(block.grips)
+    try:
+        return answer(engine, block)
+    except MechanismError:
+        if count == 1:
+            infinite = np.full(1, np.inf)
+            return Answers(dict.fromkeys(block.names, infinite), np.full(block.grips.shape, np.inf))
+    halves = block.grips[: count // 2], block.grips[count // 2 :]
+    return join_answers([_answer_loose(engine, replace(block, grips=half)) for half in halves])
+
+
+def _share_out(
+    blocks: Iterable[Block], store: Store | None, enough: float | None
+) -> Iterator[_Portion]:
+    """Return portions of about equal work, each of neighboring blocks; stored ones apart.
+
+    Engines that grow with the structure serve ascending brick counts best, and what all states of
+    one share they prepare once: portions keep the order of the blocks, and end between brick counts
+    unless one has several portions' work.
+
+    ``enough``: work of a portion; None where each block is one.
+    """
+    mine: list[Block] = []
+    for block in blocks:
+        found = None if store is None else store.find(block)
+        if mine and enough is not None:
+            several = 1 if block.bricks != mine[-1].bricks else _SEVERAL
+            if found is not None or sum(each.work for each in mine) >= several * enough:
+                yield _Portion(tuple(mine))
+                mine = []
+        if found is not None or enough is None:
+            yield _Portion((block,), None if found is None else [found])
+        else:
+            mine.append(block)
+    if mine:
+        yield _Portion(tuple(mine))
+
+
+class Moved(NamedTuple):
+    """The largest displacement of any node over the limit of the linear range, and its step."""
+
+    share: float
+    step: int
+
+
+def most_moved(engines: Iterable[Engine], steps: Sequence[Step]) -> Moved:
+    """Return how far any node moves in any step, in the worst of some engines of alike scenes.
+
+    Displacements alone are computed, to six digits: all states with as many bricks and grips at
+    once.
+    """
+    return max((_most_moved(engine, steps) for engine in engines), key=lambda moved: moved.share)
+
+
+def _most_moved(engine: Engine, steps: Sequence[Step]) -> Moved:
+    scene, found = engine.network.scene, [Moved(0.0, 0)]
+    alike = defaultdict[tuple[int, int], dict[tuple[int, ...], int]](dict)
+    for step in steps:
+        grips = scene.grip_numbers(step.grips, step.bricks)
+        if step.bricks:
+            alike[step.bricks, len(grips)].setdefault(grips, step.number)
+    far = linear_limit(scene)
+    for (bricks, count), numbers in alike.items():
+        sets = np.array([*numbers], dtype=np.int64).reshape(len(numbers), count)
+        shift = solve_sets(engine, Block(bricks, sets, ("D_max",)))[:, 0]
+        at = int(shift.argmax())
+        found.append(Moved(float(shift[at]) / far, [*numbers.values()][at]))
+    return max(found, key=lambda moved: moved.share)
 
 
 BAND = 1e-5  # share of a value within which six digits do not decide

@@ -22,7 +22,7 @@ from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits
 from seqopt.report.comparison import compare
-from seqopt.responses._range import Moved, most_moved
+from seqopt.responses._grip_sets import Moved, most_moved
 from tests.builders import scaled, small_arch
 
 FORCES = WeightedSum("forces", (("F_largest", 1.0, 100.0), ("D_max", 1e-6, 1e-3)))  # no ties

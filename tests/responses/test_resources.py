@@ -21,9 +21,9 @@ from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.responses import _blocks as batches
-from seqopt.responses import _choices as division
+from seqopt.responses import _grip_sets as division
 from seqopt.responses._blocks import Block, answer, packed
-from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, _answer_all, _Portion
+from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
@@ -143,6 +143,7 @@ def test_an_engine_that_remembers_is_seen():
 
 def test_the_scene_is_sent_and_no_operators(loop25):
     engine = make_engine("compliance", loop25.scene)
+    engine.solve(1, [[1]])  # what the scene knows of its grips goes along
     before = len(packed(engine))
     assert evaluation(engine, loop25).models == 8642  # operators of all brick counts
     assert len(packed(engine)) == before < 2 * len(pickle.dumps(loop25.scene))
@@ -152,14 +153,14 @@ def test_the_scene_is_sent_and_no_operators(loop25):
 def test_an_engine_is_made_once_for_a_worker(small_blocks, loop25, monkeypatch):
     made = []
     engine = make_engine("compliance", loop25.scene)
-    send = partial(_answer_all, packed(engine))
+    send = partial(division._answer_all, packed(engine), loose=False)
     monkeypatch.setattr(
         "seqopt.engines.registry.make_engine",
         lambda *given, **named: made.append(given) or make_engine(*given, **named),
     )
     with ThreadPoolExecutor(1) as executor:
         for block in blocks()[:3]:
-            asked = _Portion((Block(1, np.array([[1]]), block.names),))
+            asked = division._Portion((Block(1, np.array([[1]]), block.names),))
             sent = executor.submit(send, asked).result()
             assert len(sent) == 1
     assert len(made) == 1

@@ -46,7 +46,7 @@ def asked(monkeypatch):
         calls.append(block.key)
         return plain(engine, block)
 
-    monkeypatch.setattr("seqopt.responses._choices.answer", counted)
+    monkeypatch.setattr("seqopt.responses._grip_sets.answer", counted)
     return calls
 
 
