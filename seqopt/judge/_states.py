@@ -82,8 +82,8 @@ def _ask_engine(problem: States, bricks: int, grips: Ints, *, low_precision: boo
     seen = StateArrays(bricks, nodes, found, borne, most, fit, problem.criterion, grips)
     for each in problem.filters:  # without a twin nothing is refused: a bound stays one
         if each.twin is not None and fit.any():
-            rows = np.flatnonzero(fit)
-            fit[rows] = ~each.twin(seen.only(rows))
+            left = np.flatnonzero(fit)
+            fit[left] = ~each.twin(seen.only(left))
     seen = seen._replace(possible=fit)
     values = np.column_stack([state_values(goal, seen) for goal in problem.goals])
     if problem.spares and bricks == len(problem.network.inner) and not grips.shape[1]:

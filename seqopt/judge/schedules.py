@@ -344,7 +344,7 @@ def _state_columns(problem: States, steps: Sequence[Step], table: _Columns) -> d
 def _forces(problem: States, table: _Columns) -> Floats:
     """Return the sizes (n, robots) of the forces of grips, N; zero where a robot holds nothing."""
     every = [table[force_column(robot)] for robot in problem.network.scene.robots]
-    return np.nan_to_num(np.abs(np.column_stack(every).astype(float)))
+    return np.asarray(np.nan_to_num(np.abs(np.column_stack(every).astype(float))))
 
 
 def _by_bricks(

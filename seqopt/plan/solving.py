@@ -19,6 +19,7 @@ from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._range import best_within
 from seqopt.plan.plan import Plan
 from seqopt.problem.amounts import MINMAX, SUM, Amount
+from seqopt.problem.filters import Filter
 from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, parse_budgets
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
@@ -43,7 +44,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     moves: Schedule | FreeRules,
     criterion: Criterion,
     goals: Sequence[Amount] | str = (),
-    limits: Sequence[Limit | str] | str = (),
+    limits: Sequence[Limit | Filter | str] | str = (),
     *,
     budgets: Sequence[str] | str = (),
     stands: Standing | Mortar | str | None = None,

@@ -201,7 +201,8 @@ class States(Shown):
     @cached_property
     def named(self) -> tuple[str, ...]:
         """The responses that goals, criterion and limits name."""
-        names = [name for part in (*self.goals, *self.filters) for name in part.responses]
+        names = [name for goal in self.goals for name in goal.responses]
+        names += [name for each in self.filters for name in each.responses]
         if any(goal.of_criterion for goal in self.goals):
             names += self.criterion.wanted(1)
         names += [limit.response for limit in self.limits]
@@ -254,7 +255,7 @@ class States(Shown):
             close = self._close(answers, forces, most)
             if close.any():
                 answers[close], forces[close] = self.sets.answers(bricks, held[close])
-        fits = np.isfinite(answers).all(axis=1) & np.isfinite(forces).all(axis=1)
+        fits: Bools = np.isfinite(np.column_stack([answers, forces])).all(axis=1)
         found, places = self._by_name(answers, forces), states[:, : self.space.robots].clip(min=0)
         nodes = self._node_numbers[places]
         seen = StateArrays(bricks, nodes, found, forces, most, fits, self.criterion, states)
