@@ -20,7 +20,6 @@ from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._props import props_table
 from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, _Columns, analyze, grips_table
-from seqopt.sequence._durations import has_durations
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, _check_part
 from seqopt.stability._step_verdicts import step_verdicts
@@ -194,7 +193,9 @@ class ShownBuild(Shown):
     def _timed(self) -> bool:
         """Whether it is known how long it takes: of a part only if where it begins is."""
         whole = bool(self.steps) and self.steps[0].number == 1
-        return (whole or self._begin is not None) and has_durations(self.engine.network.scene)
+        robots = self.engine.network.scene.robots
+        known = bool(robots) and all(robot.durations is not None for robot in robots)
+        return known and (whole or self._begin is not None)
 
     def gantt(
         self, first: int | None = None, last: int | None = None, *, seconds: bool | None = None

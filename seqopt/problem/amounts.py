@@ -27,6 +27,7 @@ from seqopt.problem.standing import MARGINS, StandingSets
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE
 from seqopt.scene._checks import short
+from seqopt.scene.scene import Scene
 
 LARGEST = "F_largest"
 STATE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", LARGEST, TOLERANCE)
@@ -100,8 +101,11 @@ class Amount:
         Of a margin of stability: takes what is known of grip sets, and these; returns (n, 2).
     of_criterion : bool
         Whether it is the criterion's.
-    needs_stays : bool
-        Whether states must tell where a free robot held last, as for its travel.
+    needs_stays : bool or callable
+        Whether states must tell where a free robot held last, as for its travel; or takes the
+        scene and returns that.
+    check : callable, optional
+        Takes the problem; raises an error where it cannot be asked for.
 
     Examples
     --------
@@ -122,7 +126,8 @@ class Amount:
         default=None, compare=False
     )
     of_criterion: bool = False
-    needs_stays: bool = False
+    needs_stays: bool | Callable[[Scene], bool] = field(default=False, compare=False)
+    check: Callable[[Any], None] | None = field(default=None, compare=False)
 
     def __str__(self) -> str:
         return self.name
@@ -140,6 +145,10 @@ class Amount:
     def has_few_digits(self) -> bool:
         """Whether six digits of responses are enough to choose by."""
         return self.is_peak and (self.of_criterion or isinstance(self.states, _Response))
+
+    def tracks_free_robots(self, scene: Scene) -> bool:
+        """Return whether states of a scene must tell where a free robot held last."""
+        return self.needs_stays(scene) if callable(self.needs_stays) else self.needs_stays
 
     def shown(self, value: float) -> float:
         """Return a value, SI units, as people read it."""

@@ -456,20 +456,7 @@ READ: dict[str, Callable[[Any], Any]] = {
 }
 
 
-class _Asked(Protocol):
-    """What is asked of a build."""
-
-    @property
-    def standing(self) -> Standing | None: ...
-    @property
-    def goals(self) -> Sequence[Amount]: ...
-    @property
-    def scenarios(self) -> Sequence[Engine]: ...
-    @property
-    def network(self) -> Network: ...
-
-
-def _require_for_curing(problem: _Asked) -> None:
+def _require_for_curing(problem: Any) -> None:
     """Raise a `ProblemError` where mortar cures and what is asked beside it is not modeled."""
     if problem.standing is None or problem.standing.curing is None:
         return

@@ -21,9 +21,9 @@ from seqopt.graph.duality import least_sum
 from seqopt.graph.graph import Graph
 from seqopt.network.network import Network
 from seqopt.scene._durations import Durations
-from seqopt.sequence._durations import require_durations
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
+from seqopt.times._durations import require_durations
 
 _Counts = tuple[int, tuple[int, ...]]  # bricks that stand, and grips by kind
 

@@ -14,10 +14,10 @@ from seqopt.graph.paths import tied
 from seqopt.graph.solution import StatePath
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
-from seqopt.sequence._durations import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.times._acts import Acts, Team, acts_of_rows
+from seqopt.times._durations import require_durations
 from seqopt.times._label_proof import Closed, Limits, kept_below, limit_below
 from seqopt.times._mortar_floors import cured_rows
 

@@ -11,9 +11,9 @@ from seqopt.graph._explore import Visited
 from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
-from seqopt.sequence._durations import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
+from seqopt.times._durations import require_durations
 from seqopt.times._fall_cuts import CuringStates, FallCuts
 
 

@@ -28,11 +28,11 @@ from typing import Any, NamedTuple
 from seqopt.errors import StepError
 from seqopt.scene._durations import Durations
 from seqopt.scene.scene import Scene
-from seqopt.sequence._durations import require_durations
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.site import Site, _begin_step
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 from seqopt.times._curing import Waits
+from seqopt.times._durations import require_durations
 
 
 @dataclass(frozen=True)

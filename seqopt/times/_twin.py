@@ -1,11 +1,28 @@
 """The makespan as an amount of whole builds, with what the judge needs to know of it."""
 
+from typing import Any
+
+from seqopt.errors import ProblemError, StepError
 from seqopt.judge._twin import PathTwin
 from seqopt.problem.amounts import Amount
+from seqopt.sequence.rules import FreeRules
 from seqopt.times._counts import least_by_counts
+from seqopt.times._durations import have_speeds, require_durations
 from seqopt.times._goal_proofs import label_bounds
 from seqopt.times._instances import claimed_time, path_makespan
 from seqopt.times._step_check import makespan_of_steps
 
 TWIN = PathTwin(makespan_of_steps, least_by_counts, label_bounds, path_makespan, claimed_time)
-makespan = Amount("makespan", unit="s", twin=TWIN)
+
+
+def _check(problem: Any) -> None:
+    """Raise a `ProblemError` unless it is known how long those take who take part."""
+    scene, rules = problem.network.scene, problem.rules
+    team = rules.team(scene) if isinstance(rules, FreeRules) else None
+    try:
+        require_durations(scene, team)
+    except StepError as error:
+        raise ProblemError(f"makespan: {error}") from None
+
+
+makespan = Amount("makespan", unit="s", twin=TWIN, needs_stays=have_speeds, check=_check)

@@ -18,8 +18,8 @@ from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence
-from seqopt.sequence._durations import has_durations
 from seqopt.sequence.steps import Step, _idle_note
+from seqopt.times._durations import has_durations
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
 from seqopt.times._tables import aged_table, busy_table, softer_lines, spent_lines, total_lines

@@ -30,7 +30,6 @@ from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scenarios import require_alike
 from seqopt.scene.scene import Order, Scene
-from seqopt.sequence._durations import has_speeds, require_for_makespan
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips
@@ -184,8 +183,7 @@ class States(Shown):
     @property
     def parks(self) -> bool:
         """Whether it counts where a free robot was last: for its travel, or the time of it."""
-        speeds = self.is_timed and has_speeds(self.network.scene)
-        return speeds or any(goal.needs_stays for goal in self.goals)
+        return any(goal.tracks_free_robots(self.network.scene) for goal in self.goals)
 
     @cached_property
     def caps(self) -> Mapping[str, float]:
@@ -543,7 +541,8 @@ def _asked(problem: States) -> States:
     """Return a problem whose stability can be asked, where it will be."""
     if problem.standing is not None or any(goal.margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
-    if problem.is_timed:
-        require_for_makespan(problem.network.scene, problem.rules)
+    for goal in problem.goals:
+        if goal.check is not None:
+            goal.check(problem)
     _require_for_curing(problem)
     return problem

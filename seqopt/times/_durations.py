@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from seqopt.errors import ProblemError, StepError
+from seqopt.errors import StepError
 from seqopt.scene._durations import EXAMPLE, Durations
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.schedule import Schedule
 
 
 def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tuple[Durations, ...]:
@@ -28,15 +26,6 @@ def has_durations(scene: Scene) -> bool:
     return bool(scene.robots) and all(robot.durations is not None for robot in scene.robots)
 
 
-def has_speeds(scene: Scene) -> bool:
+def have_speeds(scene: Scene) -> bool:
     """Return whether ways of some robot take time of their own."""
     return any(robot.durations and robot.durations.speed for robot in scene.robots)
-
-
-def require_for_makespan(scene: Scene, moves: FreeRules | Schedule) -> None:
-    """Raise a `ProblemError` unless it is known how long those take who take part."""
-    team = moves.team(scene) if isinstance(moves, FreeRules) else None
-    try:
-        require_durations(scene, team)
-    except StepError as error:
-        raise ProblemError(f"makespan: {error}") from None
