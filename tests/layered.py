@@ -106,6 +106,14 @@ def changed(formulation, change):
     return replace(formulation, solve=solve)
 
 
+def path_of(compiled, choice):
+    """The nodes that a choice stands for; a candidate that no path passes has none."""
+    levels, nodes = compiled.instance.levels, []
+    for level, candidate in enumerate(choice, start=1):
+        nodes += np.flatnonzero((levels == level) & (compiled.candidates == candidate)).tolist()
+    return tuple(nodes)
+
+
 def told(
     costs,
     choice,
@@ -121,7 +129,7 @@ def told(
     offset = costs.compiled(aim).offset
 
     def solve(instance):
-        states = tuple((node,) for node in costs.compiled(aim).nodes(choice))
+        states = tuple((node,) for node in path_of(costs.compiled(aim), choice))
         values = (objective - offset,), (bound - offset,)
         return StatePath(states, *values, prices=(tuple(prices),), stopped=stopped)
 

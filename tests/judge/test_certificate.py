@@ -16,7 +16,7 @@ from seqopt.graph.layers.layers import travel
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.solving import solve
 from seqopt.problem.problem import Aim
-from tests.layered import Costs, answer, changed, told
+from tests.layered import Costs, answer, changed, path_of, told
 from tests.strategies import problems
 
 HEURISTIC, EXACT = FormulationKind.HEURISTIC, FormulationKind.EXACT
@@ -115,7 +115,7 @@ def test_within_a_budget_a_poor_answer_is_seen_and_prices_need_not_be_believed(p
 @pytest.mark.parametrize("choice", [(1,), (0,)])
 def test_a_choice_that_is_not_allowed_has_no_node(choice):
     costs = Costs(LayeredCosts((np.array([0.0, np.inf]),), (np.zeros((1, 2)),)))
-    assert costs.compiled().nodes(choice) == ((1,) if choice == (0,) else ())
+    assert path_of(costs.compiled(), choice) == ((1,) if choice == (0,) else ())
     with pytest.raises(SolverError):
         answer(costs, told(costs, (1,), 0.0))
 
@@ -124,7 +124,7 @@ def proven(costs, aim):
     """What the judge proves of any choice, given one."""
     choice = next(iter(costs.within(aim)))
     compiled = costs.compiled(aim)
-    return judge_instance(compiled.instance, compiled.nodes(choice)).bound + compiled.offset
+    return judge_instance(compiled.instance, path_of(compiled, choice)).bound + compiled.offset
 
 
 @given(problem=problems())

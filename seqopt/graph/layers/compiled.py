@@ -36,13 +36,6 @@ class Compiled(NamedTuple):
         """Return the candidates on a path."""
         return tuple(self.candidates[list(nodes)].tolist())
 
-    def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the nodes that a choice stands for; a candidate that no path passes has none."""
-        levels, found = self.instance.levels, list[int]()
-        for level, candidate in enumerate(choice, start=1):
-            found += np.flatnonzero((levels == level) & (self.candidates == candidate)).tolist()
-        return tuple(found)
-
 
 def compile_layers(
     problem: Layers, aim: Aim | None, name: str = "", *, alone: bool = False

@@ -194,6 +194,10 @@ class Joined:
             before = np.zeros(1) if self._join is np.add else costs
         self._found[moves] = self._join(before, costs)
 
+    def add_anyway(self, cost: float) -> None:
+        """Join what a build costs whatever is chosen, to the costs of the first move."""
+        self.add((-1, 0), np.full((1, self._sizes[0]), cost))
+
     def single(self, move: int) -> Floats:
         """Return the costs of a move's candidates where it alone is open.
 
@@ -206,6 +210,11 @@ class Joined:
         pairs = zip([1, *self._sizes[:-1]], self._sizes, strict=True)
         shared = tuple(self._of((k - 1, k), pair) for k, pair in enumerate(pairs))
         return LayeredCosts(tuple(map(self.single, range(len(self._sizes)))), shared)
+
+    def budget(self, name: str, bound: float) -> Budget:
+        """Return a bound on the total of what is joined."""
+        amounts = self.layered()
+        return Budget(name, amounts.single, amounts.shared, bound)
 
     def _of(self, moves: tuple[int, ...], shape: tuple[int, ...]) -> Floats:
         if moves in self._found:

@@ -247,7 +247,7 @@ class Layers(Shown):
         """
         joined = Joined([len(move.candidates) for move in self.schedule.moves], join)
         for cost in self.given_costs:
-            joined.add((-1, 0), np.full((1, len(self.schedule.moves[0].candidates)), cost))
+            joined.add_anyway(float(cost))
         seconds = 0.0
         for steps in self.evaluation.levels():
             start = time.perf_counter()
@@ -471,18 +471,17 @@ def steps_over(problem: Layers, response: str, level: float, bound: float) -> Bu
     first move those without an open grip too, in which no robot takes its grip (``F_move``). Raises
     `ProblemError` if the problem does not evaluate the response.
     """
-    single, shared = _empty(problem)
+    joined = Joined([*map(len, problem.candidates)], np.add)
     for choices in chain.from_iterable(problem.evaluation.levels()):
         if response not in choices.responses:
             raise ProblemError(
                 f"budget on {response}: step {choices.step.number} has only "
                 f"{', '.join(choices.responses)}; name it in `also` when the problem is posed"
             )
-        target = single if len(choices.moves) == 1 else shared
-        target[choices.moves[-1]] += choices.responses[response] > level
+        joined.add(choices.moves, (choices.responses[response] > level).astype(float))
     if response != "F_move" and problem.given:
-        shared[0] += (problem.given_values(response) > level).sum()
-    return Budget(f"steps with {response} over {level:g}", tuple(single), tuple(shared), bound)
+        joined.add_anyway(float((problem.given_values(response) > level).sum()))
+    return joined.budget(f"steps with {response} over {level:g}", bound)
 
 
 def travel(problem: Layers, bound: float) -> Budget:
@@ -493,7 +492,10 @@ def travel(problem: Layers, bound: float) -> Budget:
     first move those between given nodes too; m. Raises `ProblemError` if a robot goes from the grip
     of a move to that of another one that is not the next.
     """
-    (single, shared), at = _empty(problem), problem.schedule.scene.node_position
+    joined, at = (
+        Joined([*map(len, problem.candidates)], np.add),
+        problem.schedule.scene.node_position,
+    )
     for robot, ends in _ways(problem.schedule):
         moves = [end.move for end in ends if isinstance(end, OpenGrip)]
         nodes = [
@@ -503,17 +505,17 @@ def travel(problem: Layers, bound: float) -> Budget:
         first, second = ([*map(at, own)] for own in nodes)
         way = np.array([[math.dist(a, b) for b in second] for a in first])
         if not moves:
-            shared[0] += way[0, 0]
+            joined.add_anyway(float(way[0, 0]))
         elif len(moves) == 1:
-            single[moves[0]] += way.ravel()
+            joined.add((moves[0],), way.ravel())
         elif moves[1] == moves[0] + 1:
-            shared[moves[1]] += way
+            joined.add((moves[0], moves[1]), way)
         else:
             raise ProblemError(
                 f"budget travel: {robot} goes from the grip of move {moves[0] + 1} to that of move "
                 f"{moves[1] + 1}, and candidates are chosen move by move; name an aim, as minmax"
             )
-    return Budget("robot travel [m]", tuple(single), tuple(shared), bound)
+    return joined.budget("robot travel [m]", bound)
 
 
 _Grip = int | OpenGrip
@@ -528,9 +530,3 @@ def _ways(schedule: Schedule) -> Iterator[tuple[str, tuple[_Grip, _Grip]]]:
         for ends in pairwise(grip for grip in grips if grip is not None):
             if ends[0] != ends[1]:
                 yield robot.name, ends
-
-
-def _empty(problem: Layers) -> tuple[list[Floats], list[Floats]]:
-    sizes = problem.sums.sizes
-    pairs = zip((1, *sizes[:-1]), sizes, strict=True)
-    return [np.zeros(size) for size in sizes], [np.zeros(pair) for pair in pairs]
