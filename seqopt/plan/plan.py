@@ -383,9 +383,7 @@ class Plan(ShownBuild):
     def objectives(self) -> Objectives:
         """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
 
-        Result: ``objectives`` as of `seqopt.graph.layers.ranking.under_both`; ``gap_parts`` with
-        ``short_sight`` and ``objective``, as of `split_gap`, for heuristics. None where there is no
-        proof, or no ranks.
+        Result: as of `seqopt.graph.layers.ranking.objectives`; None where there is no proof.
         """
         if (
             self.certificate is None

@@ -180,8 +180,8 @@ def test_what_some_pairs_prove(problem, data, aim):
     assert part.bound <= best + 1e-9 * abs(best) or np.isinf(best)
     assert part.best >= best - 1e-9 * abs(best) or np.isinf(part.best)
     for move in range(1, len(single)):
-        assert (part.through(move) >= part.bound * (1 - 1e-9)).all()
-        assert np.isinf(part.through(move)[part.before[move - 1]]).all()
+        assert (part.promise(move) >= part.bound * (1 - 1e-9)).all()
+        assert np.isinf(part.promise(move)[part.before[move - 1]]).all()
     assert everything.bound == pytest.approx(best, **close)
     assert everything.best == pytest.approx(best, **close)
     assert everything.proven == np.isfinite(best)

@@ -16,22 +16,6 @@ from seqopt.problem.problem import Aim
 Objectives = dict[str, dict[str, float] | None]
 
 
-def under_both(problem: Layers, choice: Sequence[int]) -> dict[str, float | None]:
-    """Return the value of a choice under both objectives.
-
-    ``choice``: a candidate for every move. Result (dict of str to (float or None)): ``pairs`` and
-    ``conditional``; None if the criterion has no ranks, or responses are not kept that the other
-    objective would need.
-    """
-    out: dict[str, float | None] = {}
-    for ranked in Ranked:
-        other = problem.ranked(ranked)
-        unknown = other is not problem and problem.evaluation.streams
-        known = isinstance(problem.criterion, RankSum) and not unknown
-        out[ranked.value] = other.sums.cost(choice) if known else None
-    return out
-
-
 def split_gap(problem: Layers, choice: Sequence[int]) -> dict[str, float]:
     """Return the gap of a choice to the exact optimum, in two parts.
 
@@ -52,10 +36,15 @@ def split_gap(problem: Layers, choice: Sequence[int]) -> dict[str, float]:
 
 
 def objectives(problem: Layers, choice: Sequence[int], *, heuristic: bool) -> Objectives:
-    """Return `under_both` and of heuristics `split_gap`; None where there are no ranks."""
-    values = {name: v for name, v in under_both(problem, choice).items() if v is not None}
-    if len(values) < len(Ranked):
+    """Return the value of a choice under both objectives, and of heuristics the parts of its gap.
+
+    ``choice``: a candidate for every move. Result: ``objectives``, its sums over ``pairs`` and
+    ``conditional``, and ``gap_parts``, as of `split_gap`; None if the criterion has no ranks, or
+    responses are not kept that the other objective would need.
+    """
+    if not isinstance(problem.criterion, RankSum) or problem.evaluation.streams:
         return {"objectives": None, "gap_parts": None}
+    values = {ranked.value: problem.ranked(ranked).sums.cost(choice) for ranked in Ranked}
     return {"objectives": values, "gap_parts": split_gap(problem, choice) if heuristic else None}
 
 

@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt._interrupts import answered
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Watch
 from seqopt.graph.graph import Graph
@@ -119,18 +119,20 @@ class KnownCosts(FrozenValue):
         size = max(abs(self.best), abs(self.bound))
         return math.isfinite(self.best) and self.best - self.bound <= EQUAL * size
 
-    def through(self, move: int, before: int | slice = slice(None)) -> Floats:
-        """Return lower bounds of choices by pairs of a move that were not looked at.
+    def promise(self, move: int) -> Floats:
+        """Return lower bounds of choices by candidates of the move before, (C_{k-1},).
 
-        ``before``: a candidate of the move before: by each of the move, (C_k,); or all: by any of
-        the move, (C_{k-1},), infinite where they were looked at.
+        Infinite where their pairs were looked at.
         """
-        join, after = self.aim.join, self.to_go[move]
-        if not isinstance(before, slice):
-            return np.asarray(join(self.reached[move - 1][before], join(self.floor, after)))
-        out = join(self.reached[move - 1], join(self.floor, after.min()))
+        after = self.aim.join(self.floor, self.to_go[move].min())
+        out = np.asarray(self.aim.join(self.reached[move - 1], after))
         out[self.before[move - 1]] = np.inf
-        return np.asarray(out)
+        return out
+
+    def worth_a_look(self, move: int, before: int) -> Bools:
+        """Return which candidates (C_k,), after one of the move before, could still be better."""
+        least = self.aim.join(self.floor, self.to_go[move])
+        return np.asarray(self.aim.join(self.reached[move - 1][before], least) < self.best)
 
     def learned(self, found: Sequence[tuple[int, int, Floats]]) -> KnownCosts:
         """Return what is known with rows (C_k,) of a move and a candidate of the one before."""
@@ -300,7 +302,7 @@ class _Search:
         costs, most = self.costs, math.ceil(FIRST * MORE**count)
         ends, out = self._aim is Aim.PEAK and count >= BROAD, list[tuple[int, int]]()
         for k in range(len(self._schedule.moves) - 1, 0, -1):
-            promise = costs.through(k)
+            promise = costs.promise(k)
             able = promise < costs.best
             if ends:
                 able &= costs.arrived[k - 1] < costs.best
@@ -341,7 +343,7 @@ class _Search:
         if not self._each:  # what one costs depends on the others
             return np.arange(len(self._schedule.moves[move].candidates))
         possible = possible_after(self._schedule, move, before)
-        return np.flatnonzero(possible & (self.costs.through(move, before) < self.costs.best))
+        return np.flatnonzero(possible & self.costs.worth_a_look(move, before))
 
     def along(self, choice: tuple[int, ...]) -> WindowSearch:
         """Return the steps that a choice meets, as a search move by move would have."""
