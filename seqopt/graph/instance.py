@@ -13,6 +13,8 @@ from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.graph import Graph, Rows
+from seqopt.graph.source import Source
+from seqopt.problem.problem import Aim
 
 if TYPE_CHECKING:
     from seqopt.graph._timed import TimedGraph
@@ -43,7 +45,7 @@ class _Cap(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Instance(FrozenValue, Shown):
+class Instance(Source, FrozenValue, Shown):
     """A graph, what its arcs take, and which path through it is sought; no scene is needed.
 
     A path leads from node 0 to one of the ends. Goals are made small one after the other: of the
@@ -118,12 +120,12 @@ class Instance(FrozenValue, Shown):
         """Nothing: an instance has no scene; a `ProblemError` says so."""
         raise ProblemError(f"instance {self.name}: it is costs alone; no scene, no steps")
 
-    models = 0  # that were solved: none, all is given
-    among = ""
-    title = ""
-    scenarios = ()
+    @property
+    def as_layers(self) -> NoReturn:
+        """Nothing, as `alone_in_scene`."""
+        return self.alone_in_scene
 
-    def names_of(self, _: object) -> tuple[str, ...]:
+    def names_of(self, aim: Aim | None) -> tuple[str, ...]:
         """Return what every goal is called."""
         return tuple(goal.name for goal in self.goals)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf, isfinite, nan
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -13,7 +13,6 @@ import pandas as pd
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import provenance
-from seqopt.errors import ProblemError
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind
 from seqopt.graph.instance import Instance
 from seqopt.graph.layers.layers import Layers
@@ -22,13 +21,11 @@ from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan._status import ENDS, Status, bare_summary, order_facts
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.amounts import judged_by
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
 from seqopt.problem.standing import Standing
 from seqopt.responses._choices import window_models
 from seqopt.responses._grip_sets import Moved
-from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import (
     FAR_OFF,
     OUTSIDE,
@@ -39,8 +36,6 @@ from seqopt.responses.table import (
     _table_of,
 )
 from seqopt.scene.scene import Order
-from seqopt.sequence.rules import Ending, FreeRules
-from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
@@ -48,9 +43,6 @@ from seqopt.stability.steps import stability_table
 if TYPE_CHECKING:
     from seqopt.graph.layers.ranking import Objectives
     from seqopt.plan.search._window_search import WindowSearch
-
-_UNCOMPARED = "not compared with the optimum"
-COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
 
 @dataclass(frozen=True, repr=False)
@@ -137,19 +129,12 @@ class Plan(ShownBuild):
     @property
     def layers(self) -> Layers:
         """The layers of candidates that it was chosen from; a `ProblemError` says if none were."""
-        graph = self.graph.alone_in_scene
-        if isinstance(graph, States):
-            raise ProblemError(
-                "the plan has no moves to show: it was chosen from states, which have no candidates"
-            )
-        return graph
+        return self.graph.as_layers
 
     @property
     def states(self) -> States:
         """The states that it was chosen from; a `ProblemError` says if there were none."""
-        if not isinstance(self.graph, States):
-            raise ProblemError("the plan was chosen from candidates, not from states of the build")
-        return self.graph
+        return self.graph.as_states
 
     @property
     def _of_scene(self) -> States | Layers:
@@ -164,7 +149,7 @@ class Plan(ShownBuild):
     @property
     def standing(self) -> Standing | None:
         """The demand that every state stands, if there was one."""
-        return self.graph.standing if isinstance(self.graph, States) else None
+        return self.graph.standing
 
     @property
     def scene_name(self) -> str:
@@ -197,16 +182,13 @@ class Plan(ShownBuild):
     def objective(self) -> dict[str, float]:
         """The value of every goal by its name; of a tilt, what is survived, in degrees."""
         claimed, proof = self.selection.objective, self.certificate
-        if proof is not None and not isinstance(self.graph, States):
+        if proof is not None:
             return self.in_display_units(proof.values)
         return self.in_display_units(claimed) if isfinite(claimed[0]) else {}
 
     def in_display_units(self, values: Sequence[float]) -> dict[str, float]:
-        """Return values of the first goals by their names, as people read them."""
-        if not isinstance(self.graph, States):
-            return dict(zip(self.goals, values, strict=True))
-        found = zip(self.goals, self.graph.goals, values, strict=False)
-        return {name: goal.shown(value) for name, goal, value in found}
+        """Return values of the first goals by their names."""
+        return self.graph.in_display_units(self.formulation.aim, values)
 
     @property
     def gap(self) -> float | None:
@@ -241,17 +223,12 @@ class Plan(ShownBuild):
 
         A margin of stability is optimal within the gap, which ``result`` and the summary name.
         """
-        proof, graph = self.certificate, self.graph
-        if self.selection.stopped and (isinstance(graph, States) or proof is None):
-            return Status.FEASIBLE
+        proof, stopped = self.certificate, bool(self.stopped)
         if proof is None:
-            return Status.UNPROVEN
-        judged_exact = isinstance(graph, States) and not (
-            graph.budgets or graph.totals or graph.is_timed
-        )
-        is_exact = self.formulation.kind is not FormulationKind.HEURISTIC
-        exact = judged_exact and is_exact and isfinite(proof.gap)
-        if exact or proof.gap <= TOLERANCE:
+            return Status.FEASIBLE if stopped else Status.UNPROVEN
+        exact = not stopped and self.formulation.kind is not FormulationKind.HEURISTIC
+        settled = self.graph.settles(exact=exact) and isfinite(proof.gap)
+        if settled or proof.gap <= TOLERANCE:
             return Status.OUTSIDE if self.is_far else Status.OPTIMAL
         if proof.claimed_gap <= TOLERANCE:
             return Status.OUTSIDE if self.is_far else Status.CLAIMED
@@ -267,39 +244,22 @@ class Plan(ShownBuild):
 
     @property
     def _value(self) -> str:
-        if isinstance(self.graph, States | Instance):
-            values = ", ".join(
-                f"{name} {value_text(name, v)}" for name, v in self.objective.items()
-            )
-            left = 0.0 if self.certificate is None else self.certificate.gap
-            within = f" within {left:.2g}" if TOLERANCE < left < inf else ""
-            among = f" among candidates {self.graph.among}" if self.graph.among else ""
-            return f"{values}, {self.status}{within}{among}"
-        if self.certificate is None:
-            values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
-            return f"{values} (claimed), {self.status}" if values else _UNCOMPARED
-        gap = f"gap {100 * _known_gap(self.certificate.gap):.3g} %"
-        proven = f"heuristic: {self.among}" if self.among else gap
-        return f"objective {self.certificate.objective:.6g}, {proven}"
+        gap = None if self.certificate is None else _known_gap(self.certificate.gap)
+        return self.graph.said(self.objective, gap, str(self.status))
 
     @property
     def choice(self) -> tuple[int, ...]:
         """The candidate chosen for every move; a `ProblemError` says if states were chosen."""
-        if isinstance(self.graph, States | Instance):
-            raise ProblemError("states were chosen, not candidates of moves; take its steps")
-        pairs = zip(self.layers.candidates, self.nodes, strict=True)
-        return tuple(candidates.index(node) for candidates, node in pairs)
+        return self.graph.chosen_candidates(self.selection.states)
 
     @property
     def nodes(self) -> tuple[int, ...]:
         """The node chosen for every move, or the nodes of a path through an instance."""
-        if isinstance(self.graph, States):
-            raise ProblemError("states were chosen, not candidates of moves; take its steps")
-        return tuple(state[-1] for state in self.selection.states)
+        return self.graph.chosen_nodes(self.selection.states)
 
     @property
     def _begin(self) -> Site | None:
-        return self.graph.rules.begin if isinstance(self.graph, States) else None
+        return self.graph.begin
 
     @property
     def explored(self) -> tuple[Layers, ...]:
@@ -347,10 +307,7 @@ class Plan(ShownBuild):
         # of all fields, which what steps leave is judged by too
         answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))
         columns = _response_columns(self.engine.network, answers)
-        if not isinstance(self.graph, States):
-            moves, steps = self.layers.schedule.moves, self.layers.schedule.steps
-            robots = {s.number: ";".join(moves[m].robot for m in s.moves) for s in steps}
-            columns["optimized_robot"] = [robots.get(step.number, nan) for step in self.steps]
+        columns.update(self.graph.step_columns(self.steps))
         return columns
 
     def table(self) -> pd.DataFrame:
@@ -361,7 +318,7 @@ class Plan(ShownBuild):
         many there were); then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or without
         proof ``cost`` and the ``margin`` to the next candidate. Of states as of `grips`.
         """
-        if isinstance(self.graph, States):
+        if not self.graph.candidates:
             return self.grips()
         from seqopt.plan import _tables  # noqa: PLC0415  # only where files are written
 
@@ -388,14 +345,14 @@ class Plan(ShownBuild):
         if (
             self.certificate is None
             or self.search is not None
-            or not isinstance(self.graph, Layers)
+            or not self.graph.candidates
             or self.graph.scenarios
         ):
             return {"objectives": None, "gap_parts": None}
         from seqopt.graph.layers.ranking import objectives  # noqa: PLC0415  # only in summaries
 
         heuristic = self.formulation.kind is FormulationKind.HEURISTIC
-        return objectives(self.graph, self.choice, heuristic=heuristic)
+        return objectives(self.layers, self.choice, heuristic=heuristic)
 
     def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
         """Return whether every step stands and by which margins, by the cone program.
@@ -403,10 +360,10 @@ class Plan(ShownBuild):
         ``mortar``: of all joints; by default that which was demanded, or dry. Result: as of
         `seqopt.stability.steps.stability_table`.
         """
-        if mortar is None and isinstance(self.graph, States):
+        if mortar is None and self.standing is not None:
             from seqopt.judge._step_checks import certified  # noqa: PLC0415  # of states
 
-            return stability_table(self.steps, certified(self.graph, self.steps))
+            return stability_table(self.steps, certified(self.states, self.steps))
         return super().stability("dry" if mortar is None else mortar)
 
     def summary(self) -> dict[str, object]:
@@ -426,8 +383,7 @@ class Plan(ShownBuild):
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
-        bare = isinstance(self.graph, Instance)
-        return bare_summary(self) if bare else _summarized(self)
+        return _summarized(self) if self.steps else bare_summary(self)
 
     def brief(self) -> dict[str, object]:
         """Return what is known of the plan without its responses: the first lines of a summary."""
@@ -449,14 +405,14 @@ class Plan(ShownBuild):
 def _summarized(plan: Plan) -> dict[str, object]:
     """Return the summary of a plan, with a fixed set of keys."""
     graph, proof, scene = plan.graph, plan.certificate, plan.engine.network.scene
-    asked = _states_asked(plan, graph) if isinstance(graph, States) else _layers_asked(plan)
+    asked = plan.problem if isinstance(plan.problem, Problem) else plan._of_scene
     narrowed = plan.among and "optimal" in plan.status
     return {
         "scene": scene.name,
         "schedule": plan.method,
         "formulation": plan.formulation.name,
         "kind": plan.formulation.kind.value,
-        **asked,
+        **graph.described(plan.formulation.aim, _said_limits(asked.limits)),
         "candidates": f"heuristic: {plan.among}" if plan.among else "all",
         "status": f"{plan.status} among these" if narrowed else str(plan.status),
         "ended": plan.ended.value,
@@ -466,9 +422,9 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "gap": plan.gap,
         "claimed_gap": None if proof is None or plan.gap is None else _known_gap(proof.claimed_gap),
         **plan.objectives(),
-        "budgets": _spent(plan),
+        "budgets": graph.spent(plan.objective, plan.selection),
         "steps": len(plan.steps),
-        "steps_before_release": len(plan.steps) - _letting_go(plan),
+        "steps_before_release": len(plan.steps) - graph.letting_go(plan.steps),
         "regrips": plan.regrips,
         "makespan": plan.makespan,
         "idle_robots": list(idle_robots(scene, plan.steps)),
@@ -484,42 +440,6 @@ def _summarized(plan: Plan) -> dict[str, object]:
     }
 
 
-def _layers_asked(plan: Plan) -> dict[str, object]:
-    """Return what was asked of candidates."""
-    layers, graph = plan.layers, plan.graph
-    return {
-        "aims": list(plan.goals),
-        "criterion": layers.criterion.name,
-        **layers.criterion.settings,
-        "scenarios": len(graph.scenarios),
-        "limits": _limits_asked(plan),
-        "rules": {},
-        "stands": None,
-    }
-
-
-def _limits_asked(plan: Plan) -> dict[str, object]:
-    """Return the limits that were asked for, as people say them."""
-    asked = plan.problem if isinstance(plan.problem, Problem) else plan._of_scene
-    return _said_limits(asked.limits)
-
-
-def _states_asked(plan: Plan, graph: States) -> dict[str, object]:
-    """Return what was asked of states."""
-    rules, stands = graph.rules, None
-    if graph.standing is not None:
-        sets = {name: getattr(graph.stability, name) for name in COUNTED}
-        stands = {**graph.standing.described(), **sets}
-    return {
-        "aims": list(graph.names[: len(graph.aims)]),
-        **judged_by(graph.goals, graph.criterion),
-        "scenarios": len(graph.scenarios),
-        "limits": _limits_asked(plan),
-        "rules": {} if isinstance(rules, Schedule) else rules.described(graph.network.scene),
-        "stands": stands,
-    }
-
-
 def _bounds(plan: Plan) -> dict[str, float | None]:
     """Return the lower bound of each goal; the claimed one if the search stopped early."""
     proof, chosen = plan.certificate, plan.selection
@@ -528,43 +448,5 @@ def _bounds(plan: Plan) -> dict[str, float | None]:
         bounds = chosen.bound
     elif proof is not None and chosen.stopped and not isfinite(proof.gap):
         bounds = tuple(map(max, chosen.bound, bounds))
-    if isinstance(plan.graph, States):
-        bounds = bounds[: len(plan.states.aims)]
-    found = plan.in_display_units(bounds) if bounds else {}
+    found = plan.in_display_units(plan.graph.bounded(bounds))
     return {name: bound if isfinite(bound) else None for name, bound in found.items()}
-
-
-def _spent(plan: Plan) -> dict[str, dict[str, float | None]]:
-    """Return what there is of every budget, what is spent, and of candidates its price."""
-    chosen, out = plan.selection, {}
-    if isinstance(plan.graph, States):
-        capped = zip(plan.goals[len(plan.graph.aims) :], plan.graph.budgets, strict=True)
-        return {
-            name: {"bound": cap, "spent": plan.objective[name], "price": None}
-            for name, cap in capped
-        }
-    assert not isinstance(plan.graph, Instance)  # of which there is another summary
-    known = [budget.name for budget in plan.graph.budgets if isfinite(budget.bound)]
-    prices = dict(zip(known, chosen.prices[0] if chosen.prices else (), strict=False))
-    for budget in plan.graph.budgets:
-        bound = budget.bound if isfinite(budget.bound) else None
-        price = prices.get(budget.name)
-        out[budget.name] = {"bound": bound, "spent": budget.spent(plan.choice), "price": price}
-    return out
-
-
-def _letting_go(plan: Plan) -> int:
-    """Return how many steps at the end only let go."""
-    rules = plan.graph.rules if isinstance(plan.graph, States) else None
-    if not isinstance(rules, FreeRules) or rules.how_it_ends is Ending.HELD:
-        return 0
-    count = 0
-    for step in reversed(plan.steps):
-        props = plan.engine.network.scene.standing_props(step.bricks, held=bool(step.held))
-        grips = len(step.held) + len(props)
-        if step.kind is not StepKind.RELEASE or grips >= rules.fewest_grips(
-            plan.engine.network.scene
-        ):
-            break
-        count += 1
-    return count

@@ -38,7 +38,7 @@ from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import settle, short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FREE, FreeRules
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 
 
@@ -364,7 +364,7 @@ class Problem(Shown):
     @property
     def method(self) -> str:
         """The name of the schedule, or ``free``."""
-        return FREE if isinstance(self.moves, FreeRules) else self.moves.method
+        return self.moves.method
 
     @property
     def is_timed(self) -> bool:

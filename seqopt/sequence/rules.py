@@ -13,6 +13,7 @@ from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Near
 from seqopt.sequence.site import Site
+from seqopt.sequence.steps import Step, StepKind
 
 FREE = "free"  # the schedule that is no list of steps
 MOST_ROBOTS = 5
@@ -240,6 +241,25 @@ class FreeRules:
             **({"direction": self.direction.value} if self.takes_down else {}),
             **{name: site.described(scene) for name, site in sites.items() if site is not None},
         }
+
+    method = FREE
+
+    @property
+    def left_out(self) -> str:
+        """How candidates are left out, in words; empty if all are open."""
+        return self.candidates
+
+    def letting_go(self, scene: Scene, steps: Sequence[Step]) -> int:
+        """Return how many steps at the end only let go, with fewer grips than rules ask for."""
+        if self.how_it_ends is Ending.HELD:
+            return 0
+        count = 0
+        for step in reversed(steps):
+            grips = len(step.held) + len(scene.standing_props(step.bricks, held=bool(step.held)))
+            if step.kind is not StepKind.RELEASE or grips >= self.fewest_grips(scene):
+                break
+            count += 1
+        return count
 
     def in_scene(self, scene: Scene) -> FreeRules:
         """Return the rules in another scene: they name no scene."""

@@ -198,6 +198,14 @@ class Schedule(Shown):
                 "for costs of moves at most two neighboring ones can be; give an aim"
             )
 
+    def described(self, scene: Scene) -> dict[str, object]:
+        """Return the rules, for a summary: there are none."""
+        return {}
+
+    def letting_go(self, scene: Scene, steps: Sequence[Step]) -> int:
+        """Return how many steps at the end only let go, whatever rules say: there are no rules."""
+        return 0
+
     def in_scene(self, scene: Scene) -> Schedule:
         """Return the same steps of another scene with the same bricks, nodes and robots."""
         return replace(self, scene=scene)

@@ -104,7 +104,7 @@ def test_nothing_is_solved_twice_where_the_best_plan_keeps_it():
     assert plan.models == lifted.models
     assert plan.certificate == lifted.certificate
     assert "D_max" not in plan.states.named
-    assert list(problem.graphs) == ["STATES"]
+    assert list(problem.graphs) == ["states"]
     assert plan.status is lifted.status is Status.OPTIMAL
 
 

@@ -19,6 +19,8 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, engine_for, recipe_for
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
 from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts, ScenarioCosts, largest_of
+from seqopt.graph.solution import StatePath
+from seqopt.graph.source import Source
 from seqopt.problem.criteria import Ranked, RankSum, _counts_every_step
 from seqopt.problem.problem import WORST_PEAK, Aim, RobustAim
 from seqopt.problem.requirements import (
@@ -97,7 +99,7 @@ def _window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepCh
 
 
 @dataclass(frozen=True, repr=False)
-class Layers(Shown):
+class Layers(Source, Shown):
     """Support placement over a whole build; responses, sums and peaks are computed on first use.
 
     ``criterion``: what a step costs; ``limits``: bounds that no step may exceed, whether or not a
@@ -158,6 +160,58 @@ class Layers(Shown):
     def scenarios(self) -> tuple[Engine, ...]:
         """What computes the responses of every scenario."""
         return tuple(engine_for(self.engine, scene) for scene in self.scenes)
+
+    @property
+    def as_layers(self) -> Layers:
+        """The same problem in the nominal scene."""
+        return self.alone_in_scene
+
+    def chosen_candidates(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
+        """Return the candidate chosen for every move."""
+        pairs = zip(self.candidates, self.chosen_nodes(states), strict=True)
+        return tuple(candidates.index(node) for candidates, node in pairs)
+
+    def said(self, objective: Mapping[str, float], gap: float | None, status: str) -> str:
+        """Return the value of a plan, and what is proven about it, in words."""
+        if gap is None:
+            values = ", ".join(f"{name} {value:.6g}" for name, value in objective.items())
+            return f"{values} (claimed), {status}" if values else "not compared with the optimum"
+        proven = f"heuristic: {self.among}" if self.among else f"gap {100 * gap:.3g} %"
+        (value,) = objective.values()
+        return f"objective {value:.6g}, {proven}"
+
+    def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
+        """Return what was asked, for a summary; ``limits``: as they are said."""
+        return {
+            "aims": [*self.names_of(aim)],
+            "criterion": self.criterion.name,
+            **self.criterion.settings,
+            "scenarios": len(self.scenes),
+            "limits": limits,
+            "rules": {},
+            "stands": None,
+        }
+
+    def spent(
+        self, objective: Mapping[str, float], found: StatePath
+    ) -> dict[str, dict[str, float | None]]:
+        """Return what there is of every budget, what is spent, and its price."""
+        known = [budget.name for budget in self.budgets if math.isfinite(budget.bound)]
+        prices = dict(zip(known, found.prices[0] if found.prices else (), strict=False))
+        return {
+            budget.name: {
+                "bound": budget.bound if math.isfinite(budget.bound) else None,
+                "spent": budget.spent(self.chosen_candidates(found.states)),
+                "price": prices.get(budget.name),
+            }
+            for budget in self.budgets
+        }
+
+    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
+        """Return the robots that were chosen for, by step."""
+        moves = self.schedule.moves
+        robots = {s.number: ";".join(moves[m].robot for m in s.moves) for s in self.schedule.steps}
+        return {"optimized_robot": [robots.get(step.number, math.nan) for step in steps]}
 
     @property
     def models(self) -> int:

@@ -15,10 +15,11 @@ from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
+from seqopt.graph.source import Source
 from seqopt.graph.states._checks import checked_limits, of_states
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.problem.amounts import LARGEST, NONE, STATE_RESPONSES, Amount, StateArrays
+from seqopt.problem.amounts import LARGEST, NONE, STATE_RESPONSES, Amount, StateArrays, judged_by
 from seqopt.problem.filters import Filter, filters_of
 from seqopt.problem.problem import WORST_PEAK, Aim, Orders, RobustAim, _goals, _require_for_curing
 from seqopt.problem.requirements import Criterion, Limit
@@ -32,18 +33,20 @@ from seqopt.scene.scenarios import require_alike
 from seqopt.scene.scene import Order, Scene
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.steps import Grips
+from seqopt.sequence.site import Site
+from seqopt.sequence.steps import Grips, Step
 from seqopt.stability.assessment import Stability
 
 if TYPE_CHECKING:
+    from seqopt.graph.solution import StatePath
     from seqopt.sequence._rule_space import FreeSpace
     from seqopt.sequence._schedule_space import ScheduleSpace
 
-FREE_TITLE = "free schedule"
+COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
 
 @dataclass(frozen=True, repr=False)
-class States(Shown):
+class States(Source, Shown):
     """The problem of the free schedule of a scene; everything is computed when first needed.
 
     ``engine``: what computes responses; ``rules``: which moves are possible: those that rules
@@ -83,7 +86,7 @@ class States(Shown):
         capped = [f"{goal} <= {cap:g}" for goal, cap in caps]
         goals = ", ".join([*self.names[: len(self.aims)], *capped])
         where = f"{self.network.scene.name!r}"
-        if isinstance(self.rules, Schedule):
+        if self.rules.method != FREE:
             where += f", {self.rules.method!r}"
         if self.scenarios:
             where += f", {len(self.scenarios)} scenarios"
@@ -146,18 +149,70 @@ class States(Shown):
     @property
     def among(self) -> str:
         """Which candidates alone are looked at, in words; empty for all."""
-        rules = self.rules
-        return rules.left_out if isinstance(rules, Schedule) else rules.candidates
+        return self.rules.left_out
 
     @property
     def method(self) -> str:
         """The name of the schedule, or ``free``."""
-        return self.rules.method if isinstance(self.rules, Schedule) else FREE
+        return self.rules.method
 
     @property
     def title(self) -> str:
         """What it is about, where plans stand beside each other."""
-        return f"{self.rules.method} schedule" if isinstance(self.rules, Schedule) else FREE_TITLE
+        return f"{self.method} schedule"
+
+    @property
+    def begin(self) -> Site | None:
+        """Where the build begins; None for the empty site."""
+        return self.rules.begin
+
+    @property
+    def as_states(self) -> States:
+        """Itself."""
+        return self
+
+    def in_display_units(self, aim: Aim | None, values: Sequence[float]) -> dict[str, float]:
+        """Return values of the first goals by their names; of a tilt, what is survived, degrees."""
+        found = zip(self.names, self.goals, values, strict=False)
+        return {name: goal.shown(value) for name, goal, value in found}
+
+    def bounded(self, bounds: Sequence[float]) -> Sequence[float]:
+        """Return the bounds of goals, without those of budgets."""
+        return bounds[: len(self.aims)]
+
+    def chosen_nodes(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
+        """Raise a `ProblemError`: a state is more than one node."""
+        return self.chosen_candidates(states)
+
+    def settles(self, *, exact: bool) -> bool:
+        """Return whether an exact search is optimal if judged: margins within what is proven."""
+        return exact and not (self.budgets or self.totals or self.is_timed)
+
+    def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
+        """Return what was asked, for a summary; ``limits``: as they are said."""
+        stands = None
+        if self.standing is not None:
+            sets = {name: getattr(self.stability, name) for name in COUNTED}
+            stands = {**self.standing.described(), **sets}
+        return {
+            "aims": [*self.names[: len(self.aims)]],
+            **judged_by(self.goals, self.criterion),
+            "scenarios": len(self.scenarios),
+            "limits": limits,
+            "rules": self.rules.described(self.network.scene),
+            "stands": stands,
+        }
+
+    def spent(
+        self, objective: Mapping[str, float], found: StatePath
+    ) -> dict[str, dict[str, float | None]]:
+        """Return what there is of every budget, and what is spent."""
+        capped = zip(self.names[len(self.aims) :], self.budgets, strict=True)
+        return {n: {"bound": cap, "spent": objective[n], "price": None} for n, cap in capped}
+
+    def letting_go(self, steps: Sequence[Step]) -> int:
+        """Return how many steps at the end only let go."""
+        return self.rules.letting_go(self.network.scene, steps)
 
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:

@@ -1,0 +1,90 @@
+"""What a plan asks of what it was chosen from: candidates of moves, states of a build, or arcs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+from seqopt.errors import ProblemError
+from seqopt.problem.problem import Aim
+from seqopt.responses._tolerance import value_text
+from seqopt.sequence.steps import Step
+
+if TYPE_CHECKING:
+    from seqopt.graph.solution import StatePath
+    from seqopt.problem.standing import Standing
+    from seqopt.sequence.site import Site
+
+
+class Source:
+    """Base class of what plans are chosen from, with what most of these have in common."""
+
+    candidates: tuple[tuple[int, ...], ...] = ()  # nodes that can be chosen, move by move
+    title = ""  # what the plan is called beside others; empty for its formulation
+    among = ""  # which candidates alone are looked at, in words
+    models = 0  # that were solved
+    scenarios: tuple[Any, ...] = ()
+    standing: Standing | None = None  # the demand that every state stands
+    begin: Site | None = None  # where a part of a build begins
+
+    @property
+    def as_layers(self) -> Any:
+        """Its layers of candidates, of the scene itself; a `ProblemError` if there are none."""
+        raise ProblemError(
+            "the plan has no moves to show: it was chosen from states, which have no candidates"
+        )
+
+    @property
+    def as_states(self) -> Any:
+        """Its states of the build; a `ProblemError` if there are none."""
+        raise ProblemError("the plan was chosen from candidates, not from states of the build")
+
+    def names_of(self, aim: Aim | None) -> tuple[str, ...]:
+        """Return what every goal is called, then what has a budget; ``aim``: of the formulation."""
+        raise NotImplementedError
+
+    def in_display_units(self, aim: Aim | None, values: Sequence[float]) -> dict[str, float]:
+        """Return values of the first goals by their names, in display units."""
+        return dict(zip(self.names_of(aim), values, strict=False))
+
+    def bounded(self, bounds: Sequence[float]) -> Sequence[float]:
+        """Return the bounds of goals, without those of budgets."""
+        return bounds
+
+    def chosen_nodes(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
+        """Return the nodes of the states of a plan, which are one each."""
+        return tuple(state[-1] for state in states)
+
+    def chosen_candidates(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
+        """Return the candidate chosen for every move; a `ProblemError` if there are no moves."""
+        raise ProblemError("states were chosen, not candidates of moves; take its steps")
+
+    def settles(self, *, exact: bool) -> bool:
+        """Return whether a judged plan is optimal though its gap is the width of a margin."""
+        return False
+
+    def said(self, objective: Mapping[str, float], gap: float | None, status: str) -> str:
+        """Return the values of a plan, and what is proven about it, in words."""
+        values = ", ".join(f"{name} {value_text(name, v)}" for name, v in objective.items())
+        within = f" within {gap:.2g}" if gap and gap < inf else ""
+        among = f" among candidates {self.among}" if self.among else ""
+        return f"{values}, {status}{within}{among}"
+
+    def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
+        """Return what was asked, for a summary; ``limits``: as they are said."""
+        raise NotImplementedError
+
+    def spent(
+        self, objective: Mapping[str, float], found: StatePath
+    ) -> dict[str, dict[str, float | None]]:
+        """Return what there is of every budget, what is spent, and its price if one is known."""
+        return {}
+
+    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
+        """Return further columns of the table of responses, for the steps of a plan."""
+        return {}
+
+    def letting_go(self, steps: Sequence[Step]) -> int:
+        """Return how many steps at the end only let go."""
+        return 0
