@@ -189,15 +189,16 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
 
 def _barred_said(problem: States, level: int, state: Ints) -> str:
     """Return which state that every plan passes is infeasible, and why, in words."""
-    bricks, each = problem.space.bricks_at(level), problem.each or (problem,)
+    each, falls = problem.each or (problem,), False
     what = f"step {level} of {problem.space.levels}, in which no grip is open,"
     if _is_bare_end(problem, level, state):
         what = "the finished structure, which nobody holds,"
     for one in each:
         if not one.values(level, state)[1].all():
             return f"{what} {_excess_said(one, level, state)}"
-    held = (one.stability.may_stand(bricks, *one.held_to_stand(state)) for one in each)
-    how = "is not proven to stand" if all(map(np.all, held)) else "does not stand"
+        states, demanded = one.responses(level, state)[0], one.every_filter if one.demands else ()
+        falls |= any(f.refuted(states).any() for f in demanded if f.expensive)
+    how = "does not stand" if falls else "is not proven to stand"
     demand = next(iter(problem.demands), None)
     return f"{what} {how}{'' if demand is None else f' {demand.said}'}"
 
@@ -218,7 +219,8 @@ def _excess_said(problem: States, level: int, state: Ints) -> str:
         for each, value in named
         if each.exceeded(value).any()
     ]
-    own = [each.name for each in problem.filters if not each.passes(states).all()]
-    if own and not over:
-        return f"does not pass the filter {own[0]}"
+    for each in problem.filters if not over else ():
+        if not each.proven(states).all():
+            falls = each.refuted(states).any()
+            return f"{'does not' if falls else 'is not proven to'} pass the filter {each.name}"
     return f"has {' and '.join(over)}" if over else "asks more of robots than they carry"

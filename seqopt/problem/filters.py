@@ -39,8 +39,9 @@ class Filter:
     ----------
     name : str
         By which it is asked for, among limits.
-    passes : callable
-        Takes `StateArrays`, returns which states are proven to pass, (n,) bool.
+    passes : callable or None
+        Takes `StateArrays`, returns which states are proven to pass, (n,) bool; None where moves
+        lead only to what passes.
     responses : tuple of str
         Those that it needs.
     refuses : callable, optional
@@ -61,7 +62,7 @@ class Filter:
     """
 
     name: str
-    passes: Passes = field(compare=False)
+    passes: Passes | None = field(compare=False)
     responses: tuple[str, ...] = ()
     refuses: Passes | None = field(default=None, compare=False)
     expensive: bool = False
@@ -74,9 +75,13 @@ class Filter:
     def __repr__(self) -> str:
         return f"Filter({self.name!r})"
 
-    def fails(self, states: StateArrays) -> Bools:
+    def proven(self, states: StateArrays) -> Bools:
+        """Return which states are proven to pass, (n,)."""
+        return np.ones(len(states.rows), bool) if self.passes is None else self.passes(states)
+
+    def refuted(self, states: StateArrays) -> Bools:
         """Return which states are proven not to pass, (n,)."""
-        return ~self.passes(states) if self.refuses is None else self.refuses(states)
+        return ~self.proven(states) if self.refuses is None else self.refuses(states)
 
     def ways(self, problem: Any) -> Iterator[tuple[str, Any]]:
         """Yield how it can be loosened in a problem, in words, and the problem with that."""
@@ -113,18 +118,15 @@ TAKEN = ("payload", LINEAR_RANGE, "rules", "stands", "arms")
 LARGE = 1e6  # N; more than robots have to carry
 
 
-def _rules_filter(problem: Any) -> Filter:
+def _rules_filter() -> Filter:
     """Return the filter of the rules of a free schedule: moves lead only to what passes."""
-
-    def passes(states: StateArrays) -> Bools:
-        return np.asarray(problem.space.lawful(states.bricks, states.rows))
 
     def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
         for words, rules in problem.rules.loosened(problem.network.scene):
             if not (problem.demands and words == IGNORED):  # robots hold with payloads
                 yield words, replace(problem, rules=rules)
 
-    return Filter("rules", passes, loosened=loosened)
+    return Filter("rules", None, loosened=loosened)
 
 
 def _standing_filter(problem: Any) -> Filter:
@@ -158,11 +160,8 @@ def _payloads_filter() -> Filter:
     return Filter("payload", passes, loosened=loosened)
 
 
-def _arms_filter(problem: Any) -> Filter:
+def _arms_filter() -> Filter:
     """Return the filter of postures that go together: moves lead only to what passes."""
-
-    def passes(states: StateArrays) -> Bools:
-        return np.asarray(problem.space.for_arms(states.bricks, states.rows))
 
     def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
         scene = problem.network.scene  # robots without arms hold as those whose joints are rigid
@@ -176,15 +175,15 @@ def _arms_filter(problem: Any) -> Filter:
         yield APART, alone.in_scene(scene.with_robots(*near))
         yield ARMS, alone.in_scene(scene.with_robots(*(replace(r, arm=None) for r in scene.robots)))
 
-    return Filter("arms", passes, loosened=loosened)
+    return Filter("arms", None, loosened=loosened)
 
 
 def filters_of(problem: Any) -> tuple[Filter, ...]:
     """Return all that states of a problem must pass, in the order in which each is loosened."""
-    out = [_rules_filter(problem)]
+    out = [_rules_filter()]
     out += [_standing_filter(problem)] if problem.demands else []
     out += [_payloads_filter()]
-    out += [_arms_filter(problem)] if problem.network.scene.has_arms else []
+    out += [_arms_filter()] if problem.network.scene.has_arms else []
     return (*out, *map(_limit_filter, problem.limits), *problem.filters)
 
 

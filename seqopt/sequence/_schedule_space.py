@@ -67,10 +67,6 @@ class ScheduleSpace(StateRows):
         """Return from which states the next step may be taken: from all, (n,)."""
         return np.ones(len(states), dtype=bool)
 
-    def lawful(self, bricks: int, states: Ints) -> Bools:
-        """Return which states keep the rules: all, steps are given, (n,)."""
-        return np.ones(len(states), dtype=bool)
-
     @cached_property
     def kinds(self) -> tuple[RobotKind, ...]:  # type: ignore[override]  # no field here
         """Every robot by itself: of a schedule none could change places."""

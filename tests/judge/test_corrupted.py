@@ -204,7 +204,7 @@ def corrupt(monkeypatch, problem, kind, change):
     """Change what the search asks; ``change``: of what passes, bricks and nodes (n, r)."""
 
     def of_filter(part):
-        own = part.passes
+        own = part.proven
         return replace(part, passes=lambda s: change(own(s), s.bricks, s.nodes))
 
     def of_method(holder, name, bricks_at):

@@ -313,11 +313,11 @@ class States(Source, Shown):
         nodes = self._node_numbers[places]
         seen = StateArrays(bricks, nodes, found, forces, most, fits, self.criterion, states)
         for each in self._asked_first:
-            fits &= each.passes(seen)
+            fits &= each.proven(seen)
         for each in self.filters if fits.any() else ():
             if each.expensive:
                 rows = np.flatnonzero(fits)
-                fits[rows] = each.passes(seen.only(rows))
+                fits[rows] = each.proven(seen.only(rows))
         return seen, fits
 
     @cached_property
@@ -332,8 +332,7 @@ class States(Source, Shown):
     @cached_property
     def _asked_first(self) -> tuple[Filter, ...]:
         """Filters that no move keeps by itself, and that cost little."""
-        kept = ("rules", "arms")
-        return tuple(f for f in self.every_filter if not (f.expensive or f.name in kept))
+        return tuple(f for f in self.every_filter if f.passes and not f.expensive)
 
     def _by_name(self, answers: Floats, forces: Floats) -> dict[str, Floats]:
         found = dict(zip(self.sets.names, answers.T, strict=True))
