@@ -46,7 +46,7 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.engines.rigid.compliance import ACCURACY, ComplianceEngine, _try_forces
+from seqopt.engines.rigid.compliance import ACCURACY, ComplianceEngine, _solve_fast
 from seqopt.report._style import GRAY, dress, looks, plain, styled
 
 ASKED = Want.EDGES | Want.DISPLACEMENTS
@@ -108,9 +108,9 @@ def growth(counts: list[int], rounds: int) -> pd.DataFrame:
         engine.solve(count, sets[:2], ASKED)
         batch = best(partial(engine.solve, count, sets, ASKED), repeat) / size
         asked = OperatorBuilder(net, tree).operator(count), grip_columns(net, count, sets)
-        solve = partial(_try_forces, *asked, even=True, accuracy=ACCURACY)
+        solve = partial(_solve_fast, *asked, even=True, accuracy=ACCURACY)
         once = best(lambda solve=solve: solve().fields(ASKED), 3) / size
-        trusted = solve().trusted
+        trusted = solve().well_conditioned
         row = {"bricks": count, "operator_s": build, "set_s": batch, "set_once_s": once}
         rows.append(row | {"again": 1 - trusted.mean()})
     return pd.DataFrame(rows)

@@ -18,7 +18,7 @@ Only what is wanted is evaluated; what supports and grips carry is all of the we
 >>> bool(abs(carried + network.weight[:4].sum(axis=0)).max() < 1e-9)
 True
 
-Whether an answer can be trusted is asked apart:
+Whether an answer can be well_conditioned is asked apart:
 
 >>> from seqopt.engines import diagnose
 >>> diagnose(engine, 4, [7, 1]).finding.value

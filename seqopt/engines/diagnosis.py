@@ -1,4 +1,4 @@
-"""How far an answer can be trusted: solved well, ill-conditioned, or a mechanism.
+"""How far an answer can be well_conditioned: solved well, ill-conditioned, or a mechanism.
 
 Two questions are kept apart. The backward error says whether the fields answer a problem next to
 the one that was asked; a long chain may be solved well although its condition is huge and the plain

@@ -364,7 +364,8 @@ class Network(Shown, FrozenValue):
             ends = self.node_name[a], self.node_name[b]
             kinds = {"kind": PartKind(kind), "since": int(since)}
             graph.add_edge(*ends, number=number, length=length, **kinds)
-        return nx.freeze(graph)
+        found: nx.Graph[object] = nx.freeze(graph)
+        return found
 
     def graph(self, bricks: int) -> nx.Graph[object]:
         """Return a partial structure as a view of the network's graph.
@@ -390,7 +391,8 @@ class Network(Shown, FrozenValue):
         """
         from networkx import Graph  # noqa: PLC0415  # as for the whole graph
 
-        springs, graph = self.springs, Graph()
+        graph: nx.Graph[int] = Graph()
+        springs = self.springs
         graph.add_nodes_from([*range(bricks), GROUND])
         ties = (springs.since <= bricks) & springs.stiffness.any(axis=1)
         graph.add_edges_from(springs.bodies[ties].tolist())

@@ -195,10 +195,10 @@ def _columns(part: Block, found: Answers) -> Floats:
 
 
 _SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
-_PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
+_CHUNKS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
 
 
-class _Portion(NamedTuple):
+class _Chunk(NamedTuple):
     """Blocks that are answered together, and their answers if they are stored."""
 
     blocks: tuple[Block, ...]
@@ -232,13 +232,13 @@ def answer_blocks(
         for what, sets in chain.from_iterable(found.tally for found in answers):
             tally[what] = tally.get(what, 0) + sets
 
-    def stored(portion: _Portion) -> list[Answers] | None:
+    def stored(portion: _Chunk) -> list[Answers] | None:
         if portion.stored is not None:
             count(portion.stored)
             progress.add(portion.work)
         return portion.stored
 
-    def done(portion: _Portion, answers: list[Answers]) -> None:
+    def done(portion: _Chunk, answers: list[Answers]) -> None:
         if store is not None:
             for block, found in zip(portion.blocks, answers, strict=True):
                 if not loose or np.isfinite(_columns(block, found)).all():
@@ -249,14 +249,14 @@ def answer_blocks(
 
     with hire(resources.executor, resources.workers) as crew:
         task = partial(_answer_all, engine if crew is None else packed(engine), loose=loose)
-        enough = None if crew is None else total / (_PORTIONS * crew.workers)
-        portions = _share_out(blocks, store, enough)
+        enough = None if crew is None else total / (_CHUNKS * crew.workers)
+        portions = _split_work(blocks, store, enough)
         with closing(map_ordered(task, portions, crew, stored, done)) as results:
             for answers in results:
                 yield from answers
 
 
-def _answer_all(engine: Engine | bytes, portion: _Portion, *, loose: bool) -> list[Answers]:
+def _answer_all(engine: Engine | bytes, portion: _Chunk, *, loose: bool) -> list[Answers]:
     solve = _answer_loose if loose else answer
     return [solve(unpacked(engine), block) for block in portion.blocks]
 
@@ -274,9 +274,9 @@ def _answer_loose(engine: Engine, block: Block) -> Answers:
     return join_answers([_answer_loose(engine, replace(block, grips=half)) for half in halves])
 
 
-def _share_out(
+def _split_work(
     blocks: Iterable[Block], store: Store | None, enough: float | None
-) -> Iterator[_Portion]:
+) -> Iterator[_Chunk]:
     """Return portions of about equal work, each of neighboring blocks; stored ones apart.
 
     Engines that grow with the structure serve ascending brick counts best, and what all states of
@@ -291,14 +291,14 @@ def _share_out(
         if mine and enough is not None:
             several = 1 if block.bricks != mine[-1].bricks else _SEVERAL
             if found is not None or sum(each.work for each in mine) >= several * enough:
-                yield _Portion(tuple(mine))
+                yield _Chunk(tuple(mine))
                 mine = []
         if found is not None or enough is None:
-            yield _Portion((block,), None if found is None else [found])
+            yield _Chunk((block,), None if found is None else [found])
         else:
             mine.append(block)
     if mine:
-        yield _Portion(tuple(mine))
+        yield _Chunk(tuple(mine))
 
 
 class Moved(NamedTuple):

@@ -15,7 +15,7 @@ from seqopt.engines.rigid._grip_equations import (
     grip_forces,
     share_pairs,
     still_forces,
-    trusted,
+    well_conditioned,
 )
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import ungripped_system
@@ -265,11 +265,11 @@ def test_what_rounding_may_change_grips_forces_by(grips):
     largest = np.sqrt(every.max() * operator.loss.max()) * np.sqrt(operator.loss / every).max()
     assert operator.worst_doubt == pytest.approx(2 * largest, rel=1e-12)
     for most, stands in ((0.999 * doubt, False), (1.001 * doubt, True)):
-        assert trusted(operator, index, found, most).tolist() == [stands]
+        assert well_conditioned(operator, index, found, most).tolist() == [stands]
     for lowest in (-1.0, 0.0, np.nan):  # not definite: nothing is known of the error
         pivot = found.pivot.copy()
         pivot[-1] = lowest
-        assert not trusted(operator, index, found._replace(pivot=pivot), 1e300).any()
+        assert not well_conditioned(operator, index, found._replace(pivot=pivot), 1e300).any()
 
 
 @pytest.mark.parametrize("grips", [1, 2, 3])

@@ -11,7 +11,7 @@ from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import compliance as trial
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.engines.rigid.compliance import ACCURACY, _try_forces
+from seqopt.engines.rigid.compliance import ACCURACY, _solve_fast
 from seqopt.network.build import build_network
 from tests.builders import small_arch, solve_batch
 
@@ -29,7 +29,7 @@ def asked():
 
 def test_asked_twice_it_says_the_same(asked):
     """Two grips on one brick share their force for good."""
-    tried = _try_forces(*asked, even=True, accuracy=ACCURACY)
+    tried = _solve_fast(*asked, even=True, accuracy=ACCURACY)
     assert len(tried.pairs.sets) == 4
     before = tried.force.copy()
     first, second = tried.fields(Want.ALL), tried.fields(Want.ALL)

@@ -61,7 +61,7 @@ def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, w
 @pytest.mark.slow
 @pytest.mark.parametrize("portions", [1, 1000])
 def test_results_are_the_same_however_work_is_shared(small_blocks, loop25, portions, monkeypatch):
-    monkeypatch.setattr(division, "_PORTIONS", portions)
+    monkeypatch.setattr(division, "_CHUNKS", portions)
     expected = evaluation(make_engine("auto", loop25.scene), loop25).steps
     with ThreadPoolExecutor(3) as executor:
         for workers in (1, 5):
@@ -79,7 +79,7 @@ def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, m
     groups = [batches.batch_of(single, steps, everything) for level in levels for steps in level]
     every = [block for group in groups for block in group.blocks()]
     total = sum(block.work for block in every)
-    shared = [*division._share_out(every, None, total / (2 * portions))]
+    shared = [*division._split_work(every, None, total / (2 * portions))]
     assert [block for portion in shared for block in portion.blocks] == every
     assert portions / 2 < len(shared) <= 2 * portions
     if portions == 3:
@@ -87,7 +87,7 @@ def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, m
         assert all(a.isdisjoint(b) for a, b in itertools.pairwise(counts))
     most = division._SEVERAL * total / (2 * portions) + max(block.work for block in every)
     assert all(portion.work <= most for portion in shared)
-    alone = [*division._share_out(every, None, None)]
+    alone = [*division._split_work(every, None, None)]
     assert [len(portion.blocks) for portion in alone] == [1] * len(every)
 
 
@@ -160,7 +160,7 @@ def test_an_engine_is_made_once_for_a_worker(small_blocks, loop25, monkeypatch):
     )
     with ThreadPoolExecutor(1) as executor:
         for block in blocks()[:3]:
-            asked = division._Portion((Block(1, np.array([[1]]), block.names),))
+            asked = division._Chunk((Block(1, np.array([[1]]), block.names),))
             sent = executor.submit(send, asked).result()
             assert len(sent) == 1
     assert len(made) == 1

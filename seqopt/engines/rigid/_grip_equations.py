@@ -193,7 +193,7 @@ def grip_forces(
     return _GripForces(force.T, pivot)
 
 
-def trusted(
+def well_conditioned(
     operator: ComplianceOperator,
     index: Ints,
     found: _GripForces,

@@ -14,6 +14,7 @@ from seqopt.engines.interface import SHAPES, SPACE, Basis, _counts_of_fields
 from seqopt.network._mechanics import build_statics, node_motion
 from seqopt.network.network import Network
 
+_ENTRY = 12  # bytes of a number of a sparse matrix and of its column
 AT_ONCE = 2**18  # numbers mapped at a time: they stay in the processor's cache
 
 
@@ -84,9 +85,11 @@ class ResponseMaps(FrozenValue):
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the maps that were made."""
-        made = [vars(self)[name] for name in ("edge", "motion") if name in vars(self)]
-        return sum(each.data.nbytes + each.indices.nbytes + each.indptr.nbytes for each in made)
+        """Bytes that the maps take at most, once they are made."""
+        network = self.scene.network
+        rows = network.count_edges(self.bricks), 3 * network.count_nodes(self.bricks)
+        maps = zip((self.scene.edge, self.scene.motion), rows, strict=True)
+        return sum(_ENTRY * int(each.indptr[count]) + 4 * count for each, count in maps)
 
     def count(self, name: str) -> int:
         """Return how many numbers a field has."""

@@ -51,7 +51,7 @@ from seqopt.engines.rigid._grip_equations import (
     nearly_rigid,
     pairs_of,
     share_pairs,
-    trusted,
+    well_conditioned,
 )
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few
@@ -75,16 +75,16 @@ def _is_screen(want: Want) -> bool:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class _Tried:
+class _FastSolution:
     """What an operator alone says about grip sets."""
 
     operator: ComplianceOperator
     columns: Ints  # (S, r); grips as indices into ``network.inner.ravel()``
     index: Ints  # (S, k); its loads at the grips
-    force: Floats  # (S, k); there, N; zero where it cannot be trusted
+    force: Floats  # (S, k); there, N; zero where it cannot be well_conditioned
     pairs: Pairs  # of rigid grips on one brick
     lever: float  # of moments, m
-    trusted: Bools  # (S,); which sets it answers well enough
+    well_conditioned: Bools  # (S,); which sets it answers well enough
 
     def fields(self, want: Want) -> dict[str, Floats]:
         """Return the fields of all sets by name, grip forces in the operator's directions."""
@@ -108,14 +108,14 @@ class _Tried:
         return found
 
 
-def _try_forces(
+def _solve_fast(
     operator: ComplianceOperator,
     columns: Ints,
     compliance: GripCompliance = RIGID,
     *,
     even: bool,
     accuracy: float,
-) -> _Tried:
+) -> _FastSolution:
     """Return what an operator alone says about grip sets, and which of them it answers well enough.
 
     ``compliance``: in the operator's directions; ``even``: whether the joints are about equally
@@ -130,7 +130,7 @@ def _try_forces(
         own = compliance.select(part)
         found = grip_forces(operator, columns[part], index[part], mine, own)
         force[part] = found.force
-        good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
+        good[part] = well_conditioned(operator, index[part], found, accuracy / _UNSEEN, own)
         good[part] &= ~nearly_rigid(operator, index[part], mine, own)
     if np.count_nonzero(good) < sets:
         force[~good] = 0.0
@@ -138,7 +138,7 @@ def _try_forces(
         pairs = pairs.only(pairs.rigid(compliance, *columns.shape))
     if not even:
         good &= ~_cancels(operator, index, force)
-    return _Tried(operator, columns, index, force, pairs, compliance.lever, good)
+    return _FastSolution(operator, columns, index, force, pairs, compliance.lever, good)
 
 
 def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
@@ -156,7 +156,7 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     return out
 
 
-def _try_extremes(
+def _solve_fast_extremes(
     operator: ComplianceOperator, columns: Ints, want: Want, accuracy: float
 ) -> tuple[Floats, Floats, Bools]:
     """Return extremes (4, S) of rigid grips, their forces (S, r), and which sets have others.
@@ -169,7 +169,7 @@ def _try_extremes(
         part = slice(start, start + _CHUNK)
         index = operator.load_index(columns[part])
         force, pivot, size[part], idle = solve_compiled(operator, columns[part], index)
-        wrong = ~trusted(operator, index, _GripForces(force, pivot), accuracy / _UNSEEN)
+        wrong = ~well_conditioned(operator, index, _GripForces(force, pivot), accuracy / _UNSEEN)
         if np.count_nonzero(wrong):
             force[wrong] = 0.0
         found[:, part] = extremes_of(rows_of(operator, want), index, force, idle)
@@ -197,10 +197,8 @@ class ComplianceEngine(NamedEngine):
     ) -> None:
         super().__init__(network)
         self._basis, self._accuracy = basis, accuracy
-        self._tree, self._even = grow_tree(self.network), _count_even(self.network)
+        self._tree, self._uniform = grow_tree(self.network), _count_uniform(self.network)
         self._kept: dict[int, ComplianceOperator] = {}  # the one that was asked last comes last
-        self._bytes: dict[int, int] = {}  # of them, when they were counted last
-        self._asked: set[int] = set()  # brick counts since then
 
     @_failing_in_a_line
     def solve(
@@ -222,22 +220,22 @@ class ComplianceEngine(NamedEngine):
 
     def _found(self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want) -> Fields:
         """Return what is wanted of grip sets, corrected where the operator is not enough."""
-        tried: _Tried | None = None
+        fast: _FastSolution | None = None
         if bricks <= len(self._tree.spring):
-            operator, even = self._operator(bricks, columns), bricks <= self._even
+            operator, even = self._operator(bricks, columns), bricks <= self._uniform
             accuracy = self._accepted(want)
             own = compliance.within(self._basis.force, self._basis.wrench)
-            tried = _try_forces(operator, columns, own, even=even, accuracy=accuracy)
-        sure = 0 if tried is None else np.count_nonzero(tried.trusted)
-        if tried is None or (len(columns) and not sure):
+            fast = _solve_fast(operator, columns, own, even=even, accuracy=accuracy)
+        sure = 0 if fast is None else np.count_nonzero(fast.well_conditioned)
+        if fast is None or (len(columns) and not sure):
             return self._refined(bricks, columns, compliance, want)
-        found = tried.fields(want)
+        found = fast.fields(want)
         if self._basis is not SPACE:
             found["grip_force"] = found["grip_force"] @ self._basis.force
-            if tried.operator.moments:
+            if fast.operator.moments:
                 found["grip_moment"] = found["grip_moment"] @ self._basis.moment
         if sure < len(columns):
-            wrong = ~tried.trusted
+            wrong = ~fast.well_conditioned
             rest = compliance.select(wrong)
             better = self._refined(bricks, columns[wrong], rest, want)
             for name, values in found.items():
@@ -262,10 +260,10 @@ class ComplianceEngine(NamedEngine):
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
         few = are_few(bricks * len(self._basis.force), len(columns))
-        if few and bricks <= min(self._even, len(self._tree.spring)):
+        if few and bricks <= min(self._uniform, len(self._tree.spring)):
             accuracy = self._accepted(want)
             operator = self._operator(bricks, columns)
-            found, size, apart = _try_extremes(operator, columns, want, accuracy)
+            found, size, apart = _solve_fast_extremes(operator, columns, want, accuracy)
         if np.count_nonzero(apart):
             fields = self._found(bricks, columns[apart], RIGID, want)
             rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
@@ -279,26 +277,17 @@ class ComplianceEngine(NamedEngine):
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
         known = self._kept.pop(bricks, None)
-        self._bytes.pop(bricks, None)
         if known is None or not known.covers(columns // 2):
             held = np.union1d(columns // 2, np.arange(0) if known is None else known.held)
             if 2 * len(held) >= bricks:
                 held = np.arange(bricks)
-            self._make_room()
+            taken = sum(each.nbytes for each in self._kept.values())
+            while taken > _KEPT:  # those that were not asked for longest go
+                taken -= self._kept.pop(next(iter(self._kept))).nbytes
             with one_thread():
                 known = self._builder.operator(bricks, held)
         self._kept[bricks] = known
-        self._asked.add(bricks)
         return known
-
-    def _make_room(self) -> None:
-        """Drop operators that were not asked for longest, until the rest takes little memory."""
-        for bricks in self._asked & self._kept.keys():  # what is not asked does not grow
-            self._bytes[bricks] = self._kept[bricks].nbytes
-        self._asked.clear()
-        while sum(self._bytes.values()) > _KEPT:
-            first = next(iter(self._kept))
-            del self._kept[first], self._bytes[first]
 
     @cached_property
     def _refinements(self) -> Refinements:
@@ -325,7 +314,7 @@ class ComplianceEngine(NamedEngine):
         return keep_wanted(answer, want)
 
 
-def _count_even(network: Network) -> int:
+def _count_uniform(network: Network) -> int:
     """Return up to how many bricks all joints that act are about equally stiff."""
     springs = network.springs
     order = np.argsort(springs.since, kind="stable")
