@@ -224,15 +224,11 @@ def _by_triangles(one: _Vectors, rate: float) -> bool | Floats:
             return corners[:, found.argmax()]
         pulls = np.linalg.norm(one.pulls(corners)[0], axis=2).sum(axis=1)
         values = (pulls + rate * (corners[0] @ one.own[0])).reshape(-1, 3).max(axis=1)
-        left = _quartered(left[values > rate * one.most[0] * _distance(left)])
+        normal = np.cross(left[:, 1] - left[:, 0], left[:, 2] - left[:, 0])
+        size = np.maximum(np.linalg.norm(normal, axis=1), _TINY)
+        plane = np.abs(np.einsum("ti,ti->t", normal, left[:, 0])) / size  # from the center
+        left = _quartered(left[values > rate * one.most[0] * plane])
     return True
-
-
-def _distance(triangles: Floats) -> Floats:
-    """Return how far from the center the planes of triangles (t, 3, 3) are, (t,)."""
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    size = np.maximum(np.linalg.norm(normal, axis=1), _TINY)
-    return np.asarray(np.abs(np.einsum("ti,ti->t", normal, triangles[:, 0])) / size)
 
 
 def _quartered(triangles: Floats) -> Floats:

@@ -148,15 +148,6 @@ def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csc_array:
 _UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
 
 
-def _kept_from_turning(columns: Ints, bricks: int, compliance: GripCompliance) -> Floats:
-    """Return the turns (n, 6b) of bricks that grips of one set resist."""
-    turns = compliance.transmit_moments(1, len(columns))[0]
-    out = np.zeros((3 * int(turns.sum()), 6 * bricks))
-    for n, brick in enumerate(columns[turns] // 2):
-        out[3 * n : 3 * n + 3, 6 * brick + 3 : 6 * brick + 6] = np.eye(3)
-    return out
-
-
 def free_motion(
     network: Network, bricks: int, columns: Ints, compliance: GripCompliance = RIGID
 ) -> Floats | None:
@@ -169,8 +160,11 @@ def free_motion(
     """
     parts = ungripped_system(network, bricks)
     node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
-    held = parts.motion[node.ravel()].toarray()
-    held = np.vstack([held, _kept_from_turning(columns, bricks, compliance)]) * parts.twist_unit
+    turned = columns[compliance.transmit_moments(1, len(columns))[0]] // 2
+    turns = (6 * turned[:, None] + np.arange(3, 6)).ravel()  # that grips resist
+    resisted = np.zeros((len(turns), 6 * bricks))
+    resisted[np.arange(len(turns)), turns] = 1.0
+    held = np.vstack([parts.motion[node.ravel()].toarray(), resisted]) * parts.twist_unit
     ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
     with one_thread():
         _, sizes, motions = np.linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
