@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from seqopt.graph._timed import TimedGraph
 
 SUM, PEAK, TAIL, TIME = "sum", "peak", "tail", "time"
-KINDS = (SUM, PEAK, TAIL, TIME)
 
 
 class _Target(NamedTuple):
