@@ -108,13 +108,6 @@ class Waits:
             return None
 
 
-def require_cured(problem: States, name: str, *, cures: bool) -> None:
-    """Raise a `ProblemError` if mortar cures and a formulation does not know of it."""
-    standing = problem.standing
-    if standing is not None and standing.curing is not None and not cures:
-        raise ProblemError(f"{name}: it does not know mortar that cures; take makespan_labels")
-
-
 def of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
     """Return the best path through an instance, its states the numbers of nodes."""
     timed = instance.timed
@@ -169,7 +162,10 @@ class _InTime(Terse):
         watch = Watch(seconds)
         if isinstance(problem, Instance):
             return of_instance(problem, self.choose, watch)
-        require_cured(problem, self.name, cures=self.cures)
+        if problem.standing is not None and problem.standing.curing and not self.cures:
+            raise ProblemError(
+                f"{self.name}: it does not know mortar that cures; take makespan_labels"
+            )
         tell = watched(problem, watch, max_memory, progress)
         return after_margins(
             problem, lambda rest: _searched(rest, self.choose, watch, tell, progress), tell

@@ -148,7 +148,10 @@ class Stages:
             elif goal.in_time:
                 self._makespan()
             elif self._stage.filtered:
-                self._filter(k)
+                kept = self._stage.kept.copy()
+                kept[kept], least = _best_moves(self._timed.graph.only(kept), k)
+                self._stage.kept = self._on_paths(kept)
+                self._stage.bounds.append(least)
             elif goal.is_peak:
                 self._peak(k)
             else:
@@ -157,13 +160,6 @@ class Stages:
             self._makespan()
         self._shorten()
         return self._stage
-
-    def _filter(self, k: int) -> None:
-        """Leave out moves that are on no path which is best in a goal."""
-        stage, kept = self._stage, self._stage.kept.copy()
-        kept[kept], least = _best_moves(self._timed.graph.only(kept), k)
-        stage.kept = self._on_paths(kept)
-        stage.bounds.append(least)
 
     def _on_paths(self, kept: Bools) -> Bools:
         """Return which of some moves (m,) are on paths from the start to an end."""

@@ -1,4 +1,4 @@
-r"""How long a build takes, by labels over its states, bounded by prices: exact.
+r"""How long a build takes, by labels over its states, bounded by multipliers: exact.
 
 A state says which bricks stand and who holds what, a move who takes a grip or lets go. A *label* of
 a state :math:`v` is when the last step ended and since when every robot :math:`r` that is free has
@@ -20,7 +20,7 @@ all, :math:`\sum \lambda = 1`, every build from a label ends no sooner than
    h_\lambda(v) = \min_{\text{paths}} \sum_{a} \Bigl( \lambda_0 a
    + \sum_{r \text{ holds or acts}} \lambda_r a + \lambda_r p \Bigr),
 
-since no robot does two things at once (:math:`\rho_r = t` while it holds). The best prices are
+since no robot does two things at once (:math:`\rho_r = t` while it holds). The best ones are
 found by cutting planes, a first build by narrow searches. Then labels that may end before some
 time are set, brick by brick, for four times up to that of the first build: where none reaches an
 end, none ends before the least bound that was left out.
@@ -74,7 +74,7 @@ def _least(asked: Asked) -> Chosen:
 
 FORMULATION = in_time(
     "makespan_labels",
-    "labels of time and readiness, bounded by prices of the robots' time",
+    "labels of time and readiness, bounded by multipliers of the robots' time",
     FormulationKind.EXACT,
     _least,
     cures=True,

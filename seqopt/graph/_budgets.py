@@ -1,9 +1,9 @@
-"""Best paths within budgets: sums of some amounts are capped, and prices say what that costs.
+"""Best paths within budgets: sums of some amounts are capped, with multipliers that bound them.
 
-A price for every budget turns its amounts into costs; the cheapest path then bounds what any path
-within the budgets takes, by weak duality. Prices are found by cutting planes: every path that was
-met is a plane, and the next prices are best for all of them. What no prices decide stays open as a
-gap between a path and its bound, except that one budget alone is decided exactly for worst amounts.
+A multiplier of every budget turns its amounts into costs; the cheapest path then bounds what any
+path within the budgets takes, by weak duality. The best ones are found by cutting planes
+(`_multipliers`). What none decides stays open as a gap between a path and its bound, except that
+one budget alone is decided exactly for worst amounts.
 
 A path within the budgets is sought first, at no cost: whether there is one, one budget alone
 decides exactly. Several can leave it open, where mixtures of paths keep them and no path was met
@@ -29,8 +29,8 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.paths import tied
 
 ROUNDS = 60  # of cutting planes
-CLOSED = 1e-9  # share of a value to which prices are the best
-DEAREST = 1e6  # largest price, over what a path takes per unit of the budget
+CLOSED = 1e-9  # share of a bound to which multipliers are the best
+DEAREST = 1e6  # largest multiplier, over what a path takes per unit of the budget
 LABELS = 20_000  # that are kept at a time at most
 NONE = LabelSearch(None, np.inf, -np.inf)
 
@@ -68,8 +68,8 @@ def within_budgets(
     ``most``: how many labels may close what multipliers leave open of a sum; ``watch``: says when
     to stop, and is told the values and bounds of the first goal.
 
-    Raises `InfeasibleError` if prices prove that no path is within all caps; `NothingFoundError` if
-    that is open, and none was found.
+    Raises `InfeasibleError` if multipliers prove that no path is within all caps;
+    `NothingFoundError` if that is open, and none was found.
     """
     watch, goals = watch or Watch(), len(graph.peaks) - len(caps)
     limited = [*enumerate(caps, start=goals)]
@@ -168,7 +168,7 @@ def _better(graph: Graph, goal: int | None, first: _Path | None, other: _Path) -
 def _least_worst(
     graph: Graph, goal: int, limited: Sequence[tuple[int, float]]
 ) -> tuple[float, Floats, _Path | None]:
-    """Return a bound on the worst amount of paths within caps, its prices, and the best path."""
+    """Return a bound on the worst amount of paths within caps, multipliers, and the best path."""
     amounts = graph.amounts[:, goal]
     levels = np.unique(amounts)
     low, high, proven, prices = 0, len(levels), 0, np.ones(len(limited))

@@ -126,7 +126,8 @@ class Sweep:
         for level in range(int(growth.levels.max()) + 1):
             here: list[Labels] = []
             while level in pending:
-                fresh = self._fresh(_joined(pending.pop(level)), here)
+                met = self._narrowed(_joined(pending.pop(level)), 4)
+                fresh = self._narrowed(_undominated(met, here, growth), 1)
                 here.append(fresh)
                 found.kept.append(fresh)
                 value, at = self._at_end(fresh)
@@ -143,15 +144,9 @@ class Sweep:
         self._trace(best)
         return found
 
-    def _fresh(self, met: Labels, here: Sequence[Labels]) -> Labels:
-        """Return labels that are continued, of those met."""
-        width = self._width
-        met = met if width is None else self._narrowed(met, 4 * width)
-        fresh = _undominated(met, here, self._growth)
-        return fresh if width is None else self._narrowed(fresh, width)
-
-    def _narrowed(self, labels: Labels, width: int) -> Labels:
-        """Return the labels with the least bounds, in their order."""
+    def _narrowed(self, labels: Labels, times: int) -> Labels:
+        """Return the labels with the least bounds, a number of times the width, in their order."""
+        width = labels.size if self._width is None else times * self._width
         if labels.size <= width:
             return labels
         bounds = self._growth.bounds(labels.state, labels.taken)[:, self._aim]
