@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -144,6 +145,14 @@ def test_names_that_mean_something_are_refused(name):
     for part in (Amount(name, busy), Filter(name, busy)):
         with pytest.raises(ProblemError, match="has a meaning already; give another one"):
             seqopt.register(part)
+
+
+def test_states_go_to_other_processes_once_filters_were_asked():
+    graph = seqopt.solve(posed("minmax,steps", "F_largest=900")).graph
+    level, start = graph.space.first + 1, graph.space.start()
+    values, within = graph.values(level, start)
+    again = pickle.loads(pickle.dumps(graph)).values(level, start)
+    assert (again[0].tolist(), again[1].tolist()) == (values.tolist(), within.tolist())
 
 
 def test_what_is_neither_is_refused():

@@ -324,12 +324,12 @@ class States(Source, Shown):
     def _node_numbers(self) -> Ints:
         return np.array([NONE, *self.network.scene.placed_nodes])
 
-    @cached_property
+    @property
     def every_filter(self) -> tuple[Filter, ...]:
         """All that states must pass: rules, standing, payloads, arms, limits, and others."""
         return filters_of(self)
 
-    @cached_property
+    @property
     def _asked_first(self) -> tuple[Filter, ...]:
         """Filters that no move keeps by itself, and that cost little."""
         return tuple(f for f in self.every_filter if f.passes and not f.expensive)
