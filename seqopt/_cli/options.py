@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, dataclass_transform
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import DEFAULT, ENGINES
@@ -69,6 +69,7 @@ def _unheard(_: object) -> None:
     """Let nobody know how far a command is."""
 
 
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 @dataclass(frozen=True, kw_only=True)
 class Asked:
     """What is written and printed?
@@ -81,13 +82,16 @@ class Asked:
 
     progress: Tell | None = None
 
+    def __init_subclass__(cls) -> None:
+        """Make a frozen value of every class of what is asked."""
+        dataclass(frozen=True, kw_only=True)(cls)
+
     @property
     def tell(self) -> Tell:
         """What is told how far the command is."""
         return self.progress or _unheard
 
 
-@dataclass(frozen=True, kw_only=True)
 class Strict(Asked):
     """What is written and printed?
 
@@ -97,7 +101,6 @@ class Strict(Asked):
     """
 
 
-@dataclass(frozen=True, kw_only=True)
 class Written(Asked):
     """What is written and printed?
 
@@ -113,7 +116,6 @@ class Written(Asked):
         return None if self.out is None else Path(self.out)
 
 
-@dataclass(frozen=True, kw_only=True)
 class Scened(Asked):
     """What is built, and by whom?
 
@@ -130,7 +132,6 @@ class Scened(Asked):
     order: Bricks | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Built(Scened):
     """What is built, and by whom?
 
@@ -153,7 +154,6 @@ class Built(Scened):
     payload: float | Numbers = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class Team(Asked):
     """What is built, and by whom?
 
@@ -166,7 +166,6 @@ class Team(Asked):
     robots: int | Words | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Timed(Asked):
     """What is built, and by whom?
 
@@ -180,7 +179,6 @@ class Timed(Asked):
     durations: Words = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class Postures(Asked):
     """How are responses computed?
 
@@ -191,7 +189,6 @@ class Postures(Asked):
     cache: File | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Fixed(Written, Postures, Team, Built):
     """Which steps may a build have?
 
@@ -206,7 +203,6 @@ class Fixed(Written, Postures, Team, Built):
     plan: ShownBuild | File | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Judging(Asked):
     """What counts as best?
 
@@ -219,7 +215,6 @@ class Judging(Asked):
     criterion: Criterion | str | None = word(None, flag="--criteria")
 
 
-@dataclass(frozen=True, kw_only=True)
 class Ranks(Judging):
     """What counts as best?
 
@@ -235,7 +230,6 @@ class Ranks(Judging):
     ranked: str | None = word(None, choices=[each.value for each in Ranked])
 
 
-@dataclass(frozen=True, kw_only=True)
 class Stands(Asked):
     """What must hold?
 
@@ -246,7 +240,6 @@ class Stands(Asked):
     stands: Stability | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Tilted(Stands):
     """What must hold?
 
@@ -260,7 +253,6 @@ class Tilted(Stands):
     tilt: Number | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Cured(Tilted):
     """What must hold?
 
@@ -273,7 +265,6 @@ class Cured(Tilted):
     curing: Words = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class Engined(Asked):
     """How are responses computed?
 
@@ -287,7 +278,6 @@ class Engined(Asked):
     engine: str | None = word(None, choices=(*ENGINES,))
 
 
-@dataclass(frozen=True, kw_only=True)
 class Computed(Engined):
     """How are responses computed?
 
@@ -299,7 +289,6 @@ class Computed(Engined):
     mortar: Mortar | str | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Judged(Computed):
     """What is written and printed?
 
@@ -311,7 +300,6 @@ class Judged(Computed):
     stability: bool = True
 
 
-@dataclass(frozen=True, kw_only=True)
 class Ruled(Asked):
     """Which steps may a build have?
 
@@ -333,7 +321,6 @@ class Ruled(Asked):
     limits: Limits = word((), flag="--limit")
 
 
-@dataclass(frozen=True, kw_only=True)
 class Aimed(Asked):
     """What counts as best?
 
@@ -349,7 +336,6 @@ class Aimed(Asked):
     aim: Words | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Limited(Asked):
     """Who chooses and proves, and how long?
 
@@ -362,7 +348,6 @@ class Limited(Asked):
     time_limit: Number | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Moves(Computed, Aimed, Stands, Ruled, Team, Scened):
     """Which steps may a build have?
 
@@ -375,7 +360,6 @@ class Moves(Computed, Aimed, Stands, Ruled, Team, Scened):
     schedule: str | Path | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Choice(Judging, Timed, Moves):
     """What must hold?
 
@@ -403,7 +387,6 @@ class Choice(Judging, Timed, Moves):
     candidates: str | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Posed(Judged, Tilted, Built, Moves):
     """Which steps may a build have?
 
@@ -429,7 +412,6 @@ class Posed(Judged, Tilted, Built, Moves):
     keep: Bricks | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Chosen(Ranks, Choice):
     """In which scenarios is it good?
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -100,7 +99,6 @@ def test_what_one_needs_first_of_optimize(printed):
     assert {"SCENE", "--schedule", "--aim", "--criteria", "--stands", "--out"} <= {*shown}
 
 
-@dataclass(frozen=True, kw_only=True)
 class Reasoned(Asked):
     """Why?
 
@@ -119,7 +117,6 @@ class Reasoned(Asked):
     often: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class Excused(Reasoned):
     """Give an excuse.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -48,7 +48,6 @@ RANGE = "whether they are in the linear range"
 UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Analyze(options.Strict, options.Computed, options.Fixed):
     """Compute how the structure responds in every step of one sequence, and write a table.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,6 @@ from seqopt.stability.assessment import Verdict
 from seqopt.work.progress import with_progress
 
 
-@dataclass(frozen=True, kw_only=True)
 class Assess(options.Fixed):
     """What must hold?
 
@@ -76,7 +75,6 @@ class Assess(options.Fixed):
     workers: int | str = 1
 
 
-@dataclass(frozen=True, kw_only=True)
 class AssessWords(Assess):
     """Prove of every step of a sequence that it stands, or that it does not.
 

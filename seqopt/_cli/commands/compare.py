@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,7 +28,6 @@ from seqopt.workflow import DEFAULTS
 SPEED = "Speed against accuracy"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Compare(
     options.Written,
     options.Strict,

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
@@ -31,7 +30,6 @@ AIMS = ("minmax", "sum", "steps", "regrips", "travel", "bond", "friction", "tilt
 SHORT = re.compile(r"[:;(]|, (?:as|if|or) ")  # where what matters of a help text ends
 
 
-@dataclass(frozen=True, kw_only=True)
 class Completion(options.Asked):
     """Print a script with which the shell completes words of seqopt.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 from seqopt._cli import inputs, options
@@ -14,7 +14,6 @@ from seqopt.exchange.exports import EXPORTS, LOST, TASKS, export_plan, read_fold
 from seqopt.problem._limit_words import number_word
 
 
-@dataclass(frozen=True, kw_only=True)
 class Export(options.Postures, options.Written):
     """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from seqopt._cli import grammar, options, remarks
@@ -18,7 +17,6 @@ from seqopt.scene.scene_file import dump_scene
 MOST_ROBOTS = 100
 
 
-@dataclass(frozen=True, kw_only=True)
 class Import(options.Asked):
     """Read an assembly of others, say what was assumed, and write it as a scene.
 

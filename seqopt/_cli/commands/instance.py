@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
 from seqopt._cli import grammar, inputs, options, outputs
@@ -23,7 +23,6 @@ from seqopt.work._clock import Clock
 SAID = ("--quiet", "--json")
 
 
-@dataclass(frozen=True, kw_only=True)
 class Instance(options.Written, options.Choice):
     """What is written and printed?
 
@@ -41,7 +40,6 @@ class Instance(options.Written, options.Choice):
     below: options.Number | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class InstanceWords(Instance, Optimize):
     """Write the graph of a problem: its nodes and arcs, what they take, what is small and capped.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from seqopt.instances.answers import judge_instance
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 
-@dataclass(frozen=True, kw_only=True)
 class Judge(options.Asked):
     """Check a path through an instance, and bounds on all others, with arithmetic alone.
 

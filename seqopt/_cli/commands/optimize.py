@@ -44,7 +44,6 @@ INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 VERDICTS, UNSEEN = "which steps stand", "its values in unseen scenarios"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Optimize(
     options.Written, options.Strict, options.Limited, options.Cured, options.Chosen, options.Posed
 ):

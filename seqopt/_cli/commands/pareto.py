@@ -46,7 +46,6 @@ MOST_ROWS = 30  # of a table on the terminal
 FOUR = "F_largest,M_sup,T_max,D_max"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Pareto(options.Written, options.Judged, options.Built, options.Moves):
     """Which steps may a build have?
 
@@ -73,7 +72,6 @@ class Pareto(options.Written, options.Judged, options.Built, options.Moves):
     seconds: float = inf
 
 
-@dataclass(frozen=True, kw_only=True)
 class ParetoWords(options.Posed, Pareto):
     """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
 

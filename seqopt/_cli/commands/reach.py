@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import pandas as pd
 
 from seqopt._cli import inputs, options, outputs
@@ -21,7 +19,6 @@ from seqopt.arms.reach import find_postures
 from seqopt.scene.scene import Scene
 
 
-@dataclass(frozen=True, kw_only=True)
 class Reach(options.Written, options.Postures, options.Built):
     """Say which robots reach which nodes.
 

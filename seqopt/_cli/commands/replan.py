@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,7 +30,6 @@ from seqopt.sequence.schedule_file import read_plan
 from seqopt.study.published import CRITERIA
 
 
-@dataclass(frozen=True, kw_only=True)
 class Replan(
     options.Written,
     options.Engined,
@@ -86,7 +85,6 @@ class Replan(
     to: int | str | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class ReplanWords(
     options.Strict, options.Postures, options.Judged, options.Cured, options.Ranks, Replan
 ):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ from seqopt.report._pages import folder_builds, folder_page
 from seqopt.stability._builds import BuildProver
 
 
-@dataclass(frozen=True, kw_only=True)
 class Report(options.Postures, options.Judged, options.Written):
     """What is built, and by whom?
 
@@ -37,7 +36,6 @@ class Report(options.Postures, options.Judged, options.Written):
     figures: options.File | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class ReportWords(Report, options.Built):
     """Write a page with a step viewer of the plans in a folder.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, sa
 from seqopt.work.progress import with_progress
 
 
-@dataclass(frozen=True, kw_only=True)
 class SceneAsked(options.Postures, options.Built):
     """Check a scene, say what is in it, and write it as a JSON file if asked.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import pandas as pd
 
@@ -27,7 +27,6 @@ from seqopt.times._tables import aged_table, busy_table, softer_lines, spent_lin
 USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Times(options.Cured, options.Timed, options.Fixed):
     """Say how long a build takes and who does what when.
 
