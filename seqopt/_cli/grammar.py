@@ -193,13 +193,10 @@ def parse_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
     for name, text in given.items():
         if not isinstance(criterion, RankSum) or (name == "crown" and named not in NAMED):
             raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
-        kinds: dict[str, Any] = {"crown": _crown, "ranked": Ranked}
-        criterion = replace(criterion, **{name: kinds[name](str(text))})
+        crown = None if name == "ranked" or text == "none" else number_word(str(text), "--crown")
+        value = Ranked(text) if name == "ranked" else NEVER if crown is None else crown
+        criterion = replace(criterion, **{name: value})
     return criterion
-
-
-def _crown(text: str) -> float:
-    return NEVER if text == "none" else number_word(text, "--crown")
 
 
 def parse_resources(asked: Chosen, progress: Tell | None = None) -> Resources:

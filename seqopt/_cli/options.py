@@ -65,10 +65,6 @@ def listed(values: Any) -> tuple[Any, ...]:
     return tuple(values)
 
 
-def _unheard(_: object) -> None:
-    """Let nobody know how far a command is."""
-
-
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 @dataclass(frozen=True, kw_only=True)
 class Asked:
@@ -89,7 +85,7 @@ class Asked:
     @property
     def tell(self) -> Tell:
         """What is told how far the command is."""
-        return self.progress or _unheard
+        return self.progress or (lambda _: None)
 
 
 class Strict(Asked):

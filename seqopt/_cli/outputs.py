@@ -39,6 +39,16 @@ def figure_notes(written: object = True) -> tuple[str, ...]:  # noqa: FBT002  # 
     return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
 
 
+def picture(name: str, draw: Callable[[Any], Any]) -> dict[str, bytes]:
+    """Return a picture as files by name, if it can be drawn; ``draw`` is given all charts."""
+    if figure_notes():
+        return {}
+    from seqopt.report import charts  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report._style import picture_files  # noqa: PLC0415
+
+    return picture_files(name, draw(charts))
+
+
 def steps_table(plan: ShownBuild) -> pd.DataFrame:
     """Return the steps of a plan without any response: as much as reading it again takes."""
     robots = plan.engine.network.scene.robots
@@ -79,11 +89,7 @@ def plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
 
 def time_files(plan: ShownBuild) -> dict[str, bytes]:
     """Return the chart of a build over seconds, where it is known how long robots take."""
-    if plan.makespan is None or figure_notes():
-        return {}
-    from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
-
-    return picture_files("times", plan.gantt())
+    return {} if plan.makespan is None else picture("times", lambda _: plan.gantt())
 
 
 def task_files(plan: Plan) -> dict[str, str]:

@@ -176,14 +176,10 @@ def _files(result: Comparison) -> dict[str, bytes | str]:
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
         **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
     }
-    files |= {} if speed is None else {"speed.csv": csv_text(speed.table)}
-    if outputs.figure_notes():
+    files |= outputs.picture("responses", lambda charts: charts.responses_figure(result.tables))
+    if speed is None:
         return files
-    from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
-    from seqopt.report.charts import responses_figure  # noqa: PLC0415
-
-    drawn = {"responses": responses_figure(result.tables)}
-    drawn |= {} if speed is None else {"speed": speed.plot()}
-    for name, figure in drawn.items():
-        files |= picture_files(name, figure)
-    return files
+    return files | {
+        "speed.csv": csv_text(speed.table),
+        **outputs.picture("speed", lambda _: speed.plot()),
+    }

@@ -133,9 +133,4 @@ def _files(scene: Scene, builds: Builds, found: FailureMap) -> dict[str, bytes |
         "map_steps.csv": csv_text(found.steps),
         PAGE: failure_page(engine, builds, found),
     }
-    if outputs.figure_notes():
-        return files
-    from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
-    from seqopt.report.charts import failure_figure  # noqa: PLC0415
-
-    return files | picture_files("map", failure_figure(found))
+    return files | outputs.picture("map", lambda charts: charts.failure_figure(found))

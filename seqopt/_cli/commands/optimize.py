@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
-from seqopt.graph.formulation import End, Formulation, Run, as_formulation, trace_rows
+from seqopt.graph.formulation import End, Run, as_formulation, trace_rows
 from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._range import at_sufficient_level
@@ -194,12 +194,12 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
     with clock.needed("posing the problem"):
         posed = asked_problem(asked, change)
         formulation = as_formulation(asked.formulation or usual(posed.problem))
-    how = _how(asked, formulation)
+    how: dict[str, Any] = grammar.parse_options(formulation, asked.option)
+    if asked.max_memory is not None and "max_memory" in formulation.options:
+        how["max_memory"] = grammar.parse_size(str(asked.max_memory))
+    tell = asked.tell if formulation.of_states else within(asked.tell, clock.left)
+    run = Run(proof=asked.proof, lazy=asked.lazy, options=how, progress=tell, clock=clock)
     assemble = time.perf_counter() - start
-    in_stages = formulation.of_states
-    run = replace(how, progress=asked.tell, clock=clock)
-    if not in_stages:
-        run = replace(run, progress=within(asked.tell, clock.left))
 
     def choose(problem: Problem) -> Plan:
         if clock.interrupted:  # one that came between two plans ends the next
@@ -269,14 +269,6 @@ def _values(plan: Plan) -> str:
     values = [f"{name} {value_text(name, v)}" for name, v in plan.objective.items()]
     steps = [] if "steps" in plan.objective else [f"{len(plan.steps)} steps"]
     return f"{OUTSIDE}: " * plan.is_far + ", ".join([*values, *steps])
-
-
-def _how(asked: Optimize, formulation: Formulation) -> Run:
-    """Return how a formulation is to be run, its own options among it."""
-    how: dict[str, Any] = grammar.parse_options(formulation, asked.option)
-    if asked.max_memory is not None and "max_memory" in formulation.options:
-        how["max_memory"] = grammar.parse_size(str(asked.max_memory))
-    return Run(proof=asked.proof, lazy=asked.lazy, options=how)
 
 
 def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:

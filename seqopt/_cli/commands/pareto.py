@@ -296,7 +296,8 @@ def _front_files(asked: ParetoWords, found: Found) -> dict[str, bytes | str]:
         numbered["order"] = [",".join(map(str, order)) for order in orders]
     files = _files(found, [*tables.values()], summary, numbered)
     page = front_page(engine, front, tables, left, verdicts)
-    return {PAGE: page, **files, **_picture(front, found.methods)}
+    drawn = outputs.picture("pareto", lambda charts: charts.front_figure(front, found.methods))
+    return {PAGE: page, **files, **drawn}
 
 
 def _names(front: Front) -> list[str]:
@@ -316,16 +317,6 @@ def _numbered(front: Front) -> pd.DataFrame:
     """Return the table of a Pareto set, its points counted from 1."""
     table = shown_table(front.table)
     return table.set_axis(pd.RangeIndex(1, len(table) + 1, name="point"))
-
-
-def _picture(front: Front, methods: Mapping[str, pd.DataFrame]) -> Mapping[str, bytes | str]:
-    """Return the chart of a Pareto set by file name, if it can be drawn."""
-    if outputs.figure_notes():
-        return {}
-    from seqopt.report._style import picture_files  # noqa: PLC0415
-    from seqopt.report.charts import front_figure  # noqa: PLC0415  # matplotlib is an extra
-
-    return picture_files("pareto", front_figure(front, methods))
 
 
 def _under(texts: Sequence[str], found: Found) -> dict[str, float]:
