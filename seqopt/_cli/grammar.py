@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -26,28 +25,13 @@ from seqopt.study.published import CRITERIA, find_criterion
 from seqopt.work.progress import Tell
 
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
-MOST_WORKERS = 1024
 NAMED = (None, *CRITERIA)
 PROPS = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma push, capacity=300"
 
 
-def parse_speed(text: Number | None) -> float:
-    """Return how long each engine and formulation may take, s; zero if speed is not asked for."""
-    if text is None:
-        return 0.0
-    try:
-        return number_word(str(text), "--speed")
-    except ProblemError as error:
-        raise ProblemError(f"{error}; give seconds, and the scene before it") from None
-
-
-def parse_count(
-    text: int | str | None, where: str, most: int, least: int = 1, usual: int = 0
-) -> int:
-    """Return a whole number within bounds, or the usual one; ``where``: argument, for messages."""
-    if text is None:
-        return usual
-    text = str(text)
+def parse_count(number: int | str, where: str, most: int, least: int = 1) -> int:
+    """Return a whole number within bounds; ``where``: argument, for messages."""
+    text = str(number)
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
         raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
     return int(text)
@@ -118,11 +102,6 @@ def parse_numbers(
     return out
 
 
-def parse_time_limit(text: Number | None) -> float:
-    """Return seconds from words, infinite where none are given."""
-    return math.inf if text is None else number_word(str(text), "--time-limit", zero=True)
-
-
 def parse_options(formulation: Formulation | str, texts: Words) -> dict[str, Any]:
     """Return options of a formulation, whose ``solve`` says which there are and of which type."""
     formulation = as_formulation(formulation)
@@ -164,22 +143,17 @@ def parse_standing(asked: Tilted) -> Standing | None:
     curing = asked.curing if isinstance(asked, Cured) else ()
     said = {"tilt": asked.tilt, "friction": asked.friction, "curing": curing}
     if asked.stands is None:
-        names = [name for name, text in said.items() if text]
+        names = [name for name, value in said.items() if value not in (None, ())]
         if names:
             raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands dry, say")
         return None
-    given = {
-        name: number_word(str(said[name]), f"--{name}", zero=True)
-        for name in ("tilt", "friction")
-        if said[name] is not None
-    }
     mortar = parse_mortar(asked.stands, "--stands")
+    mortar = mortar if asked.friction is None else replace(mortar, friction=asked.friction)
     try:
         cures = _find_curing(" ".join(curing)) if curing else None
     except SceneError as error:
         raise ProblemError(f"--{error}") from error
-    tilt = radians(given.pop("tilt", 0.0))
-    return Standing(replace(mortar, **given), tilt, cures)
+    return Standing(mortar, radians(asked.tilt or 0.0), cures)
 
 
 def parse_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
@@ -194,16 +168,15 @@ def parse_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
         if not isinstance(criterion, RankSum) or (name == "crown" and named not in NAMED):
             raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
         crown = None if name == "ranked" or text == "none" else number_word(str(text), "--crown")
-        value = Ranked(text) if name == "ranked" else NEVER if crown is None else crown
+        value: Any = Ranked(text) if name == "ranked" else NEVER if crown is None else crown
         criterion = replace(criterion, **{name: value})
     return criterion
 
 
 def parse_resources(asked: Chosen, progress: Tell | None = None) -> Resources:
     """Return what a computation may use."""
-    workers = parse_count(asked.workers, "--workers", MOST_WORKERS)
     most = None if asked.max_memory is None else parse_size(asked.max_memory)
-    return Resources(workers, None, asked.cache, most, progress)
+    return Resources(asked.workers, None, asked.cache, most, progress)
 
 
 def parse_size(text: str) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any, TypeAlias, dataclass_transform
 
@@ -20,6 +21,7 @@ from seqopt.plan.build import ShownBuild
 from seqopt.problem.criteria import Ranked
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
+from seqopt.scene.scenarios import MOST
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.rules import FreeRules
@@ -39,6 +41,7 @@ Limits: TypeAlias = Sequence[Limit | str] | Limit | str
 Rules: TypeAlias = FreeRules | Sequence[str] | str
 Stability: TypeAlias = Standing | Mortar | str
 
+MOST_WORKERS = 1024
 NAMES: dict[str, Callable[[], Iterable[str]]] = {  # what stands in braces in the help
     "criteria": lambda: CRITERIA,
     "engine": lambda: [DEFAULT],
@@ -54,8 +57,10 @@ NAMES: dict[str, Callable[[], Iterable[str]]] = {  # what stands in braces in th
 def word(default: Any = MISSING, **how: Any) -> Any:
     """Return a field of which a parser knows more: ``choices``, ``flag``, ``const``.
 
-    ``const``: what it is where no value follows. What has no default must be given. The field of
-    an argument without dashes is no keyword, so that type checkers see it as functions have it.
+    ``const``: what it is where no value follows; ``zero``: whether a number may be zero, ``least``
+    and ``most``: bounds of a whole one; ``advice``: beside what is wrong with it. What has no
+    default must be given. The field of an argument without dashes is no keyword, so that type
+    checkers see it as functions have it.
     """
     return field(metadata=how) if default is MISSING else field(default=default, metadata=how)
 
@@ -245,8 +250,8 @@ class Tilted(Stands):
         with --stands: tilt that every state must survive
     """
 
-    friction: Number | None = None
-    tilt: Number | None = None
+    friction: float | None = word(None, zero=True)
+    tilt: float | None = word(None, zero=True)
 
 
 class Cured(Tilted):
@@ -341,7 +346,7 @@ class Limited(Asked):
         choosing and computing are one, the moves that were chosen by then
     """
 
-    time_limit: Number | None = None
+    time_limit: float = word(inf, zero=True)
 
 
 class Moves(Computed, Aimed, Stands, Ruled, Team, Scened):
@@ -441,10 +446,10 @@ class Chosen(Ranks, Choice):
     """
 
     robust: str | None = None
-    scenarios: int | str | None = None
-    unseen: int | str | None = None
-    seed: int | str | None = None
+    scenarios: int | None = word(None, most=MOST)
+    unseen: int | None = word(None, most=MOST)
+    seed: int = word(0, least=0, most=MOST)
     vary: Numbers = ()
-    workers: int | str = 1
+    workers: int = word(1, most=MOST_WORKERS)
     cache: File | None = None
     max_memory: str | None = None

@@ -22,7 +22,7 @@ from seqopt.problem.problem import (
     parse_budgets,
     parse_robust,
 )
-from seqopt.scene.scenarios import MOST, Scenarios, scenarios
+from seqopt.scene.scenarios import Scenarios, scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, Direction, FreeRules
 from seqopt.sequence.steps import StepKind
@@ -183,11 +183,10 @@ def _asked_scenarios(
         aim = parse_robust(asked.robust)
     except ProblemError as error:
         raise ProblemError(f"--robust: {error}") from error
-    count = grammar.parse_count(asked.scenarios, "--scenarios", MOST, usual=COUNT)
-    seed, known = grammar.parse_count(asked.seed, "--seed", MOST, least=0), asked.unseen
-    other = None if known is None else grammar.parse_count(known, "--unseen", MOST)
-    drawn = _drawn(scene, asked.vary, count, seed)
-    return aim, drawn, None if other is None else _drawn(scene, asked.vary, other, seed + 1)
+    drawn = _drawn(scene, asked.vary, asked.scenarios or COUNT, asked.seed)
+    if asked.unseen is None:
+        return aim, drawn, None
+    return aim, drawn, _drawn(scene, asked.vary, asked.unseen, asked.seed + 1)
 
 
 def _drawn(scene: Scene, vary: options.Numbers, count: int, seed: int) -> Scenarios:

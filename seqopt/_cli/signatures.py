@@ -11,9 +11,11 @@ from inspect import cleandoc
 from pathlib import Path
 from typing import Any, TypeVar
 
+from seqopt._cli.grammar import parse_count
 from seqopt._cli.options import NAMES, Asked
 from seqopt._cli.terminal import columns, wrapped
 from seqopt.errors import ProblemError, did_you_mean
+from seqopt.problem._limit_words import number_word
 
 QUESTIONS = (
     "What is built, and by whom?",
@@ -113,7 +115,6 @@ def _add(takes: Any, name: str, known: Field[Any] | None, value: str, text: str)
         how["metavar"] = None if value == "CHOICE" else value
         how |= {"choices": more["choices"]} if "choices" in more else {}
         how |= {"type": Path} if value in PATHS else {}
-        how |= {"type": float} if isinstance(default, float) else {}
     if isinstance(default, tuple):
         how |= {"action": "append", "default": [], "help": f"{text}; may be repeated"}
     if "const" in more:
@@ -148,13 +149,25 @@ def _value(known: Field[Any], value: Any) -> Any:
             value = [f"{name}={_text(each)}" for name, each in value.items()]
         several = value if isinstance(value, Sequence) and not isinstance(value, str) else [value]
         return tuple(map(_text, several))
-    if isinstance(known.default, float):
-        return float(value)
-    text, choices = _text(value), known.metadata.get("choices")
+    kind, more = str(known.type), known.metadata
+    if kind in ("float", "float | None"):
+        return value if value == known.default else _number(known, value)
+    if kind in ("int", "int | None"):
+        return parse_count(value, _flag(known.name), more["most"], more.get("least", 1))
+    text, choices = _text(value), more.get("choices")
     if choices is not None and text not in choices:
         hint = did_you_mean(text, choices)
         raise ProblemError(f"{known.name} {text!r} does not exist{hint}; give {', '.join(choices)}")
     return Path(text) if FILE.match(str(known.type)) and isinstance(text, str) else text
+
+
+def _number(known: Field[Any], value: float | str) -> float:
+    """Return the number of an option; ``advice`` of it stands beside what is wrong with it."""
+    flag, zero = known.metadata.get("flag", _flag(known.name)), known.metadata.get("zero", False)
+    try:
+        return number_word(str(value), flag, zero=zero)
+    except ProblemError as error:
+        raise ProblemError(f"{error}{known.metadata.get('advice', '')}") from None
 
 
 def _text(value: Any) -> Any:

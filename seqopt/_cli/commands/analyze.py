@@ -6,11 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from math import inf
 from pathlib import Path
 
 import pandas as pd
 
-from seqopt._cli import grammar, inputs, options, outputs, remarks
+from seqopt._cli import inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
@@ -88,14 +89,14 @@ class Analyze(options.Strict, options.Computed, options.Fixed):
     staged: str | None = options.word(None, choices=[way.value for way in Placing])
     tolerance: str | None = options.word(None, const="")
     fields: options.File | None = None
-    time_limit: options.Number | None = None
+    time_limit: float = options.word(inf, zero=True)
 
 
 def run(asked: Analyze) -> Answer:
     """Analyze every step of a sequence."""
     archived = None if asked.fields is None else Path(asked.fields)
     outputs.keep_apart(asked, asked.path, archived)
-    clock, faults = Clock(grammar.parse_time_limit(asked.time_limit)), dict[int, SeqoptError]()
+    clock, faults = Clock(asked.time_limit), dict[int, SeqoptError]()
     with clock.needed("reading scene and steps"):
         scene = inputs.find_scene(asked)
         find_postures(scene, asked.cache, asked.tell)
@@ -249,7 +250,7 @@ def _late(
         so_far += f", {dear} by discrete elements, which are what takes long"
     if in_time.interrupted:
         return (f"seqopt: interrupted; {so_far}",), Status.INTERRUPTED
-    said = f"seqopt: error: --time-limit {asked.time_limit}: {so_far}; give more seconds"
+    said = f"seqopt: error: --time-limit {asked.time_limit:g}: {so_far}; give more seconds"
     return (said,), Status.FAILED
 
 

@@ -19,7 +19,6 @@ from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.problem._limit_words import number_word
 from seqopt.responses.quantities import _steps_in_words
 from seqopt.sequence.steps import Step
 from seqopt.stability._load_factor import format_load_factors, load_factor_table, load_factors
@@ -72,7 +71,7 @@ class Assess(options.Fixed):
     load_factor: bool = False
     map: str | None = None
     holds: options.Words | None = None
-    workers: int | str = 1
+    workers: int = options.word(1, most=options.MOST_WORKERS)
 
 
 class AssessWords(Assess):
@@ -105,9 +104,9 @@ class AssessWords(Assess):
     seqopt assess arch:span=2,rise=0.8 --map friction --out map
     """
 
-    friction: options.Number | None = None
-    tensile_strength: options.Number | None = None
-    cohesion: options.Number | None = None
+    friction: float | None = options.word(None, zero=True)
+    tensile_strength: float | None = options.word(None, zero=True)
+    cohesion: float | None = options.word(None, zero=True)
 
 
 def answer_load_factor(asked: AssessWords) -> Answer:
@@ -204,9 +203,9 @@ def _asked_mortars(asked: AssessWords) -> dict[str, Mortar]:
     friction in dry joints as well.
     """
     given = {
-        name: number_word(str(text), f"--{name.replace('_', '-')}", zero=True)
+        name: value
         for name in ("friction", "tensile_strength", "cohesion")
-        if (text := getattr(asked, name)) is not None
+        if (value := getattr(asked, name)) is not None
     }
     own = replace(grammar.parse_mortar(asked.mortar or "epoxy", "--mortar"), **given)
     dry = () if asked.mortar else (Mortar(friction=own.friction),)
@@ -218,10 +217,9 @@ def _verdicts(
 ) -> Iterator[dict[str, Any]]:
     """Yield the rows of all steps, mortar by mortar."""
     margins, at = _asked_margins(asked, steps)
-    workers = grammar.parse_count(asked.workers, "--workers", grammar.MOST_WORKERS)
     for name, mortar in mortars.items():
         told = with_progress(f"assessing steps, {_with_mortar(name)}", steps, asked.tell)
-        found = each_stability(network, steps, mortar, margins, at, (None, workers))
+        found = each_stability(network, steps, mortar, margins, at, (None, asked.workers))
         for step, result in zip(told, found, strict=True):
             yield {"mortar": name, **stability_row(step, result)}
 

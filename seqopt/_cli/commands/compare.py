@@ -62,7 +62,7 @@ class Compare(
     seqopt compare arch25 --speed 20 --out speed
     """
 
-    speed: options.Number | None = options.word(None, const="10")
+    speed: float = options.word(0.0, const="10", advice="; give seconds, and the scene before it")
 
 
 def run(asked: Compare) -> Answer:
@@ -81,7 +81,6 @@ class Found(NamedTuple):
 
 def find(asked: Compare) -> Found:
     """Compare all ways to build a scene; with what it is compared by."""
-    seconds = grammar.parse_speed(asked.speed)
     scene = inputs.find_scene(asked)
     find_postures(scene, asked.cache, asked.tell)
     engine = inputs.find_engine(asked, build_network(scene))
@@ -90,7 +89,7 @@ def find(asked: Compare) -> Found:
     outputs.require_out(asked)
     prover = inputs.find_prover(asked, engine.network)
     robots = grammar.parse_robots(asked.robots)
-    result = compare(engine, criterion, asked.tell, robots, prover, seconds)
+    result = compare(engine, criterion, asked.tell, robots, prover, asked.speed)
     return Found(engine, criterion, prover, result)
 
 

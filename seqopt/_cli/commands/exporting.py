@@ -11,7 +11,6 @@ from seqopt._files import require_apart, write_text
 from seqopt.arms._kept import arm_faults
 from seqopt.exchange._tasks import Postures
 from seqopt.exchange.exports import EXPORTS, LOST, TASKS, export_plan, read_folder
-from seqopt.problem._limit_words import number_word
 
 
 class Export(options.Postures, options.Written):
@@ -44,7 +43,7 @@ class Export(options.Postures, options.Written):
     folder: options.BuiltFrom = field(kw_only=False, metadata={"place": True})
     format: str = field(default="csv", kw_only=False, metadata={"choices": EXPORTS})
     source: options.File | None = None
-    distance: options.Number | None = None
+    distance: float | None = None
 
 
 def run(asked: Export) -> Answer:
@@ -54,8 +53,6 @@ def run(asked: Export) -> Answer:
     source = None if asked.source is None else Path(asked.source)
     require_apart([*filter(None, [asked.path])], [*read, *filter(None, [source])])
     scene, steps = read_folder(folder)
-    given = asked.distance
-    distance = None if given is None else number_word(str(given), f"--distance {given}")
     notes: tuple[str, ...] = ()
     postures: Postures | None = None  # of other formats than tasks
     if asked.format in TASKS and scene.has_arms:
@@ -63,7 +60,7 @@ def run(asked: Export) -> Answer:
             notes, postures = (f"arms: grips are proposals without postures; {trouble}",), {}
         else:
             notes = tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps))
-    text = export_plan(scene, steps, asked.format, source, distance, postures)
+    text = export_plan(scene, steps, asked.format, source, asked.distance, postures)
     said, lost = f"{len(steps)} steps", LOST.get(asked.format)
     if lost:
         plan = "" if "steps" in lost else f" and {said}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from seqopt._cli import grammar, options, remarks
+from seqopt._cli import options, remarks
 from seqopt._cli.answer import Answer
 from seqopt._files import require_apart, write_text
 from seqopt.errors import ProblemError
@@ -72,11 +72,11 @@ class Import(options.Asked):
     name: str | None = None
     unit: str | None = options.word(None, choices=UNITS)
     up: str | None = options.word(None, choices=UPS)
-    density: str | None = None
+    density: float | None = None
     supports: str | None = None
-    robots: str | None = None
+    robots: int | None = options.word(None, most=MOST_ROBOTS)
     stiffness: str | None = None
-    gap: str | None = None
+    gap: float | None = None
     detect: bool = False
     accept_overlaps: bool = False
 
@@ -99,24 +99,20 @@ def run(asked: Import) -> Answer:
 
 def _given(asked: Import) -> Given:
     """Return what the words say where the file does not."""
-    keys, robots = asked.supports, asked.robots
+    keys = asked.supports
     return Given(
         unit=asked.unit,
         up=asked.up,
-        density=_positive("--density", asked.density),
+        density=asked.density,
         supports=None if keys is None else [key.strip() for key in keys.split(",") if key.strip()],
         law=_law(asked.stiffness),
-        gap=_positive("--gap", asked.gap),
+        gap=asked.gap,
         detect=asked.detect,
         accept_overlaps=asked.accept_overlaps,
-        robots=robots if robots is None else grammar.parse_count(robots, "--robots", MOST_ROBOTS),
+        robots=asked.robots,
         name=asked.name,
         progress=asked.tell,
     )
-
-
-def _positive(where: str, text: str | None) -> float | None:
-    return None if text is None else number_word(text, f"{where} {text}")
 
 
 def _law(text: str | None) -> JointLaw | None:

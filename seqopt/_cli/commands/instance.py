@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 
-from seqopt._cli import grammar, inputs, options, outputs
+from seqopt._cli import inputs, options, outputs
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands.optimize import Optimize
 from seqopt._cli.posing import asked_problem
@@ -17,7 +17,6 @@ from seqopt.graph.instance import Instance as Graph
 from seqopt.instances._files import WRITERS, save_instance
 from seqopt.instances.compiled import compile_instance
 from seqopt.judge._claims import first_stage
-from seqopt.problem._limit_words import number_word
 from seqopt.work._clock import Clock
 
 SAID = ("--quiet", "--json")
@@ -37,7 +36,7 @@ class Instance(options.Written, options.Choice):
     """
 
     name: str | None = None
-    below: options.Number | None = None
+    below: float = inf
 
 
 class InstanceWords(Instance, Optimize):
@@ -75,8 +74,7 @@ def find(asked: InstanceWords) -> Graph:
     path = asked.path
     if path and path.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
-    below = inf if asked.below is None else number_word(str(asked.below), "--below")
-    clock = Clock(grammar.parse_time_limit(asked.time_limit))
+    clock = Clock(asked.time_limit)
     with clock.needed("posing the problem"):
         problem = asked_problem(asked).problem
     named = None if asked.formulation is None else find_formulation(asked.formulation)
@@ -85,7 +83,7 @@ def find(asked: InstanceWords) -> Graph:
     facts = {"made_by": _made_by(asked.made_by)} if asked.made_by else {}
     name = asked.name or (problem.scene.name if path is None else path.stem)
     with clock.needed("writing down the graph"):
-        return compile_instance(problem, name=name, aim=aim, below=below, facts=facts)
+        return compile_instance(problem, name=name, aim=aim, below=asked.below, facts=facts)
 
 
 def answered(asked: InstanceWords, found: Graph) -> Answer:

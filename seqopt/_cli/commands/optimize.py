@@ -188,7 +188,7 @@ def run(asked: Optimize) -> Answer:
 
 def find(asked: Optimize, change: Change | None = None) -> Found:
     """Choose every open grip of a build, or every step; ``change``: what has changed before."""
-    clock = Clock(grammar.parse_time_limit(asked.time_limit))
+    clock = Clock(asked.time_limit)
     outputs.require_out(asked, *outputs.ALWAYS)
     start = time.perf_counter()
     with clock.needed("posing the problem"):

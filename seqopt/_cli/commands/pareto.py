@@ -69,7 +69,7 @@ class Pareto(options.Written, options.Judged, options.Built, options.Moves):
     schedule: str | Path | None = FREE
     aim: options.Words | None = FOUR
     rounding: options.Numbers = options.word((), flag="--round")
-    seconds: float = inf
+    seconds: float = options.word(inf, zero=True)
 
 
 class ParetoWords(options.Posed, Pareto):
@@ -162,8 +162,6 @@ class Found:
 
 def find(asked: ParetoWords) -> Found:
     """Find all plans that no other beats in every aim."""
-    if not asked.seconds >= 0:
-        raise ProblemError(f"--seconds {asked.seconds:g}: give a number from 0")
     outputs.require_out(asked)
     clock = Clock(asked.seconds)
     with clock.needed("posing the problem"):
