@@ -164,7 +164,7 @@ def test_a_time_limit_of_analyze_leaves_the_rows_so_far(tmp_path):
     answer = analyze_command.run(asked)
     assert answer.status == 4
     assert answer.failures == (
-        "seqopt: error: --time-limit 1e9: 3 of 49 steps computed; give more seconds",
+        "seqopt: error: --time-limit 1e+09: 3 of 49 steps computed; give more seconds",
     )
     assert pd.read_csv(path)["step"].tolist() == [1, 2, 3]
     with np.load(fields) as archive:
