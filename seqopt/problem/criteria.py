@@ -39,62 +39,38 @@ class Ranked(Enum):
     CONDITIONAL = "conditional"  # the later move's candidates, the earlier choice being made
 
 
-def _ranks_of(values: Floats, choices: int, ranked: Ranked) -> Floats:
-    """Return mean ranks of the choices in a step, (C,) or (C, D), as `_scaled_ranks`."""
-    if values.ndim == 2 and ranked is Ranked.CONDITIONAL:
-        return _row_ranks(values, choices)
-    return _scaled_ranks(values, choices)
-
-
-def _row_ranks(values: Floats, choices: int) -> Floats:
-    """Return mean ranks (C, D), every row for itself, as `_scaled_ranks`.
-
-    NaN stays NaN where any value is known; otherwise all ranks are the mean of 1 and ``choices``.
-    """
-    known = np.isfinite(values)
-    if not known.any():
-        return np.full(values.shape, 0.5 * (choices + 1))
-    rounded = np.where(known, np.round(values), np.inf)  # what is impossible comes last
-    order = np.argsort(rounded, axis=1, kind="stable")
-    ordered = np.take_along_axis(rounded, order, axis=1)
-    place = np.arange(values.shape[1])
-    new = np.ones(values.shape, dtype=bool)
-    new[:, 1:] = ordered[:, 1:] != ordered[:, :-1]
-    last = np.roll(new, -1, axis=1)  # the first is always new, so that the last is one
-    first_of = np.maximum.accumulate(np.where(new, place, 0), axis=1)
-    last_of = np.minimum.accumulate(np.where(last, place, len(place))[:, ::-1], axis=1)[:, ::-1]
-    ranks = np.empty(values.shape)
-    np.put_along_axis(ranks, order, 0.5 * (first_of + last_of) + 1.0, axis=1)
-    return np.where(known, ranks, np.nan)
-
-
-def _scaled_ranks(values: Floats, choices: int) -> Floats:
-    """Return mean ranks of values, (C,) or (C, D), rounded to whole numbers.
+def _ranks_of(values: Floats, choices: int, ranked: Ranked = Ranked.PAIRS) -> Floats:
+    """Return mean ranks of the choices in a step, (C,) or (C, D), rounded to whole numbers.
 
     Values are in units of their resolution, NaN where a choice is impossible. Ranks over pairs are
-    scaled so that they run from 1 to ``choices``. NaN stays NaN, except that all ranks are equal
-    where all values are NaN.
+    scaled so that they run from 1 to ``choices``; those given the choice before are of every row
+    for itself. NaN stays NaN, except that all ranks are equal where all values are NaN.
     """
     known = np.isfinite(values)
     if not known.any():
         return np.full(values.shape, 0.5 * (choices + 1))
+    if values.ndim == 1 or ranked is Ranked.CONDITIONAL:  # what is impossible comes last
+        return np.where(known, _mean_ranks(np.where(known, np.round(values), np.inf)), np.nan)
     out = np.full(values.shape, np.nan)
-    ranks = _mean_ranks(np.round(values[known]))
-    out[known] = ranks if values.ndim == 1 else (ranks - 0.5) * choices / known.sum() + 0.5
+    out[known] = (_mean_ranks(np.round(values[known])) - 0.5) * choices / known.sum() + 0.5
     return out
 
 
 def _mean_ranks(values: Floats) -> Floats:
-    """Return ranks from 1 of values (n,); ties share the mean of theirs.
+    """Return ranks from 1 of values (..., n), row by row; ties share the mean of theirs.
 
-    As `scipy.stats.rankdata`, in a fifth of its time for the few values of a step.
+    As `scipy.stats.rankdata`, in a fraction of its time for the few values of a step.
     """
-    order = np.argsort(values)
-    ordered = values[order]
-    new = np.flatnonzero(ordered[1:] != ordered[:-1]) + 1
-    ends = np.concatenate([[0], new, [len(values)]])
-    ranks = np.empty(len(values))
-    ranks[order] = np.repeat(0.5 * (ends[1:] + ends[:-1] + 1), np.diff(ends))
+    order = np.argsort(values, axis=-1, kind="stable")
+    ordered, place = np.take_along_axis(values, order, axis=-1), np.arange(values.shape[-1])
+    new = np.ones(values.shape, dtype=bool)
+    new[..., 1:] = ordered[..., 1:] != ordered[..., :-1]
+    last = np.roll(new, -1, axis=-1)  # the first is always new, so that the last is one
+    first_of = np.maximum.accumulate(np.where(new, place, 0), axis=-1)
+    back = np.where(last, place, len(place))[..., ::-1]
+    last_of = np.minimum.accumulate(back, axis=-1)[..., ::-1]
+    ranks = np.empty(values.shape)
+    np.put_along_axis(ranks, order, 0.5 * (first_of + last_of) + 1.0, axis=-1)
     return ranks
 
 

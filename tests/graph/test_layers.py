@@ -11,7 +11,7 @@ from scipy.stats import rankdata
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.plan._tables import choice_table
 from seqopt.plan.solving import solve
-from seqopt.problem.criteria import _mean_ranks, _scaled_ranks
+from seqopt.problem.criteria import _mean_ranks, _ranks_of
 from seqopt.problem.requirements import SceneFacts, payload_limits
 from seqopt.sequence.three_robots import modified_sequential
 from seqopt.study.published import CRITERIA, EQUATIONS, paper_models
@@ -42,9 +42,9 @@ def test_payloads_can_be_kept(engine25, loop25):
 
 def test_ranks():
     values = np.array([3.0, 1.0, 1.0, np.nan, 2.0])
-    assert _scaled_ranks(values, 5) == pytest.approx([4, 1.5, 1.5, np.nan, 3], nan_ok=True)
-    assert _scaled_ranks(np.array([1.2, 0.9, 1.4]), 3) == pytest.approx([2, 2, 2])  # all round to 1
-    assert _scaled_ranks(np.full(3, np.nan), 3) == pytest.approx([2, 2, 2])
+    assert _ranks_of(values, 5) == pytest.approx([4, 1.5, 1.5, np.nan, 3], nan_ok=True)
+    assert _ranks_of(np.array([1.2, 0.9, 1.4]), 3) == pytest.approx([2, 2, 2])  # all round to 1
+    assert _ranks_of(np.full(3, np.nan), 3) == pytest.approx([2, 2, 2])
 
 
 @given(values=st.lists(st.integers(-5, 5), min_size=1, max_size=30))
@@ -57,8 +57,8 @@ def test_ranks_are_those_of_scipy(values):
 @given(st.lists(st.integers(0, 9), min_size=12, max_size=12))
 def test_shared_ranks_weigh_as_much_as_single_ones(values):
     """Ranks over pairs have the mean of ranks over single candidates."""
-    pairs = _scaled_ranks(np.array(values, float).reshape(3, 4), 4)
-    assert pairs.mean() == pytest.approx(_scaled_ranks(np.arange(4.0), 4).mean())
+    pairs = _ranks_of(np.array(values, float).reshape(3, 4), 4)
+    assert pairs.mean() == pytest.approx(_ranks_of(np.arange(4.0), 4).mean())
     assert 0.5 < pairs.min() <= pairs.max() < 4.5
 
 

@@ -18,7 +18,7 @@ from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.layers.ranking import _least_among_least, move_costs, objectives, split_gap
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
-from seqopt.problem.criteria import Ranked, _row_ranks, _scaled_ranks
+from seqopt.problem.criteria import Ranked, _ranks_of
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED
@@ -61,9 +61,9 @@ def test_rows_are_ranked_as_if_alone(rows):
     table = np.array(rows, float)
     if not np.isfinite(table).any() or table.ndim != 2:
         return
-    together = _row_ranks(table, 9)
+    together = _ranks_of(table, 9, Ranked.CONDITIONAL)
     for row, ranks in zip(table, together, strict=True):
-        alone = _scaled_ranks(row, 9) if np.isfinite(row).any() else np.full(row.shape, np.nan)
+        alone = _ranks_of(row, 9) if np.isfinite(row).any() else np.full(row.shape, np.nan)
         np.testing.assert_array_equal(ranks, alone)
 
 

@@ -17,7 +17,6 @@ from seqopt.problem.criteria import (
     _mean_ranks,
     _present,
     _ranks_of,
-    _scaled_ranks,
     equal,
 )
 from seqopt.problem.criteria import WorstRatio as Worst
@@ -77,11 +76,11 @@ def test_what_is_below_the_resolution_decides_nothing():
 
 def test_ranks_of_pairs_run_as_far_as_those_of_candidates():
     pairs = np.array([[4.0, 1.0, 2.0], [3.0, NAN, NAN]])
-    assert _scaled_ranks(pairs, 2) == pytest.approx(
+    assert _ranks_of(pairs, 2) == pytest.approx(
         np.array([[2.25, 0.75, 1.25], [1.75, NAN, NAN]]), nan_ok=True
     )
-    assert _scaled_ranks(np.full((2, 3), NAN), 4).tolist() == [[2.5] * 3] * 2
-    assert _scaled_ranks(np.array([NAN, 5.0, np.inf, 2.0]), 4) == pytest.approx(
+    assert _ranks_of(np.full((2, 3), NAN), 4).tolist() == [[2.5] * 3] * 2
+    assert _ranks_of(np.array([NAN, 5.0, np.inf, 2.0]), 4) == pytest.approx(
         [NAN, 2, NAN, 1], nan_ok=True
     )
     assert _mean_ranks(np.array([7.0, 1.0, 7.0, 7.0, 3.0])).tolist() == [4, 1, 4, 4, 2]
@@ -96,7 +95,7 @@ def test_given_the_choice_before_every_row_is_ranked_for_itself(seed):
         values[0, 0] = 1.0
     rows = _ranks_of(values, 9, Ranked.CONDITIONAL)
     for row, own in zip(rows, values, strict=True):
-        one = np.full(own.shape, NAN) if np.isnan(own).all() else _scaled_ranks(own, len(own))
+        one = np.full(own.shape, NAN) if np.isnan(own).all() else _ranks_of(own, len(own))
         assert row == pytest.approx(one, nan_ok=True)
     assert _ranks_of(np.full((2, 3), NAN), 4, Ranked.CONDITIONAL).tolist() == [[2.5] * 3] * 2
 
