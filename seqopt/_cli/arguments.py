@@ -197,7 +197,7 @@ class Printed:
 
 def request(words: Sequence[str], tell: Any = None) -> tuple[str, Any, Printed]:
     """Return the command that words name, and its options; a wrong word ends the program."""
-    options = vars(parser(asked_command(words)).parse_args(words))
+    options = vars(parser(named_command(words)).parse_args(words))
     from seqopt._cli.signatures import given  # noqa: PLC0415  # of which help needs nothing
 
     name = options.pop("command")
@@ -237,6 +237,6 @@ def first_screen(command: argparse.ArgumentParser) -> str:
     return lines.format_help()
 
 
-def asked_command(words: Sequence[str]) -> str:
+def named_command(words: Sequence[str]) -> str:
     """Return the command that words after ``seqopt`` ask for, empty if there is none."""
     return next((word for word in words if not word.startswith("-")), "")

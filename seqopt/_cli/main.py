@@ -12,7 +12,7 @@ from importlib import import_module
 from types import ModuleType
 
 from seqopt._cli.answer import Answer, Status, print_answer, status_of
-from seqopt._cli.arguments import COMMANDS, EXAMPLES, asked_command, request
+from seqopt._cli.arguments import COMMANDS, EXAMPLES, named_command, request
 from seqopt._cli.terminal import flush, quiet_numbers, show, silence
 from seqopt.errors import SeqoptError
 
@@ -51,7 +51,7 @@ def load(words: Sequence[str]) -> None:
     what is loaded later on: all of it stays.
     """
     gc.disable()
-    asked = asked_command(words)
+    asked = named_command(words)
     if asked in COMMANDS:
         import numpy as np  # noqa: PLC0415  # of which help needs nothing
 

@@ -63,7 +63,7 @@ class PosedProblem:
     unseen: Scenarios | None = None
 
 
-def asked_problem(asked: options.Posed, change: Change | None = None) -> PosedProblem:
+def pose_problem(asked: options.Posed, change: Change | None = None) -> PosedProblem:
     """Return the problem that the command ``optimize`` or ``pareto`` is asked for.
 
     ``change``: what has changed where the build begins. Raises `ProblemError` or `StepError` if
@@ -78,13 +78,13 @@ def asked_problem(asked: options.Posed, change: Change | None = None) -> PosedPr
         choice, DEFAULTS[FREE if of_states else "any other"].criterion
     )
     scene = inputs.find_scene(asked)
-    scene, begin, end, robots = _asked_ends(asked, scene, change)
+    scene, begin, end, robots = _ends(asked, scene, change)
     scene = inputs.in_seconds(choice, scene) if choice.durations else scene
     find_postures(scene, choice.cache, asked.tell)
     words: dict[str, Any] = {"limits": parse_limits(asked.limits, scene, "--limit")}
     parse_budgets(choice.budgets, of_states=of_states)  # said before anything is built
     words["resources"] = grammar.parse_resources(choice, None if of_states else asked.tell)
-    aim, known, unseen = _asked_scenarios(choice, scene)
+    aim, known, unseen = _scenarios(choice, scene)
     words |= {} if aim is None else {"scenarios": known, "over": aim}
     engine = inputs.find_engine(asked, build_network(scene))
     rules = asked.rules if asked.schedule == FREE else None
@@ -130,7 +130,7 @@ def _aged(asked: options.Posed, scene: Scene, begin: inputs.Place) -> inputs.Pla
     return replace(begin, site=replace(begin.site, ages=ages))
 
 
-def _asked_ends(
+def _ends(
     asked: options.Posed, scene: Scene, change: Change | None
 ) -> tuple[Scene, inputs.Place, inputs.Place, int | options.Words | None]:
     """Return where a build begins and ends, the scene after what has changed, who takes part."""
@@ -173,7 +173,7 @@ def _require_known(asked: options.Posed, choice: options.Chosen, *, of_states: b
             raise ProblemError(f"--{'rule' if name == 'rules' else name}: {why}")
 
 
-def _asked_scenarios(
+def _scenarios(
     asked: options.Chosen, scene: Scene
 ) -> tuple[RobustAim | None, Scenarios | None, Scenarios | None]:
     """Return the aim over scenarios, those to choose by, and those of the next seed that judge."""

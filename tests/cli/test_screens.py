@@ -179,6 +179,17 @@ def test_values_of_python_are_the_same_words():
         given(Excused, {"needed": "c"})
 
 
+def test_numbers_are_read_where_they_are_given():
+    """In words and in Python, at once: no command meets one that is wrong."""
+    kind = COMMANDS["assess"].asked
+    for words in ({"workers": "2", "friction": "0"}, {"workers": 2, "friction": 0.0}):
+        found = given(kind, words)
+        assert (found.workers, found.friction) == (2, 0.0)
+    for wrong in ({"workers": 0}, {"workers": "two"}, {"friction": "x"}, {"cohesion": -1}):
+        with pytest.raises(ProblemError, match=r"^--(workers|friction|cohesion)"):
+            given(kind, wrong)
+
+
 @pytest.mark.parametrize(
     ("words", "why"),
     [

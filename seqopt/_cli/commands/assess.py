@@ -113,7 +113,7 @@ def answer_load_factor(asked: AssessWords) -> Answer:
     """Answer how much load every step of a sequence bears."""
     scene = inputs.find_scene(asked)
     outputs.require_out(asked)
-    network, mortars = build_network(scene), _asked_mortars(asked)
+    network, mortars = build_network(scene), _mortars(asked)
     (title, steps, taken), each, tables = inputs.find_steps(asked, network), {}, []
     for name, mortar in mortars.items():
         found = each[name] = load_factors(network, steps, mortar, asked.tell)
@@ -158,7 +158,7 @@ def run(asked: AssessWords) -> Answer:
     if asked.load_factor:
         return answer_load_factor(asked)
     outputs.keep_apart(asked, asked.path)
-    scene, mortars = inputs.find_scene(asked), _asked_mortars(asked)
+    scene, mortars = inputs.find_scene(asked), _mortars(asked)
     network = build_network(scene)
     _, steps, taken = inputs.find_steps(asked, network)
     rows, early = list[dict[str, Any]](), tuple[str, ...]()
@@ -196,7 +196,7 @@ def run(asked: AssessWords) -> Answer:
     )
 
 
-def _asked_mortars(asked: AssessWords) -> dict[str, Mortar]:
+def _mortars(asked: AssessWords) -> dict[str, Mortar]:
     """Return the mortar that is named, or dry joints and the epoxy, by what they are called.
 
     The last is what the build counts on. Numbers that are given take the place of its own, and
@@ -216,7 +216,7 @@ def _verdicts(
     asked: AssessWords, network: Network, steps: Sequence[Step], mortars: Mapping[str, Mortar]
 ) -> Iterator[dict[str, Any]]:
     """Yield the rows of all steps, mortar by mortar."""
-    margins, at = _asked_margins(asked, steps)
+    margins, at = _margins(asked, steps)
     for name, mortar in mortars.items():
         told = with_progress(f"assessing steps, {_with_mortar(name)}", steps, asked.tell)
         found = each_stability(network, steps, mortar, margins, at, (None, asked.workers))
@@ -224,7 +224,7 @@ def _verdicts(
             yield {"mortar": name, **stability_row(step, result)}
 
 
-def _asked_margins(asked: AssessWords, steps: Sequence[Step]) -> tuple[tuple[str, ...], range]:
+def _margins(asked: AssessWords, steps: Sequence[Step]) -> tuple[tuple[str, ...], range]:
     """Return which margins are asked for, and the numbers of which steps."""
     margins = find_margins(asked.margins or ("all" if asked.steps else ()))
     if asked.steps is None:

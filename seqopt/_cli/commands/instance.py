@@ -10,7 +10,7 @@ from math import inf
 from seqopt._cli import inputs, options, outputs
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands.optimize import Optimize
-from seqopt._cli.posing import asked_problem
+from seqopt._cli.posing import pose_problem
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instance import Instance as Graph
@@ -76,7 +76,7 @@ def find(asked: InstanceWords) -> Graph:
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
     clock = Clock(asked.time_limit)
     with clock.needed("posing the problem"):
-        problem = asked_problem(asked).problem
+        problem = pose_problem(asked).problem
     named = None if asked.formulation is None else find_formulation(asked.formulation)
     asked.tell("computing all that arcs take")
     aim = None if named is None else named.aim

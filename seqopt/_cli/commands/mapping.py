@@ -28,11 +28,11 @@ STEEPEST = 45.0  # degrees
 def answer_map(asked: options.Fixed, over: str, holds: Sequence[str]) -> Answer:
     """Answer where builds of a scene fail, over an axis and what holds their joints."""
     scene = inputs.find_scene(asked)
-    axis, values = _asked_axis(over)
+    axis, values = _axis(over)
     for name in holds:
         grammar.parse_mortar(name, "--holds")
     outputs.require_out(asked)
-    builds, notes = _asked_builds(asked, scene)
+    builds, notes = _builds(asked, scene)
     if axis == BRICKS:
         scene, builds, found, more = _over_bricks(asked, scene, builds, (over, holds, values))
         notes += more
@@ -58,7 +58,7 @@ def answer_map(asked: options.Fixed, over: str, holds: Sequence[str]) -> Answer:
     )
 
 
-def _asked_axis(text: str) -> tuple[str, tuple[float, ...]]:
+def _axis(text: str) -> tuple[str, tuple[float, ...]]:
     """Return the axis of a map, and its values; none where the usual ones are meant."""
     axis, _, values = text.partition("=")
     if axis not in (*WAYS, BRICKS):
@@ -106,7 +106,7 @@ def _over_bricks(
             order = None if asked.order is None else str(asked.order)
             other = in_order(scene_of_bricks(str(asked.scene), int(count)), order)
             if len(other.bricks) not in scenes:
-                scenes[len(other.bricks)] = other, _asked_builds(asked, other)[0]
+                scenes[len(other.bricks)] = other, _builds(asked, other)[0]
         except SeqoptError as error:
             notes.append(f"{count:g} bricks: {error}")
     if counts and now not in counts:
@@ -117,7 +117,7 @@ def _over_bricks(
     return *scenes[usual], _brick_map(ordered, usual, holds, asked.tell), notes
 
 
-def _asked_builds(asked: options.Fixed, scene: Scene) -> tuple[Builds, list[str]]:
+def _builds(asked: options.Fixed, scene: Scene) -> tuple[Builds, list[str]]:
     """Return the builds that are asked for, by name, and why others are not possible."""
     if asked.method is None and inputs.given_plan(asked) is None:
         return usual_builds(scene, asked.tell)

@@ -14,7 +14,7 @@ import pandas as pd
 
 from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.posing import Change, PosedProblem, asked_problem
+from seqopt._cli.posing import Change, PosedProblem, pose_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
@@ -192,7 +192,7 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
     outputs.require_out(asked, *outputs.ALWAYS)
     start = time.perf_counter()
     with clock.needed("posing the problem"):
-        posed = asked_problem(asked, change)
+        posed = pose_problem(asked, change)
         formulation = as_formulation(asked.formulation or usual(posed.problem))
     how: dict[str, Any] = grammar.parse_options(formulation, asked.option)
     if asked.max_memory is not None and "max_memory" in formulation.options:

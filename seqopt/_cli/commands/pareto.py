@@ -14,7 +14,7 @@ import pandas as pd
 
 from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.posing import asked_problem
+from seqopt._cli.posing import pose_problem
 from seqopt._files import csv_text, write_folder
 from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
@@ -165,7 +165,7 @@ def find(asked: ParetoWords) -> Found:
     outputs.require_out(asked)
     clock = Clock(asked.seconds)
     with clock.needed("posing the problem"):
-        problem = asked_problem(asked).problem
+        problem = pose_problem(asked).problem
         free = states_of(problem)
     rounding = grammar.parse_numbers("--round", asked.rounding, [str(goal) for goal in free.goals])
     tell = within(asked.tell, clock.left)

@@ -75,7 +75,7 @@ def run(asked: Times) -> Answer:
     scene = inputs.in_seconds(asked, scene)
     network = build_network(scene)
     named = inputs.find_steps(asked, network)
-    build, given, least = _asked_build(asked, network, named.steps)
+    build, given, least = _build(asked, network, named.steps)
     timed, aged = build.times(), _aged(asked, build)
     tables = {"plan.csv": build.responses, "times.csv": build.times}
     tables |= {} if aged is None else {"aged.csv": lambda: aged}
@@ -112,7 +112,7 @@ def run(asked: Times) -> Answer:
     )
 
 
-def _asked_build(
+def _build(
     asked: Times, network: Network, steps: Sequence[Step]
 ) -> tuple[GivenSequence, float, float | None]:
     """Return a build, when it ends, s, and when it ends reassigned, if that is asked."""
