@@ -180,7 +180,7 @@ class Engine(Protocol):
             default. A rigid grip moves its node as far, a soft one the far end of its spring.
             Fields are linear in it, beside those that the weight makes. Two rigid grips on one
             brick cannot stretch it: along the brick, both of its nodes go halfway between, which is
-            what grips of one stiffness do, whatever it is.
+            what grips of one stiffness do.
 
         Returns
         -------

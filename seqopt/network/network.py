@@ -112,7 +112,7 @@ class Springs(FrozenValue):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Compliances(FrozenValue):
-    """The compliance of every grip, one value for each of M kinds, whoever computed it.
+    """The compliance of every grip, one value for each of M kinds: of hands, or arms behind them.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Compliances(FrozenValue):
     transmits_moment : (M,) bool
         Which kinds bear moments; others let their nodes turn.
     index : (K, N) int
-        The kind of a grip of each kind of robots at each node, -1 where nobody knows it; one column
+        The kind of a grip of each kind of robots at each node, -1 where it is not known; one column
         where nodes do not matter.
     nodes : (N,) int
         Numbers of nodes, ascending.
@@ -136,7 +136,7 @@ class Compliances(FrozenValue):
     def at(self, node: Ints, kind: Ints) -> Ints:
         """Return the kinds (S, r) of grips by robots of some kind on nodes; (1, 1) if all are one.
 
-        -1 of grips of which nobody knows how they give way.
+        -1 of grips whose compliance is not known.
         """
         if len(self.compliance) == 1:
             return np.zeros((1, 1), dtype=np.int64)

@@ -337,23 +337,18 @@ class _Asked(NamedTuple):
         return _Asked(self.columns[which], self.loads[which], compliance)
 
 
+@dataclass(frozen=True)
 class _Corrector:
     """Corrects what an operator answers; as of `Refinement.solve`."""
 
-    def __init__(
-        self,
-        system: Refinement,
-        operator: ComplianceOperator,
-        largest: float = LAST_CORRECTION,
-        basis: Basis = SPACE,
-    ) -> None:
-        self.network, self.bricks, self.parts = system.network, system.bricks, system.parts
-        self.held, self.inner = system.held, system.inner
-        self.operator, self.largest, self.basis = operator, largest, basis
+    system: Refinement
+    operator: ComplianceOperator
+    largest: float = LAST_CORRECTION
+    basis: Basis = SPACE
 
     def together(self, columns: Ints, compliance: GripCompliance = RIGID) -> Fields:
         """Return the fields of a few sets."""
-        operator, parts, bricks = self.operator, self.parts, self.bricks
+        operator, parts, network = self.operator, self.system.parts, self.system.network
         index = operator.load_index(columns)
         own = compliance.within(self.basis.force, self.basis.wrench)
         pairs = pairs_of(operator, columns)
@@ -361,7 +356,7 @@ class _Corrector:
         if operator.loose:
             for at in np.flatnonzero(~(found.lowest >= _HARDLY_HELD)):
                 mine = compliance.select(slice(at, at + 1))
-                require_resistance(self.network, bricks, columns[at], mine)
+                require_resistance(network, parts.bricks, columns[at], mine)
         states = self._states(index, found.force)
         force = self._in_space(found.force, columns.shape[1])
         done = self._correct(_Asked(columns, index, own), states, force)
@@ -370,11 +365,11 @@ class _Corrector:
         mine = compliance.select(done)
         solution = Solution(twist, wrench, *borne(force[done], columns.shape[1], mine))
         motion = operator.maps.motion if self.basis is SPACE else parts.motion
-        fields = respond(self.network, parts.statics, motion, columns[done], solution)
+        fields = respond(network, parts.statics, motion, columns[done], solution)
         if done.all():
             return fields
         rest = compliance.select(~done)
-        return merge_sets(done, fields, solve_mixed(self.network, bricks, columns[~done], rest))
+        return merge_sets(done, fields, solve_mixed(network, parts.bricks, columns[~done], rest))
 
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
         """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
@@ -382,7 +377,7 @@ class _Corrector:
         every = self.basis.wrench
         rows = self.operator.wrench, self.operator.twist
         wrench, twist = (loads.sum(r).reshape(len(index), -1, len(every)) @ every for r in rows)
-        return rescaled(self.parts, wrench, twist.reshape(len(index), -1))
+        return rescaled(self.system.parts, wrench, twist.reshape(len(index), -1))
 
     def _in_space(self, force: Floats, grips: int) -> Floats:
         """Return forces of grips, then moments if any, given in the operator's directions (S, k).
@@ -411,23 +406,24 @@ class _Corrector:
             change, more = self._correction(asked.of(left), before, force[left])
             states[left] += change
             force[left] += more
-            done[left] = unchanged(self.parts, before, change, self.largest)
+            done[left] = unchanged(self.system.parts, before, change, self.largest)
             left = left[~done[left] & np.isfinite(change).all(axis=1)]
         return done
 
     def _correction(self, asked: _Asked, states: Floats, force: Floats) -> tuple[Floats, Floats]:
         """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
-        operator, parts, columns = self.operator, self.parts, asked.columns
+        operator, system, columns = self.operator, self.system, asked.columns
+        parts, inner = system.parts, system.inner
         joints, grips = len(parts.wrench_unit), columns.shape[1]
         at = load_rows(columns, 3, 3 if operator.moments else 0)
-        load = np.zeros((len(at), self.inner.shape[0]))
+        load = np.zeros((len(at), inner.shape[0]))
         np.add.at(load, (np.arange(len(at))[:, None], at), force)  # a brick may be turned twice
-        pulled = (self.inner.T @ load.T).T / parts.unit + parts.load
+        pulled = (inner.T @ load.T).T / parts.unit + parts.load
         missing = -(parts.matrix @ states.T).T
         missing[:, joints:] += pulled
         missing[:, :joints] += parts.moved
-        answer, pull = self.held.solve(missing)
-        moved = (self.inner @ (states + answer)[:, joints:].T).T
+        answer, pull = system.held.solve(missing)
+        moved = (inner @ (states + answer)[:, joints:].T).T
         loose = -operator.softness * pull  # how far what is missing moves loose parts
         if operator.loose:
             moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
