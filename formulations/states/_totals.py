@@ -17,7 +17,7 @@ import numpy as np
 
 from formulations.choice import Choose
 from seqopt.arrays import Floats, Ints
-from seqopt.graph._labels import Labels, LabelSearch, widening
+from seqopt.graph._labels import LabelSearch, SummedLabels, widening
 from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
@@ -98,24 +98,16 @@ def _by_labels(graph: Graph, aim: RobustAim, known: LeastTotal, watch: Watch) ->
     return LeastTotal(path, found.cost, found.bound, known.weights)
 
 
-class _Totals:
+class _Totals(SummedLabels):
     """Labels of the totals of all scenarios, bounded by weights (S,), and by single scenarios."""
 
-    look_back = 32
-
     def __init__(self, graph: Graph, aim: RobustAim, weights: Floats) -> None:
-        scenarios, self._graph, self._aim = len(weights), graph, aim
-        self.ends, self.levels = graph.ends, np.zeros(graph.states, dtype=np.int64)
-        self.starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
-        self.target, self.first = graph.target.astype(np.int64), np.zeros((1, scenarios))
+        super().__init__(graph, graph.amounts)
+        scenarios, self._aim = len(weights), aim
         single = np.eye(scenarios if aim.most(scenarios) >= 1 else 0, scenarios)
         self._weights = np.vstack([weights, single])
         left = [distances(graph, graph.amounts @ own, back=True) for own in self._weights]
         self._left = np.column_stack(left)
-
-    def follow(self, labels: Labels, arc: Ints) -> Floats:
-        """Return totals after an arc each."""
-        return np.asarray(labels.taken + self._graph.amounts[arc])
 
     def bounds(self, state: Ints, taken: Floats) -> Floats:
         """Return what the aim makes at least of totals of paths."""

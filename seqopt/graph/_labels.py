@@ -276,28 +276,35 @@ def widening(
     return best
 
 
-class CappedSums:
-    """Labels of sums: what moves cost (m,), and amounts (m, B) that are capped.
+class SummedLabels:
+    """Labels of what moves add to sums, (m, k)."""
+
+    look_back = 32
+
+    def __init__(self, graph: Graph, amounts: Floats) -> None:
+        self.ends, self.levels = graph.ends, np.zeros(graph.states, dtype=np.int64)
+        self.starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
+        self.target, self.first = graph.target.astype(np.int64), np.zeros((1, amounts.shape[1]))
+        self._amounts = amounts
+
+    def follow(self, labels: Labels, arc: Ints) -> Floats:
+        """Return sums after an arc each."""
+        return np.asarray(labels.taken + self._amounts[arc])
+
+
+class CappedSums(SummedLabels):
+    """Labels of what moves cost (m,), and of amounts (m, B) that are capped.
 
     ``multipliers`` (B,) of the caps, from 0, lead the search and prove bounds.
     """
 
-    look_back = 32
-
     def __init__(
         self, graph: Graph, costs: Floats, amounts: Floats, caps: Floats, multipliers: Floats
     ) -> None:
-        self.ends, self.levels = graph.ends, np.zeros(graph.states, dtype=np.int64)
-        self.starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
-        self.target = graph.target.astype(np.int64)
-        self._taken, self._multipliers = np.column_stack([costs, amounts]), multipliers
-        self.first, self._paid_back = np.zeros((1, 1 + len(caps))), float(multipliers @ caps)
+        super().__init__(graph, np.column_stack([costs, amounts]))
+        self._multipliers, self._paid_back = multipliers, float(multipliers @ caps)
         self._rest = distances(graph, costs + amounts @ multipliers, back=True)
         self._least = np.column_stack([distances(graph, own, back=True) for own in amounts.T])
-
-    def follow(self, labels: Labels, arc: Ints) -> Floats:
-        """Return costs and sums after an arc each."""
-        return np.asarray(labels.taken + self._taken[arc])
 
     def bounds(self, state: Ints, taken: Floats) -> Floats:
         """Return what paths cost at least by the multipliers, and take of capped sums."""

@@ -120,7 +120,7 @@ class Instance(Source, FrozenValue, Shown):
         raise ProblemError(f"instance {self.name}: it is costs alone; no scene, no steps")
 
     @property
-    def as_layers(self) -> NoReturn:
+    def as_layers(self) -> Any:
         """Nothing, as `alone_in_scene`."""
         return self.alone_in_scene
 
