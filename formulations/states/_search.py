@@ -43,6 +43,7 @@ COPIES = 2.0  # of what is kept, that are needed at once while it grows
 MANY = 500_000  # grip sets, about: to look at all takes longer than a second narrow search
 WIDER = 4  # how many times as wide the second narrow search is
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
+NARROW = 1.005  # from a target to the incumbent, below which no other target is set
 GROWN = 1.1  # times as much is kept before it is asked again how much memory is free
 
 Watching = Callable[[Explorer], None]
@@ -301,6 +302,8 @@ class ThresholdSearch:
             for wider in (1, WIDER):
                 if wider > 1 and not many and (self.incumbent or self._options.dear):
                     break  # it is worth its time where the first one found nothing
+                if wider > 1 and self.incumbent and self._misses_floor():
+                    break
                 plans = [self.incumbent, self._first(wider)]
                 self.incumbent = min(filter(None, plans), key=lambda p: p.objective, default=None)
                 if self.incumbent and self.is_best:
@@ -317,6 +320,13 @@ class ThresholdSearch:
         found = self.incumbent
         within = found and not self._problem.budgets
         return bool(within and found and all(map(le, found.objective, self.floors)))
+
+    def _misses_floor(self) -> bool:
+        """Return whether a dive, whose states stay visited, proves that every plan exceeds it."""
+        floor = self.floors[0]
+        if not self._cuts or self.wide.dive(floor):
+            return False
+        return self.wide.excluded > floor
 
     def _first(self, wider: int) -> StatePath | None:
         """Return a first plan; where that is expensive, only if it takes no more than floors."""
@@ -341,7 +351,7 @@ class ThresholdSearch:
         below = self._ceiling if self._cuts else np.inf
         while True:
             if self._cuts and self._dives(threshold, below):
-                threshold = below = self._ceiling
+                threshold = below = self._target
                 continue
             nothing = None
             if self.wide.rise(threshold, below):
@@ -350,22 +360,30 @@ class ThresholdSearch:
                 except NothingFoundError as error:
                     nothing = error
             lower = self.wide.excluded
+            self.bound = max(self.bound, min(lower, self._ceiling))  # every plan passes such a state
             if self.incumbent and lower >= strictly_below(below):
-                if len(problem.goals) == 1:
+                if below < self._ceiling:
+                    threshold = below = self._target
+                    continue
+                if all(map(le, self.incumbent.objective[1:], self.floors[1:])):
                     visited, effort = self.wide.visited(), self.wide.space.effort
                     return replace(self.incumbent, visited=visited, effort=effort)
                 threshold, below = below, np.inf  # later goals need the states that take as much
                 continue
             if lower == np.inf:
                 raise nothing or self.wide.without_plan("no plan is allowed")
-            # of a state that every plan would have to pass, or a larger
-            self.bound = max(self.bound, lower)
             grown = threshold * self._options.growth if np.isfinite(threshold) else -np.inf
             threshold = max(lower, min(self._ceiling, grown))
 
     @property
     def _ceiling(self) -> float:
         return self.incumbent.objective[0] if self.incumbent else np.inf
+
+    @property
+    def _target(self) -> float:
+        """Below which the next plan is sought: halfway to the bound, or better once it is close."""
+        middle = (max(self.bound, self._ceiling / FAR_BELOW) * self._ceiling) ** 0.5
+        return middle if middle * NARROW < self._ceiling else self._ceiling
 
     def _dives(self, threshold: float, below: float) -> bool:
         """Return whether a dive finds a better incumbent; what it visits in vain stays visited."""

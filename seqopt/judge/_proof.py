@@ -135,7 +135,7 @@ class Proof:
         if not self._leaves_room(values, least):
             self.states = 1  # a cut before the end alone
             return least
-        if self._is_cut(values):
+        if self._is_cut(values, least):
             return tuple(values)
         bounds = partial(lexicographic_bounds, values=values)
         out = self._where_states_stand(self.rebuilt(Filter(values)), values, bounds)
@@ -153,12 +153,14 @@ class Proof:
             return True
         return self._reaches_no_end((value,))
 
-    def _is_cut(self, values: Sequence[float]) -> bool:
-        """Return whether states strictly below the one worst value there is reach no end."""
-        goals = self.evaluator.problem.goals
-        if len(goals) > 1 or not goals[0].is_peak:
-            return False
-        return self._reaches_no_end(values)
+    def _is_cut(self, values: Sequence[float], least: Sequence[float]) -> bool:
+        """Return whether states strictly below a worst value reach no end, which proves all bounds.
+
+        Goals after it must take no more than every plan does, by what is known of all.
+        """
+        first, margins = self.evaluator.problem.goals[0], self.evaluator.margins
+        closed = not self._leaves_room(values[1:], least[1:])
+        return first.is_peak and not margins and closed and self._reaches_no_end(values)
 
     def _reaches_no_end(self, values: Sequence[float]) -> bool:
         graph = self.rebuilt(Filter(values, strict=True)).graph()
