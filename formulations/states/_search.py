@@ -271,83 +271,51 @@ class Options:
 
 
 class ThresholdSearch:
-    """A search on its way: the incumbent, the lower bound of the first goal, and what is visited.
+    """A search through a space: incumbent, lower bound of the first goal, and visited states.
 
-    ``most``: how many sets of bricks there may be, where their order is sought. ``_cuts``: whether
-    a cut proves the first goal: it is a worst value, and there are no budgets.
+    ``floors``: lower bounds of all goals that are known before; ``caps``: on the last ones, which
+    are budgets; ``growth``: of the threshold from one search to the next. A cut proves the first
+    goal where it is a worst value, and there are no budgets.
     """
 
     def __init__(
         self,
-        problem: States,
-        options: Options,
+        space: Space,
         tell: Watching = lambda _: None,
-        most: int | None = None,
+        *,
+        floors: Sequence[float] = (),
+        caps: Sequence[float] = (),
+        growth: float = 1.1,
     ) -> None:
-        self._problem, self._options, self.tell = problem, options, tell
-        self._peak = problem.goals[0].is_peak
-        self._cuts = self._peak and not problem.budgets
-        self.wide = Explorer(build_space(problem, most=most), tell=tell)
+        self._caps, self._growth = caps, growth
+        self._peak = space.peaks[0]
+        self._cuts = self._peak and not caps
+        self.wide = Explorer(space, tell=tell)
         self.incumbent: StatePath | None = None
-        self.floors = tuple(map(tied, floors_of_goals(problem)))
+        self.floors = tuple(floors or [-np.inf] * len(space.peaks))
         self.bound = self.floors[0]
-
-    def run(self) -> StatePath:
-        """Return the best path, or the incumbent where the search is stopped."""
-        problem = self._problem
-        try:
-            # in a large problem a wider search may spare most of all states
-            sets = comb(2 * len(problem.network.inner), problem.space.robots)
-            many = sets * problem.space.levels > MANY
-            for wider in (1, WIDER):
-                if wider > 1 and not many and (self.incumbent or self._options.dear):
-                    break  # it is worth its time where the first one found nothing
-                if wider > 1 and self.incumbent and self._misses_floor():
-                    break
-                plans = [self.incumbent, self._first(wider)]
-                self.incumbent = min(filter(None, plans), key=lambda p: p.objective, default=None)
-                if self.incumbent and self.is_best:
-                    return self.incumbent
-            if self.incumbent is None and problem.budgets:
-                _require_room(problem, self.tell)
-            return self.best()
-        except (StopError, KeyboardInterrupt) as stop:
-            return unproven(plan_by_then(self.incumbent, stop), self.wide, self.bound)
 
     @property
     def is_best(self) -> bool:
         """Whether no plan is better than the incumbent, since it takes no more than all must."""
         found = self.incumbent
-        within = found and not self._problem.budgets
-        return bool(within and found and all(map(le, found.objective, self.floors)))
+        return bool(found and not self._caps and all(map(le, found.objective, self.floors)))
 
-    def _misses_floor(self) -> bool:
+    def misses_floor(self) -> bool:
         """Return whether a dive, whose states stay visited, proves that every plan exceeds it."""
         floor = self.floors[0]
         if not self._cuts or self.wide.dive(floor):
             return False
         return self.wide.excluded > floor
 
-    def _first(self, wider: int) -> StatePath | None:
-        """Return a first plan; where that is expensive, only if it takes no more than floors."""
-        problem, width, floors = self._problem, wider * self._options.width, self.floors
-        enough = floors[0] if wider > 1 else -np.inf
-        most = floors if self._options.dear else None
-        if most and problem.each and not problem.demands:
-            found = _in_all(
-                problem, narrow(problem.each[0], width, self.tell, most, enough), floors
-            )
-            if found:
-                return found
-        return narrow(problem, width, self.tell, most, enough)
+    def best(self, start: float = -np.inf) -> StatePath:
+        """Return the best path, by a threshold that rises until states below it reach an end.
 
-    def best(self) -> StatePath:
-        """Return the best plan, by a threshold that rises until states below it reach an end."""
-        problem, threshold = self._problem, -np.inf
+        ``start``: a threshold that is known to be low enough for the first search.
+        """
+        threshold = start
         if self.incumbent or not self._peak:
-            threshold = max(self._ceiling / FAR_BELOW, self.bound)
-        if problem.each and self._peak:
-            threshold = max(_of_one(problem, self._options), self.bound)
+            threshold = max(start, self._ceiling / FAR_BELOW, self.bound)
         below = self._ceiling if self._cuts else np.inf
         while True:
             if self._cuts and self._dives(threshold, below):
@@ -356,11 +324,12 @@ class ThresholdSearch:
             nothing = None
             if self.wide.rise(threshold, below):
                 try:
-                    return best_standing(self.wide, problem.budgets)
+                    return best_standing(self.wide, self._caps)
                 except NothingFoundError as error:
                     nothing = error
             lower = self.wide.excluded
-            self.bound = max(self.bound, min(lower, self._ceiling))  # every plan passes such a state
+            # of a state that every plan would have to pass, or a larger
+            self.bound = max(self.bound, min(lower, self._ceiling))
             if self.incumbent and lower >= strictly_below(below):
                 if below < self._ceiling:
                     threshold = below = self._target
@@ -372,7 +341,7 @@ class ThresholdSearch:
                 continue
             if lower == np.inf:
                 raise nothing or self.wide.without_plan("no plan is allowed")
-            grown = threshold * self._options.growth if np.isfinite(threshold) else -np.inf
+            grown = threshold * self._growth if np.isfinite(threshold) else -np.inf
             threshold = max(lower, min(self._ceiling, grown))
 
     @property
@@ -398,6 +367,56 @@ class ThresholdSearch:
         return False
 
 
+def threshold_search(
+    problem: States, options: Options, tell: Watching, most: int | None = None
+) -> ThresholdSearch:
+    """Return the search through the states of a problem; ``most``: as of `build_space`."""
+    floors, caps = tuple(map(tied, floors_of_goals(problem))), problem.budgets
+    space = build_space(problem, most=most)
+    return ThresholdSearch(space, tell, floors=floors, caps=caps, growth=options.growth)
+
+
+def search_states(problem: States, options: Options, tell: Watching) -> StatePath:
+    """Return the best plan of a problem, or the incumbent where the search is stopped."""
+    search = threshold_search(problem, options, tell)
+    try:
+        # in a large problem a wider search may spare most of all states
+        sets = comb(2 * len(problem.network.inner), problem.space.robots)
+        many = sets * problem.space.levels > MANY
+        for wider in (1, WIDER):
+            if wider > 1 and not many and (search.incumbent or options.dear):
+                break  # it is worth its time where the first one found nothing
+            if wider > 1 and search.incumbent and search.misses_floor():
+                break
+            plans = [search.incumbent, _first(problem, options, search.floors, wider, tell)]
+            search.incumbent = min(filter(None, plans), key=lambda p: p.objective, default=None)
+            if search.is_best and search.incumbent:
+                return search.incumbent
+        if search.incumbent is None and problem.budgets:
+            _require_room(problem, tell)
+        return search.best(first_threshold(problem, options))
+    except (StopError, KeyboardInterrupt) as stop:
+        return unproven(plan_by_then(search.incumbent, stop), search.wide, search.bound)
+
+
+def _first(
+    problem: States, options: Options, floors: Sequence[float], wider: int, tell: Watching
+) -> StatePath | None:
+    """Return a first plan; where that is expensive, only if it takes no more than floors."""
+    width, enough = wider * options.width, floors[0] if wider > 1 else -np.inf
+    most = floors if options.dear else None
+    if most and problem.each and not problem.demands:
+        found = _in_all(problem, narrow(problem.each[0], width, tell, most, enough), floors)
+        if found:
+            return found
+    return narrow(problem, width, tell, most, enough)
+
+
+def first_threshold(problem: States, options: Options) -> float:
+    """Return from where thresholds rise: over scenarios what the best plan of the first takes."""
+    return _of_one(problem, options) if problem.each and problem.goals[0].is_peak else -np.inf
+
+
 def _require_room(problem: States, tell: Watching) -> None:
     """Raise an `InfeasibleError` if every plan exceeds a budget, before thresholds are tried."""
     totals = problem.goals[len(problem.aims) :]
@@ -412,14 +431,14 @@ def _of_one(problem: States, options: Options) -> float:
     What is below the former is enough to be looked at, where that plan is allowed in all.
     """
     first = replace(problem.each[0], goals=problem.aims, budgets=())  # budgets are of the scene
-    search = ThresholdSearch(first, options)
+    search = threshold_search(first, options, lambda _: None)
     search.incumbent = narrow(first, WIDTH, lambda _: None)
     one = search.best()
     inside = _in_all(problem, one, (np.inf,) * len(problem.goals))
     return (inside or one).objective[0]
 
 
-def _in_all(problem: States, one: StatePath | None, most: tuple[float, ...]) -> StatePath | None:
+def _in_all(problem: States, one: StatePath | None, most: Sequence[float]) -> StatePath | None:
     """Return a plan of one scenario, valued in all; None if in any it is not allowed.
 
     Or if goals then take more of it than ``most``.

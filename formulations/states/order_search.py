@@ -34,7 +34,10 @@ from formulations.states._search import (
     Options,
     ThresholdSearch,
     Watching,
+    first_threshold,
     plan_by_then,
+    search_states,
+    threshold_search,
     unproven,
     watched,
 )
@@ -85,13 +88,15 @@ def solve(
         found: StatePath = find_formulation("schedule_search").solve(problem, **limits)
         return found
     watch = Watch(seconds)
-    search = ThresholdSearch(problem, HOW, watched(problem, watch, max_memory, progress), most)
+    search = threshold_search(problem, HOW, watched(problem, watch, max_memory, progress), most)
     own = problem.network.scene.build_order
     try:
         if order_rules(problem).allows(own):
             quiet = watched(problem, watch, max_memory, lambda _: None)
             search.incumbent = _plan_in(problem, own, quiet)
-        return search.incumbent if search.incumbent and search.is_best else search.best()
+        if search.is_best and search.incumbent:
+            return search.incumbent
+        return search.best(first_threshold(problem, HOW))
     except TooManySetsError:
         tried = _Tried(problem, watch, progress, search.incumbent)
         return tried.best(search, tries, np.random.default_rng(seed))
@@ -103,7 +108,7 @@ def _plan_in(problem: States, order: Order, tell: Watching) -> StatePath | None:
     """Return the best plan in an order, or the best by the end of the search; None without any."""
     own = problem.at(order)
     try:
-        found = ThresholdSearch(own, HOW, tell).run()
+        found = search_states(own, HOW, tell)
     except (InfeasibleError, NothingFoundError):
         return None
     return replace(found, visited=(), order=order, effort=(1, own.models))

@@ -24,8 +24,9 @@ steps as bricks and robots call for. If not, let its first goal be :math:`z`. Th
 
 grows with a rising threshold :math:`t`. While :math:`R(t)` has no end, the least :math:`v` next to
 it is a lower bound. Where it has one there is a better incumbent, which a *dive* finds early: it
-visits the states of :math:`R(t)` with the most bricks first, few at a time. When :math:`R(z)` has
-no end, the states next to it are a cut: :math:`z` is the least worst value, and no response was
+visits the states of :math:`R(t)` with the most bricks first, few at a time. From then on
+thresholds lie between bound and incumbent, at the latter once it is close. When :math:`R(z)` has no
+end, the states next to it are a cut: :math:`z` is the least worst value, and no response was
 computed beyond that cut but for the dives. Later goals need the states that take :math:`z` too;
 among these every goal is a shortest path, and what is on none is left out before the next.
 
@@ -47,9 +48,9 @@ from formulations.labels import relaxed
 from formulations.on_graph import path_of_instance
 from formulations.states._search import (
     Options,
-    ThresholdSearch,
     after_margins,
     best_total,
+    search_states,
     shortest,
     watched,
 )
@@ -90,7 +91,7 @@ def solve(
         return best_total(problem, shortest, Watch(seconds), tell)
     dear = bool(problem.demands or problem.each) and min(seconds, max_memory) == np.inf
     options = Options(width, growth, dear)
-    return after_margins(problem, lambda rest: ThresholdSearch(rest, options, tell).run(), tell)
+    return after_margins(problem, lambda rest: search_states(rest, options, tell), tell)
 
 
 FORMULATION = Formulation(

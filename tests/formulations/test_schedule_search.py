@@ -13,6 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import seqopt
+from experiments.harness.scenes import longer
 from seqopt import Search
 from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
@@ -464,3 +465,33 @@ def test_the_short_cut_says_in_a_line_what_does_not_fit(words, said):
     with pytest.raises(seqopt.SeqoptError, match=said) as caught:
         seqopt.optimize(**{"scene": small_arch(4), "schedule": "free"} | words)
     assert "\n" not in str(caught.value)
+
+
+def strictly_below(problem, value):
+    """How many models tell which states below a value are reached, in whole levels."""
+    space, entering = problem.space, {problem.space.first: [problem.space.start()]}
+    for level in range(space.first, space.levels + 1):
+        fresh, known = np.concatenate(entering.pop(level, [space.start()[:0]])), np.zeros(0, int)
+        while len(fresh):
+            codes, first = np.unique(space.codes(fresh), return_index=True)
+            states, known = fresh[first[~np.isin(codes, known)]], np.union1d(known, codes)
+            if level > space.first:
+                values, allowed = problem.values(level, states)
+                states = states[allowed & (values[:, 0] < value * (1 - 1e-9))]
+            within = space.within(level, states) if level else ()
+            fresh = np.concatenate([states[:0], *(moves.states for moves, _ in within)])
+            able = states[space.may_place(level, states)] if level < space.levels else states[:0]
+            more = space.onward(level, able) if len(able) else ()
+            entering.setdefault(level + 1, []).extend(moves.states for moves, _ in more)
+    return problem.models
+
+
+@pytest.mark.slow
+def test_a_large_search_looks_at_little_more_than_its_proof_needs():
+    """The models of states strictly below the least worst value, and a tenth for a first plan."""
+    scene = longer(seqopt.load_scene("arch25"), 4.0)
+    asked = FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax"
+    plan = seqopt.solve(build_states(seqopt.make_engine("compliance", scene), *asked))
+    fresh = build_states(seqopt.make_engine("compliance", scene), *asked)
+    assert plan.certificate.gap == 0
+    assert plan.models <= 1.1 * strictly_below(fresh, plan.objective["minmax"])

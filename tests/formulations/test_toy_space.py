@@ -1,15 +1,20 @@
-"""A puzzle without bricks, as a graph: every formulation solves it, and the judge proves it."""
+"""A puzzle without bricks, as a graph and a space: formulations solve it, the judge proves it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 
 import seqopt
-from seqopt.graph.formulation import formulations
+from formulations.states._search import ThresholdSearch
+from seqopt.errors import SolverError
+from seqopt.graph._explore import Explorer
+from seqopt.graph.formulation import find_formulation, formulations
 from seqopt.graph.instance import Instance, _Cap, _Target
+from seqopt.graph.space import Moves, Space
 from seqopt.problem.problem import Aim
 
 JUGS, WANTED = (5, 3), 4  # liters that jugs hold, and liters to be measured
@@ -80,3 +85,109 @@ def test_moves_may_be_capped():
     assert len(plan.nodes) == 6
     with pytest.raises(seqopt.errors.InfeasibleError, match="moves"):
         seqopt.solve(puzzle("sum", 5.0), "labels")
+
+
+class Jugs(Space):
+    """The same puzzle, explored as far as needed: the most water in both jugs, then moves."""
+
+    first = levels = 1
+    peaks = (True, False)
+
+    def start(self):
+        return "jugs", np.zeros((1, 2), dtype=int)
+
+    def codes(self, part, states):
+        return states @ [JUGS[1] + 1, 1]
+
+    def within(self, part, states):
+        moves = [(k, t) for k, s in enumerate(states.tolist()) for t in {*poured(s)} - {tuple(s)}]
+        source, after = zip(*moves, strict=True)
+        return Moves(np.array(source), np.array(after), np.zeros((len(moves), 0)))
+
+    def onward(self, part, states):
+        yield from ()
+
+    def values(self, part, states, *, rough, most):
+        return np.column_stack([states.sum(axis=1), 0 * states[:, 0]]) * 1.0, states[:, 0] >= 0
+
+    def amounts(self, values, taken):
+        return values + np.array([0.0, 1.0])
+
+    def ended(self, part, states):
+        return states[:, 0] == WANTED
+
+
+def least_of_space(cap=12):
+    """The least (most water, moves) of all sequences of at most so many moves, by trying all."""
+    found, reached = [], {((0, 0), 0)}
+    for moves in range(1, cap + 1):
+        reached = {(t, max(most, sum(t))) for s, most in reached for t in poured(s)}
+        found += [(most, moves) for s, most in reached if s[0] == WANTED]
+    return min(found)
+
+
+def whole(goals):
+    """The whole space as an instance with goals, and the number of every state."""
+    explorer = Explorer(Jugs())
+    assert explorer.rise()
+    graph, ((_, _, states),) = explorer.graph()
+    rows = np.column_stack([np.zeros(len(states), int), states])
+    arcs, names = (graph.source, graph.target, graph.ends), ("water", "moves")
+    one = Instance("jugs", *arcs, names, graph.amounts, goals, states=rows)
+    return one, {tuple(state): number for number, state in enumerate(states.tolist())}
+
+
+WATER, MOVES = _Target("water", "peak", (0,)), _Target("moves", "sum", (1,))
+
+
+@pytest.mark.parametrize(
+    ("name", "goal"), [*((n, MOVES) for n in SUMS), *((n, WATER) for n in PEAKS)]
+)
+def test_every_formulation_solves_a_space_that_nobody_knows(name, goal):
+    plan = seqopt.solve(whole((goal,))[0], name)
+    fewest = min(k for k in range(1, 12) if least_moves(k))
+    least = {"water": least_of_space()[0], "moves": fewest}[goal.name]
+    value = plan.objective[goal.name]
+    assert value >= least - 1e-9
+    if EVERY[name].kind.value == "exact":
+        assert value == pytest.approx(least)
+        assert plan.certificate.gap <= 1e-9
+
+
+def least_moves(count):
+    """Whether so many moves are enough."""
+    reached = {(0, 0)}
+    for _ in range(count):
+        reached = {t for s in reached for t in poured(s)}
+    return any(full[0] == WANTED for full in reached)
+
+
+def by_thresholds(numbers):
+    """A formulation that searches the space itself, by thresholds, as schedules are searched."""
+    found = ThresholdSearch(Jugs()).best()
+    path = tuple((numbers[tuple(state)],) for _, *state in found.states)
+    return replace(found, states=path, visited=())
+
+
+def test_the_search_by_thresholds_solves_it_and_is_judged():
+    one, numbers = whole((WATER, MOVES))
+    answer = by_thresholds(numbers)
+    assert answer.objective == answer.bound == least_of_space()
+    known = find_formulation("schedule_search")
+    plan = seqopt.solve(one, replace(known, solve=lambda *_, **__: answer))
+    assert (plan.status, plan.certificate.gap) == ("optimal", 0.0)
+    assert plan.objective == dict(zip(("water", "moves"), least_of_space(), strict=True))
+    for lie in (
+        replace(answer, objective=tuple(0.9 * v for v in answer.objective), bound=(0.0, 0.0)),
+        replace(answer, states=answer.states[:-1]),
+    ):
+        with pytest.raises(SolverError):
+            seqopt.solve(one, replace(known, solve=lambda *_, lie=lie, **__: lie))
+
+
+def test_the_search_leaves_out_what_takes_more_than_the_best():
+    """With less water than both jugs hold, states above the best value are not visited."""
+    search = ThresholdSearch(Jugs())
+    best_value = search.best().objective[0]
+    visited = np.concatenate(search.wide.visited())
+    assert visited.sum(axis=1).max() <= best_value < sum(JUGS)
