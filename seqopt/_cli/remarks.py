@@ -116,7 +116,7 @@ def in_time(answer: Answer, clock: Clock, interrupted: str) -> Answer:
     each = {why: [what for what, own in clock.left_out.items() if own == why] for why in left}
     said = (f"not done, {WHY[why]}: {', '.join(names)}" for why, names in each.items())
     answer = replace(answer, notes=(*answer.notes, *said))
-    if not clock.interrupted:
+    if not clock.interrupted or answer.status is Status.INTERRUPTED:
         return answer
     failures = (*answer.failures, interrupted)
     return replace(answer, failures=failures, status=Status.INTERRUPTED)

@@ -103,12 +103,11 @@ def run(asked: Analyze) -> Answer:
         network = build_network(scene)
         engine, named = inputs.find_engine(asked, network), inputs.find_steps(asked, network)
     network, within, steps = engine.network, LinearRange(engine), named.steps
-    in_time = _InTime(_step_answers(asked, within, steps), clock)
-    solved = _solved(engine, in_time, faults)
+    solved = _solved(engine, _in_time(_step_answers(asked, within, steps), clock), faults)
     answers = solved if archived is None else list(solved)
     table = response_table(network, answers)
     reached = len(table) + len(faults)
-    late, ended = _late(asked, reached, len(steps), engine, in_time)
+    late, ended = _late(asked, reached, len(steps), engine, clock)
     failures, status = (*_faults_said(faults, reached), *late), _status_of(faults, ended)
     answer = Answer({}, scene=scene, notes=named.notes, failures=failures, status=status)
     if table.empty:
@@ -238,7 +237,7 @@ def _with_tolerances(
 
 
 def _late(
-    asked: Analyze, computed: int, steps: int, engine: Engine, in_time: _InTime
+    asked: Analyze, computed: int, steps: int, engine: Engine, clock: Clock
 ) -> tuple[tuple[str, ...], Status]:
     """Return a line if steps ended before the last one, else none, and the status of that."""
     if computed == steps:
@@ -248,7 +247,7 @@ def _late(
     dear = sum(sets for choice, sets in levels.items() if choice.level is Level.DISCRETE)
     if dear:
         so_far += f", {dear} by discrete elements, which are what takes long"
-    if in_time.interrupted:
+    if clock.interrupted:
         return (f"seqopt: interrupted; {so_far}",), Status.INTERRUPTED
     said = f"seqopt: error: --time-limit {asked.time_limit:g}: {so_far}; give more seconds"
     return (said,), Status.FAILED
@@ -279,25 +278,17 @@ def _step_answers(
     return zip(each, staged_fields(engine.network, steps, asked.staged), strict=True)
 
 
-class _InTime:
-    """Answers that come in time, from the first one that is asked for.
-
-    ``interrupted``: whether somebody ended them; those that were there by then are not lost.
-    """
-
-    def __init__(self, answers: Iterator[_Answered], clock: Clock) -> None:
-        self._answers, self._clock, self.interrupted = answers, clock, False
-
-    def __iter__(self) -> Iterator[_Answered]:
-        while True:
-            try:
-                with ending(self._clock.left):
-                    answer = next(self._answers, None)
-            except TimeoutError:
-                return
-            except KeyboardInterrupt:
-                self.interrupted = True
-                return
-            if answer is None:
-                return
-            yield answer
+def _in_time(answers: Iterator[_Answered], clock: Clock) -> Iterator[_Answered]:
+    """Yield answers that come in time; those before an interrupt are not lost."""
+    while True:
+        try:
+            with ending(clock.left):
+                answer = next(answers, None)
+        except TimeoutError:
+            return
+        except KeyboardInterrupt:
+            clock.interrupted = True
+            return
+        if answer is None:
+            return
+        yield answer
