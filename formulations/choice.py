@@ -14,7 +14,7 @@ from seqopt.graph.paths import distances
 class Choice(NamedTuple):
     """A path through a graph, its start left out and empty where none was found in time.
 
-    ``bounds``: what no path stays below in the first goals, those before each being at their
+    ``bounds``: lexicographic lower bounds of the first goals, those before each being at their
     values; ``stopped``: whether time was over before all was found; ``prices``: by goal, the
     multipliers of caps and of the sums before it that prove its bound; ``compile_seconds``: what
     writing a program down took.

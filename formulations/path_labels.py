@@ -13,7 +13,7 @@ Continued first is the label whose vector :math:`f` is least, goal by goal,
 
    f_g = \max \{ z_g, h_g(v) \} \quad\text{or}\quad f_g = z_g + h_g(v),
 
-and one whose vector another one of the same state is nowhere above is dropped. The first one at an
+and one that another one of the same state dominates is dropped. The first one at an
 end is the best, since no goal ever gets less on the way. Values up to `seqopt.graph.paths.TIED`
 apart count as one. In ``path_labels`` nothing is known of what is ahead, :math:`h = 0` (Martins, On
 a multicriteria shortest path problem, 1984). In ``best_first`` (A*) what is left of every goal
@@ -72,7 +72,7 @@ def _best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
         if len(popped) % 1000 == 0 and watch.over:
             return Choice(_path(popped, last), heap[0][0][:1], stopped=True)
         least, _, taken, state, before = heappop(heap)
-        if not _improves(least, best) or _beaten(least, kept[state]):
+        if not _improves(least, best) or _is_dominated(least, kept[state]):
             continue
         kept[state].append(least)
         popped.append((state, before))
@@ -81,7 +81,7 @@ def _best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
         for move in range(starts[state], starts[state + 1]):
             to, more = targets[move], _and(peaks, taken, amounts[move])
             bound = _and(peaks, more, ahead[to])
-            if _improves(bound, best) and not _beaten(bound, kept[to]):
+            if _improves(bound, best) and not _is_dominated(bound, kept[to]):
                 heappush(heap, (bound, move, more, to, len(popped) - 1))
     return Choice(_path(popped, last), best)
 
@@ -102,8 +102,8 @@ def _improves(bound: _Values, best: _Values) -> bool:
     return False
 
 
-def _beaten(bound: _Values, others: list[_Values]) -> bool:
-    """Return whether one of others is nowhere above."""
+def _is_dominated(bound: _Values, others: list[_Values]) -> bool:
+    """Return whether one of others dominates values."""
     return any(all(map(le, other, bound)) for other in others)
 
 

@@ -216,8 +216,8 @@ def _undominated(at: Ints, cost: Floats, taken: Floats) -> Bools:
     good = np.ones(len(at), dtype=bool)
     for n in NEIGHBORS:
         if n < len(at):
-            beats = (taken[:-n] <= taken[n:]).all(axis=1) & (cost[:-n] <= cost[n:])
-            good[n:] &= ~(beats & (at[:-n] == at[n:]))
+            dominates = (taken[:-n] <= taken[n:]).all(axis=1) & (cost[:-n] <= cost[n:])
+            good[n:] &= ~(dominates & (at[:-n] == at[n:]))
     out = np.zeros(len(at), dtype=bool)
     out[order] = good
     return out
