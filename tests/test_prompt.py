@@ -14,7 +14,7 @@ from seqopt.errors import SceneError
 from seqopt.graph._orders import among_orders
 from seqopt.graph.layers.layers import travel
 from seqopt.graph.states.states import build_states
-from seqopt.plan.front import _StateFront, find_front
+from seqopt.plan.front import FrontProblem, find_front
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.report.comparison import compare
 from seqopt.scene.library import ArchForm, DomeShape
@@ -48,11 +48,11 @@ def met(problem25):
     asked = (posed.engine, posed.moves, posed.criterion)
     robust = seqopt.solve(seqopt.pose(*asked, scenarios=drawn))
     words = posed.criterion, "F_largest,M_sup"
-    loop = _StateFront(build_states(posed.engine, posed.schedule, *words))
+    loop = FrontProblem(build_states(posed.engine, posed.schedule, *words))
     rules, aim = seqopt.FreeRules(), "F_largest,steps"
     aims = build_states(posed.engine, rules, posed.criterion, aim)
     values = [plan, lean, free, robust, free.report()]
-    values += [judge_unseen(robust, drawn), drawn, loop, find_front(loop), _StateFront(aims)]
+    values += [judge_unseen(robust, drawn), drawn, loop, find_front(loop), FrontProblem(aims)]
     values += [
         seqopt.solve(among_orders(free.states, "tied")),
         *engines(network),

@@ -17,41 +17,45 @@ and Vanderpooten, On the representation of the search region in multi-objective 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from seqopt.arrays import Bools, Floats
+from seqopt.errors import TimeUpError
 from seqopt.graph.formulation import Formulation, FormulationKind, Watch
-from seqopt.plan.front import FrontSelection, _StateFront
+from seqopt.graph.solution import StatePath
+from seqopt.plan.front import FrontProblem
 from seqopt.work.progress import Tell
 
 
 def solve(
-    problem: _StateFront, *, seconds: float = np.inf, progress: Tell = lambda _: None
-) -> FrontSelection:
-    """Return all vectors that no plan dominates, and a plan for each.
+    problem: FrontProblem, *, seconds: float = np.inf, progress: Tell = lambda _: None
+) -> tuple[StatePath, ...]:
+    """Return a plan for each vector that no plan dominates.
 
-    ``seconds``: after which the points found are returned.
+    ``seconds``: after which the plans found are returned, or a `TimeUpError` says there is none.
     """
-    watch = Watch(seconds)
+    watch, stopped = Watch(seconds), ""
     zones = np.full((1, len(problem.names)), np.inf)
-    points: list[Floats] = []
-    plans: list[object] = []
-    stopped = ""
+    plans = list[StatePath]()
     try:
         while len(zones) and not stopped:
-            progress(f"{len(points)} plans found, {len(zones)} regions left")
+            progress(f"{len(plans)} plans found, {len(zones)} regions left")
             found = problem.best_below(zones[-1])
             if found is None:
                 zones = zones[:-1]
             else:
-                points.append(found[0])
-                plans.append(found[1])
-                zones = _split(zones, found[0])
+                plans.append(found)
+                zones = _split(zones, np.array(found.objective))
             stopped = "time" if watch.over and len(zones) else ""
     except KeyboardInterrupt:
+        if not plans:
+            raise
         stopped = "interrupt"
-    shape = np.array(points).reshape(-1, len(problem.names))
-    return FrontSelection(shape, tuple(plans), stopped)
+    if stopped and not plans:
+        raise TimeUpError("no plan was found yet; give more")
+    return tuple(replace(plan, stopped=stopped) for plan in plans)
 
 
 def _split(zones: Floats, point: Floats) -> Floats:

@@ -20,8 +20,6 @@ from seqopt._files import (
     write_text,
 )
 from seqopt._showing import PAGE
-from seqopt.graph.layers.layers import Layers
-from seqopt.graph.states.states import States
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
@@ -70,11 +68,11 @@ def bare_files(
 def plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
     """Return tables and tasks of a plan by file name; ``choices``: with those of every choice."""
     tables = {"plan": plan.responses()}
-    if not isinstance(plan.graph, States):
+    if plan.graph.candidates:
         tables["selection"] = plan.table()
     elif plan.graph.standing is not None:
         tables["stability"] = plan.stability()
-    if choices and isinstance(plan.graph, Layers) and not plan.graph.scenes:
+    if choices and plan.graph.candidates and not plan.graph.scenarios:
         tables["responses"] = plan.alternatives()
     if plan.engine.network.scene.props:
         tables["props"] = plan.props()

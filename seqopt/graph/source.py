@@ -20,13 +20,40 @@ if TYPE_CHECKING:
 class Source:
     """Base class of what plans are chosen from, with what most of these have in common."""
 
-    candidates: tuple[tuple[int, ...], ...] = ()  # nodes that can be chosen, move by move
-    title = ""  # what the plan is called beside others; empty for its formulation
-    among = ""  # which candidates alone are looked at, in words
-    models = 0  # that were solved
-    scenarios: tuple[Any, ...] = ()
-    standing: Standing | None = None  # the demand that every state stands
-    begin: Site | None = None  # where a part of a build begins
+    @property
+    def candidates(self) -> tuple[tuple[int, ...], ...]:
+        """The nodes that can be chosen, move by move; none where states are chosen."""
+        return ()
+
+    @property
+    def title(self) -> str:
+        """What the plan is called beside others; empty for the name of its formulation."""
+        return ""
+
+    @property
+    def among(self) -> str:
+        """Which candidates alone are looked at, in words; empty for all."""
+        return ""
+
+    @property
+    def models(self) -> int:
+        """How many models were solved."""
+        return 0
+
+    @property
+    def scenarios(self) -> tuple[Any, ...]:
+        """What computes the responses of every scenario."""
+        return ()
+
+    @property
+    def standing(self) -> Standing | None:
+        """The demand that every state stands, if there is one."""
+        return None
+
+    @property
+    def begin(self) -> Site | None:
+        """Where a part of a build begins, if that is known."""
+        return None
 
     @property
     def as_layers(self) -> Any:

@@ -10,19 +10,20 @@ from functools import cached_property, partial
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Terse
+from seqopt.arrays import Floats, Ints, Terse
 from seqopt.engines.interface import Engine
-from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError, did_you_mean
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
+from seqopt.graph.solution import StatePath
 from seqopt.graph.space import Space
 from seqopt.graph.states._visits import steps_of, steps_with, with_held
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import States
 from seqopt.judge.schedules import ordered, plan_values
-from seqopt.plan._guard import called, readable, text
+from seqopt.plan._guard import called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
 from seqopt.plan._paths import PROOF
 from seqopt.plan._range import INTERRUPTED, RANGE, keeping, leaves
@@ -67,7 +68,7 @@ def _rounded_up(values: Floats, steps: Floats) -> Floats:
     return np.where(steps > 0, np.ceil(values / safe - EDGE) * safe, plain)
 
 
-class _StateFront:
+class FrontProblem:
     """The schedule of a problem whose goals are all to be small at once: what formulations get.
 
     ``problem``: its goals are responses, margins of stability, and of a free schedule steps and
@@ -85,11 +86,11 @@ class _StateFront:
         self._round, self._rounding = _rounding_steps(self.names, rounding), rounding
 
     def __repr__(self) -> str:
-        return f"<_StateFront of {self._problem}>"
+        return f"<FrontProblem of {self._problem}>"
 
-    def anew(self) -> _StateFront:
+    def anew(self) -> FrontProblem:
         """Return the same problem with nothing known of it, for its judge."""
-        return _StateFront(replace(self._problem), self._rounding)
+        return FrontProblem(replace(self._problem), self._rounding)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -122,8 +123,8 @@ class _StateFront:
         """Which goals count moves: bounds on them hold along a path, not state by state."""
         return [k for k, goal in enumerate(self._problem.goals) if not goal.is_peak]
 
-    def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
-        """Return a point (k,) below bounds (k,) that no plan dominates, SI units, and its plan."""
+    def best_below(self, bounds: Floats) -> StatePath | None:
+        """Return a plan with values below bounds (k,) that no plan dominates, SI units."""
         below = self._below(bounds)
         if not below.ends[reached(below)].any():
             return None
@@ -136,7 +137,9 @@ class _StateFront:
             if not point[k] < bounds[k]:
                 return None
         assert graph is not None
-        return point, self._explored[1].path(self._visited.of(fewest_moves(graph)))
+        order, states = self._explored[1].path(self._visited.of(fewest_moves(graph)))
+        values = tuple(point.tolist())
+        return StatePath(states, values, values, order=order)
 
     def _below(self, bounds: Floats) -> Graph:
         """Return the moves to states whose values are all below bounds."""
@@ -187,27 +190,23 @@ class _StateFront:
         grips = [self._problem.space.grips(rows) for _, _, rows in self._visited.states]
         return np.concatenate(grips)
 
-    def steps(self, plan: object) -> tuple[Step, ...]:
-        """Return the checked steps of a plan: its order, if that was sought, and its states."""
-        return steps_of(self._of_plan(plan).space, plan[1])  # type: ignore[index]
+    def steps(self, plan: StatePath) -> tuple[Step, ...]:
+        """Return the checked steps of a plan."""
+        return steps_of(self._of_plan(plan).space, plan.states)
 
-    def values(self, plan: object, claimed: Floats) -> Floats:
-        """Return the goals' values (k,) of a plan, from its responses, rounded; SI units.
-
-        ``claimed`` (k,): the values with which margins of stability are compared.
-        """
-        found = plan_values(self._of_plan(plan), self.steps(plan), claimed.tolist())
+    def values(self, plan: StatePath) -> Floats:
+        """Return the goals' values (k,) of a plan, from its responses, rounded; SI units."""
+        found = plan_values(self._of_plan(plan), self.steps(plan), plan.objective)
         return _rounded_up(np.array(found), self._round)
 
-    def engine(self, plan: object) -> Engine:
+    def engine(self, plan: StatePath) -> Engine:
         """Return what computes the responses of a plan, of the scene in its build order."""
         return self._of_plan(plan).engine
 
-    def _of_plan(self, plan: object) -> States:
-        order = tuple(plan[0])  # type: ignore[index]
-        if order not in self._known:
-            self._known[order] = ordered(self._problem, order)
-        return self._known[order]
+    def _of_plan(self, plan: StatePath) -> States:
+        if plan.order not in self._known:
+            self._known[plan.order] = ordered(self._problem, plan.order)
+        return self._known[plan.order]
 
 
 def _require_memory(found: Explorer) -> None:
@@ -216,19 +215,6 @@ def _require_memory(found: Explorer) -> None:
         raise ProblemError(
             "pareto: the states do not fit the memory; give an order, or rules with fewer states"
         )
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class FrontSelection(FrozenValue):
-    """The points of a Pareto set, and what its formulation claims of them.
-
-    ``points`` (n, k): SI units; ``plans``: one for every point; ``stopped``: why the search ended
-    before the set was complete; empty if it did not.
-    """
-
-    points: Floats
-    plans: tuple[object, ...]
-    stopped: str = ""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -261,9 +247,6 @@ class Front(Terse):
         )
 
 
-_NONE_YET = "no plan was found yet; give more"
-
-
 def _moved(front: Front) -> tuple[Moved, ...]:
     """Return how far the steps of every plan move nodes, over what the linear range allows."""
     pairs = zip(front.engines, front.steps, strict=True)
@@ -271,7 +254,7 @@ def _moved(front: Front) -> tuple[Moved, ...]:
 
 
 def find_front(
-    problem: Problem | _StateFront,
+    problem: Problem | FrontProblem,
     formulation: Formulation | str = "pareto_zones",
     *,
     rounding: Mapping[str, float] | None = None,
@@ -299,7 +282,7 @@ def find_front(
             states = states_of(asked)
             if states.orders is not None and states.free_rules.takes_down:
                 raise ProblemError("a Pareto set of take-downs is of one order; give an order")
-            posed = _StateFront(states, rounding)
+            posed = FrontProblem(states, rounding)
         left = max(0.0, end - time.perf_counter())
         front = _front_of(posed, formulation, left, progress, watch)
         return replace(front, moved=watch.spare(RANGE, partial(_moved, front), ()))
@@ -318,7 +301,7 @@ def find_front(
 
 
 def _front_of(
-    problem: _StateFront, formulation: Formulation, seconds: float, progress: Tell, clock: Clock
+    problem: FrontProblem, formulation: Formulation, seconds: float, progress: Tell, clock: Clock
 ) -> Front:
     """Return the Pareto set of a problem, judged."""
     start = time.perf_counter()
@@ -327,16 +310,13 @@ def _front_of(
     solve = partial(formulation.solve, problem, seconds=limit, progress=progress)
     with clock.needed("finding a first plan"):
         found = _found(name, (problem, twin), solve)
-    found = replace(found, stopped=clock.why(found.stopped))
-    if found.stopped and not len(found.points):
-        raise KeyboardInterrupt if found.stopped == INTERRUPT else TimeUpError(_NONE_YET)
     solved, problem = time.perf_counter(), twin
-    points = found.points[order := np.lexsort(found.points.T[::-1])]
+    chosen = sorted(found, key=lambda plan: plan.objective)
+    points = np.array([plan.objective for plan in chosen])
     with readable(name):
-        chosen = [found.plans[i] for i in order]
         plans = tuple(map(problem.steps, chosen))
     for point, plan in zip(points, chosen, strict=True):
-        values = problem.values(plan, point)
+        values = problem.values(plan)
         if not (np.abs(values - point) <= TOLERANCE * np.abs(point)).all():
             raise SolverError(
                 f"the values of a plan are {values.tolist()}, not {point.tolist()} as claimed"
@@ -344,7 +324,7 @@ def _front_of(
     for i, point in enumerate(points):
         if (np.delete(points, i, axis=0) <= point).all(axis=1).any():
             raise SolverError(f"the point {point.tolist()} is dominated by another one")
-    stopped = found.stopped
+    stopped = clock.why(chosen[0].stopped)
     if not stopped:
         complete = partial(_require_complete, problem, points, progress)
         whole = clock.spare(PROOF, lambda: complete() or True, otherwise=False)
@@ -356,27 +336,26 @@ def _front_of(
 
 
 def _found(
-    name: str, problems: tuple[_StateFront, _StateFront], solve: Callable[[], object]
-) -> FrontSelection:
-    """Return what a formulation says, in numbers; raise that no plan exists once it is proven."""
+    name: str, problems: tuple[FrontProblem, FrontProblem], solve: Callable[[], object]
+) -> list[StatePath]:
+    """Return the plans of a formulation, in numbers; raise that there is none once it is proven."""
     twin = problems[1]
     try:
-        found = called(name, lambda: problems, FrontSelection, solve)
+        plans = called(name, lambda: problems, tuple, solve)
     except InfeasibleError:
-        found = FrontSelection(np.zeros((0, len(twin.names))), ())
+        plans = ()
     with readable(name):
-        points = np.array(found.points, dtype=float).reshape(-1, len(twin.names))
-        if not np.isfinite(points).all() or len(points) != len(found.plans):
-            raise ValueError(f"{len(points)} points, {len(found.plans)} plans, or one is no number")
-        found = FrontSelection(points, tuple(found.plans), text(found.stopped))
-    if len(found.points) or found.stopped:
+        found = [with_numbers(name, plan, len(twin.names)) for plan in plans]
+        if not np.isfinite([plan.objective for plan in found]).all():
+            raise ValueError("a value is no number")
+    if found:
         return found
     if not twin.is_empty_below(np.full(len(twin.names), np.inf)):
         raise SolverError(f"formulation {name} found no plan, and some are allowed")
     raise InfeasibleError("pareto: no plan is within the limits; relax one")
 
 
-def _require_complete(problem: _StateFront, points: Floats, progress: Tell) -> None:
+def _require_complete(problem: FrontProblem, points: Floats, progress: Tell) -> None:
     """Raise an error if a plan exists that no point dominates: bounds are searched again."""
     bounds = upper_bounds(points)
     for bound in with_progress("proving that no plan is missing", bounds, progress):
@@ -407,7 +386,7 @@ def upper_bounds(points: Floats) -> Floats:
     return np.array(kept)
 
 
-def _table(problem: _StateFront, points: Floats, plans: Sequence[Sequence[Step]]) -> pd.DataFrame:
+def _table(problem: FrontProblem, points: Floats, plans: Sequence[Sequence[Step]]) -> pd.DataFrame:
     table = pd.DataFrame(points, columns=[*problem.names])
     counts = {
         "steps": [len(steps) for steps in plans],

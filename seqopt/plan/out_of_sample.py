@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -73,10 +74,10 @@ def judge_unseen(plan: Plan, scenes: Layers | Scenarios | Sequence[Scene]) -> Tr
     scene and of the scenarios that it was made for. Raises `ProblemError` if a scenario has other
     bricks or nodes.
     """
-    problem = plan.graph
-    if not isinstance(problem, Layers) or not problem.scenes:
+    problem: Any = plan.graph
+    if not (problem.candidates and problem.scenarios):
         raise ProblemError("the plan was not chosen over scenarios; pose with scenarios")
-    nominal, aim = problem.alone_in_scene, problem.over.aim
+    nominal, aim = problem.as_layers, problem.over.aim
     known = ScenarioCosts(nominal.sums, nominal.peaks, 0, 0.0)
     chosen = best_choice(aim.costs(nominal), aim)
     if not isinstance(scenes, Layers):

@@ -104,7 +104,7 @@ def graph_kind(problem: Problem) -> str:
 
 def in_layers(moves: Schedule | FreeRules) -> bool:
     """Return whether steps have at most two open grips, so that candidates form layers."""
-    return not isinstance(moves, FreeRules) and getattr(moves, "has_pairs", True)
+    return getattr(moves, "has_pairs", True)
 
 
 def usual(problem: Problem) -> str:
@@ -120,7 +120,7 @@ def usual(problem: Problem) -> str:
     return "labels" if problem.budgets else "overlap_dp"
 
 
-def graph_of(problem: Problem, kind: str = "") -> Graph:
+def graph_of(problem: Problem, kind: str = "") -> Any:
     """Return the graph of choices of a problem; what was computed for it before is kept.
 
     ``kind``: ``candidates``, ``states`` or ``orders``; by default as `graph_kind`. Raises
@@ -129,21 +129,18 @@ def graph_of(problem: Problem, kind: str = "") -> Graph:
     kind = kind or graph_kind(problem)
     if kind not in problem.graphs:
         problem.graphs[kind] = BUILDERS[kind](problem)
-    found: Graph = problem.graphs[kind]
-    return found
+    return problem.graphs[kind]
 
 
 def layers_of(problem: Problem) -> Layers:
     """Return the open grips of a problem in layers of candidates, budgets included."""
-    found = graph_of(problem, CANDIDATES)
-    assert isinstance(found, Layers)
+    found: Layers = graph_of(problem, CANDIDATES)
     return found
 
 
 def states_of(problem: Problem) -> States:
     """Return the states and moves of a problem."""
-    found = graph_of(problem, STATES if problem.orders is None else ORDERS)
-    assert isinstance(found, States)
+    found: States = graph_of(problem, STATES if problem.orders is None else ORDERS)
     return found
 
 
@@ -323,11 +320,11 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
         return _of_graph(problem, formulation, run)
     found = as_formulation(formulation or usual(problem), *questions_of(problem))
     kind = _kind_for(problem, found)
-    of_costs = kind == CANDIDATES and found.aim is not None
-    if of_costs and problem.goals not in ((), (AIMS[found.aim],)):
+    aim = found.aim if kind == CANDIDATES else None
+    if aim is not None and problem.goals not in ((), (AIMS[aim],)):
         asked = ", ".join(map(str, problem.goals))
         raise ProblemError(
-            f"aim {asked}: {found.name} minimizes the {found.aim.value} of costs; "
+            f"aim {asked}: {found.name} minimizes the {aim.value} of costs; "
             "take another formulation"
         )
 

@@ -18,7 +18,6 @@ import numpy as np
 
 from seqopt._showing import display
 from seqopt.errors import ExtraError, ProblemError
-from seqopt.graph.states.states import States
 from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.plan import Plan
@@ -179,8 +178,8 @@ def _build(value: ShownBuild) -> _Card:
         rows[OUTSIDE] = f"{left}. {REMEDY}"
     rows["found by"] = typed(value.title)
     if isinstance(value, Plan):
-        posed = value.states if isinstance(value.graph, States) else value.layers
-        rows |= {"criterion": posed.criterion.name} if posed.criterion.name else {}
+        name = value._of_scene.criterion.name
+        rows |= {"criterion": name} if name else {}
     rows |= {"result": value.result, "steps": len(value.steps)}
     rows |= _computed(value) if small else {"stability": "see verdicts: not computed here"}
     if value.seconds:

@@ -242,7 +242,7 @@ class FreeRules:
             **{name: site.described(scene) for name, site in sites.items() if site is not None},
         }
 
-    method = FREE
+    method, has_pairs = FREE, False  # it is no list of steps with open grips
 
     @property
     def left_out(self) -> str:

@@ -27,7 +27,7 @@ from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge.schedules import judge_schedule, plan_values
 from seqopt.network.build import build_network
-from seqopt.plan.front import _StateFront, find_front, pick, upper_bounds
+from seqopt.plan.front import FrontProblem, find_front, pick, upper_bounds
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.rules import FreeRules, with_robots
@@ -156,7 +156,7 @@ def test_pareto_sets_equal_brute_force(build):
     step = np.array([5.0, 2.0])
     problem = build_states(engine, rules, ONES, "F_largest,M_sup")
     expected = brute_front(engine, rules, step)
-    front = _StateFront(problem, {"F_largest": 5.0, "M_sup": 2.0})
+    front = FrontProblem(problem, {"F_largest": 5.0, "M_sup": 2.0})
     if not expected:
         with pytest.raises(InfeasibleError):
             find_front(front)
@@ -198,7 +198,7 @@ def test_steps_and_regrips_in_one_set_equal_brute_force(build):
     }
     expected = counted_front(graph, start, worst)
     for aim in ("F_largest,steps,regrips", "regrips,F_largest,steps"):
-        front = _StateFront(build_states(engine, rules, ONES, aim), {"F_largest": 10.0})
+        front = FrontProblem(build_states(engine, rules, ONES, aim), {"F_largest": 10.0})
         if not expected:
             with pytest.raises(InfeasibleError):
                 find_front(front)
@@ -379,7 +379,7 @@ def test_refusals_name_the_brick_and_what_opens_a_way(arch, engine25):
 def test_the_front_of_the_arch_rounded(arch):
     problem = replace(arch, goals=pose_goals("F_largest,M_sup,T_max,D_max"))
     rounding = {"F_largest": 5.0, "M_sup": 1.0, "T_max": 5.0, "D_max": 1e-6}
-    front = find_front(_StateFront(problem, rounding))
+    front = find_front(FrontProblem(problem, rounding))
     assert front.complete
     assert len(front.table) == 34
     best = pick(front.table, "D_max", {"F_largest": 250.0})
@@ -392,18 +392,18 @@ def test_the_front_of_the_arch_rounded(arch):
 
 def test_steps_can_be_among_what_is_to_be_small(arch, engine25):
     problem = build_states(engine25, FreeRules(), arch.criterion, "F_largest,M_sup,steps")
-    front = find_front(_StateFront(problem, {"F_largest": 10.0, "M_sup": 2.0}))
+    front = find_front(FrontProblem(problem, {"F_largest": 10.0, "M_sup": 2.0}))
     steps = front.table["steps"].to_numpy()
     assert steps.min() == 48
     assert len({*steps}) > 1
     with pytest.raises(ProblemError, match="pareto: travel adds up along a plan"):
-        _StateFront(build_states(engine25, FreeRules(), arch.criterion, "steps,travel"))
+        FrontProblem(build_states(engine25, FreeRules(), arch.criterion, "steps,travel"))
 
 
 def test_the_front_of_the_loop_holds_its_best_peak(engine25):
     loop = three_robot_loop(engine25.network)
     posed = build_states(engine25, loop, ONES, "F_largest,M_sup")
-    front = find_front(_StateFront(posed, rounding={"F_largest": 5.0}))
+    front = find_front(FrontProblem(posed, rounding={"F_largest": 5.0}))
     assert front.complete
     alone = seqopt.solve(
         seqopt.pose(engine25, loop, WorstRatio("F", (("F_largest", 1.0),))), "minimax"
@@ -418,7 +418,7 @@ def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force(count
     engine = ComplianceEngine(build_network(small_arch(count)))
     loop = modified_sequential(engine.network)
     problem = build_states(engine, loop, ONES, "T_max,F_largest")
-    front, values = find_front(_StateFront(problem)), set()
+    front, values = find_front(FrontProblem(problem)), set()
     for nodes in product(*(move.candidates for move in loop.moves)):
         with contextlib.suppress(StepError):
             values.add(tuple(np.round(plan_values(problem, loop.fill(nodes)), 6)))

@@ -22,7 +22,7 @@ from seqopt.graph.states.states import build_states
 from seqopt.judge.schedules import judge_schedule
 from seqopt.network.build import build_network
 from seqopt.plan._remedies import worst_least
-from seqopt.plan.front import _StateFront, find_front
+from seqopt.plan.front import FrontProblem, find_front
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import NARROW, Standing, StandingSets, _without_implied, slack
@@ -306,7 +306,7 @@ def test_tilts_by_steps_are_those_of_the_program(dry):
 @pytest.mark.slow
 def test_pareto_sets_with_a_margin(dry):
     problem = build_states(dry.engine, dry.rules, ONES, "F_largest,bond")
-    front = find_front(_StateFront(problem, {"F_largest": 10.0, "bond": 500.0}))
+    front = find_front(FrontProblem(problem, {"F_largest": 10.0, "bond": 500.0}))
     assert front.complete
     assert (front.table["bond"] % 500 == 0).all()
     assert front.table["bond"].is_monotonic_decreasing

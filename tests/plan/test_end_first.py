@@ -19,7 +19,7 @@ from seqopt.graph.states.explored import barred, explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge._proof import Proof
 from seqopt.network.build import build_network
-from seqopt.plan.front import _StateFront, find_front
+from seqopt.plan.front import FrontProblem, find_front
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.scene.scene_file import load_scene
@@ -83,9 +83,9 @@ def test_all_orders_and_fronts_end_in_it_too():
     with pytest.raises(InfeasibleError, match=END):
         seqopt.solve(among_orders(problem, "tied"), "order_search")
     with pytest.raises(InfeasibleError, match=END):
-        find_front(_StateFront(problem, None))
+        find_front(FrontProblem(problem, None))
     with pytest.raises(InfeasibleError, match=END):
-        find_front(_StateFront(among_orders(problem, "tied"), None))
+        find_front(FrontProblem(among_orders(problem, "tied"), None))
 
 
 def test_a_step_without_an_open_grip_is_asked_before_those_with_one():

@@ -13,7 +13,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph._orders import TooManySetsError, order_rules
 from seqopt.graph.formulation import find_formulation
 from seqopt.plan import front as fronts
-from seqopt.plan.front import FrontSelection, find_front
+from seqopt.plan.front import find_front
 from seqopt.plan.solving import graph_of
 from seqopt.responses.table import analyze
 from tests.builders import small_arch
@@ -74,7 +74,7 @@ def test_every_plan_is_analyzed_in_its_own_order():
 
 def short_of_one(problem, **options):
     found = find_formulation("pareto_zones").solve(problem, **options)
-    return FrontSelection(found.points[1:], found.plans[1:])
+    return found[1:]
 
 
 def test_a_missing_point_is_seen():

@@ -20,7 +20,6 @@ from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
 from seqopt.graph.formulation import End, Run, as_formulation, trace_rows
-from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._range import at_sufficient_level
 from seqopt.plan._softer import _payload_advice
@@ -114,7 +113,7 @@ class Found:
     def trial(self) -> Trial | None:
         """Beside other plans, where candidates were chosen over scenarios."""
         unseen = self.posed.unseen
-        if unseen is None or isinstance(self.plan.graph, States):
+        if unseen is None or not self.plan.graph.candidates:
             return None
         from seqopt.plan.out_of_sample import judge_unseen  # noqa: PLC0415  # few plans are robust
 
@@ -155,7 +154,7 @@ class Found:
     def report(self) -> dict[str, object]:
         """The summary, and what the command adds to it."""
         plan = self.plan
-        loop = plan.method == "three-robot" and not isinstance(plan.graph, States)
+        loop = plan.method == "three-robot" and plan.graph.candidates
         counts = paper_models(plan.layers.schedule) if loop else ()
         out = self.summary | {
             "seconds": {"assemble": self.assemble, **plan.seconds},
@@ -172,7 +171,7 @@ class Found:
         if self.trial is not None:
             return out | {"unseen": unseen.settings, "worth": self.trial.summary()}
         worst = None
-        if isinstance(self.plan.graph, States):
+        if not self.plan.graph.candidates:
             from seqopt.plan.out_of_sample import worst_values  # noqa: PLC0415
 
             worst = self.clock.spare(UNSEEN, lambda: worst_values(self.plan, unseen), None)
@@ -307,7 +306,7 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
         held = f"{OUTSIDE}: " * bool(plan.outside) + f"{_headline(scene, plan._columns)}; "
     yield f"{held}{_value(found)}"
     counts = [f"{len(plan.steps)} steps"]
-    if isinstance(plan.graph, States):
+    if not plan.graph.candidates:
         counts.append(f"{plan.regrips} regrip{'s' * (plan.regrips != 1)}")
     counts.append(f"{plan.models:,} models")
     search = f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"
@@ -350,7 +349,7 @@ def _value(found: Found) -> str:
         values = ", ".join(f"{name} {value_text(name, v)}" for name, v in plan.objective.items())
         return f"{values}, {plan.status}, {order_bound_said(plan)}"
     known = found.posed.known
-    if known is None or isinstance(plan.graph, States):
+    if known is None or not plan.graph.candidates:
         return plan._value
     value = f"{plan._value} over {len(known.scenes)} scenarios ({plan.title})"
     if found.trial is None:
