@@ -96,6 +96,7 @@ def test_a_registered_filter_is_a_limit(schedule):
     assert any(node in step.held for step in free.steps)
     assert not any(node in step.held for step in kept.steps)
     assert kept.objective["F_largest"] >= free.objective["F_largest"]
+    assert (kept.summary()["filters"], "filters" in free.summary()) == (["away"], False)
     assert str(kept.status) == "optimal"
 
 

@@ -281,6 +281,7 @@ def _front_files(asked: ParetoWords, found: Found) -> dict[str, bytes | str]:
         "aims": [str(goal) for goal in free.goals],
         **judged_by(free.goals, free.criterion),
         "limits": _said_limits(problem.limits),
+        **({"filters": [*map(str, problem.filters)]} if problem.filters else {}),
         **provenance(engine),
     }
     numbered = _numbered(front).reset_index()

@@ -199,6 +199,7 @@ class States(Source, Shown):
             **judged_by(self.goals, self.criterion),
             "scenarios": len(self.scenarios),
             "limits": limits,
+            **({"filters": [*map(str, self.filters)]} if self.filters else {}),
             "rules": self.rules.described(self.network.scene),
             "stands": stands,
         }
