@@ -186,7 +186,7 @@ def _values(free: States, held: Ints) -> Floats:
     places = np.where(held > 0, (held - 1) % (2 * bricks) + 1, 0)  # whoever holds
     nodes, most = free._node_numbers[places], np.full(held.shape, np.inf)
     seen = StateArrays(bricks, nodes, finite, forces, most, whole, free.criterion, places)
-    values = np.zeros(len(held)) if goal.states is None else goal.states(seen)
+    values = np.zeros(len(held)) if goal.states is None else goal.value(seen)
     return np.where(whole, values, np.inf)
 
 

@@ -81,9 +81,9 @@ def _ask_engine(problem: States, bricks: int, grips: Ints, *, low_precision: boo
     most = np.full(borne.shape, np.inf)
     seen = StateArrays(bricks, nodes, found, borne, most, fit, problem.criterion, grips)
     for each in problem.filters:  # without a twin nothing is refused: a bound stays one
-        if each.twin is not None and fit.any():
-            left = np.flatnonzero(fit)
-            fit[left] = ~each.twin(seen.only(left))
+        left = np.flatnonzero(fit)
+        if len(left):
+            fit[left] = ~each.refuted_again(seen.only(left))
     seen = seen._replace(possible=fit)
     values = np.column_stack([state_values(goal, seen) for goal in problem.goals])
     if problem.spares and bricks == len(problem.network.inner) and not grips.shape[1]:

@@ -100,7 +100,9 @@ def twin_of(amount: Amount) -> Twin | None:
         return TWINS[amount.name]
     if amount.name in BUILT_IN or is_tolerance(amount.name):
         return Twin(_none if amount.margins else partial(_response, amount.responses[0]))
-    return None if amount.twin is None or amount.in_time else Twin(amount.twin)
+    if amount.twin is None or amount.in_time:
+        return None
+    return Twin(partial(amount.checked, amount.twin))
 
 
 def path_twin() -> PathTwin | None:
@@ -112,7 +114,9 @@ def path_twin() -> PathTwin | None:
 def own_values(amount: Amount) -> Callable[[Any], Floats] | None:
     """Return the judge's function of an amount, or its own where it has no twin; None of paths."""
     twin = twin_of(amount)
-    return (amount.states or amount.moves) if twin is None else twin.values
+    if twin is not None:
+        return twin.values
+    return None if amount.in_time or amount.margins else amount.value
 
 
 def exceeds(limit: Limit, values: Floats) -> Bools:

@@ -306,8 +306,7 @@ def _check_filters(problem: States, levels: Levels, steps: Sequence[Step]) -> No
     """Raise a `SolverError` if a state does not pass a filter, by its own function or its twin."""
     for each in problem.filters:
         for rows, states in levels:
-            refused = ~each.proven(states)
-            refused |= False if each.twin is None else each.twin(states)
+            refused = ~each.proven(states) | each.refuted_again(states)
             if refused.any():
                 number = steps[rows[np.flatnonzero(refused)[0]]].number
                 raise SolverError(f"step {number} does not pass the filter {each.name}")

@@ -14,6 +14,7 @@ from seqopt.engines.registry import simplest
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, Run, as_formulation
 from seqopt.graph.layers.layers import Layers, candidate_layers, in_scenarios
+from seqopt.graph.states._checks import check_parts
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._range import best_within
@@ -205,6 +206,7 @@ def _states(problem: Problem) -> States:
     goals = problem.goals or (AIMS[over.aim],)
     asked = problem.engine, problem.moves, problem.criterion, goals, problem.limits
     found = build_states(*asked, problem.stands)
+    check_parts(problem.filters)
     found = replace(found, resources=problem.resources, filters=problem.filters)
     space = found.space
     ends = isinstance(space, FreeSpace) and space.first == space.levels

@@ -21,7 +21,7 @@ import numpy as np
 
 from seqopt._registry import registered
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import ProblemError, did_you_mean
+from seqopt.errors import ProblemError, did_you_mean, message_of
 from seqopt.problem.requirements import Criterion, state_costs
 from seqopt.problem.standing import MARGINS, StandingSets
 from seqopt.responses._tolerance import is_tolerance
@@ -71,6 +71,20 @@ class MoveArrays(NamedTuple):
 
     regrips: Floats
     distances: Floats
+
+
+def call(what: str, function: Any, arrays: StateArrays | MoveArrays) -> np.ndarray:
+    """Return what a function of somebody else makes of n states or moves, (n,)."""
+    count = len(arrays.possible if isinstance(arrays, StateArrays) else arrays.regrips)
+    try:
+        found = np.asarray(function(arrays))
+    except Exception as error:  # whatever a function of others may raise
+        raise ProblemError(f"{what}: its function failed: {message_of(error)}") from error
+    if found.shape != (count,):
+        raise ProblemError(
+            f"{what}: its function returned shape {found.shape}; give ({count},), one for each"
+        )
+    return found
 
 
 @dataclass(frozen=True, repr=False)
@@ -145,6 +159,22 @@ class Amount:
     def has_few_digits(self) -> bool:
         """Whether six digits of responses are enough to choose by."""
         return self.is_peak and (self.of_criterion or isinstance(self.states, _Response))
+
+    def value(self, arrays: StateArrays | MoveArrays) -> Floats:
+        """Return what it takes of states or moves, (n,), by its own function."""
+        return self.checked(self.states or self.moves, arrays)
+
+    def checked(self, function: Any, arrays: StateArrays | MoveArrays) -> Floats:
+        """Return what its function, or its twin, says; a `ProblemError` if those are no values."""
+        if self.name in BUILT_IN or isinstance(self.states, _Response):
+            found: Floats = function(arrays)
+            return found
+        values = call(f"amount {self.name}", function, arrays).astype(float)
+        if not (values >= 0).all():
+            raise ProblemError(
+                f"amount {self.name}: a value is {values.min():.6g}; give numbers from zero"
+            )
+        return values
 
     def tracks_free_robots(self, scene: Scene) -> bool:
         """Return whether states of a scene must tell where a free robot held last."""

@@ -23,7 +23,7 @@ from seqopt._registry import ADDED
 from seqopt.arrays import Bools
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError
-from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays
+from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays, call
 from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Limit
 from seqopt.scene._checks import short
 
@@ -77,11 +77,21 @@ class Filter:
 
     def proven(self, states: StateArrays) -> Bools:
         """Return which states are proven to pass, (n,)."""
-        return np.ones(len(states.rows), bool) if self.passes is None else self.passes(states)
+        if self.passes is None:
+            return np.ones(len(states.rows), dtype=bool)
+        return call(f"filter {self.name}", self.passes, states).astype(bool)
 
     def refuted(self, states: StateArrays) -> Bools:
         """Return which states are proven not to pass, (n,)."""
-        return ~self.proven(states) if self.refuses is None else self.refuses(states)
+        if self.refuses is None:
+            return ~self.proven(states)
+        return call(f"filter {self.name}", self.refuses, states).astype(bool)
+
+    def refuted_again(self, states: StateArrays) -> Bools:
+        """Return the same as its twin says; none where there is no twin."""
+        if self.twin is None:
+            return np.zeros(len(states.rows), dtype=bool)
+        return call(f"twin of filter {self.name}", self.twin, states).astype(bool)
 
     def ways(self, problem: Any) -> Iterator[tuple[str, Any]]:
         """Yield how it can be loosened in a problem, in words, and the problem with that."""

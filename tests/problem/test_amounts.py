@@ -156,6 +156,30 @@ def test_states_go_to_other_processes_once_filters_were_asked():
     assert (again[0].tolist(), again[1].tolist()) == (values.tolist(), within.tolist())
 
 
+WRONG = {
+    "its function failed: ZeroDivisionError": lambda states: 1 / 0,
+    r"returned shape \(\); give": lambda states: 1.0,
+    "a value is -1; give numbers from zero": lambda states: -1.0 * (states.nodes[:, 0] > -2),
+    "a value is nan": lambda states: np.full(len(states.nodes), np.nan),
+}
+
+
+@pytest.mark.parametrize("said", WRONG)
+def test_a_function_that_is_wrong_is_one_line(said):
+    with pytest.raises(ProblemError, match=f"amount own: .*{said}"):
+        seqopt.solve(posed((Amount("own", WRONG[said]),)))
+    if "value" not in said:
+        with pytest.raises(ProblemError, match=f"filter own: .*{said}"):
+            seqopt.solve(posed("minmax", [Filter("own", WRONG[said])]))
+
+
+def test_responses_that_no_state_has_are_named():
+    for part in (Amount("own", busy, responses=("F_move",)), Filter("own", busy, ("F_move",))):
+        kind = type(part).__name__.lower()
+        with pytest.raises(ProblemError, match=f"{kind} own: a state .* has no F_move; give C_max"):
+            seqopt.solve(posed((part,)) if kind == "amount" else posed("minmax", [part]))
+
+
 def test_what_is_neither_is_refused():
     with pytest.raises(ProblemError, match="give an Amount or a Filter"):
         seqopt.register("busy")

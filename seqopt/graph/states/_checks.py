@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
-from seqopt.problem.amounts import STATE_RESPONSES
+from seqopt.problem.amounts import STATE_RESPONSES, Amount
 from seqopt.problem.criteria import RankSum
+from seqopt.problem.filters import Filter
 from seqopt.problem.requirements import Criterion, Limit, SceneFacts, _step_limits
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
@@ -21,6 +22,13 @@ def checked_limits(limits: Sequence[Limit], network: Network) -> tuple[Limit, ..
     for limit in limits:
         _require(limit.response, {*STATE_RESPONSES, PROP_EXCESS, *robots}, "limit")
     return limits
+
+
+def check_parts(parts: Sequence[Amount | Filter]) -> None:
+    """Raise a `ProblemError` if an amount or a filter asks for a response that no state has."""
+    for part in parts:
+        for name in part.responses:
+            _require(name, {*STATE_RESPONSES}, f"{type(part).__name__.lower()} {part}")
 
 
 def of_states(engine: Engine, criterion: Criterion) -> Criterion:

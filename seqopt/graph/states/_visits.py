@@ -280,7 +280,7 @@ def move_amounts(problem: States, values: Floats, taken: Floats) -> Floats:
     out, moves = values.copy(), MoveArrays(*taken.T)
     for k, goal in enumerate(problem.goals):
         if goal.moves is not None:
-            out[:, k] = goal.moves(moves)
+            out[:, k] = goal.value(moves)
     return out
 
 

@@ -16,7 +16,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph.source import Source
-from seqopt.graph.states._checks import checked_limits, of_states
+from seqopt.graph.states._checks import check_parts, checked_limits, of_states
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.problem.amounts import LARGEST, NONE, STATE_RESPONSES, Amount, StateArrays, judged_by
@@ -370,7 +370,7 @@ class States(Source, Shown):
         found = found._replace(possible=within)
         for column, goal in enumerate(self.goals):
             if goal.states is not None:
-                out[:, column] = goal.states(found)
+                out[:, column] = goal.value(found)
         if self.spares and bricks == len(self.network.inner):
             out[(states[:, : self.space.robots] <= 0).all(axis=1)] = 0.0
         within &= np.isfinite(out).all(axis=1)
@@ -596,6 +596,7 @@ def _asked(problem: States) -> States:
     """Return a problem whose stability can be asked, where it will be."""
     if problem.standing is not None or any(goal.margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
+    check_parts(problem.goals)
     for goal in problem.goals:
         if goal.check is not None:
             goal.check(problem)
