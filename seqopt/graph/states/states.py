@@ -309,7 +309,7 @@ class States(Source, Shown):
             close = self._close(answers, forces, most)
             if close.any():
                 answers[close], forces[close] = self.sets.answers(bricks, held[close])
-        fits: Bools = np.isfinite(np.column_stack([answers, forces])).all(axis=1)
+        fits = np.asarray(np.isfinite(np.column_stack([answers, forces])).all(axis=1))
         found, places = self._by_name(answers, forces), states[:, : self.space.robots].clip(min=0)
         nodes = self._node_numbers[places]
         seen = StateArrays(bricks, nodes, found, forces, most, fits, self.criterion, states)
