@@ -81,7 +81,7 @@ def within_budgets(
             told = watch if not goal else None
             found = _least_sum(graph, graph.amounts[:, goal], limited, told)
             if most:
-                found = _by_labels(graph, goal, limited, found, told or Watch(watch.left), most)
+                found = _by_labels(graph, goal, limited, found, told or watch.apart(), most)
             bound, price, way = found.bound, found.prices, _path(graph, found.moves)
         best = _better(graph, goal, way, best)
         taken = _taken(graph, best)[goal]
@@ -109,7 +109,7 @@ def _some_path(graph: Graph, caps: Sequence[float], watch: Watch) -> _Path:
     if found.bound <= _rounding(graph, found.prices, caps):
         most = np.array([tied(cap) for cap in caps])
         growth = CappedSums(graph, nothing, graph.amounts[:, goals:], most, found.prices)
-        until = Watch(watch.left)  # it is told no costs that are none
+        until = watch.apart()  # it is told no costs that are none
         met = widening(growth, most, NONE, until, LABELS, any_path=True)
         path = _path(graph, met.arcs)
         if path is None and until.over:

@@ -93,6 +93,7 @@ class Watch:
         self._start, self._limit = time.perf_counter(), time_limit
         self._progress = progress
         self._trace: list[Finding] = []
+        self._within: Watch | None = None
         self.interrupted = False  # whether somebody asked for an end
 
     @property
@@ -103,12 +104,19 @@ class Watch:
     @property
     def left(self) -> float:
         """How much time is left, s; zero where it is over."""
-        return 0.0 if self.interrupted else max(0.0, self._limit - self.seconds)
+        return 0.0 if self.over else self._limit - self.seconds
 
     @property
     def over(self) -> bool:
         """Whether the time limit is reached, or somebody asked for an end."""
-        return self.interrupted or self.seconds >= self._limit
+        ended = self._within is not None and self._within.over
+        return ended or self.interrupted or self.seconds >= self._limit
+
+    def apart(self) -> Watch:
+        """Return a watch that takes note of other findings, and is over where this one is."""
+        other = Watch(self.left)
+        other._within = self
+        return other
 
     def interrupt(self) -> None:
         """Ask for an end: time is over from now on."""

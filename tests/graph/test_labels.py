@@ -59,6 +59,13 @@ def test_a_sweep_stops_in_time_and_at_so_many_labels(graph):
     limits = np.array([np.inf, 9.0])
     with pytest.raises(LateError):
         Sweep(growth, limits).run(Watch(0.0))
+    watch = Watch()
+    first = watch.apart()  # of a search that is told other values, as of paths within caps
+    assert (first.over, first.left, first.bound) == (False, np.inf, watch.bound)
+    watch.interrupt()
+    assert (first.over, first.left) == (True, 0.0)
+    with pytest.raises(LateError):
+        Sweep(growth, limits).run(first)
     every = Sweep(growth, limits).run(Watch())
     count = sum(labels.size for labels in every.kept)
     assert Sweep(growth, limits).run(Watch(), count).best == every.best
