@@ -24,8 +24,7 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import MOST_ROBOTS, FreeRules, _usual_grips
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
-from seqopt.stability._builds import BuildProver, BuildVerdicts
-from seqopt.stability._settlement import _settlement_said
+from seqopt.stability._builds import BuildProver, BuildVerdicts, _settlement_said
 from seqopt.stability.assessment import Verdict
 from seqopt.work._clock import INTERRUPT, TIME, Clock
 

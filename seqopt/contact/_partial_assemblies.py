@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from seqopt.contact._prop_grips import added, prop_grips
+from seqopt.contact._prop_grips import grip_fields
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import _applied_rows, bare_assembly
+from seqopt.contact.faces import bare_assembly
 from seqopt.network.network import GROUND, Network
 
 _KEPT = 3000  # bricks in all partial structures that are kept, some 5 kB each
@@ -29,8 +29,6 @@ class PartialAssemblies:
     def __init__(self, network: Network, bricks: int) -> None:
         self.network, self.bricks = network, bricks
         self._whole = whole = bare_assembly(network, bricks)
-        placed = network.scene.placed
-        self._block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}
         self._heaviest = np.maximum.accumulate(np.linalg.norm(whole.weight, axis=1))
         lever = np.zeros(len(whole.corner))
         for body in whole.bodies[whole.contact].T:
@@ -56,15 +54,13 @@ class PartialAssemblies:
         return self._made[key]
 
     def _cut(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
-        whole, scene = self._whole, self.network.scene
+        whole = self._whole
         contacts = len(self.network.springs.acting(bricks))
         corners = int(np.searchsorted(whole.contact, contacts))
-        payload = [robot.payload for robot in scene.robots]
+        payload = [robot.payload for robot in self.network.scene.robots]
         payload += [max(payload, default=0.0)] * (len(grips) - len(payload))
         pairs = zip(grips, payload, strict=True)
         held = [(node, most) for node, most in pairs if node is not None]
-        props = prop_grips(self.network, bricks, held=bool(held))
-        nodes = [*(node for node, _ in held), *props.nodes]
         part: Assembly = Assembly.__new__(Assembly)
         part.__setstate__(  # as one that was checked before
             {
@@ -76,11 +72,7 @@ class PartialAssemblies:
                 "normal": whole.normal[:contacts],
                 "corner": whole.corner[:corners],
                 "contact": whole.contact[:corners],
-                "grip_block": np.array([self._block[node] for node in nodes], dtype=np.int64),
-                "grip_position": np.array([scene.node_position(n) for n in nodes]).reshape(-1, 3),
-                "payload": np.array([*(payload for _, payload in held), *props.payload]),
-                "applied": added(_applied_rows(self.network, bricks), props.applied),
-                "grip_line": np.concatenate([np.zeros((len(held), 3)), props.line]),
+                **grip_fields(self.network, bricks, held),
                 "bond": np.zeros(0),
                 "corner_area": whole.corner_area[:corners],
                 "area": whole.area[:contacts],
@@ -92,14 +84,11 @@ class PartialAssemblies:
         scales = float(self._heaviest[bricks - 1]) or 1.0, float(longest) or 1.0
         key = bricks, scales[1]
         if key not in self._last:
-            self._last = {key: self._contact_map(bricks, corners, scales[1])}
+            ends = self._map.indptr[: 3 * corners + 1]
+            kept = slice(0, int(ends[-1]))
+            ratio = np.where(self._turning[kept], whole.scales[1] / scales[1], 1.0)  # of levers
+            entries = self._map.data[kept] * ratio, self._map.indices[kept], ends
+            shape = 6 * bricks, 3 * corners
+            self._last = {key: sparse.csc_array(entries, shape=shape).tocsr()}
         part.__setstate__({"scales": scales, "contact_map": self._last[key]})
         return part
-
-    def _contact_map(self, bricks: int, corners: int, length: float) -> sparse.csr_array:
-        """Return the first lines and columns of the whole's map, moments over another length."""
-        ends = self._map.indptr[: 3 * corners + 1]
-        kept = slice(0, int(ends[-1]))
-        ratio = np.where(self._turning[kept], self._whole.scales[1] / length, 1.0)
-        entries = self._map.data[kept] * ratio, self._map.indices[kept], ends
-        return sparse.csc_array(entries, shape=(6 * bricks, 3 * corners)).tocsr()

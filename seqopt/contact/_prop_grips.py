@@ -1,4 +1,4 @@
-"""Props as grips of assemblies: what they bear, and along which line.
+"""Grips of assemblies: those of robots, and props with what they bear and along which line.
 
 What holds both ways is a grip like that of a robot. One that only pushes bears from nothing to its
 capacity along its line, and nothing across it: half the capacity is applied for good, and a grip
@@ -7,7 +7,8 @@ along the line adds as much or takes it away.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -56,6 +57,26 @@ def prop_grips(network: Network, bricks: int, *, held: bool) -> PropGrips:
     return PropGrips(props, payload, line, applied)
 
 
-def added(one: Floats, other: Floats) -> Floats:
-    """Return what two parts apply, (B, 6), either of which may have no rows."""
-    return one + other if len(one) and len(other) else one if len(one) else other
+def applied_rows(network: Network, bricks: int, props: PropGrips | None = None) -> Floats:
+    """Return `Assembly.applied` of a partial structure, with what props apply for good."""
+    applied = network.applied(bricks)
+    if props is None or not len(props.applied):
+        return applied if applied.any() else np.zeros((0, 6))
+    return applied + props.applied
+
+
+def grip_fields(network: Network, bricks: int, held: Sequence[tuple[int, float]]) -> dict[str, Any]:
+    """Return the fields of an assembly that depend on its grips, by name.
+
+    ``held``: node and payload (N) of every robot that holds one; props follow.
+    """
+    scene, props = network.scene, prop_grips(network, bricks, held=bool(held))
+    nodes = [*(node for node, _ in held), *props.nodes]
+    blocks = [scene.since[scene.brick_of_node[node].name] - 1 for node in nodes]
+    return {
+        "grip_block": np.array(blocks, dtype=np.int64),
+        "grip_position": np.array([scene.node_position(n) for n in nodes]).reshape(-1, 3),
+        "payload": np.array([*(payload for _, payload in held), *props.payload]),
+        "applied": applied_rows(network, bricks, props),
+        "grip_line": np.concatenate([np.zeros((len(held), 3)), props.line]),
+    }

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from seqopt.arrays import Floats, frozen
-from seqopt.contact._prop_grips import added, prop_grips
+from seqopt.contact._prop_grips import applied_rows, grip_fields
 from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
@@ -111,24 +111,7 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     """
     pairs = zip(grips, network.scene.robots, strict=True)
     held = [(node, robot.payload) for node, robot in pairs if node is not None]
-    bare = bare_assembly(network, bricks)
-    props = prop_grips(network, bricks, held=bool(held))
-    block = {node: i for i, brick in enumerate(network.scene.placed) for node in brick.nodes}
-    nodes = [*(node for node, _ in held), *props.nodes]
-    return replace(
-        bare,
-        grip_block=np.array([block[node] for node in nodes], dtype=np.int64),
-        grip_position=np.array([network.scene.node_position(n) for n in nodes]).reshape(-1, 3),
-        payload=np.array([*(payload for _, payload in held), *props.payload]),
-        applied=added(bare.applied, props.applied),
-        grip_line=np.concatenate([np.zeros((len(held), 3)), props.line]),
-    )
-
-
-def _applied_rows(network: Network, bricks: int) -> Floats:
-    """Return `Assembly.applied` of a partial structure."""
-    applied = network.applied(bricks)
-    return applied if applied.any() else np.zeros((0, 6))
+    return replace(bare_assembly(network, bricks), **grip_fields(network, bricks, held))
 
 
 def bare_assembly(network: Network, bricks: int) -> Assembly:
@@ -163,7 +146,7 @@ def bare_assembly(network: Network, bricks: int) -> Assembly:
         grip_block=np.zeros(0, dtype=np.int64),
         grip_position=np.zeros((0, 3)),
         payload=np.zeros(0),
-        applied=_applied_rows(network, bricks),
+        applied=applied_rows(network, bricks),
     )
 
 

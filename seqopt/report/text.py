@@ -15,8 +15,7 @@ from seqopt.problem.requirements import Criterion, _prop_faults, _response_along
 from seqopt.responses.quantities import RESPONSES, _plain, length_text, robot_response
 from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
 from seqopt.scene.scene import Scene
-from seqopt.stability._builds import BuildVerdicts
-from seqopt.stability._settlement import _settlement_said
+from seqopt.stability._builds import BuildVerdicts, _settlement_said
 from seqopt.stability.assessment import Verdict
 
 _NUMBERED = re.compile(r"rob(?:ot)?[ _-]?(\d+)")

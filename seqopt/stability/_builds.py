@@ -1,12 +1,19 @@
-"""Which steps of builds stand that are shown beside each other: verdicts, and what fails first."""
+"""Which steps of builds stand that are shown beside each other: verdicts, and what fails first.
+
+One proof is sought for many steps. Forces that hold a structure by the grips that steps have in
+common prove all of these steps, and a motion in which it falls although all of them together hold
+it proves that all fall. So such a structure is proven before one of the steps is. It may be of no
+use; it is never a verdict.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import Enum
 from functools import partial
-from itertools import chain, groupby
+from itertools import accumulate, chain, groupby, islice
 from operator import attrgetter
 
 import numpy as np
@@ -17,10 +24,11 @@ from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._ahead import quick_verdicts, shared_verdicts
 from seqopt.stability._screens import OPEN, STANDS, Screen
-from seqopt.stability._step_verdicts import each_verdict
-from seqopt.stability.assessment import Verdict
+from seqopt.stability._step_verdicts import by_workers, each_verdict
+from seqopt.stability._verdict_chain import VerdictChain, Way
+from seqopt.stability.assessment import Verdict, _verdict_of, bonded
+from seqopt.stability.limit_analysis import compile_equilibrium
 from seqopt.work._threads import cores
 from seqopt.work._workers import Crew, hire
 from seqopt.work.progress import Tell, with_progress
@@ -29,6 +37,13 @@ SHOWN = {"dry": DRY, "epoxy": EPOXY}  # with which it is said what stands
 SCREENED = 60  # bricks up to which a program for all grips at once is quickly solved
 _SETS = 12  # grips of as many bricks, in the mean, from which on such a program pays
 _SHARED = 5e4  # bricks in all steps from which on a process more takes less than it saves
+_DEAR = 50  # bricks from which on a proof takes much longer than trying others
+_TOGETHER = 1500  # bricks in all steps that are sought for beside each other, where it is not dear
+_SPAN = 8  # brick counts whose grips hold a structure that is to fall all the same
+_MOST = 16  # brick counts for which nothing is sought at most after it was of no use
+_CHUNKS = 6  # of the steps with one mortar: what is found for one does not prove the next one
+_SMALL = 0.1  # of a brick's smallest side: ground that turns and shifts no more changes no balance
+_EARLIER = (Way.EARLIER_FORCES, Way.EARLIER_MOTION)
 _State = tuple[int, Grips]  # bricks that stand, and nodes held
 _Found = Iterator[tuple[_State, Verdict]]
 _Told = Callable[[], Iterator[Step]]  # steps, told as they are asked
@@ -144,7 +159,10 @@ class BuildProver:
         distinct = [*{_state(step): step for step in steps}.values()]
         try:
             for name in self._mortars:
-                self._ask_all(name, self._new(name, distinct))
+                known = self._known[name]
+                new = [step for step in distinct if _state(step) not in known]
+                # one that fewer hold comes before others, which its forces prove
+                self._ask_all(name, sorted(new, key=lambda s: (s.bricks, len(s.held))))
         except SceneError as error:
             self.refusal = str(error)
             return False
@@ -173,18 +191,7 @@ class BuildProver:
         counts = {step.bricks for step in new}
         if len(new) > _SETS * len(counts) and len(self._network.inner) <= SCREENED:
             return partial(_screened, self._parts)  # a program for all grips of a brick count pays
-        if self._crew is not None:
-            return partial(_by_workers, self._crew, self._parts)
-        return partial(_one_by_one, self._parts)
-
-    def _new(self, name: str, steps: Sequence[Step]) -> list[Step]:
-        """Return the steps that are not known with a mortar, in the order in which they are asked.
-
-        Equal ones are asked once; one that fewer hold before others, which its forces prove.
-        """
-        known = self._known[name]
-        new = {s: step for step in steps if (s := _state(step)) not in known}
-        return sorted(new.values(), key=lambda step: (step.bricks, len(step.held)))
+        return partial(_one_by_one, self._parts, crew=self._crew)
 
     def _of_build(self, steps: Sequence[Step], name: str) -> BuildVerdicts:
         verdicts = tuple(self._known[name][_state(step)] for step in steps)
@@ -197,26 +204,31 @@ class BuildProver:
 
 
 def _one_by_one(
-    parts: PartialAssemblies, steps: Sequence[Step], mortar: Mortar, tell: _Told | None = None
+    parts: PartialAssemblies,
+    steps: Sequence[Step],
+    mortar: Mortar,
+    tell: _Told | None = None,
+    crew: Crew | None = None,
 ) -> _Found:
     """Yield the verdicts of partial structures, by what was found for those before."""
-    each = quick_verdicts(parts, steps, mortar)
+    if crew is None:
+        each = quick_verdicts(parts, steps, mortar)
+    else:
+        chunks = [list[Step]()]  # they end between brick counts
+        for _, same in groupby(steps, attrgetter("bricks")):
+            chunks[-1] += same
+            if len(chunks[-1]) * _CHUNKS >= len(steps):
+                chunks.append([])
+        find = partial(quick_verdicts, mortar=mortar)
+        each = by_workers(parts, find, [*filter(None, chunks)], crew)
     for step, found in zip(steps if tell is None else tell(), each, strict=True):
-        yield _state(step), found
-
-
-def _by_workers(
-    crew: Crew, parts: PartialAssemblies, steps: Sequence[Step], mortar: Mortar, tell: _Told
-) -> _Found:
-    """Yield the same, shared with workers."""
-    for step, found in zip(tell(), shared_verdicts(parts, steps, mortar, crew), strict=True):
         yield _state(step), found
 
 
 def _screened(parts: PartialAssemblies, _: Sequence[Step], mortar: Mortar, tell: _Told) -> _Found:
     """Yield the same, many grip sets at a time; what is left open is asked one by one."""
     screen, scene = Screen(parts.network, mortar), parts.network.scene
-    place = {node: i for i, node in enumerate((n for b in scene.placed for n in b.nodes), 1)}
+    place = {node: i for i, node in enumerate(scene.placed_nodes, 1)}
     payload = np.array([robot.payload for robot in scene.robots])
     for bricks, same in groupby(tell(), attrgetter("bricks")):
         part = [*same]
@@ -234,3 +246,120 @@ def _screened(parts: PartialAssemblies, _: Sequence[Step], mortar: Mortar, tell:
 
 def _state(step: Step) -> _State:
     return step.bricks, step.grips
+
+
+class _ProofKind(Enum):
+    """What may prove many steps."""
+
+    FORCES = "forces"
+    MOTION = "motion"
+
+
+class _Backoff:
+    """How many brick counts are left out after a try was of no use: twice as many each time."""
+
+    def __init__(self) -> None:
+        self._rest = self._next = 0
+
+    def ready(self) -> bool:
+        """Return whether it is time for another try; if not, it is nearer now."""
+        self._rest = max(self._rest - 1, -1)
+        return self._rest < 0
+
+    def learn(self, *, useful: bool) -> None:
+        """Take note of how a try has ended."""
+        self._next = 0 if useful else min(max(2 * self._next, 1), _MOST)
+        self._rest = self._next
+
+
+def quick_verdicts(
+    built: Network | PartialAssemblies, steps: Sequence[Step], mortar: Mortar
+) -> Iterator[Verdict]:
+    """Yield the verdict of every step as soon as it is found; best by ascending brick counts."""
+    most = max((step.bricks for step in steps), default=1) or 1
+    parts = PartialAssemblies(built, most) if isinstance(built, Network) else built
+    prove = VerdictChain(parts, lambda each: bonded(each, mortar), compile_equilibrium, near=True)
+    for dear, same in groupby(steps, lambda step: step.bricks > _DEAR):
+        if dear:
+            yield from _each_dear(prove, [*same], parts.network)
+        else:
+            yield from _each_small(prove, [*same])
+
+
+def _each_small(prove: VerdictChain, steps: Sequence[Step]) -> Iterator[Verdict]:
+    """Yield verdicts; cases that earlier proofs leave open are solved as one batch."""
+
+    def seek(number: int) -> None:
+        near = [*islice(steps, number, number + _TOGETHER)]
+        total = accumulate(step.bricks for step in near)
+        few = [step for step, bricks in zip(near, total, strict=True) if bricks <= _TOGETHER]
+        prove.search([*dict.fromkeys((step.bricks, step.grips) for step in few if step.bricks)])
+
+    for number, step in enumerate(steps):
+        if not step.bricks:
+            yield Verdict.STANDS
+        else:
+            yield _verdict_of(prove(step.bricks, step.grips, partial(seek, number))[1])
+
+
+def _each_dear(prove: VerdictChain, steps: Sequence[Step], network: Network) -> Iterator[Verdict]:
+    """Yield verdicts, where what may prove many is sought before what proves one."""
+    groups = [(bricks, [*each]) for bricks, each in groupby(steps, attrgetter("bricks"))]
+    backoff, sought = {kind: _Backoff() for kind in _ProofKind}, _ProofKind.FORCES
+    for i, (bricks, group) in enumerate(groups):
+        near = [step for _, each in groups[i : i + _SPAN] for step in each]
+        left = {kind for kind in _ProofKind if backoff[kind].ready()}
+        for step in group:
+            common = sought is _ProofKind.FORCES
+            trial = _common_grips(group) if common else _all_grips(network, near, bricks)
+            tried: list[object] = []
+            before = partial(_try, prove, bricks, trial, tried)
+            _, proven, way = prove(bricks, step.grips, before if sought in left else None)
+            if tried:
+                backoff[sought].learn(useful=way in _EARLIER)
+                left.discard(sought)
+            if way not in _EARLIER:
+                sought = _ProofKind.MOTION if proven.bound > 0 else _ProofKind.FORCES
+            yield _verdict_of(proven)
+
+
+def _try(prove: VerdictChain, bricks: int, grips: Grips, tried: list[object]) -> None:
+    tried.append(prove(bricks, grips)[2])
+
+
+def _common_grips(steps: Sequence[Step]) -> Grips:
+    """Return the grips that all steps have: forces by them hold every step."""
+    every = zip(*(step.grips for step in steps), strict=True)
+    return tuple(held[0] if len({*held}) == 1 else None for held in every)
+
+
+def _all_grips(network: Network, steps: Sequence[Step], bricks: int) -> Grips:
+    """Return the grips of any step at bricks that stand: what falls with them falls in each."""
+    stands = {*network.scene.placed_nodes[: 2 * bricks]}
+    held = {node for step in steps for node in step.grips if node in stands}
+    return (*(None for _ in network.scene.robots), *sorted(held))
+
+
+def _settlement_said(scene: Scene) -> str:
+    """Return that movements of ground ends enter no verdict, in words; empty where none moves.
+
+    Rigid bricks follow the ground, and balance as they did.
+    """
+    every = (ground.movement for ground in scene.grounds)
+    moved = [np.reshape(each, (2, 3)) for each in every if each is not None and any(each)]
+    if not moved:
+        return ""
+    side = min(min(brick.dimensions) for brick in scene.bricks)
+    lever = max(max(brick.dimensions) for brick in scene.bricks)
+    most = max(float(np.linalg.norm(s) + lever * np.linalg.norm(t)) for s, t in moved)
+    many = "s" * (len(moved) > 1)
+    ends = f"the movement of {len(moved)} ground end{many}, up to {1e3 * most:.4g} mm,"
+    if most > _SMALL * side:
+        return (
+            f"{ends} enters no verdict, and is not small beside a brick's {1e3 * side:.4g} mm: "
+            "verdicts are of the structure where it is planned, not where it moves to"
+        )
+    return (
+        f"{ends} enters no verdict: rigid bricks follow it without strain, and one so small leaves "
+        "their balance as it is; where it opens joints, ask: analyze --engine discrete"
+    )

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.contact._prop_grips import added, prop_grips
+from seqopt.contact._prop_grips import applied_rows, prop_grips
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly
 from seqopt.errors import plugins
@@ -198,11 +198,11 @@ def node_assembly(network: Network, bricks: int, *, held: bool = True) -> Assemb
     nodes, props = network.inner[:bricks].ravel(), prop_grips(network, bricks, held=held)
     line = np.zeros((len(nodes) if props.line.any() else 0, 3))
     if len(line):
-        numbers = [node for brick in network.scene.placed[:bricks] for node in brick.nodes]
+        numbers = network.scene.placed_nodes
         line[[numbers.index(node) for node in props.nodes]] = props.line
     return replace(
         bare,
-        applied=added(bare.applied, props.applied),
+        applied=applied_rows(network, bricks, props),
         grip_line=line,
         grip_block=np.repeat(np.arange(bricks), 2),
         grip_position=network.node_position[nodes],

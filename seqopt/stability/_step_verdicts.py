@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pickle
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -30,9 +30,11 @@ from seqopt.stability.assessment import (
     bonded,
 )
 from seqopt.stability.limit_analysis import Claim, Compile, compile_equilibrium
-from seqopt.work._workers import hire, map_ordered
+from seqopt.work._workers import Crew, hire, map_ordered
 
-_PORTIONS = 8  # for every worker, of neighboring steps, which are proven by one another
+_CHUNKS = 8  # for every worker, of neighboring steps, which are proven by one another
+_Found = TypeVar("_Found")
+_Find = Callable[[PartialAssemblies, Sequence[Step]], Iterator[_Found]]
 
 
 def each_verdict(
@@ -103,16 +105,6 @@ def find_margins(asked: Collection[str] | str) -> tuple[str, ...]:
     return MARGINS if "all" in names else names
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _Portion:
-    """Neighboring steps of a build, and the numbers of those whose margins are asked for."""
-
-    steps: tuple[Step, ...]
-    mortar: Mortar
-    margins: tuple[str, ...]
-    at: Collection[int]
-
-
 def each_stability(
     network: Network,
     steps: Sequence[Step],
@@ -127,41 +119,52 @@ def each_stability(
     and among how many workers the steps are shared.
     """
     numbers = {step.number for step in steps} if at is None else at
-    whole = _Portion(tuple(steps), mortar, margins, numbers if margins else ())
+    find = partial(_each, mortar=mortar, margins=margins, at=numbers if margins else ())
     most = max((step.bricks for step in steps), default=1) or 1
     parts = PartialAssemblies(network, most)
     with hire(*shared) as crew:
         if crew is None:
-            yield from _each(parts, whole)
+            yield from find(parts, steps)
             return
-        size = -(-len(steps) // (_PORTIONS * crew.workers)) or 1
-        cut = [whole.steps[i : i + size] for i in range(0, len(steps), size)]
-        portions = [replace(whole, steps=part) for part in cut]
-        for found in map_ordered(partial(_sent, pickle.dumps(parts)), portions, crew):
-            yield from found
+        size = -(-len(steps) // (_CHUNKS * crew.workers)) or 1
+        chunks = [tuple(steps[i : i + size]) for i in range(0, len(steps), size)]
+        yield from by_workers(parts, find, chunks, crew)
 
 
-def _sent(parts: bytes, portion: _Portion) -> tuple[Stability, ...]:
-    return tuple(_each(parts_sent(parts), portion))
+def by_workers(
+    parts: PartialAssemblies, find: _Find[_Found], chunks: Sequence[Sequence[Step]], crew: Crew
+) -> Iterator[_Found]:
+    """Yield what a function of a module finds in chunks of steps, in order, by workers."""
+    for found in map_ordered(partial(_in_worker, pickle.dumps(parts), find), chunks, crew):
+        yield from found
+
+
+def _in_worker(parts: bytes, find: _Find[_Found], steps: Sequence[Step]) -> tuple[_Found, ...]:
+    return tuple(find(_unpickled(parts), steps))
 
 
 @lru_cache(maxsize=1)
-def parts_sent(parts: bytes) -> PartialAssemblies:
-    """Return what a worker is sent for all portions of a build."""
-    out: PartialAssemblies = pickle.loads(parts)  # our own, of `each_stability`
+def _unpickled(parts: bytes) -> PartialAssemblies:
+    """Return what a worker is sent, the same for all chunks of a build."""
+    out: PartialAssemblies = pickle.loads(parts)  # our own, of `by_workers`
     return out
 
 
-def _each(parts: PartialAssemblies, portion: _Portion) -> Iterator[Stability]:
-    verdicts = each_verdict(parts, portion.steps, portion.mortar)
+def _each(
+    parts: PartialAssemblies,
+    steps: Sequence[Step],
+    mortar: Mortar,
+    margins: tuple[str, ...],
+    at: Collection[int],
+) -> Iterator[Stability]:
+    """Yield the verdicts of steps, with margins of those whose numbers are given."""
     up = parts.network.scene.up
-    full = partial(assess, mortar=portion.mortar, up=up, margins=portion.margins)
-    for step, found in zip(portion.steps, verdicts, strict=True):
-        if step.number not in portion.at or not step.bricks:
+    for step, found in zip(steps, each_verdict(parts, steps, mortar), strict=True):
+        if step.number not in at or not step.bricks:
             yield found
             continue
-        margins = full(parts(step.bricks, step.grips))
-        yield replace(margins, verdict=found.verdict, proof=found.proof)
+        whole = assess(parts(step.bricks, step.grips), mortar, up, margins=margins)
+        yield replace(whole, verdict=found.verdict, proof=found.proof)
 
 
 def stability_row(step: Step, result: Stability) -> dict[str, object]:

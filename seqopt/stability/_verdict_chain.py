@@ -318,16 +318,11 @@ def _extended(assembly: Assembly, known: Floats | None) -> Iterator[Floats]:
             others = beside[(beside < new) & (beside != GROUND)]
             if len(others):
                 other = int(side(others))
-                arm = assembly.centroid[new] - assembly.centroid[other]
-                turn = motion[other, 3:]
-                motion[new, :3] = motion[other, :3] + _crossed(turn, arm)
-                motion[new, 3:] = turn
+                x, y, z = (assembly.centroid[new] - assembly.centroid[other]).tolist()
+                a, b, c = motion[other, 3:].tolist()
+                turned = b * z - c * y, c * x - a * z, a * y - b * x  # ten times as fast as NumPy
+                motion[new, :3] = motion[other, :3] + turned
+                motion[new, 3:] = motion[other, 3:]
         if not any(np.array_equal(motion, other) for other in tried):
             yield motion * size
         tried.append(motion.copy())
-
-
-def _crossed(first: Floats, second: Floats) -> list[float]:
-    """Return the cross product of two vectors, of which NumPy takes ten times as long."""
-    (a, b, c), (x, y, z) = first.tolist(), second.tolist()
-    return [b * z - c * y, c * x - a * z, a * y - b * x]

@@ -151,10 +151,15 @@ def assess(
     motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
     block, contact = _first_to_fail(assembly, motion)
     friction = _least_friction(prove, mortar) if "friction" in margins else np.nan
+    bond = np.nan
+    if "bond" in margins:
+        bare = bonded(assembly, Mortar(friction=mortar.friction))
+        lacking = stand if bare == growing else prove(bare)
+        bond = _amount(lacking.value) * assembly.stress_scale
     return Stability(
         verdict=verdict,
         proof=CONES,
-        bond=_least_bond(prove, mortar, stand) if "bond" in margins else np.nan,
+        bond=bond,
         friction=friction,
         pull=np.array([pull.held for pull in pulls[:DIRECTIONS]] or [np.nan] * DIRECTIONS),
         tilt=float(np.arctan(worst)),
@@ -166,13 +171,6 @@ def assess(
         claims=dict(prove.claims),
         unproven=prove.unproven,
     )
-
-
-def _least_bond(prove: Prover, mortar: Mortar, stand: Proven) -> float:
-    """Return the least bond with which an assembly stands, Pa; ``stand``: with its mortar."""
-    bare = bonded(prove.assembly, Mortar(friction=mortar.friction))
-    same = bare == bonded(prove.assembly, mortar)
-    return _amount((stand if same else prove(bare)).value) * prove.assembly.stress_scale
 
 
 def _least_payload(prove: Prover, fixed: Case) -> float:

@@ -246,7 +246,7 @@ def _cases(
                     first = [step for step in steps if step.bricks <= value]
                     yield value, replace(whole, steps=first, whole=whole)
                 else:
-                    own = _rougher(mortar, value) if axis == "friction" else mortar
+                    own = replace(mortar, friction=value) if axis == "friction" else mortar
                     yield value, _Case(name, steps, held, own, turned[value])
 
 
@@ -265,10 +265,6 @@ def _tilted(scene: Scene, degrees: float) -> tuple[PartialAssemblies, ...]:
         x, y, z = pull.tolist()
         out.append(_parts(replace(scene, gravity=(x, y, z))))
     return tuple(out)
-
-
-def _rougher(mortar: Mortar, friction: float) -> Mortar:
-    return replace(mortar, friction=friction)
 
 
 def _row(case: _Case, axis: str, value: float) -> dict[str, object]:
@@ -315,7 +311,7 @@ def _motion_word(assembly: Assembly, found: Stability) -> str:
 def _stronger(mortar: Mortar, what: str, needed: float) -> Mortar:
     """Return a mortar with at least a bond, Pa, or with a friction."""
     if what == "friction":
-        return _rougher(mortar, needed)
+        return replace(mortar, friction=needed)
     bond = bond_mortar(needed, mortar.friction)
     tension = max(bond.tensile_strength, mortar.tensile_strength)
     return replace(bond, tensile_strength=tension, cohesion=max(bond.cohesion, mortar.cohesion))

@@ -83,9 +83,9 @@ def test_what_a_line_says_is_not_asked_again_for_the_page(monkeypatch, tmp_path)
         asked.update(("off", bricks, held) for _, bricks, held in keys)
         return misfits(engine, keys)
 
-    def proven(parts, steps, mortar, tell=None):
+    def proven(parts, steps, mortar, tell=None, crew=None):
         asked.update((mortar, step.bricks, step.grips) for step in steps)
-        return verdicts(parts, steps, mortar, tell)
+        return verdicts(parts, steps, mortar, tell, crew)
 
     for module in ("_cli.outputs", "report.page"):
         monkeypatch.setattr(

@@ -17,7 +17,7 @@ from seqopt.report.comparison import compare
 from seqopt.report.page import Build, _build_data
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import dump_scene
-from seqopt.stability import _ahead, _builds
+from seqopt.stability import _builds
 from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
 from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import Verdict, assess, verdict
@@ -78,9 +78,9 @@ def test_what_one_mortar_proves_is_not_proven_with_another(flat, builds, monkeyp
     """What stands dry stands with epoxy; what falls with epoxy falls dry, and here nothing does."""
     asked, real = {}, _builds._one_by_one
 
-    def noted(parts, steps, mortar, tell=None):
+    def noted(parts, steps, mortar, tell=None, crew=None):
         asked[mortar] = {(step.bricks, step.grips) for step in steps}
-        return real(parts, steps, mortar, tell)
+        return real(parts, steps, mortar, tell, crew)
 
     monkeypatch.setattr(_builds, "_one_by_one", noted)
     prover, steps = BuildProver(flat, {name: SHOWN[name] for name in names}), builds["cantilever"]
@@ -137,26 +137,27 @@ def test_what_is_tried_ahead_changes_no_verdict(flat, builds, found, monkeypatch
         return real(self, *asked)
 
     monkeypatch.setattr(VerdictChain, "__call__", counted)
-    monkeypatch.setattr(_ahead, "_DEAR", 0)
+    monkeypatch.setattr(_builds, "_DEAR", 0)
     if held is not None:  # of no use
         nodes = flat.scene.placed[0].nodes[:held]
         grips = (*(None for _ in flat.scene.robots), *nodes)
-        monkeypatch.setattr(_ahead, "_held", lambda *_: grips)
+        for name in ("_common_grips", "_all_grips"):
+            monkeypatch.setattr(_builds, name, lambda *_: grips)
     for name, steps in builds.items():
         for said in found[name]:
             mortar = SHOWN[said.mortar]
-            assert tuple(_ahead.quick_verdicts(flat, steps, mortar)) == said.verdicts
+            assert tuple(_builds.quick_verdicts(flat, steps, mortar)) == said.verdicts
     assert len(calls) > 2 * sum(map(len, builds.values()))  # some were tried ahead
 
 
-def test_patience_grows_with_what_is_of_no_use():
-    patience, waited = _ahead._Patience(), []
+def test_the_backoff_grows_with_what_is_of_no_use():
+    backoff, waited = _builds._Backoff(), []
     for _ in range(4):
-        waited.append(next(n for n in range(99) if patience.ready()))
-        patience.learn(useful=False)
+        waited.append(next(n for n in range(99) if backoff.ready()))
+        backoff.learn(useful=False)
     assert waited == [0, 1, 2, 4]
-    patience.learn(useful=True)
-    assert patience.ready()
+    backoff.learn(useful=True)
+    assert backoff.ready()
 
 
 def test_equal_structures_are_asked_once(flat, builds, found, monkeypatch):

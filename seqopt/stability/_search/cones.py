@@ -70,7 +70,11 @@ class Cones:
     """
 
     def __init__(self, sought: Sequence[Sought], parts: Sequence[Changing]) -> None:
-        borne = [_borne(each, part) for each, part in zip(sought, parts, strict=True)]
+        borne = []
+        for each, part in zip(sought, parts, strict=True):
+            tension, cohesion, payload = limits(each.assembly, each.case, 0.0)
+            own = tension[part.corners], cohesion[part.corners], payload[part.grips]
+            borne.append((*own, np.full(len(own[0]), each.case.friction)))
         tension, cohesion, payload, friction = map(np.concatenate, zip(*borne, strict=True))
         corners, self.owners = len(tension), len(tension) + len(payload)
         self._cut = np.flatnonzero((friction == 0) | (friction * tension < cohesion))
@@ -118,14 +122,6 @@ class Cones:
         fall = np.sqrt(np.maximum(under, 0.0)) - first
         ends = (under >= -_ROUNDED * first**2) & (fall > 0)  # zero where only the first is any
         return np.minimum(self.least(none / fall, ends), _FARTHEST)
-
-
-def _borne(sought: Sought, part: Changing) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return what changing corners bear of tension and cohesion, grips of payload, and friction."""
-    tension, cohesion, payload = limits(sought.assembly, sought.case, 0.0)
-    own = tension[part.corners]
-    friction = np.full(len(own), sought.case.friction)
-    return own, cohesion[part.corners], payload[part.grips], friction
 
 
 def scaling(slack: Floats, press: Floats) -> tuple[Floats, Floats]:

@@ -84,10 +84,6 @@ class _Search:
         self._cones = Cones(sought, self._parts)
         self._bodies = numbered([6 * int(np.count_nonzero(part.blocks)) for part in self._parts])
 
-    def _works(self, motion: Floats) -> Floats:
-        """Return the work of the loads of every assembly, (A,)."""
-        return np.asarray(np.bincount(self._bodies, self._load * motion, len(self._parts)), float)
-
     @np.errstate(all="ignore")
     def start(self) -> tuple[_Point, Floats]:
         """Return a point in equilibrium near forces, and the motions that nothing hinders."""
@@ -217,7 +213,8 @@ class _Search:
     def promises(self, point: _Point) -> Bools:
         """Return for which assemblies a point's forces or its motion may prove something, (A,)."""
         rest = self._cones.sums(self._cones.most * point.press[0])
-        return (point.raised <= _DONE) | (self._works(point.motion) > rest)
+        work = np.bincount(self._bodies, self._load * point.motion, len(self._parts))
+        return np.asarray((point.raised <= _DONE) | (work > rest))
 
 
 def _load(sought: Sought, part: Changing) -> Floats:
