@@ -56,6 +56,16 @@ class Source:
         return None
 
     @property
+    def questions(self) -> tuple[str, ...]:
+        """What a formulation must answer to choose from it."""
+        raise NotImplementedError
+
+    @property
+    def default_formulation(self) -> str:
+        """The name of the formulation that chooses from it if none is named."""
+        raise NotImplementedError
+
+    @property
     def as_layers(self) -> Any:
         """Its layers of candidates, of the scene itself; a `ProblemError` if there are none."""
         raise ProblemError(

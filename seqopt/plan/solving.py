@@ -14,6 +14,7 @@ from seqopt.engines.registry import simplest
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, Run, as_formulation
 from seqopt.graph.layers.layers import Layers, candidate_layers, in_scenarios
+from seqopt.graph.source import Source
 from seqopt.graph.states._checks import check_parts
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.plan._layers import solve_layers, with_budgets
@@ -376,21 +377,8 @@ def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> 
 
     if isinstance(problem, Instance):
         return solve_instance(problem, formulation, run)
-    match problem:
-        case States():
-            kind, question, name = STATES, "goals", "schedule_search"
-            if problem.is_timed:
-                question, name = "time", "makespan_labels"
-            elif problem.orders is not None:
-                question, name = "order", "order_search"
-            questions: tuple[str, ...] = (question,)
-        case Layers():
-            totals = bool(problem.scenes) and problem.over.aim is Aim.SUM
-            kind, questions = CANDIDATES, ("tail" if totals else "goals", "instance")
-            name = "labels" if problem.budgets else "overlap_dp"
-            if problem.scenes:
-                name = "scenario_search" if totals else "minimax"
-        case _:
-            found = type(problem).__name__
-            raise ProblemError(f"a {found} is not a problem; give one that seqopt.pose made")
-    return _solver(kind)(problem, as_formulation(formulation or name, *questions), run)
+    if not isinstance(problem, Source):
+        kind = type(problem).__name__
+        raise ProblemError(f"a {kind} is not a problem; give one that seqopt.pose made")
+    found = as_formulation(formulation or problem.default_formulation, *problem.questions)
+    return _solver(CANDIDATES if problem.candidates else STATES)(problem, found, run)

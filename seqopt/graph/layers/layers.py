@@ -162,6 +162,19 @@ class Layers(Source, Shown):
         return tuple(engine_for(self.engine, scene) for scene in self.scenes)
 
     @property
+    def questions(self) -> tuple[str, ...]:
+        """What a formulation must answer to choose from it."""
+        totals = bool(self.scenes) and self.over.aim is Aim.SUM
+        return ("tail" if totals else "goals", "instance")
+
+    @property
+    def default_formulation(self) -> str:
+        """The name of the formulation that chooses from it if none is named."""
+        if self.scenes:
+            return "scenario_search" if "tail" in self.questions else "minimax"
+        return "labels" if self.budgets else "overlap_dp"
+
+    @property
     def as_layers(self) -> Layers:
         """The same problem in the nominal scene."""
         return self.alone_in_scene

@@ -167,6 +167,19 @@ class States(Source, Shown):
         return self.rules.begin
 
     @property
+    def questions(self) -> tuple[str, ...]:
+        """What a formulation must answer to choose from it."""
+        if self.is_timed:
+            return ("time",)
+        return ("goals",) if self.orders is None else ("order",)
+
+    @property
+    def default_formulation(self) -> str:
+        """The name of the formulation that chooses from it if none is named."""
+        others = {"time": "makespan_labels", "order": "order_search"}
+        return others.get(self.questions[0], "schedule_search")
+
+    @property
     def as_states(self) -> States:
         """Itself."""
         return self
