@@ -210,7 +210,7 @@ def test_a_mechanism_has_no_answer(capsys, tmp_path):
     [
         (("--schedule", "free"), "no plan was found yet; give more"),
         (("--schedule", "free", "--stands", "dry", "--aim", "bond"), "no plan was found yet"),
-        (("--schedule", "free", "--order", "search"), "no order with a plan was found yet"),
+        (("--schedule", "free", "--order", "search"), "no plan was found yet; give more"),
         (("--formulation", "cascade", "--no-proof"), "no move was chosen yet; give more"),
     ],
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from dataclasses import replace
 from collections import Counter
 
 import numpy as np
@@ -128,7 +129,9 @@ def test_a_tool_comes_from_its_robot_through_a_face_that_is_free():
 def test_a_block_that_is_no_box_is_held_through_a_face_before_the_node():
     shape = prism(C_SHAPE, 0.5)
     floor = flat_face(np.array([(0, 0, 0), (3, 0, 0), (3, 1, 0), (0, 1, 0)], dtype=float))
-    brick = block_brick(0, shape, 2000.0, grips=((0.5, 1.5, 0.25), (2.0, 0.5, 0.25)))
+    nodes = np.array([(0.5, 1.5, 0.25), (2.0, 0.5, 0.25)])
+    offsets = tuple(map(tuple, (nodes - shape.centroid).tolist()))
+    brick = replace(block_brick(0, shape, 2000.0), node_offsets=offsets)
     robot = Robot(name="r", payload=1.0, reach=Sphere(center=(2.0, 9.0, 0.25), radius=20.0))
     ground = face_ground(0, floor, MASONRY)
     scene = Scene(
