@@ -18,7 +18,7 @@ from seqopt.graph.formulation import find_formulation
 from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import lexicographic
 from seqopt.graph.states.states import build_states
-from seqopt.plan.front import FrontSelection, _StateFront, find_front
+from seqopt.plan.front import FrontProblem, find_front
 from seqopt.sequence.rules import FreeRules, with_robots
 from tests.brute_force import ONES
 from tests.builders import small_arch
@@ -233,9 +233,9 @@ def test_labels_that_are_left_out_are_missed(space):
 
 @cache
 def front():
-    """The points of a small build that no other one beats, and how they were found."""
+    """The plans of a small build that no other one dominates."""
     engine = seqopt.make_engine("compliance", small_arch(7))
-    posed = _StateFront(build_states(engine, HOLD_NO, ONES, "F_largest,M_sup"))
+    posed = FrontProblem(build_states(engine, HOLD_NO, ONES, "F_largest,M_sup"))
     return posed, find_formulation("pareto_zones").solve(posed)
 
 
@@ -247,17 +247,18 @@ def told_front(change):
 
 def test_a_front_with_a_point_missing_or_moved_is_refused():
     found = front()[1]
-    count = len(found.points)
-    assert told_front(lambda f: f).complete
-    assert count > 1
-    for lost in range(count):
-        keep = [i for i in range(count) if i != lost]
-        fewer = FrontSelection(found.points[keep], tuple(found.plans[i] for i in keep))
+    assert told_front(lambda plans: plans).complete
+    assert len(found) > 1
+    for lost in found:
+        fewer = tuple(plan for plan in found if plan is not lost)
         with pytest.raises(SolverError, match="the set lacks a point below"):
             told_front(lambda _, fewer=fewer: fewer)
+
+    def better(plan):
+        claimed = tuple(0.9 * value for value in plan.objective)
+        return replace(plan, objective=claimed, bound=claimed)
+
     with pytest.raises(SolverError, match="as claimed"):
-        told_front(lambda f: FrontSelection(0.9 * f.points, f.plans))
+        told_front(lambda plans: tuple(map(better, plans)))
     with pytest.raises(SolverError, match="dominated by another"):
-        told_front(
-            lambda f: FrontSelection(np.vstack([f.points, f.points[:1]]), (*f.plans, f.plans[0]))
-        )
+        told_front(lambda plans: (*plans, plans[0]))
