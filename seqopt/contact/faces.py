@@ -66,13 +66,12 @@ def _distance_beside(polygon: Floats) -> float:
     return float((out / size[real]).max())
 
 
-_KEY = "_contacts"
 _SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
 
 def contact_at(network: Network, spring: int) -> tuple[str, Floats, Floats]:
     """Return name, normal (3,) and corners (m, 3) of a spring's contact; the network keeps it."""
-    kept: dict[int, tuple[str, Floats, Floats]] = vars(network).setdefault(_KEY, {})
+    kept: dict[int, tuple[str, Floats, Floats]] = network.derived.setdefault("contacts", {})
     if spring not in kept:
         springs, placed = network.springs, network.scene.placed
         first, second = springs.bodies[spring]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -286,6 +286,11 @@ class Network(Shown, FrozenValue):
     def index_of_node(self) -> dict[int, int]:
         """Index of every inner node by its number in the scene."""
         return {name: i for i, name in enumerate(self.node_name) if isinstance(name, int)}
+
+    @cached_property
+    def derived(self) -> dict[str, Any]:
+        """What later rooms derive from the network alone and keep with it, by name."""
+        return {}
 
     @cached_property
     def lever(self) -> float:

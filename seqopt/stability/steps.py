@@ -19,8 +19,6 @@ from seqopt.stability._step_verdicts import each_stability, find_margins, stabil
 from seqopt.stability.assessment import Stability
 from seqopt.work.progress import Tell, with_progress
 
-_KEY = "_overlapping"
-
 
 def assess_steps(
     network: Network | Scene,
@@ -77,8 +75,8 @@ def assess_steps(
 def _warned(scene: Network | Scene) -> Network:
     """Return the network of a scene; warn once of bricks that interpenetrate, joint or not."""
     network = network_of(scene)
-    if _KEY not in vars(network):
-        vars(network)[_KEY] = found = [*_find_overlapping(network.scene)]
+    if "overlaps" not in network.derived:
+        network.derived["overlaps"] = found = [*_find_overlapping(network.scene)]
         for line in found:
             warnings.warn(
                 f"scene {network.scene.name}: {line}: no verdict sees it",
