@@ -244,17 +244,20 @@ def test_one_that_cannot_be_used_is_left_out_of_all_others(monkeypatch, tmp_path
     folder.mkdir()
     (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\nVersion: 1.0\n")
     entries = "odd = math:pi\nodder = no_such_package:X\noddest = odd_formulation:X\n"
+    entries += "oddly = odd_formulation:Y\n"
     (folder / "entry_points.txt").write_text(f"[seqopt.formulations]\n{entries}")
     text = "from formulations.cascade import FORMULATION as F\n"
     text += "from dataclasses import replace\nX = replace(F, kind='exact')\n"
+    text += "Y = replace(F, answers=('goals', 'walls'))\n"
     (tmp_path / "odd_formulation.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.warns(PluginWarning) as seen:
         assert formulations() == whole
-    assert [str(each.message).split("'")[1] for each in seen] == ["odd", "odder", "oddest"]
+    assert [str(each.message).split("'")[1] for each in seen] == ["odd", "odder", "oddest", "oddly"]
     words = ("wall:columns=2,courses=2", "--no-stability")
     assert main(["compare", *words]) == 0
     lines = [x for x in capsys.readouterr().err.splitlines() if x.startswith("seqopt: warning")]
-    assert ["math:pi is a float" in x for x in lines] == [True, False, False]
+    assert ["math:pi is a float" in x for x in lines] == [True, False, False, False]
     assert lines[2].endswith("has str as kind; correct it; it is left out")
+    assert "answers walls; give some of costs, goals, " in lines[3]
     assert main(["optimize", *words, "--formulation", "odd"]) == 2
