@@ -130,9 +130,9 @@ class Evaluation(Terse):
         Raises `MechanismError`, `SolverError`, `WorkerError` as the engine does, and the workers;
         `MemoryShortError` if there is not the memory.
         """
-        keep, known = not self.streams, vars(self).get("_found")
-        if known is not None and keep:
-            yield known.steps
+        keep = not self.streams
+        if self._kept and keep:
+            yield self._kept[0].steps
             return
         steps: list[StepChoices] = []
         models, seconds, start = 0, 0.0, time.perf_counter()
@@ -143,14 +143,18 @@ class Evaluation(Terse):
                 steps += found if keep else ()
                 yield found
                 start = time.perf_counter()
-        vars(self)["_found"] = _Found(tuple(steps), models, seconds + time.perf_counter() - start)
+        self._kept[:] = [_Found(tuple(steps), models, seconds + time.perf_counter() - start)]
 
     @cached_property
+    def _kept(self) -> list[_Found]:
+        """What was found, once all levels were computed."""
+        return []
+
+    @property
     def _found(self) -> _Found:
-        for _ in self.levels():
-            pass
-        found: _Found = vars(self)["_found"]
-        return found
+        if not self._kept:
+            deque(self.levels(), maxlen=0)
+        return self._kept[0]
 
     @property
     def models(self) -> int:
