@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import networkx as nx
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from hypothesis import given
 
 from experiments.harness.scenes import running_bond
 from seqopt.network.build import build_network
-from seqopt.network.network import PartKind
+from seqopt.network.network import GROUND, PartKind
 from tests.strategies import arches
 
 
@@ -60,3 +62,34 @@ def test_a_wall_has_loops():
     assert len(nx.cycle_basis(graph)) > 0
     assert (np.bincount(net.edge_kind) > 0).all()
     assert net.node_kind[net.inner].max() == PartKind.INNER
+
+
+def test_springs_that_resist_tie_bodies(arch25):
+    network = build_network(arch25)
+    assert nx.is_connected(network.bodies(24))
+    loose = replace(
+        arch25,
+        joints=tuple(
+            replace(joint, translational_stiffness=(0.0,) * 3, rotational_stiffness=(0.0,) * 3)
+            if joint.bricks == (4, 5)
+            else joint
+            for joint in arch25.joints
+        ),
+    )
+    parts = [*nx.connected_components(build_network(loose).bodies(6))]
+    assert parts == [{GROUND, 0, 1, 2, 3}, {4, 5}]
+
+
+def test_a_grips_compliance_is_one_value(arch25):
+    """Of rigid hands zero, of soft ones what their stiffness says; one kind for all that agree."""
+    rigid, soft = (build_network(s).compliances for s in (arch25, arch25.with_grips(1e6)))
+    assert not rigid.compliance.any()
+    assert soft.compliance[0, :3, :3] == pytest.approx(1e-6 * np.eye(3))
+    first, *others = arch25.robots
+    mixed = arch25.with_robots(replace(first, stiffness=1e5, rotational_stiffness=1e4), *others)
+    found = build_network(mixed).compliances
+    assert found.transmits_moment.tolist() == [True, False]
+    assert found.compliance[0].diagonal() == pytest.approx([1e-5] * 3 + [1e-4] * 3)
+    assert not found.compliance[1].any()
+    kinds = np.array([[0, 1, 0]])
+    assert (found.at(np.array([[3, 5, 7]]), kinds) == kinds).all()
