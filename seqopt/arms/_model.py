@@ -140,7 +140,7 @@ class ArmModel:
     def names(self) -> tuple[str, ...]:
         """Bodies in words: fixed ones, moving ones, and last the tool; `SAYS` is what they do.
 
-        Links that come after the flange are the tool: it is said what to give.
+        Links beyond the flange count as the tool, and their names give the remedy.
         """
         frames, bodies = self.model.frames, (*self.fixed, *self.moving)
         after = {self.flange}
@@ -271,23 +271,16 @@ def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
         model, geometry = pin.buildReducedModel(model, geometry, still, pin.neutral(model))
     if not model.nq:
         raise SceneError(f"arm: no joint of {path} moves its flange; name another flange")
-    endless = [*_endless(model)]
+    low, high = model.lowerPositionLimit, model.upperPositionLimit
+    limited = np.isfinite(low) & np.isfinite(high) & (low < high)
+    named = zip([*model.names][1:], [*model.joints][1:], strict=True)
+    endless = [name for name, j in named if j.nq != j.nv or not limited[j.idx_q]]
     if endless:
         raise SceneError(
             f"arm: {path} has no limits of joint {', '.join(endless)}; give <limit> with lower < "
             "upper, and type revolute in place of continuous"
         )
     return model, geometry
-
-
-def _endless(model: Any) -> Iterator[str]:
-    """Yield the joints that go around without end, or whose limits leave no way to move."""
-    low, high = model.lowerPositionLimit, model.upperPositionLimit
-    for name, joint in zip([*model.names][1:], [*model.joints][1:], strict=True):
-        at = joint.idx_q
-        ends = np.isfinite([low[at], high[at]]).all() and low[at] < high[at]
-        if joint.nq != joint.nv or not ends:
-            yield name
 
 
 def _bodies(model: Any, geometry: Any) -> Iterator[Body]:

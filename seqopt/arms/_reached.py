@@ -244,18 +244,18 @@ _Fault = tuple[int, int, str]  # the check that is not passed, by order; which b
 def _blame(
     faults: list[_Fault | None],
     found: Bools,
-    said: Sequence[str],
+    words: Sequence[str],
     check: int,
     rows: Ints | None = None,
 ) -> None:
-    """Give postures without a fault the first one that is found, in place.
+    """Record, in place, the first fault found of postures that have none yet.
 
-    ``found`` (n, k); ``said``: the k faults in words; ``rows`` (n,): of which postures, if not all.
+    ``found`` (n, k); ``words``: of the k faults; ``rows`` (n,): of which postures, if not all.
     """
     for row, own in zip(range(len(faults)) if rows is None else rows.tolist(), found, strict=True):
         if faults[row] is None and own.any():
             body = int(own.argmax())
-            faults[row] = (check, body, said[body])
+            faults[row] = (check, body, words[body])
 
 
 def _lacking(node: Ints, faults: Sequence[_Fault | None]) -> dict[int, str]:

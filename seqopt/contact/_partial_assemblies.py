@@ -20,7 +20,7 @@ _KEPT = 3000  # bricks in all partial structures that are kept, some 5 kB each
 
 
 class PartialAssemblies:
-    """Gives what `step_assembly` does for steps of up to so many bricks.
+    """Cuts the assemblies of steps, as of `step_assembly`, from one whole.
 
     Its maps differ by rounding, and all else in no bit. Raises a `SceneError` if bricks that share
     a joint do not touch, even in a step that is not asked for.

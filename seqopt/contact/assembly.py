@@ -87,7 +87,7 @@ class Assembly(FrozenValue):
             raise SceneError(f"contact {self.contact_name[flat[0]]}: its face has no area")
 
     def with_bond(self, shares: Floats) -> Assembly:
-        """Return it with other shares of the mortar's bond, (C,); nothing is found again."""
+        """Return a copy with other shares of the mortar's bond, (C,); cached values are kept."""
         out: Assembly = Assembly.__new__(Assembly)
         out.__setstate__({**vars(self), "bond": np.array(shares, dtype=float)})
         return out

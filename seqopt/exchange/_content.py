@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -113,11 +112,11 @@ class Given:
 
 def assembly_json(text: str, source: str) -> Any:
     """Return the JSON document of an assembly, whose numbers are finite."""
-    return parse_json(text, source, SceneError, parse_constant=partial(_refuse, source))
 
+    def refuse(name: str) -> float:
+        raise SceneError(f"{source}: {name} stands where a number should; give finite numbers")
 
-def _refuse(source: str, name: str) -> float:
-    raise SceneError(f"{source}: {name} stands where a number should; give finite numbers")
+    return parse_json(text, source, SceneError, parse_constant=refuse)
 
 
 def mapping(where: str, value: object) -> Entry:

@@ -95,11 +95,11 @@ def load_page(
     name: str,
     steps: Sequence[Step],
     found: Mapping[str, Sequence[LoadFactor]],
-    said: Mapping[str, str],
+    summaries: Mapping[str, str],
 ) -> str:
-    """Return the page of a build with how its steps give way under the largest load they bear.
+    """Return the page of a build with the mechanism of every step at its load factor.
 
-    ``found``, ``said``: by mortar, each beside the others.
+    ``found``: load factors of the steps; ``summaries``: in a line; both by mortar.
     """
     builds, tables, responses = [], [], analyze(engine, steps)
     caption = "How much load every step bears: the largest multiple, weights as they are"
@@ -110,7 +110,7 @@ def load_page(
             motions[i, : step.bricks] = one.motion
         builds.append(Build(f"{name}, {how}", steps, responses, falls=motions))
         tables.append((f"{caption}, {how}", load_factor_table(steps, each)))
-    words = "; ".join(f"{_with_mortar(mortar)}: {text}" for mortar, text in said.items())
+    words = "; ".join(f"{_with_mortar(mortar)}: {text}" for mortar, text in summaries.items())
     sentence = f"{engine.network.scene.name}, {name}: {words}. A step can be shown as it gives way."
     return report_page(engine, builds, sentence, tables)
 
@@ -128,7 +128,7 @@ def _cases_shown(found: FailureMap, axis: str) -> pd.DataFrame:
 
 
 def _verdicts(found: FailureMap, build: str, value: float) -> tuple[BuildVerdicts, ...]:
-    """Return the verdicts of a build at a value of the axis, what is first said to hold last."""
+    """Return the verdicts of a build at a value of the axis, the map's first mortar last."""
     steps, cases = (
         table[(table["build"] == build) & (table["value"] == value)]
         for table in (found.steps, found.cases)

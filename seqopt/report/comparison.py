@@ -129,7 +129,7 @@ def compare(
     Parameters
     ----------
     engine, criterion, progress : Engine, Criterion, callable
-        What computes responses, and has the scene; what a step costs; what is told how far it is.
+        Computes responses, and has the scene; the cost of a step; called with the progress.
     robots : sequence of str, optional
         Of those that take part, as many as a method needs; found from reach by default.
     prover : BuildProver, optional

@@ -456,11 +456,11 @@ class Robot(Terse):
     stiffness : float or Vector, optional
         How stiff its grip is, the robot behind it included: a force by which the node it holds is
         pulled from where the hand should be, over that distance, N/m. One number, or three along
-        the scene's axes; rigid by default. Where an arm has joint stiffnesses, of what is between
-        the joints and the node alone: both give way, one after the other.
+        the scene's axes; rigid by default. If its arm has joint stiffnesses, only the stiffness
+        between the joints and the node: the two compliances add.
     rotational_stiffness : float or Vector, optional
-        The same for turning the node: moments over angles, N m/rad, one number or three about the
-        scene's axes. By default a grip lets its node turn.
+        Of the grip against rotation of the node, N m/rad: one number, or three about the scene's
+        axes. By default a grip lets its node turn.
     arm : Arm, optional
         Its arm, which must reach a node as well; see `seqopt.arms`.
     durations : Durations, optional

@@ -224,11 +224,6 @@ def _stored() -> tuple[str, ...]:
     return tuple(item.name.removesuffix(".json") for item in _DATA.joinpath("scenes").iterdir())
 
 
-def _load_stored(name: str) -> Scene:
-    text = _DATA.joinpath("scenes", f"{name}.json").read_text("utf-8")
-    return _scene_from_dict(json.loads(text))  # ours obey the schema: a test asks
-
-
 def _refuse_mesh(path: Path) -> None:
     """Raise an error that says how a mesh becomes a scene."""
     within = [path] if path.is_file() else path.glob("*.*") if path.is_dir() else ()
@@ -278,7 +273,8 @@ def load_scene(name: str | Path) -> Scene:
     if name in _GENERATED:
         return replace(_scene_by_words(_GENERATED[name]), name=name)
     if name in _stored():
-        return _load_stored(name)
+        text = _DATA.joinpath("scenes", f"{name}.json").read_text("utf-8")
+        return _scene_from_dict(json.loads(text))  # ours obey the schema: a test asks
     if ":" in name and name.partition(":")[0] in KINDS:
         return _scene_by_words(name)
     path = Path(name)

@@ -11,9 +11,9 @@ An assembly of blocks is assessed with the mortar in its joints. Every verdict i
 >>> [assess(assembly, mortar).verdict.value for mortar in (DRY, EPOXY)]
 ['does not stand', 'stands']
 
-`assess_steps` asks the same of every step of a build, and `stability_table` lays the answers out.
-`Screen` says which of many grip sets stand, and `Margins` by how much: most of them unsolved.
-`load_factors` says what multiple of the scene's loads every step bears.
+`assess_steps` assesses every step of a build, and `stability_table` has a row for each.
+`Screen` finds which of many grip sets stand, and `Margins` by how much, most without a solver.
+`load_factors` finds the largest multiple of the scene's loads that every step bears.
 """
 
 from typing import TYPE_CHECKING

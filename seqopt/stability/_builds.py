@@ -143,7 +143,7 @@ class BuildProver:
 
     @contextmanager
     def begun(self, steps: Sequence[Step]) -> Iterator[None]:
-        """Let two processes share a large build, within: a command may start them, no script."""
+        """Share a large build between two processes: for commands, which may start them."""
         work = sum(step.bricks for step in steps) * len(self._mortars)
         with hire(workers=2 if work >= _SHARED and cores() > 1 else 1) as crew:
             self._crew = crew
@@ -153,7 +153,7 @@ class BuildProver:
                 self._crew = None
 
     def _ask(self, steps: Iterable[Step]) -> bool:
-        """Ask what is not known of steps yet; return whether anything is asked at all."""
+        """Find the verdicts that are not cached; return whether there are verdicts at all."""
         if self.refusal:
             return False
         distinct = [*{_state(step): step for step in steps}.values()]
@@ -169,7 +169,7 @@ class BuildProver:
         return bool(self._mortars)
 
     def _ask_all(self, name: str, new: Sequence[Step]) -> None:
-        """Ask of steps whether they stand with a mortar, and what that says of others."""
+        """Find the verdicts of steps with a mortar, and those implied with other mortars."""
         if not new:
             return
         what, mortar = f"proving what stands, {name}", self._mortars[name]
@@ -184,7 +184,7 @@ class BuildProver:
             self._known[other] = implied | self._known[other]
 
     def _way(self, new: Sequence[Step]) -> _Way:
-        """Return what proves most quickly which of some steps stand."""
+        """Select the fastest route to the verdicts of steps."""
         self._most = max(self._most, *(step.bricks for step in new))
         if not isinstance(self._parts, PartialAssemblies) or self._parts.bricks < self._most:
             self._parts = PartialAssemblies(self._network, self._most)
@@ -226,7 +226,7 @@ def _one_by_one(
 
 
 def _screened(parts: PartialAssemblies, _: Sequence[Step], mortar: Mortar, tell: _Told) -> _Found:
-    """Yield the same, many grip sets at a time; what is left open is asked one by one."""
+    """Yield verdicts of many grip sets at a time; those left open are found one by one."""
     screen, scene = Screen(parts.network, mortar), parts.network.scene
     place = {node: i for i, node in enumerate(scene.placed_nodes, 1)}
     payload = np.array([robot.payload for robot in scene.robots])
@@ -262,12 +262,12 @@ class _Backoff:
         self._rest = self._next = 0
 
     def ready(self) -> bool:
-        """Return whether it is time for another try; if not, it is nearer now."""
+        """Count down by one brick count; return whether to try again."""
         self._rest = max(self._rest - 1, -1)
         return self._rest < 0
 
     def learn(self, *, useful: bool) -> None:
-        """Take note of how a try has ended."""
+        """Start anew after a useful try, else double the pause."""
         self._next = 0 if useful else min(max(2 * self._next, 1), _MOST)
         self._rest = self._next
 
@@ -303,7 +303,7 @@ def _each_small(prove: VerdictChain, steps: Sequence[Step]) -> Iterator[Verdict]
 
 
 def _each_dear(prove: VerdictChain, steps: Sequence[Step], network: Network) -> Iterator[Verdict]:
-    """Yield verdicts, where what may prove many is sought before what proves one."""
+    """Yield verdicts; a proof of many steps is tried before that of a single one."""
     groups = [(bricks, [*each]) for bricks, each in groupby(steps, attrgetter("bricks"))]
     backoff, sought = {kind: _Backoff() for kind in _ProofKind}, _ProofKind.FORCES
     for i, (bricks, group) in enumerate(groups):

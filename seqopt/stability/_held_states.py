@@ -1,4 +1,4 @@
-"""A partial structure with whatever grips: a question, solved only where nothing is known.
+"""Brackets of z for any grip sets of a partial structure, solved where no known proof decides.
 
 Forces that hold a structure hold it with more grips, larger payloads, or without a grip that they
 leave idle. A motion in which it falls makes it fall with any grips whose payloads can take up less

@@ -1,7 +1,7 @@
 """How much load a step bears: the largest multiple of a scene's loads with which it stands.
 
 Weights stay as they are; forces on bricks and wind grow together. Forces that hold prove that a
-multiple is borne, a motion in which the structure gives way that no larger one is.
+multiple is borne, a mechanism that no larger one is.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class LoadFactor(FrozenValue):
     load : float
         Sum of the sizes of the forces that act, N; zero if none does yet.
     motion : (B, 6) float
-        How it gives way at the factor, as of `seqopt.stability.assessment.Stability`.
+        The mechanism at the factor, as of `seqopt.stability.assessment.Stability`.
     first_block, first_contact : str
         The fastest block and the contact that parts fastest in that motion; empty if unknown.
 

@@ -140,7 +140,7 @@ class Margins:
         open_ = np.ones(len(sets), dtype=bool)
 
         def narrow_by(friction: float, rows: Ints) -> None:
-            """Narrow some brackets by whether sets stand with a friction."""
+            """Narrow the brackets of rows by verdicts at a friction."""
             if friction not in self.screens:
                 mortar = replace(self.mortar, friction=friction)
                 self.screens[friction] = Screen(self.network, mortar)
@@ -184,14 +184,14 @@ class Margins:
 
 
 def _narrow(bracket: Floats) -> Bools:
-    """Return which brackets (S, 2) are as narrow as proofs of a margin have to be."""
+    """Return which brackets (S, 2) of a margin have converged."""
     scale = np.maximum(1.0, np.where(np.isfinite(bracket[:, 0]), np.abs(bracket[:, 0]), 0.0))
     near = bracket[:, 1] - bracket[:, 0] <= GAP * scale
     return np.asarray(near | (bracket[:, 0] >= CAP))
 
 
 def _of_rows(payload: ArrayLike | None, rows: Ints) -> ArrayLike | None:
-    """Return the payloads of some grip sets."""
+    """Select the payloads of grip sets."""
     if payload is None or np.ndim(payload) < 2:
         return payload
     return np.asarray(payload)[rows]

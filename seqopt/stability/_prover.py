@@ -65,16 +65,16 @@ class Prover:
 
     def __call__(self, case: Case) -> Proven:
         """Return the proven answer of a case."""
-        held = np.nan
+        held, best = np.nan, np.fmin if case.sense is Sense.SMALLEST else np.fmax
         for attempt in range(ATTEMPTS):
             answer = self._program(case, attempt)
             self.claims[answer.claim] += 1
-            value = _proven_value(self.assembly, case, answer)
-            best = np.fmin if case.sense is Sense.SMALLEST else np.fmax
-            held = float(best(held, _held_value(self.assembly, case, answer)))
+            own = _held_value(self.assembly, case, answer)
+            held, proven = float(best(held, own)), bound(self.assembly, case, answer)
+            near = abs(answer.value - proven) <= GAP * max(1.0, abs(answer.value))
+            value = own if near else np.nan
             if answer.claim is Claim.INFEASIBLE or not np.isnan(value):
                 break
-        proven = bound(self.assembly, case, answer)
         if np.isnan(value) and case.sense is Sense.SMALLEST and answer.claim is Claim.INFEASIBLE:
             answer = self._refuted(case)
             value = proven = np.inf if answer.value > EXACT else np.nan
@@ -101,13 +101,6 @@ class Prover:
         self.claims[answer.claim] += 1
         known = is_finite(helped, answer)
         return replace(answer, value=bound(helped, strongest, answer) if known else np.nan)
-
-
-def _proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
-    """Return the z of an answer if its forces and its motion prove it, else NaN."""
-    gap = abs(answer.value - bound(assembly, case, answer))
-    near = gap <= GAP * max(1.0, abs(answer.value))
-    return _held_value(assembly, case, answer) if near else np.nan
 
 
 def _held_value(assembly: Assembly, case: Case, answer: Answer) -> float:

@@ -70,7 +70,7 @@ class TiltedStates:
         return hulls(_ANGLES, survived)[0] >= pull, least < pull
 
     def survive(self, pull: float, places: Ints, payload: Floats) -> tuple[Bools, Bools]:
-        """Return the same, of sets that stand without a pull, asking what is not known."""
+        """Return the same of sets that stand without a pull; open directions are solved."""
         survived, least = self._brackets(places, payload)
         asked = np.zeros(survived.shape, dtype=bool)
         rows = np.arange(len(places))
@@ -128,7 +128,7 @@ def _settled(pull: float, bracket: Floats) -> Bools:
 
 
 class Proofs:
-    """What screens of one scene share: what one proves, another need not ask.
+    """Proofs shared by the screens of one scene.
 
     ``upright``, ``tilted``: what is known of structures by brick count and mortar; ``answers``: by
     brick count, what the programs of all mortars found, if they are kept.
@@ -248,7 +248,7 @@ def _lacking(
     compiled: CompileHeld,
     earlier: list[tuple[Answer, Floats]] | None = None,
 ) -> HeldStates:
-    """Return the question whether a structure stands: whether it lacks any bond."""
+    """Return the brackets of the least bond that a structure lacks; it stands at zero."""
     case = bonded(assembly, mortar)
     return HeldStates(assembly, case, compiled, case.fixed(), earlier)
 

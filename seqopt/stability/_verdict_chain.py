@@ -52,7 +52,7 @@ Ask = Callable[[Assembly], Case]
 
 
 def judged(assembly: Assembly, case: Case, answer: Answer) -> Proven | None:
-    """Return what an answer proves by itself: that no z is needed, or that some is; or nothing.
+    """Return what an answer proves by itself: that z is zero, or positive; None if neither.
 
     Forces are looked at if the answer says that they need none.
     """
@@ -117,7 +117,7 @@ class VerdictChain:
         return assembly, proven, way
 
     def search(self, states: Sequence[_State]) -> None:
-        """Seek what proves several cases beside each other; it is taken when they are asked."""
+        """Prefetch proofs for several cases, solved as one batch."""
         assemblies = [self._parts(*state) for state in states]
         pairs = [(assembly, self._ask(assembly)) for assembly in assemblies]
         counts = [len(each.corner) + len(each.payload) for each in assemblies]
@@ -133,14 +133,14 @@ class VerdictChain:
     def _known(
         self, state: _State, assembly: Assembly, case: Case, held: Sequence[int]
     ) -> tuple[Proven, Way] | None:
-        """Return what was found for it, or for those before it."""
+        """Return the prefetched proof, or one by earlier forces and motions."""
         proven = self._found.pop(state, None)
         if proven is not None:
             return proven, Way.MOTION if proven.bound > 0 else Way.FORCES
         return _first(self._claimed(assembly, case, held))
 
     def _claimed(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
-        """Yield what forces and motions that were found before prove, those found last first."""
+        """Yield proofs by earlier forces and motions, the latest first."""
         none = np.zeros((len(assembly.corner), 3)), np.zeros((len(held), 3))
         motions = _extended(assembly, self._motion)
         falls = (Answer(Claim.SOLVED, 1.0, *none, motion) for motion in motions)
@@ -153,7 +153,7 @@ class VerdictChain:
                 yield judged(assembly, case, claim), way
 
     def _sought(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
-        """Yield what is proven by what is sought for it, what takes least first."""
+        """Yield proofs by forces and motions sought for this case, the cheapest search first."""
         forces = len(assembly.corner) + len(held)
         force, level = np.zeros((forces, 3)), np.ones((forces, 3))
         if self._near:
@@ -188,7 +188,7 @@ class VerdictChain:
                 return  # it does not hold what is beside it
 
     def _bearing(self, assembly: Assembly) -> Changing | None:
-        """Return what may bear new blocks and grips instead of those before, down to the ground."""
+        """Return the part near new blocks and grips, and along their paths to the ground."""
         blocks, corners = len(assembly.centroid), len(assembly.corner)
         if self._corner_force is None or self._blocks > blocks:
             return None
@@ -202,7 +202,7 @@ class VerdictChain:
         return Changing(near, changes, np.ones(len(assembly.payload), dtype=bool), kept)
 
     def _falling(self, assembly: Assembly) -> Changing | None:
-        """Return what fell before, and what is beside it; the rest is held."""
+        """Return the blocks of the last motion and their neighbors; the rest is fixed."""
         if self._motion is None:
             return None
         blocks, size = len(assembly.centroid), np.abs(self._motion).max(axis=1)

@@ -176,7 +176,7 @@ def _brick_map(
     holds: Sequence[str] = ("dry", "epoxy"),
     progress: Tell | None = None,
 ) -> FailureMap:
-    """Return the same over the number of bricks of which something is built.
+    """Return a failure map over the number of bricks of a form.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -72,7 +72,41 @@ def _free_within_limit() -> float:
     return float(limit - own)
 
 
-class _Processes:
+class Crew:
+    """Workers that work on tasks: here those of an executor, which its caller ends.
+
+    Parameters
+    ----------
+    executor : concurrent.futures.Executor
+    workers : int
+        How many tasks are worked on at once.
+    """
+
+    def __init__(self, executor: Executor, workers: int) -> None:
+        self.executor, self.workers = executor, workers
+
+    def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
+        """Submit a call of a function of a module, so that it can be sent to another process."""
+        return self.executor.submit(function, *arguments)
+
+    def drop(self, calls: Iterable[Future[Any]]) -> None:
+        """Cancel calls whose answers are no longer needed."""
+        for call in calls:
+            call.cancel()
+
+    def look_after(self) -> None:
+        """See to it that a worker that has died does not keep the others waiting."""
+
+    def replace(self) -> bool:
+        """Replace workers that died; return whether there are workers again."""
+        try:
+            self.executor.submit(_nothing)  # an executor's workers are its own matter
+        except Exception:  # whatever an executor of others may raise where it is broken
+            return False
+        return True
+
+
+class _Processes(Crew):
     """Processes of our own: started when they are needed, replaced when they die.
 
     They end with the process that started them, however that ends.
@@ -85,7 +119,7 @@ class _Processes:
         self._started: list[BaseProcess] = []
 
     def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
-        """Give a call out; see `Crew`."""
+        """Submit a call."""
         if self._pool is None:
             context = multiprocessing.get_context("spawn")  # threads and fork do not go together
             end, self._leash = context.Pipe(duplex=False)
@@ -97,14 +131,14 @@ class _Processes:
         return future
 
     def drop(self, calls: Iterable[Future[Any]]) -> None:
-        """Leave calls to the pool, which cancels them when it ends; see `Crew`.
+        """Leave calls to the pool, which cancels them when it ends.
 
         If its processes end before it has seen that a call was cancelled, its thread ends with an
         `InvalidStateError` (Python's issue gh-107219) and leaves other calls without an answer.
         """
 
     def look_after(self) -> None:
-        """End all processes if one has died while it sent an answer; see `Crew`.
+        """End all processes if one has died while it sent an answer.
 
         The rest of that answer would be waited for without end: others, and this process itself,
         keep open what it was sent through. Once they let go, the pool knows that it is broken.
@@ -116,8 +150,8 @@ class _Processes:
         if writer := getattr(results, "_writer", None):
             writer.close()
 
-    def replace(self, error: BaseException) -> bool:
-        """Take new processes for those that died; see `Crew`. Result: True."""
+    def replace(self) -> bool:
+        """Take new processes for those that died."""
         self.end(now=True)
         return True
 
@@ -161,81 +195,6 @@ def _wait_and_end(end: Connection) -> None:
     os._exit(1)
 
 
-class Crew(Protocol):
-    """Workers that work on tasks."""
-
-    @property
-    def workers(self) -> int:
-        """How many tasks are worked on at once."""
-
-    def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
-        """Give a call out.
-
-        Parameters
-        ----------
-        function : callable
-            Of a module, so that it can be sent to another process.
-        *arguments : object
-
-        Returns
-        -------
-        concurrent.futures.Future
-        """
-
-    def drop(self, calls: Iterable[Future[Any]]) -> None:
-        """Let go of calls whose answers nobody waits for any more.
-
-        Parameters
-        ----------
-        calls : iterable of concurrent.futures.Future
-        """
-
-    def look_after(self) -> None:
-        """See to it that a worker that has died does not keep the others waiting."""
-
-    def replace(self, error: BaseException) -> bool:
-        """Take new workers for those that died.
-
-        Parameters
-        ----------
-        error : BaseException
-            What came in place of an answer.
-
-        Returns
-        -------
-        bool
-            Whether there are workers again.
-        """
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Given:
-    """An executor of the caller, who also ends it."""
-
-    executor: Executor
-    workers: int
-
-    def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
-        """Give a call out; see `Crew`."""
-        return self.executor.submit(function, *arguments)
-
-    def drop(self, calls: Iterable[Future[Any]]) -> None:
-        """Cancel calls; see `Crew`."""
-        for call in calls:
-            call.cancel()
-
-    def look_after(self) -> None:
-        """Leave the workers to the executor; see `Crew`."""
-
-    def replace(self, error: BaseException) -> bool:
-        """Say whether the executor still takes work; its workers are its own matter."""
-        try:
-            self.executor.submit(_nothing)
-        except Exception:  # whatever an executor of others may raise where it is broken
-            return False
-        return True
-
-
 @contextmanager
 def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | None]:
     """Hire workers for the duration of a with block.
@@ -258,7 +217,7 @@ def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | 
     elif executor is not None:
         known = getattr(executor, "_max_workers", None)
         most = known if isinstance(known, int) else 16  # where it does not say
-        yield _Given(executor, workers if workers > 1 else most)
+        yield Crew(executor, workers if workers > 1 else most)
     elif workers > 1:
         processes = _Processes(workers)
         try:
@@ -345,7 +304,7 @@ def map_ordered(
 
 @dataclass(eq=False, repr=False)
 class _Course(Generic[_Task, _Result]):
-    """What was given out, what came back, and what is to be given out again."""
+    """Tasks that wait, that run, and results that are ready."""
 
     function: Callable[[_Task], _Result]
     crew: Crew
@@ -378,7 +337,7 @@ class _Course(Generic[_Task, _Result]):
             self.crew.drop(self.running)
 
     def _take(self, number: int, tasks: Iterator[_Task]) -> bool:
-        """Take the next task up, whose result may be known; return whether there was one."""
+        """Start the next task unless its result is known; return whether there was one."""
         for task in tasks:
             result = self.known(task)
             if result is None:
@@ -400,7 +359,7 @@ class _Course(Generic[_Task, _Result]):
             self.running[future] = number, self.waiting.pop(number)
 
     def _collect(self) -> None:
-        """Wait for an answer at least; what came without one is to be given out again."""
+        """Wait for at least one answer; tasks whose workers died wait again."""
         failure: BaseException | None = None
         if not self.running:  # nothing could be given out
             return
@@ -424,7 +383,7 @@ class _Course(Generic[_Task, _Result]):
     def _failed(self, error: BaseException) -> None:
         """Replace workers that died, unless there are none any more."""
         self.failures += 1
-        if self.failures <= _FAILURES and self.crew.replace(error):
+        if self.failures <= _FAILURES and self.crew.replace():
             ended = [call for call in self.running if call.done()]
             lost = [call for call in ended if call.cancelled() or call.exception() is not None]
             self.waiting |= dict(self.running.pop(call) for call in lost)

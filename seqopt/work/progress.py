@@ -26,8 +26,7 @@ class Stage:
     share : float
         How much of it is done, from 0 to 1.
     left : float or None
-        Seconds that it will still take, as far as whoever works knows; None if that is left to
-        whoever shows it.
+        Estimated time left, s; None if the work itself has no estimate.
 
     Examples
     --------
@@ -45,7 +44,7 @@ class Stage:
 
 
 class Progress:
-    """How far a computation is, told as a `Stage` once it takes longer than `_QUIET`.
+    """Reports a computation as a `Stage` once it takes longer than `_QUIET`.
 
     Parameters
     ----------
@@ -54,7 +53,7 @@ class Progress:
     total : float
         How much work that is, in any unit.
     tell : callable, optional
-        Told a `Stage`, whose text is a line; by default nobody is.
+        Called with a `Stage`, whose text is a line.
     """
 
     def __init__(self, what: str, total: float, tell: Tell | None) -> None:
@@ -75,7 +74,7 @@ class Progress:
 
 
 def with_progress(what: str, items: Collection[_Item], tell: Tell | None) -> Iterator[_Item]:
-    """Yield items one after the other, and tell a `Stage` before the work on each.
+    """Yield items one after the other, and report a `Stage` before the work on each.
 
     Examples
     --------
@@ -91,10 +90,10 @@ def with_progress(what: str, items: Collection[_Item], tell: Tell | None) -> Ite
 
 
 def within(tell: Tell, seconds: float) -> Tell:
-    """Return what shows words as a stage of a computation that may take so long.
+    """Return a callback that reports words as stages of a computation with a time limit.
 
-    ``tell``: told words as a `Stage` whose share is that of the time; a `Stage` as it is.
-    ``seconds``: from now on; as they come where it is infinite.
+    ``tell``: called with a `Stage` whose share is that of the time, or with the `Stage` given;
+    ``seconds``: the limit, from now on; if infinite, words are passed on as they are.
 
     Examples
     --------

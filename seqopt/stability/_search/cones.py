@@ -18,7 +18,7 @@ _FARTHEST = 1e3  # share of a step that counts as no limit
 
 
 class Changing(NamedTuple):
-    """What of an assembly changes: other blocks stay where they are, other corners as they press.
+    """The part of an assembly that changes: other blocks rest, other corner forces stay.
 
     ``blocks`` (B,), ``corners`` (K,), ``grips`` (G,): which; ``kept`` (K, 3): what others bear,
     over the force scale.
@@ -31,7 +31,7 @@ class Changing(NamedTuple):
 
 
 class Sought(NamedTuple):
-    """For what forces or a motion are sought, and where from.
+    """A search for forces or a motion: assembly, case and starting point.
 
     Of the case, only what it bears at a z of zero counts. ``force`` (N, 3): of corners and then of
     grips, over the force scale; ``level`` (N, 3), positive: how much each may change beside the
