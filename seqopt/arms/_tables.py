@@ -21,7 +21,7 @@ from seqopt.arms._model import UP, ArmModel
 from seqopt.arms._postures import PostureTable, choose
 from seqopt.arms._reached import Reached, Site, beside_others, reached_alone
 from seqopt.arms._urdf import model_path, shape_notes
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Bools, Ints
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene.arm import MOST, Arm, HeldPostures
 from seqopt.scene.scene import Scene
@@ -46,6 +46,9 @@ def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
     tell("postures that are in each other's way")
     robot_of = np.repeat(np.arange(len(reached)), [len(each.node) for each in reached])
     node = np.concatenate([each.node for each in reached])
+    joints = np.full((len(node), max(each.joints.shape[1] for each in reached)), np.nan)
+    for number, each in enumerate(reached):  # an arm may have fewer joints than another one
+        joints[robot_of == number, : each.joints.shape[1]] = each.joints
     links = [each.model.names for each in reached]
     first = np.cumsum([len(fixed) for fixed in ((), *links)])
     places = range(len(site.nodes))
@@ -55,7 +58,7 @@ def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
         bricks=tuple(brick.name for brick in site.bricks),
         robot=robot_of,
         node=node,
-        joints=_padded([each.joints for each in reached]),
+        joints=joints,
         axes=np.concatenate([each.axes for each in reached]),
         place=np.concatenate([each.place for each in reached]),
         tools=np.concatenate([each.placed.tools for each in reached]),
@@ -71,17 +74,6 @@ def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
         found=np.array([each.found for each in reached]),
         why=np.array([[each.why.get(place, "") for place in places] for each in reached]),
     )
-
-
-def _padded(joints: list[Floats]) -> Floats:
-    """Return the joints of several arms below each other, NaN where an arm has fewer."""
-    most = max(each.shape[1] for each in joints)
-    wide = [(0, 0), (0, 0)]
-    out = []
-    for each in joints:
-        wide[1] = (0, most - each.shape[1])
-        out.append(np.pad(each, wide, constant_values=np.nan))
-    return np.concatenate(out)
 
 
 def _collisions(site: Site, reached: list[Reached], robot: Ints) -> Bools:

@@ -210,16 +210,13 @@ def _overlap(first: Floats, second: Floats, plane: tuple[Floats, Floats], gap: f
     if not common.area > _SLIVER * min(one.area, other.area):
         return []
     points = shapely.get_coordinates(common)
-    heights = [_heights(face, points) for face in seen]
+    heights = []  # of each face's plane, over the points
+    for face in seen:
+        normal, middle = normal_of(face), face.mean(axis=0)
+        heights.append(middle[0] - (points - middle[1:]) @ normal[1:] / normal[0])
     if np.abs(heights[1] - heights[0]).max() > gap:
         return []
     return _polygons(common)
-
-
-def _heights(face: Floats, points: Floats) -> Floats:
-    """Return how high a plane through corners (m, 3) lies over points (k, 2) of its first axis."""
-    normal, middle = normal_of(face), face.mean(axis=0)
-    return np.asarray(middle[0] - (points - middle[1:]) @ normal[1:] / normal[0])
 
 
 _STUB = 0.05  # m; from a face on the ground to the fixed point behind it

@@ -116,8 +116,7 @@ class BuildProver:
     ) -> None:
         self._network, self._mortars, self._progress = network, mortars, progress
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
-        self._parts: Network | PartialAssemblies = network
-        self._most = 1  # bricks of any step so far: what is known of one may be asked again
+        self._parts: PartialAssemblies | None = None  # of as many bricks as any step had so far
         self._crew: Crew | None = None
         self.refusal = ""
 
@@ -185,9 +184,9 @@ class BuildProver:
 
     def _way(self, new: Sequence[Step]) -> _Way:
         """Select the fastest route to the verdicts of steps."""
-        self._most = max(self._most, *(step.bricks for step in new))
-        if not isinstance(self._parts, PartialAssemblies) or self._parts.bricks < self._most:
-            self._parts = PartialAssemblies(self._network, self._most)
+        most = max(step.bricks for step in new) or 1
+        if self._parts is None or self._parts.bricks < most:
+            self._parts = PartialAssemblies(self._network, most)
         counts = {step.bricks for step in new}
         if len(new) > _SETS * len(counts) and len(self._network.inner) <= SCREENED:
             return partial(_screened, self._parts)  # a program for all grips of a brick count pays
@@ -197,7 +196,8 @@ class BuildProver:
         verdicts = tuple(self._known[name][_state(step)] for step in steps)
         for step, verdict in zip(steps, verdicts, strict=True):
             if verdict is Verdict.FALLS:
-                (found,) = each_verdict(self._parts, [step], self._mortars[name])
+                parts = self._parts or self._network
+                (found,) = each_verdict(parts, [step], self._mortars[name])
                 first = found.first_block, found.first_contact
                 return BuildVerdicts(name, verdicts, step.number, *first, steps[0].number)
         return BuildVerdicts(name, verdicts, begins=steps[0].number if steps else 1)
