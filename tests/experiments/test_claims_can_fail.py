@@ -158,7 +158,7 @@ CHECKS = {
     "makespan": Check(
         makespan.holds,
         ("makespan",),
-        *("makespan", 100.0, {"formulation": "makespan_cp", "bricks": 7}),
+        *("makespan", 100.0, {"formulation": "makespan_flow", "bricks": 7}),
     ),
     "free_growth": Check(
         free_growth.holds, ("free_growth",), *("status", "feasible", {"bricks": 49, "robots": 4})

@@ -76,18 +76,13 @@ def test_budgets_are_kept_and_exact():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["makespan_cp", "makespan_flow"])
-def test_other_formulations_agree_or_bound(name):
-    pytest.importorskip("ortools")
+def test_a_flow_that_shares_the_time_of_robots_is_a_bound():
     engine = engine_of(3, 3, "rob3:slower=2.5")
-    plan = solved(engine, RULES, "makespan", name)
+    plan = solved(engine, RULES, "makespan", "makespan_flow")
     least = least_makespan(engine)
     assert plan.certificate.bounds[0] <= least * (1 + 1e-9)
     assert plan.selection.bound[0] <= least * (1 + 1e-6)
     assert plan.makespan >= least * (1 - 1e-9)
-    if name == "makespan_cp":
-        assert plan.makespan == pytest.approx(least)
-        assert plan.status in (Status.OPTIMAL, Status.CLAIMED)
 
 
 def test_nothing_is_assumed_silently():
