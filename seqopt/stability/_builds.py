@@ -25,10 +25,9 @@ from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._screens import OPEN, STANDS, Screen
-from seqopt.stability._step_verdicts import by_workers, each_verdict
+from seqopt.stability._step_verdicts import by_workers, each_verdict, parts_of
 from seqopt.stability._verdict_chain import VerdictChain, Way
-from seqopt.stability.assessment import Verdict, _verdict_of, bonded
-from seqopt.stability.limit_analysis import compile_equilibrium
+from seqopt.stability.assessment import Verdict, _verdict_of
 from seqopt.work._threads import cores
 from seqopt.work._workers import Crew, hire
 from seqopt.work.progress import Tell, with_progress
@@ -276,9 +275,8 @@ def quick_verdicts(
     built: Network | PartialAssemblies, steps: Sequence[Step], mortar: Mortar
 ) -> Iterator[Verdict]:
     """Yield the verdict of every step as soon as it is found; best by ascending brick counts."""
-    most = max((step.bricks for step in steps), default=1) or 1
-    parts = PartialAssemblies(built, most) if isinstance(built, Network) else built
-    prove = VerdictChain(parts, lambda each: bonded(each, mortar), compile_equilibrium, near=True)
+    parts = parts_of(built, steps)
+    prove = VerdictChain(parts, mortar, near=True)
     for dear, same in groupby(steps, lambda step: step.bricks > _DEAR):
         if dear:
             yield from _each_dear(prove, [*same], parts.network)

@@ -27,7 +27,6 @@ from seqopt.stability.assessment import (
     _first_to_fail,
     _verdict_of,
     assess,
-    bonded,
 )
 from seqopt.stability.limit_analysis import Claim, Compile, compile_equilibrium
 from seqopt.work._workers import Crew, hire, map_ordered
@@ -35,6 +34,12 @@ from seqopt.work._workers import Crew, hire, map_ordered
 _CHUNKS = 8  # for every worker, of neighboring steps, which are proven by one another
 _Found = TypeVar("_Found")
 _Find = Callable[[PartialAssemblies, Sequence[Step]], Iterator[_Found]]
+
+
+def parts_of(built: Network | PartialAssemblies, steps: Sequence[Step]) -> PartialAssemblies:
+    """Return the partial structures of steps, those given or cut from as large a whole."""
+    most = max((step.bricks for step in steps), default=1) or 1
+    return PartialAssemblies(built, most) if isinstance(built, Network) else built
 
 
 def each_verdict(
@@ -49,9 +54,7 @@ def each_verdict(
     follow, so steps of a build are asked best in their order. ``compiled``: makes the programs of
     the steps for which that proves nothing.
     """
-    most = max((step.bricks for step in steps), default=1) or 1
-    parts = PartialAssemblies(built, most) if isinstance(built, Network) else built
-    prove = VerdictChain(parts, lambda assembly: bonded(assembly, mortar), compiled)
+    prove = VerdictChain(parts_of(built, steps), mortar, compiled)
     found: dict[tuple[int, Grips], Stability] = {}
     for step in steps:
         key = step.bricks, step.grips
@@ -120,8 +123,7 @@ def each_stability(
     """
     numbers = {step.number for step in steps} if at is None else at
     find = partial(_each, mortar=mortar, margins=margins, at=numbers if margins else ())
-    most = max((step.bricks for step in steps), default=1) or 1
-    parts = PartialAssemblies(network, most)
+    parts = parts_of(network, steps)
     with hire(*shared) as crew:
         if crew is None:
             yield from find(parts, steps)

@@ -16,12 +16,23 @@ from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
+from seqopt.contact.mortar import Mortar
 from seqopt.network.network import GROUND
 from seqopt.sequence.steps import Grips
 from seqopt.stability._prover import Proven, Prover
 from seqopt.stability._search.cones import Changing, Sought
 from seqopt.stability._search.interior_point import approach, approach_all
-from seqopt.stability.limit_analysis import EXACT, Answer, Case, Claim, Compile, bound, violation
+from seqopt.stability.assessment import bonded
+from seqopt.stability.limit_analysis import (
+    EXACT,
+    Answer,
+    Case,
+    Claim,
+    Compile,
+    bound,
+    compile_equilibrium,
+    violation,
+)
 from seqopt.work._threads import one_thread
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
@@ -46,9 +57,6 @@ class Way(Enum):
 
 Parts = Callable[[int, Grips], Assembly]
 """Gives partial structures with their grips, as `PartialAssemblies`."""
-
-Ask = Callable[[Assembly], Case]
-"""Gives the case of an assembly: of a smallest z, of which is only asked whether it is zero."""
 
 
 def judged(assembly: Assembly, case: Case, answer: Answer) -> Proven | None:
@@ -77,7 +85,7 @@ def _labeled(proven: Proven | None, way: Way) -> _Tried:
 
 
 class VerdictChain:
-    """Proves the case of one partial structure after the other.
+    """Proves of one partial structure after the other whether it stands with a mortar.
 
     Forces and a motion are remembered in N, m and rad. Where not the cone program proves a case, z
     is only as good as the answer to whether it is zero.
@@ -85,8 +93,15 @@ class VerdictChain:
     ``near``: whether what is sought is sought near what has changed first.
     """
 
-    def __init__(self, parts: Parts, ask: Ask, compiled: Compile, *, near: bool = False) -> None:
-        self._parts, self._ask, self._compile, self._near = parts, ask, compiled, near
+    def __init__(
+        self,
+        parts: Parts,
+        mortar: Mortar,
+        compiled: Compile = compile_equilibrium,
+        *,
+        near: bool = False,
+    ) -> None:
+        self._parts, self._mortar, self._compile, self._near = parts, mortar, compiled, near
         self._corner_force: Floats | None = None
         self._grip_force: dict[int, Floats] = {}
         self._motion: Floats | None = None
@@ -105,7 +120,7 @@ class VerdictChain:
         """
         assembly, held = self._parts(bricks, grips), [n for n in grips if n is not None]
         held += [-1 - i for i in range(len(assembly.payload) - len(held))]  # props
-        case = self._ask(assembly)
+        case = bonded(assembly, self._mortar)
         with one_thread():
             known = self._known((bricks, grips), assembly, case, held)
             if known is None and before is not None:
@@ -119,7 +134,7 @@ class VerdictChain:
     def search(self, states: Sequence[_State]) -> None:
         """Prefetch proofs for several cases, solved as one batch."""
         assemblies = [self._parts(*state) for state in states]
-        pairs = [(assembly, self._ask(assembly)) for assembly in assemblies]
+        pairs = [(assembly, bonded(assembly, self._mortar)) for assembly in assemblies]
         counts = [len(each.corner) + len(each.payload) for each in assemblies]
         starts = [_none_yet(count) for count in counts]
         sought = [Sought(*pair, *start) for pair, start in zip(pairs, starts, strict=True)]

@@ -22,8 +22,7 @@ from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
 from seqopt.stability._verdict_chain import VerdictChain
-from seqopt.stability.assessment import Verdict, _verdict_of, bonded
-from seqopt.stability.limit_analysis import compile_equilibrium
+from seqopt.stability.assessment import Verdict, _verdict_of
 
 SLACK = 1e-9  # of a time: ages this much short of a point count as there
 
@@ -102,7 +101,7 @@ class CuringBuilds:
         self.network, self.joints = network, JointsInTime(network, curing)
         self._parts = PartialAssemblies(network, len(network.inner))
         self._bond = np.zeros(0)
-        self._chain = VerdictChain(self._bonded, lambda a: bonded(a, mortar), compile_equilibrium)
+        self._chain = VerdictChain(self._bonded, mortar)
         self._found: dict[tuple[int, Grips, bytes], tuple[Verdict, Floats | None]] = {}
         self.asked = 0
 

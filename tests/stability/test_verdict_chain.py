@@ -436,7 +436,7 @@ def test_a_vault_is_proven_without_cone_programs():
 
 def near_verdicts(network, steps, mortar):
     parts = PartialAssemblies(network, max(step.bricks for step in steps))
-    prove = chain.VerdictChain(parts, lambda a: bonded(a, mortar), compile_equilibrium, near=True)
+    prove = chain.VerdictChain(parts, mortar, near=True)
     return tuple(_verdict_of(prove(step.bricks, step.grips)[1]) for step in steps)
 
 
