@@ -70,7 +70,7 @@ class TiltedStates:
         return hulls(_ANGLES, survived)[0] >= pull, least < pull
 
     def survive(self, pull: float, places: Ints, payload: Floats) -> tuple[Bools, Bools]:
-        """Return the same of sets that stand without a pull; open directions are solved."""
+        """Return as `known` does, of sets that stand without a pull; open directions are solved."""
         survived, least = self._brackets(places, payload)
         asked = np.zeros(survived.shape, dtype=bool)
         rows = np.arange(len(places))

@@ -165,7 +165,12 @@ def failure_map(
     told = with_progress("mapping failures", asked, progress)
     rows = [_row(case, axis, value) for value, case in told]
     here = [case for value, case in asked if value == usual and case.holds == holds[0]]
-    motions = {case.build: _motions(case, len(scene.bricks)) for case in here}
+    motions = dict[str, Floats]()
+    for case in here:
+        motions[case.build] = np.zeros((len(case.steps), len(scene.bricks), 6))
+        for motion, step, found in zip(motions[case.build], case.steps, case.found, strict=True):
+            if found.verdict is Verdict.FALLS:
+                motion[: step.bricks] = found.motion
     steps = pd.concat([_of_steps(case, axis, value) for value, case in asked], ignore_index=True)
     return FailureMap(pd.DataFrame(rows), steps, motions, usual)
 
@@ -365,12 +370,3 @@ def _fastest(network: Network, step: Step, found: Stability) -> Iterator[int]:
                 arm = np.subtract(scene.node_position(node), brick.position)
                 speed[node] = float(np.linalg.norm(motion[:3] + np.cross(motion[3:], arm)))
     yield from sorted(speed, key=lambda node: -speed[node])
-
-
-def _motions(case: _Case, bricks: int) -> Floats:
-    """Return how the steps of a case fall, (steps, B, 6)."""
-    out = np.zeros((len(case.steps), bricks, 6))
-    for i, (step, found) in enumerate(zip(case.steps, case.found, strict=True)):
-        if found.verdict is Verdict.FALLS:
-            out[i, : step.bricks] = found.motion
-    return out
