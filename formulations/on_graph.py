@@ -27,13 +27,13 @@ from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
 from seqopt.graph.paths import path_values, tied
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.work.progress import Tell
 
 
-def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
+def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> Solution:
     """Return the path that is chosen, its states the numbers of nodes."""
     graph, goal = instance.asked, instance.goals[0]
     if goal.kind == TAIL:
@@ -52,7 +52,7 @@ def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> StateP
     early = ("interrupt" if watch.interrupted else "time") * found.stopped
     watch.tell(values[0], min(values[0], bounds[0]))  # the trace ends with what is claimed
     told = (found.prices, early)
-    return StatePath(
+    return Solution(
         states,
         values,
         tuple(v if v < b <= tied(v) else b for v, b in zip(values, bounds, strict=True)),
@@ -104,7 +104,7 @@ class OnGraph(Terse):
         max_memory: float = np.inf,
         progress: Tell = lambda _: None,
         **options: Any,
-    ) -> StatePath:
+    ) -> Solution:
         """Return the plan of the chosen path; where time or memory ends early, a first plan.
 
         Raises a `ProblemError` if there are budgets that it does not take.

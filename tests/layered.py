@@ -10,7 +10,7 @@ import numpy as np
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, as_formulation
 from seqopt.graph.layers.compiled import compile_costs
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.plan._guard import require_fit
 from seqopt.plan._paths import find_path
 from seqopt.problem.problem import Aim
@@ -131,6 +131,6 @@ def told(
     def solve(instance):
         states = tuple((node,) for node in path_of(costs.compiled(aim), choice))
         values = (objective - offset,), (bound - offset,)
-        return StatePath(states, *values, prices=(tuple(prices),), stopped=stopped)
+        return Solution(states, *values, prices=(tuple(prices),), stopped=stopped)
 
     return Formulation("told", "", kind, aim, solve, takes_budgets=True)

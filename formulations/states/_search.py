@@ -30,7 +30,7 @@ from seqopt.graph.paths import (
     strictly_below,
     tied,
 )
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.space import Space
 from seqopt.graph.states.explored import build_space, explore, floors_of_goals
 from seqopt.graph.states.states import States
@@ -47,7 +47,7 @@ NARROW = 1.005  # from a target to the incumbent, below which no other target is
 GROWN = 1.1  # times as much is kept before it is asked again how much memory is free
 
 Watching = Callable[[Explorer], None]
-Search = Callable[[States], StatePath]
+Search = Callable[[States], Solution]
 
 
 def shortest(graph: Graph, _: Watch) -> Choice:
@@ -57,7 +57,7 @@ def shortest(graph: Graph, _: Watch) -> Choice:
 
 def best_total(
     problem: States, choose: Choose, watch: Watch, tell: Watching, width: int | None = None
-) -> StatePath:
+) -> Solution:
     """Return the plan of least total over scenarios.
 
     ``choose``: paths of least sum; ``width``: how many new states of a brick count are kept; by
@@ -81,7 +81,7 @@ def best_total(
     return replace(plan, bound=bound, prices=prices, stopped="time" * watch.over)
 
 
-def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> StatePath:
+def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> Solution:
     """Return the plan of a choice; where time was over, the better one of it and a first plan."""
     first = None
     try:
@@ -128,7 +128,7 @@ def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watch
     return tell
 
 
-def plan_by_then(found: StatePath | None, stop: StopError | KeyboardInterrupt) -> StatePath:
+def plan_by_then(found: Solution | None, stop: StopError | KeyboardInterrupt) -> Solution:
     """Return a first plan, of which nothing is proven; raise an error if there is none yet."""
     if found is None:
         raise _too_little(stop) from None
@@ -146,7 +146,7 @@ def _too_little(stop: StopError | KeyboardInterrupt) -> SeqoptError | KeyboardIn
     return TimeUpError("no plan was found yet; give more")
 
 
-def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
+def after_margins(problem: States, search: Search, tell: Watching) -> Solution:
     """Return what is found once margins of stability, which come first, are at their best."""
     margins = [goal.margins is not None for goal in problem.goals]
     if sorted(margins, reverse=True) != margins:
@@ -159,7 +159,7 @@ def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
     except StopError as stop:
         raise _too_little(stop) from None
     if len(problem.goals) == 1:  # nothing else was wished
-        return StatePath(states, (value,), (bound,), order=order)
+        return Solution(states, (value,), (bound,), order=order)
     try:
         after = after_margins(rest, search, tell)
     except InfeasibleError as error:
@@ -180,7 +180,7 @@ def narrow(
     enough: float = -np.inf,
     *,
     every: bool = False,
-) -> StatePath | None:
+) -> Solution | None:
     """Return the best plan through a few states of every brick count, if there is one.
 
     Where states must stand it is asked of all of them only if the best paths fall; ``most``: what
@@ -201,7 +201,7 @@ def narrow(
     return None
 
 
-def best_standing(found: Explorer, budgets: Sequence[float] = ()) -> StatePath:
+def best_standing(found: Explorer, budgets: Sequence[float] = ()) -> Solution:
     """Return the best path through visited states that pass what is asked of those on it alone."""
     while True:
         visited, best = exact_best(found, budgets)
@@ -242,7 +242,7 @@ def exact_best(found: Explorer, budgets: Sequence[float] = ()) -> tuple[Visited,
             return visited, best
 
 
-def selected(space: Space, visited: Visited, best: Best | Within) -> StatePath:
+def selected(space: Space, visited: Visited, best: Best | Within) -> Solution:
     """Return a path as a plan, and with it the states that a better one could pass.
 
     These are left out where an order was sought: rows of other orders mean other things.
@@ -258,7 +258,7 @@ def selected(space: Space, visited: Visited, best: Best | Within) -> StatePath:
     if isinstance(best, Within):
         bounds, prices = best.bounds, best.prices
     path = rows, best.values, bounds, hint, prices
-    return StatePath(*path, order=order, effort=space.effort)
+    return Solution(*path, order=order, effort=space.effort)
 
 
 @dataclass(frozen=True)
@@ -291,7 +291,7 @@ class ThresholdSearch:
         self._peak = space.peaks[0]
         self._cuts = self._peak and not caps
         self.wide = Explorer(space, tell=tell)
-        self.incumbent: StatePath | None = None
+        self.incumbent: Solution | None = None
         self.floors = tuple(floors or [-np.inf] * len(space.peaks))
         self.bound = self.floors[0]
 
@@ -308,7 +308,7 @@ class ThresholdSearch:
             return False
         return self.wide.excluded > floor
 
-    def best(self, start: float = -np.inf) -> StatePath:
+    def best(self, start: float = -np.inf) -> Solution:
         """Return the best path, by a threshold that rises until states below it reach an end.
 
         ``start``: a threshold that is known to be low enough for the first search.
@@ -376,7 +376,7 @@ def threshold_search(
     return ThresholdSearch(space, tell, floors=floors, caps=caps, growth=options.growth)
 
 
-def search_states(problem: States, options: Options, tell: Watching) -> StatePath:
+def search_states(problem: States, options: Options, tell: Watching) -> Solution:
     """Return the best plan of a problem, or the incumbent where the search is stopped."""
     search = threshold_search(problem, options, tell)
     try:
@@ -401,7 +401,7 @@ def search_states(problem: States, options: Options, tell: Watching) -> StatePat
 
 def _first(
     problem: States, options: Options, floors: Sequence[float], wider: int, tell: Watching
-) -> StatePath | None:
+) -> Solution | None:
     """Return a first plan; where that is expensive, only if it takes no more than floors."""
     width, enough = wider * options.width, floors[0] if wider > 1 else -np.inf
     most = floors if options.dear else None
@@ -438,7 +438,7 @@ def _of_one(problem: States, options: Options) -> float:
     return (inside or one).objective[0]
 
 
-def _in_all(problem: States, one: StatePath | None, most: Sequence[float]) -> StatePath | None:
+def _in_all(problem: States, one: Solution | None, most: Sequence[float]) -> Solution | None:
     """Return a plan of one scenario, valued in all; None if in any it is not allowed.
 
     Or if goals then take more of it than ``most``.
@@ -458,7 +458,7 @@ def _in_all(problem: States, one: StatePath | None, most: Sequence[float]) -> St
     return replace(one, objective=objective, bound=objective) if inside else None
 
 
-def unproven(found: StatePath, wide: Explorer, proven: float) -> StatePath:
+def unproven(found: Solution, wide: Explorer, proven: float) -> Solution:
     """Return the first plan, and what thresholds and the levels reached prove of the first goal."""
     bound = proven
     if not wide.peaks[0] and wide.level:

@@ -52,7 +52,7 @@ from seqopt.graph._orders import (
     trying,
 )
 from seqopt.graph.formulation import Formulation, FormulationKind, Watch, find_formulation
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
 from seqopt.scene.scene import ORDERS, Order
 from seqopt.work._workers import hire, map_ordered
@@ -71,7 +71,7 @@ def solve(
     seconds: float = np.inf,
     max_memory: float = np.inf,
     progress: Tell = lambda _: None,
-) -> StatePath:
+) -> Solution:
     """Return the best plan in any order, or one in a good order and a bound.
 
     ``most``: pairs of a set of bricks and a newest one, up to which all orders are looked at;
@@ -85,7 +85,7 @@ def solve(
     first = problem.goals[0]
     if not first.is_peak or first.margins or problem.budgets:
         limits = {"seconds": seconds, "max_memory": max_memory, "progress": progress}
-        found: StatePath = find_formulation("schedule_search").solve(problem, **limits)
+        found: Solution = find_formulation("schedule_search").solve(problem, **limits)
         return found
     watch = Watch(seconds)
     search = threshold_search(problem, HOW, watched(problem, watch, max_memory, progress), most)
@@ -104,7 +104,7 @@ def solve(
         return unproven(plan_by_then(search.incumbent, stop), search.wide, search.bound)
 
 
-def _plan_in(problem: States, order: Order, tell: Watching) -> StatePath | None:
+def _plan_in(problem: States, order: Order, tell: Watching) -> Solution | None:
     """Return the best plan in an order, or the best by the end of the search; None without any."""
     own = problem.at(order)
     try:
@@ -118,7 +118,7 @@ class _Tried:
     """Orders that are tried one by one: the best so far, the value of its plan, and how many."""
 
     def __init__(
-        self, problem: States, watch: Watch, progress: Tell, first: StatePath | None
+        self, problem: States, watch: Watch, progress: Tell, first: Solution | None
     ) -> None:
         self._problem, self._watch, self._progress = problem, watch, progress
         self._rules = order_rules(problem)
@@ -126,7 +126,7 @@ class _Tried:
         self.value = first.objective[0] if first else np.inf
         self.count = self._tries = self._left = 0
 
-    def best(self, search: ThresholdSearch, tries: int, rng: np.random.Generator) -> StatePath:
+    def best(self, search: ThresholdSearch, tries: int, rng: np.random.Generator) -> Solution:
         """Return the plan of the best order that is found, and what the search proved before."""
         scene, why = self._problem.network.scene, "size"
         try:

@@ -24,21 +24,21 @@ import numpy as np
 from seqopt.arrays import Bools, Floats
 from seqopt.errors import TimeUpError
 from seqopt.graph.formulation import Formulation, FormulationKind, Watch
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.plan.front import FrontProblem
 from seqopt.work.progress import Tell
 
 
 def solve(
     problem: FrontProblem, *, seconds: float = np.inf, progress: Tell = lambda _: None
-) -> tuple[StatePath, ...]:
+) -> tuple[Solution, ...]:
     """Return a plan for each vector that no plan dominates.
 
     ``seconds``: after which the plans found are returned, or a `TimeUpError` says there is none.
     """
     watch, stopped = Watch(seconds), ""
     zones = np.full((1, len(problem.names)), np.inf)
-    plans = list[StatePath]()
+    plans = list[Solution]()
     try:
         while len(zones) and not stopped:
             progress(f"{len(plans)} plans found, {len(zones)} regions left")

@@ -32,7 +32,7 @@ from formulations.states._totals import StopError
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.formulation import Formulation, FormulationKind, Watch
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.work.progress import Tell
@@ -45,7 +45,7 @@ def solve(
     seconds: float = np.inf,
     max_memory: float = np.inf,
     progress: Tell = lambda _: None,
-) -> StatePath:
+) -> Solution:
     """Return a plan through the states of a beam.
 
     ``width``: how many new states of a brick count are kept, from 1; ``seconds``, ``max_memory``:
@@ -62,7 +62,7 @@ def solve(
         plan = best_total(problem, shortest, watch, tell, width)
         return replace(plan, bound=(-np.inf,))
 
-    def search(rest: States) -> StatePath:
+    def search(rest: States) -> Solution:
         try:
             found = narrow(rest, width, tell, every=True)
             if found is None:

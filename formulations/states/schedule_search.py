@@ -57,7 +57,7 @@ from formulations.states._search import (
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.instance import Instance
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
 from seqopt.work.progress import Tell
 
@@ -70,7 +70,7 @@ def solve(
     seconds: float = np.inf,
     max_memory: float = np.inf,
     progress: Tell = lambda _: None,
-) -> StatePath:
+) -> Solution:
     """Return the best path.
 
     ``width``: from how many new states of a brick count the narrow search goes on; ``growth``: of

@@ -30,7 +30,7 @@ from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.states._visits import steps_of
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
@@ -108,7 +108,7 @@ class Waits:
             return None
 
 
-def of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
+def of_instance(instance: Instance, choose: Choose, watch: Watch) -> Solution:
     """Return the best path through an instance, its states the numbers of nodes."""
     timed = instance.timed
     if timed is None:
@@ -126,7 +126,7 @@ def of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
     values = _timed_values(aims, stages.values(found.path), stages.least(found.path))
     states, late = tuple((node,) for node in found.path), "time" * found.late
     proofs, bounds = tuple(found.proofs), _no_higher(found.bounds, values)
-    return StatePath(states, values, bounds, stopped=late, proofs=proofs)
+    return Solution(states, values, bounds, stopped=late, proofs=proofs)
 
 
 def _timed_values(
@@ -157,7 +157,7 @@ class _InTime(Terse):
         seconds: float = np.inf,
         max_memory: float = np.inf,
         progress: Tell = lambda _: None,
-    ) -> StatePath:
+    ) -> Solution:
         """Return the plan of the chosen path; where time or memory ends early, the best so far."""
         watch = Watch(seconds)
         if isinstance(problem, Instance):
@@ -174,9 +174,9 @@ class _InTime(Terse):
 
 def _searched(
     problem: States, choose: Choose, watch: Watch, tell: Watching, progress: Tell
-) -> StatePath:
+) -> Solution:
     """Return the best plan of states that are proven to stand, where that is demanded."""
-    first, waits, best = None, Waits(problem), list[StatePath]()
+    first, waits, best = None, Waits(problem), list[Solution]()
     try:
         first = narrow(problem, WIDTH, tell)
         wide = Explorer(build_space(problem), tell=tell)
@@ -207,7 +207,7 @@ def _searched(
     raise wide.without_plan("no plan is allowed")
 
 
-def _ceiling(problem: States, first: StatePath | None, waits: Waits) -> float:
+def _ceiling(problem: States, first: Solution | None, waits: Waits) -> float:
     """Return up to which value of the first goal states are looked at: that of a first plan.
 
     Unless budgets of time, or mortar, may forbid it.
@@ -232,7 +232,7 @@ def _staged(
         raise wide.without_plan(str(error)) from None
 
 
-def _least_of(plans: Sequence[StatePath], bound: tuple[float, ...], stopped: str = "") -> StatePath:
+def _least_of(plans: Sequence[Solution], bound: tuple[float, ...], stopped: str = "") -> Solution:
     """Return the best of some plans with bounds that hold for all."""
     best = min(plans, key=lambda plan: plan.objective)
     bounds, open_ = list[float](), True
@@ -247,14 +247,14 @@ def _least_of(plans: Sequence[StatePath], bound: tuple[float, ...], stopped: str
 
 def _plan(
     problem: States, visited: Visited, stages: Stages, found: StageFound, waits: Waits
-) -> StatePath | None:
+) -> Solution | None:
     """Return a path as a plan, by the robots that are soonest done; None if mortar forbids it."""
     states = tuple((level, *state.tolist()) for level, _, state in visited.of(found.path))
     soonest = waits.try_soonest(problem, states)
     if soonest is None:
         return None
     values = _timed_values(problem.goals, stages.values(found.path), soonest.makespan)
-    return StatePath(
+    return Solution(
         states,
         values,
         _no_higher(found.bounds, values),
@@ -269,8 +269,8 @@ def _plan(
 
 
 def _by_then(
-    problem: States, first: StatePath | None, stop: StopError | KeyboardInterrupt, waits: Waits
-) -> StatePath:
+    problem: States, first: Solution | None, stop: StopError | KeyboardInterrupt, waits: Waits
+) -> Solution:
     """Return a first plan with its makespan; raise an error if there is none that keeps caps."""
     found = plan_by_then(first, stop)
     soonest = waits.try_soonest(problem, found.states)

@@ -204,7 +204,7 @@ class Formulation:
         What it minimizes of candidates of moves: the sum of the costs, or the largest cost; None
         where a problem has its goals.
     solve : callable
-        Takes a problem and named options, returns a `seqopt.graph.solution.StatePath`.
+        Takes a problem and named options, returns a `seqopt.graph.solution.Solution`.
     takes_budgets : bool
         Whether it can keep totals over the build within budgets.
     windowed : tuple of (str, int or str), optional

@@ -11,7 +11,7 @@ from seqopt.scene.scene import Order
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StatePath(FrozenValue):
+class Solution(FrozenValue):
     """A free schedule, and what its formulation claims of it.
 
     ``states``: after every step: how many bricks stand, then the node that each robot holds, as a

@@ -12,7 +12,7 @@ from seqopt.responses._tolerance import value_text
 from seqopt.sequence.steps import Step
 
 if TYPE_CHECKING:
-    from seqopt.graph.solution import StatePath
+    from seqopt.graph.solution import Solution
     from seqopt.problem.standing import Standing
     from seqopt.sequence.site import Site
 
@@ -113,7 +113,7 @@ class Source:
         raise NotImplementedError
 
     def spent(
-        self, objective: Mapping[str, float], found: StatePath
+        self, objective: Mapping[str, float], found: Solution
     ) -> dict[str, dict[str, float | None]]:
         """Return what there is of every budget, what is spent, and its price if one is known."""
         return {}

@@ -17,7 +17,7 @@ from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import FAILS, PASSES, _lazy_path, lexicographic, reached
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import is_beyond
 from seqopt.judge._claims import budget_bounds
@@ -199,7 +199,7 @@ class Proof:
         return budget_bounds(rebuilt.graph(), values, claimed, (caps, multipliers))
 
     def timed_bounds(
-        self, twin: PathTwin, values: Sequence[float], found: StatePath
+        self, twin: PathTwin, values: Sequence[float], found: Solution
     ) -> tuple[float, ...]:
         """Return bounds of measures of whole paths, by their twin, of a path that is claimed."""
         rebuilt = self.rebuilt(Filter(values, exact=True))

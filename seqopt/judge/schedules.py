@@ -16,7 +16,7 @@ import numpy as np
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError, StepError
 from seqopt.graph._orders import order_rules
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
 from seqopt.judge._proof import BELOW, Hint, Proof
 from seqopt.judge._rule_moves import check_free
@@ -44,7 +44,7 @@ Bounds = tuple[float, ...]
 
 def judge_schedule(
     problem: States,
-    selection: StatePath,
+    selection: Solution,
     steps: Sequence[Step],
     hint: Hint | None = None,
     *,
@@ -98,7 +98,7 @@ def ordered(problem: States, order: Order) -> States:
     return problem.at(order)
 
 
-def _first_bound(problem: States, selection: StatePath, bounds: Bounds) -> Bounds:
+def _first_bound(problem: States, selection: Solution, bounds: Bounds) -> Bounds:
     """Return bounds with the one that is claimed of the first goal, where it can be proven.
 
     Raises `SolverError` if a plan is better.
@@ -115,7 +115,7 @@ def _first_bound(problem: States, selection: StatePath, bounds: Bounds) -> Bound
 
 
 def _proven(
-    problem: States, selection: StatePath, values: Bounds, hint: Hint | None, *, exact: bool
+    problem: States, selection: Solution, values: Bounds, hint: Hint | None, *, exact: bool
 ) -> Certificate:
     """Return the certificate of values by bounds that are proven."""
     aims = len(problem.aims)
@@ -159,7 +159,7 @@ def _gap(goals: Sequence[Amount], values: Sequence[float], bounds: Sequence[floa
     )
 
 
-def _weighed(problem: States, selection: StatePath) -> States:
+def _weighed(problem: States, selection: Solution) -> States:
     """Return a problem over totals of scenarios with the weights that are claimed, made valid."""
     if not problem.totals:
         return problem
@@ -181,7 +181,7 @@ def _margin_bounds(problem: States, proof: Proof, values: Bounds) -> Bounds:
     return tuple(out)
 
 
-def _multipliers(problem: States, selection: StatePath) -> Sequence[Sequence[float]]:
+def _multipliers(problem: States, selection: Solution) -> Sequence[Sequence[float]]:
     """Return the multipliers that are claimed of budgets, goal by goal."""
     found, budgets = selection.prices, len(problem.budgets)
     if len(found) < len(problem.aims) or any(len(each) < budgets for each in found):
@@ -210,7 +210,7 @@ def _with_counts(problem: States, twin: PathTwin | None, values: Bounds, bounds:
     )
 
 
-def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) -> Bounds:
+def _as_claimed(problem: States, selection: Solution, steps: Sequence[Step]) -> Bounds:
     """Return the values of steps that keep the rules, if they are those that are claimed."""
     if isinstance(problem.rules, Schedule):
         _check_scheduled(problem.rules, steps)

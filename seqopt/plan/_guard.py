@@ -23,7 +23,7 @@ from seqopt.errors import ProblemError, SeqoptError, SolverError, message_of
 from seqopt.graph.formulation import Formulation, formulations
 from seqopt.graph.graph import LabelProof
 from seqopt.graph.layers.costs import Budget
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.scene._checks import LARGEST_NUMBER, short
 
 Result = TypeVar("Result")
@@ -129,7 +129,7 @@ def _shadowing(value: object) -> list[str]:
 CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 
 
-def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
+def with_numbers(name: str, found: Solution, goals: int) -> Solution:
     """Return the answer of a formulation by name with numbers where numbers belong.
 
     Raises `SolverError` if a number is none, or there are not as many as goals.
@@ -159,7 +159,7 @@ def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
             raise ValueError(f"compile_seconds is {seconds}")
         order = tuple(map(_whole, found.order))
         sets, models = map(_whole, found.effort)
-        own = partial(StatePath, compile_seconds=seconds, order=order, effort=(sets, models))
+        own = partial(Solution, compile_seconds=seconds, order=order, effort=(sets, models))
         return own(states, objective, bound, *told)
 
 

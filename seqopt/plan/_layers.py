@@ -13,7 +13,7 @@ from seqopt.graph.formulation import End, Formulation, Run, Watch, formulations,
 from seqopt.graph.layers.compiled import best_in_order, compile_layers
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.layers import Layers, steps_over, travel
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.judge._step_checks import check_shape
 from seqopt.judge.certificate import _require_anew
 from seqopt.plan._guard import require_fit, require_proof, require_time
@@ -122,7 +122,7 @@ def _solve_windows(graph: Layers, formulation: Formulation, run: Run) -> Plan:
         steps = _checked(graph.steps(found.choice), graph)
         _require_anew(graph, found.choice, found.met)
     stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
-    chosen = StatePath(graph.rows(found.choice), (np.nan,), (-np.inf,))
+    chosen = Solution(graph.rows(found.choice), (np.nan,), (-np.inf,))
     return Plan(graph, graph, formulation, chosen, None, steps, stages, found)
 
 

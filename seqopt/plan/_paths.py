@@ -16,7 +16,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, NothingFoundError, SolverError, TimeUpError
 from seqopt.graph.formulation import Finding, Formulation, FormulationKind, Run, Watch, timed
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.judge._arithmetic import Answer, OverCapError, judge_path
 from seqopt.judge._claims import Claim
 from seqopt.judge.certificate import TOLERANCE, Certificate
@@ -29,7 +29,7 @@ PROOF = "the proof"  # what it is called where there was no time for it
 class FoundPath(NamedTuple):
     """A path through an instance: what is claimed of it, what is proven, and what it took, s."""
 
-    selection: StatePath
+    selection: Solution
     certificate: Certificate | None
     seconds: dict[str, float]
 
@@ -66,7 +66,7 @@ def find_path(
 
 def _selected(
     instance: Instance, formulation: Formulation, run: Run, watch: Watch, offset: float
-) -> StatePath:
+) -> Solution:
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
     name = formulation.name
     limit = {} if math.isinf(run.left) else {"seconds": run.left}
@@ -74,7 +74,7 @@ def _selected(
     solve = partial(formulation.solve, instance, **run.options, **told)
     try:
         with answered(watch.interrupt) if formulation.watched else nullcontext():
-            found = called(name, lambda: instance, StatePath, solve)
+            found = called(name, lambda: instance, Solution, solve)
     except InfeasibleError as error:
         if not instance.caps:
             raise SolverError(
@@ -113,8 +113,8 @@ def _moved(found: Finding, offset: float) -> Finding:
 
 
 def _raised(
-    selection: StatePath, certificate: Certificate | None, offset: float
-) -> tuple[StatePath, Certificate | None]:
+    selection: Solution, certificate: Certificate | None, offset: float
+) -> tuple[Solution, Certificate | None]:
     """Return the same with what every path takes beside its arcs."""
     values, bounds = ((v[0] + offset, *v[1:]) for v in (selection.objective, selection.bound))
     trace = tuple(_moved(found, offset) for found in selection.trace)
@@ -125,7 +125,7 @@ def _raised(
     return selection, replace(certificate, values=proven[0], bounds=proven[1])
 
 
-def judged(instance: Instance, formulation: Formulation, found: StatePath) -> Certificate:
+def judged(instance: Instance, formulation: Formulation, found: Solution) -> Certificate:
     """Return the certificate of a path, by what the formulation says proves its bounds."""
     nodes = [state[0] for state in found.states]
     answer = Answer("nodes", np.array(nodes), found.objective, tuple(_claims(instance, found)))
@@ -147,7 +147,7 @@ def judged(instance: Instance, formulation: Formulation, found: StatePath) -> Ce
     return replace(proof, claimed_gap=max(left))
 
 
-def _claims(instance: Instance, found: StatePath) -> list[Claim]:
+def _claims(instance: Instance, found: Solution) -> list[Claim]:
     """Return what proves the bound of every goal, as far as the formulation says."""
     kinds = [goal.kind for goal in instance.goals]
     if instance.asks_time:
@@ -166,7 +166,7 @@ def _claims(instance: Instance, found: StatePath) -> list[Claim]:
     return out
 
 
-def _of_times(instance: Instance, found: StatePath, kinds: list[str]) -> list[Claim]:
+def _of_times(instance: Instance, found: Solution, kinds: list[str]) -> list[Claim]:
     """Return what proves times: labels where there are any, and shares."""
     first = 0 if instance.caps else kinds.index(TIME)
     own = [Claim() for _ in kinds]

@@ -12,7 +12,7 @@ from typing import Any
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, as_formulation, formulations
 from seqopt.graph.instance import PEAK, SUM, Instance
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.states._visits import steps_in_hands
 from seqopt.graph.states.explored import barred
 from seqopt.graph.states.states import States
@@ -113,7 +113,7 @@ def _selected(
     options: Mapping[str, Any],
     *,
     explain: bool,
-) -> StatePath:
+) -> Solution:
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
     (problem, twin), start, name = problems, time.perf_counter(), formulation.name
     limit = float(options.get("seconds", inf))
@@ -122,7 +122,7 @@ def _selected(
         raise confirmed(twin, name, limit, explain=explain)
     judged = partial(replace, problem, resources=HERE)  # who works for a formulation may change
     try:
-        selection = called(name, judged, StatePath, solve)
+        selection = called(name, judged, Solution, solve)
     except InfeasibleError as error:
         left = limit - (time.perf_counter() - start)
         why = confirmed(twin, name, left, exact=formulation.looks_at_all, explain=explain)

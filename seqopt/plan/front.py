@@ -17,7 +17,7 @@ from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.space import Space
 from seqopt.graph.states._visits import steps_of, steps_with, with_held
 from seqopt.graph.states.explored import explore
@@ -123,7 +123,7 @@ class FrontProblem:
         """Which goals count moves: bounds on them hold along a path, not state by state."""
         return [k for k, goal in enumerate(self._problem.goals) if not goal.is_peak]
 
-    def best_below(self, bounds: Floats) -> StatePath | None:
+    def best_below(self, bounds: Floats) -> Solution | None:
         """Return a plan with values below bounds (k,) that no plan dominates, SI units."""
         below = self._below(bounds)
         if not below.ends[reached(below)].any():
@@ -139,7 +139,7 @@ class FrontProblem:
         assert graph is not None
         order, states = self._explored[1].path(self._visited.of(fewest_moves(graph)))
         values = tuple(point.tolist())
-        return StatePath(states, values, values, order=order)
+        return Solution(states, values, values, order=order)
 
     def _below(self, bounds: Floats) -> Graph:
         """Return the moves to states whose values are all below bounds."""
@@ -190,20 +190,20 @@ class FrontProblem:
         grips = [self._problem.space.grips(rows) for _, _, rows in self._visited.states]
         return np.concatenate(grips)
 
-    def steps(self, plan: StatePath) -> tuple[Step, ...]:
+    def steps(self, plan: Solution) -> tuple[Step, ...]:
         """Return the checked steps of a plan."""
         return steps_of(self._of_plan(plan).space, plan.states)
 
-    def values(self, plan: StatePath) -> Floats:
+    def values(self, plan: Solution) -> Floats:
         """Return the goals' values (k,) of a plan, from its responses, rounded; SI units."""
         found = plan_values(self._of_plan(plan), self.steps(plan), plan.objective)
         return _rounded_up(np.array(found), self._round)
 
-    def engine(self, plan: StatePath) -> Engine:
+    def engine(self, plan: Solution) -> Engine:
         """Return what computes the responses of a plan, of the scene in its build order."""
         return self._of_plan(plan).engine
 
-    def _of_plan(self, plan: StatePath) -> States:
+    def _of_plan(self, plan: Solution) -> States:
         if plan.order not in self._known:
             self._known[plan.order] = ordered(self._problem, plan.order)
         return self._known[plan.order]
@@ -337,7 +337,7 @@ def _front_of(
 
 def _found(
     name: str, problems: tuple[FrontProblem, FrontProblem], solve: Callable[[], object]
-) -> list[StatePath]:
+) -> list[Solution]:
     """Return the plans of a formulation, in numbers; raise that there is none once it is proven."""
     twin = problems[1]
     try:

@@ -16,7 +16,7 @@ from seqopt.engines.registry import provenance
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind
 from seqopt.graph.instance import Instance
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan._status import ENDS, Status, bare_summary, order_facts
@@ -57,7 +57,7 @@ class Plan(ShownBuild):
         What was chosen from.
     formulation : Formulation
         The formulation that solved it.
-    selection : StatePath
+    selection : Solution
         What was chosen, a candidate for every move or states, and what is claimed of it.
     certificate : Certificate or None
         The checked values; None without a proof.
@@ -90,7 +90,7 @@ class Plan(ShownBuild):
     problem: Problem | Layers | States | Instance
     graph: Layers | States | Instance
     formulation: Formulation
-    selection: StatePath
+    selection: Solution
     certificate: Certificate | None
     steps: tuple[Step, ...]
     seconds: Mapping[str, float] = field(compare=False, hash=False)

@@ -11,7 +11,7 @@ from seqopt.errors import SolverError
 from seqopt.graph.duality import cut, potentials
 from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import tied
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
 from seqopt.sequence.schedule import Schedule
@@ -23,7 +23,7 @@ from seqopt.times._mortar_floors import cured_rows
 
 
 def label_bounds(
-    evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: StatePath
+    evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: Solution
 ) -> Callable[[Graph], tuple[float, ...]]:
     """Return what bounds the goals after those about margins, by labels, on rebuilt subgraphs.
 
@@ -41,7 +41,7 @@ class _TimedRows:
     """
 
     def __init__(
-        self, evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: StatePath
+        self, evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: Solution
     ) -> None:
         self.evaluator, self._rebuilt = evaluator, rebuilt
         self._margins = values[: evaluator.margins]
@@ -123,7 +123,7 @@ class _GoalProofs:
     """Bounds on the goals of a build in time, each where those before it are at their values."""
 
     def __init__(
-        self, rows: _TimedRows, graph: Graph, values: Sequence[float], found: StatePath
+        self, rows: _TimedRows, graph: Graph, values: Sequence[float], found: Solution
     ) -> None:
         self._rows, self._graph, self._values, self._found = rows, graph, values, found
         problem = rows.evaluator.problem

@@ -19,7 +19,7 @@ from seqopt.graph.formulation import End, find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.paths import lexicographic
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.network.build import build_network
 from seqopt.plan._paths import judged
@@ -202,7 +202,7 @@ def test_the_judge_holds_a_plan_against_the_graph_with_floors(aim, best, bound):
     assert (part.best, part.bound) == (best, bound)
     instance, nodes = part.compiled(unknown=True)
     path = tuple((node,) for node in np.searchsorted(nodes, [1, 3]).tolist())
-    good = StatePath(path, (best,), (bound,), stopped="time")
+    good = Solution(path, (best,), (bound,), stopped="time")
     exact = find_formulation("overlap_dp" if aim is Aim.SUM else "minimax")
     proof = judged(instance, exact, good)
     assert (proof.bound, proof.gap) == (bound, (best - bound) / best)

@@ -14,7 +14,7 @@ from formulations.overlap_flow import Flow
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.problem.problem import Aim
 from tests.layered import Costs, answer, changed, told
 from tests.quality.degenerate import MALFORMED, judge, outcomes
@@ -109,7 +109,7 @@ def another(instance):
     codes = [a * instance.nodes + b for a, b in pairwise(nodes)]
     every = (instance.source.astype(int) * instance.nodes + instance.target).tolist()
     value = sum(instance.amounts[every.index(code), 0] for code in codes)
-    return StatePath(states, (float(value),), (-np.inf,))
+    return Solution(states, (float(value),), (-np.inf,))
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from formulations.states.pareto_zones import FORMULATION as FRONT
 from formulations.states.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError, StepError
 from seqopt.graph._orders import among_orders
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import build_states
 from seqopt.plan.front import FrontProblem, find_front
 from seqopt.plan.solving import solve
@@ -228,12 +228,12 @@ def test_nonsense_has_failed(kind, change, proof):
 
 
 @kinds
-@pytest.mark.parametrize("reply", [None, "best", 3.0, (), np.zeros(3), StatePath])
+@pytest.mark.parametrize("reply", [None, "best", 3.0, (), np.zeros(3), Solution])
 def test_what_is_no_selection_has_failed(kind, reply):
     if "front" in kind and isinstance(reply, tuple):
         return  # that there is no plan: below
     with pytest.raises(
-        SolverError, match=r"formulation fake returned a .*, not a (StatePath|tuple)"
+        SolverError, match=r"formulation fake returned a .*, not a (Solution|tuple)"
     ):
         asked(kind, lambda *_, **__: reply)
 
@@ -296,7 +296,7 @@ def test_scenarios_have_the_same_guard():
     for fake, said in (
         (changes, CHANGED),
         (denies, "says that no path is allowed, and some are"),
-        (lambda _: None, "returned a NoneType, not a StatePath"),
+        (lambda _: None, "returned a NoneType, not a Solution"),
     ):
         cheat = replace(real, solve=fake)
         with pytest.raises(SolverError, match=said):

@@ -23,7 +23,7 @@ from seqopt.graph.formulation import FormulationKind, find_formulation, formulat
 from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.responses import _blocks as batches
@@ -59,14 +59,14 @@ def problem():
 
 
 NODES = (1,), (2,), (3,)
-PATH = StatePath(NODES, (1.0,), (0.0,))
+PATH = Solution(NODES, (1.0,), (0.0,))
 NONSENSE = {
     "None": None,
     "text": "overlap_dp",
     "a number": 3.0,
     "a tuple": (NODES, 1.0),
     "an array": np.zeros(3),
-    "a class": StatePath,
+    "a class": Solution,
     **{
         f"{name} {said}": replace(PATH, **{name: value})
         for name, values in {

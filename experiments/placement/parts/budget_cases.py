@@ -24,7 +24,7 @@ from seqopt.graph.formulation import End, Formulation, Watch, find_formulation
 from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.layers import Layers, candidate_layers, steps_over, travel
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 
 COUNTED = ("F_largest", "M_sup")
 COMPARED = ("equations-2-3", "weighted")
@@ -73,7 +73,7 @@ def _whole(problem: Layers, choice: tuple[int, ...]) -> list[Budget]:
 
 def timed(
     problem: Layers, formulation: Formulation, limit: float
-) -> tuple[StatePath | SeqoptError, float]:
+) -> tuple[Solution | SeqoptError, float]:
     """Return what a formulation chooses, or how it fails, and the seconds of the processor."""
     formulation.aim.costs(problem)
     took: list[float] = []
@@ -81,7 +81,7 @@ def timed(
         start = time.process_time()
         try:
             graph = compile_layers(problem, formulation.aim, alone=formulation.alone).instance
-            found: StatePath | SeqoptError = formulation.solve(graph, watch=Watch(limit))
+            found: Solution | SeqoptError = formulation.solve(graph, watch=Watch(limit))
         except SeqoptError as error:
             found = error
         took.append(time.process_time() - start)

@@ -19,7 +19,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, engine_for, recipe_for
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
 from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts, ScenarioCosts, largest_of
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.graph.source import Source
 from seqopt.problem.criteria import Ranked, RankSum, _counts_every_step
 from seqopt.problem.problem import WORST_PEAK, Aim, RobustAim
@@ -206,7 +206,7 @@ class Layers(Source, Shown):
         }
 
     def spent(
-        self, objective: Mapping[str, float], found: StatePath
+        self, objective: Mapping[str, float], found: Solution
     ) -> dict[str, dict[str, float | None]]:
         """Return what there is of every budget, what is spent, and its price."""
         known = [budget.name for budget in self.budgets if math.isfinite(budget.bound)]

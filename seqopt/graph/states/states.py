@@ -38,7 +38,7 @@ from seqopt.sequence.steps import Grips, Step
 from seqopt.stability.assessment import Stability
 
 if TYPE_CHECKING:
-    from seqopt.graph.solution import StatePath
+    from seqopt.graph.solution import Solution
     from seqopt.sequence._rule_space import FreeSpace
     from seqopt.sequence._schedule_space import ScheduleSpace
 
@@ -218,7 +218,7 @@ class States(Source, Shown):
         }
 
     def spent(
-        self, objective: Mapping[str, float], found: StatePath
+        self, objective: Mapping[str, float], found: Solution
     ) -> dict[str, dict[str, float | None]]:
         """Return what there is of every budget, and what is spent."""
         capped = zip(self.names[len(self.aims) :], self.budgets, strict=True)

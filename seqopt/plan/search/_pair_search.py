@@ -37,7 +37,7 @@ from seqopt.graph.instance import PEAK, SUM, Instance, _Target
 from seqopt.graph.layers.compiled import on_paths
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.layers import Layers, possible_after, windows
-from seqopt.graph.solution import StatePath
+from seqopt.graph.solution import Solution
 from seqopt.plan._paths import find_path
 from seqopt.plan.search._window_search import (
     WindowSearch,
@@ -194,7 +194,7 @@ class PairSearch(NamedTuple):
     """
 
     instance: Instance
-    selection: StatePath
+    selection: Solution
     along: WindowSearch
     models: int
 
