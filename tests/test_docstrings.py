@@ -82,8 +82,9 @@ def is_whole(name):
 def faults(name, *, whole=None):
     """Return what the docstring of an object lacks."""
     whole = is_whole(name) if whole is None else whole
-    if not whole and "Parameters\n---" not in (inspect.getdoc(locate(name)) or "Parameters\n---"):
-        return []  # it is there, and documents no parameter
+    said = inspect.getdoc(locate(name))
+    if not whole and said and ("Parameters\n---" not in said or not locate(name).__doc__):
+        return []  # it is there, and documents no parameter, or is that of the base it stands for
     wanted = WHOLE if whole else ALWAYS
     found = [f"{code}: {text}" for code, text in validate(name)["errors"] if code in wanted]
     thing = locate(name)

@@ -68,7 +68,7 @@ def _joined(parts: Sequence[Labels]) -> Labels:
     return Labels(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-class Growth(Protocol):
+class _Growth(Protocol):
     """What labels take, and how arcs continue them."""
 
     ends: Bools  # (n,)
@@ -112,7 +112,7 @@ class Sweep:
     """
 
     def __init__(
-        self, growth: Growth, limits: Floats, *, aim: int = 0, width: int | None = None
+        self, growth: _Growth, limits: Floats, *, aim: int = 0, width: int | None = None
     ) -> None:
         self._growth, self._limits = growth, np.array(limits, dtype=float)
         self._aim, self._width, self._found = aim, width, Swept()
@@ -203,7 +203,7 @@ class Sweep:
         self._found.path = tuple(self._growth.target[self._found.arcs].tolist())
 
 
-def _undominated(fresh: Labels, known: Sequence[Labels], growth: Growth) -> Labels:
+def _undominated(fresh: Labels, known: Sequence[Labels], growth: _Growth) -> Labels:
     """Return the labels that no known one, and no other, is found to dominate."""
     states = np.zeros(len(growth.ends), dtype=bool)
     states[fresh.state] = True
@@ -245,7 +245,7 @@ class LabelSearch(NamedTuple):
 
 
 def widening(
-    growth: Growth,
+    growth: _Growth,
     caps: Floats,
     best: LabelSearch,
     watch: Watch,

@@ -279,6 +279,7 @@ class OrderSpace(Space):
         return self._of(part).known(len(part[0]), states)
 
     def schedule(self, part: Part, asked: States) -> tuple[int, States]:
+        """Return how many bricks a part has, and its states with the demands of a problem."""
         own = self._of(part).problem
         found = replace(own, standing=asked.standing, settled=asked.settled)
         found.share_proofs(own)

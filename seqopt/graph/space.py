@@ -66,26 +66,100 @@ class Space(Protocol):
         """Return the first part and its only state (1, c)."""
 
     def codes(self, part: Key, states: Ints) -> Ints:
-        """Return a number (n,) for every state (n, c) that no other one of its part has."""
+        """Return a number for every state that no other one of its part has.
+
+        Parameters
+        ----------
+        part : hashable
+            Of which the states are.
+        states : (n, c) int
+            A state a row.
+
+        Returns
+        -------
+        (n,) int
+        """
 
     def within(self, part: Key, states: Ints) -> Moves:
-        """Return the moves from states (n, c) that stay within their part."""
+        """Return the moves from states that stay within their part.
+
+        Parameters
+        ----------
+        part : hashable
+            Of which the states are.
+        states : (n, c) int
+            A state a row.
+
+        Returns
+        -------
+        Moves
+        """
 
     def onward(self, part: Key, states: Ints) -> Iterator[tuple[Key, Moves]]:
-        """Yield the moves from states (n, c) that lead to the next level, by part."""
+        """Yield the moves from states that lead to the next level, by part.
+
+        Parameters
+        ----------
+        part : hashable
+            Of which the states are.
+        states : (n, c) int
+            A state a row.
+
+        Yields
+        ------
+        tuple of (hashable, Moves)
+        """
 
     def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
-        """Return what goals take of states (n, c), (n, g) in SI units, and which are allowed (n,).
+        """Return what goals take of states, and which states are allowed.
 
-        ``rough``: whether six digits are enough. ``most``: where there are floors, a state of which
-        the first goal takes more need not have values that are larger than this.
+        Parameters
+        ----------
+        part : hashable
+            Of which the states are.
+        states : (n, c) int
+            A state a row.
+        rough : bool
+            Whether six digits are enough.
+        most : float
+            Where there are floors, a state of which the first goal takes more need not have values
+            that are larger than this.
+
+        Returns
+        -------
+        tuple of ((n, g) float, (n,) bool)
+            Values in SI units.
         """
 
     def ended(self, part: Key, states: Ints) -> Bools:
-        """Return in which states (n, c) of the last level a build may end, (n,)."""
+        """Return in which states of the last level a build may end.
+
+        Parameters
+        ----------
+        part : hashable
+            Of which the states are.
+        states : (n, c) int
+            A state a row.
+
+        Returns
+        -------
+        (n,) bool
+        """
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
-        """Return what goals take of moves (m, g): of the states they lead to, and as of `Moves`."""
+        """Return what goals take of moves.
+
+        Parameters
+        ----------
+        values : (m, g) float
+            What they take of the states that the moves lead to.
+        taken : (m, k) float
+            As of `Moves`.
+
+        Returns
+        -------
+        (m, g) float
+        """
         return values
 
     @property
@@ -99,11 +173,36 @@ class Space(Protocol):
         return False
 
     def stand(self, part: Key, states: Ints) -> Bools:
-        """Return which states (n, c) pass what is too expensive to be asked of all, (n,)."""
+        """Return which states pass what is too expensive to be asked of all.
+
+        Parameters
+        ----------
+        part : hashable
+            Of which the states are.
+        states : (n, c) int
+            A state a row.
+
+        Returns
+        -------
+        (n,) bool
+        """
         return np.ones(len(states), dtype=bool)
 
     def known(self, part: Key, states: Ints) -> Ints:
-        """Return the same where it is known before it is asked: 1 passes, -1 does not, else 0."""
+        """Return the same where it is known before it is asked.
+
+        Parameters
+        ----------
+        part : hashable
+            Of which the states are.
+        states : (n, c) int
+            A state a row.
+
+        Returns
+        -------
+        (n,) int
+            1 where a state passes, -1 where it does not, 0 where that is open.
+        """
         return np.zeros(len(states), dtype=np.int64)
 
     @property
@@ -112,8 +211,16 @@ class Space(Protocol):
         return 0, 0
 
     def path(self, found: Found) -> tuple[tuple[int, ...], tuple[tuple[int, ...], ...]]:
-        """Return the bricks in the order of a path, empty where it is given, and its states.
+        """Return the order of bricks on a path, and its states.
 
-        Each state is its level, then its numbers.
+        Parameters
+        ----------
+        found : sequence of (int, hashable, (c,) int)
+            Level, part and state of all states of the path, the start left out.
+
+        Returns
+        -------
+        tuple of (tuple of int, tuple of tuple of int)
+            The order is empty where it is given; each state is its level, then its numbers.
         """
         return (), tuple((level, *state.tolist()) for level, _, state in found)
