@@ -227,15 +227,24 @@ def _told(verb: str, path: Path) -> Iterator[None]:
     except FileError:
         raise
     except (OSError, ValueError) as error:
+        why = str(error)
+        if isinstance(error, OSError):
+            why = error.strerror or why
+        elif isinstance(error, UnicodeEncodeError):
+            why = f"{error.object[error.start]!r} in it is half a character"
+        elif isinstance(error, UnicodeError):
+            why = "it is not UTF-8 text"
         wanted = {"read": "readable", "write": "writable"}[verb]
-        raise FileError(f"cannot {verb} {path}: {_reason(error)}; name a {wanted} file") from error
+        raise FileError(f"cannot {verb} {path}: {why}; name a {wanted} file") from error
 
 
 def _stage(path: Path, content: bytes | str) -> tuple[Path, Path]:
     """Write content beside its place; return the file that has it, and the place."""
     content = content.encode() if isinstance(content, str) else content
     target = Path(os.path.realpath(path))
-    mode = 0o666 & ~_umask()
+    mask = os.umask(0)  # a new file gets it; a temporary one is private
+    os.umask(mask)
+    mode = 0o666 & ~mask
     if target.exists():
         if not target.is_file():
             what = "folder" if target.is_dir() else "device or pipe"
@@ -272,19 +281,3 @@ def _is_same(path: Path, other: Path) -> bool:
         return path.samefile(other)
     except OSError:  # one of them is not there
         return os.path.realpath(path) == os.path.realpath(other)
-
-
-def _reason(error: Exception) -> str:
-    """Return why a file cannot be read or written, in a few words."""
-    if isinstance(error, OSError):
-        return error.strerror or str(error)
-    if isinstance(error, UnicodeEncodeError):
-        return f"{error.object[error.start]!r} in it is half a character"
-    return "it is not UTF-8 text" if isinstance(error, UnicodeError) else str(error)
-
-
-def _umask() -> int:
-    """Return the mask that an ordinary new file would get (a temporary one is private)."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -165,12 +165,6 @@ def _short(content: object) -> str:
     if isinstance(content, Mapping):
         return "{" + ", ".join(f"{key!r}: {_short(content[key])}" for key in content) + "}"
     if isinstance(content, list | tuple):
-        return _short_list(content)
+        many = f"<{len(content)} {type(content[0]).__name__}>" if len(content) > 3 else ""
+        return many or "(" + ", ".join(map(_short, content)) + ")"
     return repr(content)
-
-
-def _short_list(content: list[object] | tuple[object, ...]) -> str:
-    """Return the entries of a list of up to three, else how many and what they are."""
-    if len(content) > 3:
-        return f"<{len(content)} {type(content[0]).__name__}>"
-    return "(" + ", ".join(map(_short, content)) + ")"

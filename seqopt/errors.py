@@ -17,12 +17,8 @@ def plugins(group: str) -> dict[str, EntryPoint]:
     >>> sorted(plugins("seqopt.limit_analysis"))
     ['lp', 'socp']
     """
-    return dict(_of_group(_places(), group))
-
-
-def _places() -> _Places:
-    """Return where packages lie and when something there last changed."""
-    return tuple((place, _changed(place)) for place in sys.path)
+    places = tuple((place, _changed(place)) for place in sys.path)
+    return dict(_of_group(places, group))
 
 
 def _changed(place: str) -> int:
@@ -137,16 +133,10 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
         return ""
     import difflib  # noqa: PLC0415  # for errors only
 
-    near = difflib.get_close_matches(given.lower(), meant, 2)
-    tied = len({_likeness(name, given) for name in near}) < len(near)
+    word = given.lower()
+    near = difflib.get_close_matches(word, meant, 2)
+    tied = len({difflib.SequenceMatcher(None, name, word).ratio() for name in near}) < len(near)
     return f" (did you mean {meant[near[0]]}?)" if near and not tied else ""
-
-
-def _likeness(one: str, other: str) -> float:
-    """Return how much one word is like another, from 0 to 1."""
-    from difflib import SequenceMatcher  # noqa: PLC0415  # for errors only
-
-    return SequenceMatcher(None, one.lower(), other.lower()).ratio()
 
 
 def message_of(error: BaseException) -> str:

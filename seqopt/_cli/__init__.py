@@ -3,7 +3,7 @@
 `seqopt._cli.main.main` runs a command as the shell does and returns its exit status, a
 `seqopt._cli.answer.Status`. `seqopt._cli.arguments` names the commands, each of which is a module
 with its arguments, its help and ``run``, which returns a `seqopt._cli.answer.Answer`: printed as
-text, as the paths of what is written, or as JSON. The room exports nothing, so that
+text, as the paths of written files, or as JSON. The package exports nothing, so that
 ``seqopt._cli.main`` stays the module.
 
 >>> from seqopt._cli.main import main

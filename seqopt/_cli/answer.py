@@ -1,4 +1,4 @@
-"""What a command answers, the three forms in which it is printed, and how a command ends."""
+"""The answer of a command, the three forms in which it is printed, and the exit status."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LESS = "take fewer bricks, robots that reach less, or a computer with more memor
 
 
 class Status(IntEnum):
-    """How a command ended: its exit status."""
+    """Exit status of a command."""
 
     DONE = 0
     DOES_NOT_HOLD = 1  # done, and something asked for does not hold
@@ -39,7 +39,7 @@ class Status(IntEnum):
 
 
 def status_of(error: BaseException) -> Status:
-    """Say in a line on standard error what went wrong, and return the exit status."""
+    """Print an error as one line on standard error, and return the exit status."""
     if isinstance(error, KeyboardInterrupt):
         complain(f"seqopt: interrupted{f'; {error}' if str(error) else ''}")
         return Status.INTERRUPTED
@@ -63,7 +63,7 @@ def status_of(error: BaseException) -> Status:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Answer:
-    """What a command answers, as facts for scripts and as text for people."""
+    """The answer of a command: facts for scripts and text for people."""
 
     facts: Mapping[str, object]  # values, mappings, sequences, tables, and what makes them if asked
     text: str = ""  # lines on standard output
@@ -78,7 +78,7 @@ class Answer:
     scene: Any = None  # of which it is
 
     def strictly(self) -> Answer:
-        """Return the answer of --strict: what does not hold is its status."""
+        """Return the answer of --strict: its violations set the exit status."""
         if not self.faults or self.status not in (Status.DONE, Status.DOES_NOT_HOLD):
             return self
         failures = (*self.failures, *self.faults)
@@ -100,7 +100,7 @@ class Answer:
 
 
 def scene_facts(scene: Any) -> dict[str, object]:
-    """Return what a scene is called, and how large it is."""
+    """Return name and size of a scene."""
     return {
         "name": scene.name,
         "bricks": len(scene.bricks),
@@ -130,10 +130,9 @@ def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) ->
 
 
 def plain(value: object) -> Any:
-    """Return a value as JSON can hold it, numbers with all of their digits.
+    """Convert a value to types of JSON, numbers with all digits.
 
-    What is not known (NaN) is null, what is infinite the text ``inf`` or ``-inf``; a table is a
-    list of rows.
+    NaN becomes null, an infinite number the string ``inf`` or ``-inf``, a table a list of rows.
 
     >>> plain({"gap": float("nan"), "bond": float("inf"), "nodes": (1, 20)})
     {'gap': None, 'bond': 'inf', 'nodes': [1, 20]}
@@ -142,7 +141,7 @@ def plain(value: object) -> Any:
 
 
 def _unpacked(value: object) -> Any:
-    """Return what a table, an array, a member of an enumeration or anything else holds."""
+    """Return the contents of a table, an array, an enumeration's member or another value."""
     import pandas as pd  # noqa: PLC0415  # help needs none of it
 
     if isinstance(value, pd.DataFrame):

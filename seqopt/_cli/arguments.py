@@ -1,4 +1,4 @@
-"""The words of the command line: commands, their arguments, and the help that they print."""
+"""Parsers of the command line: commands, their arguments, and their help."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MISSING = "the following arguments are required"
 
 
 def _nearest(message: str, options: Iterable[str]) -> str:
-    """Return a hint at the word that a message of the parser is about, or nothing.
+    """Return a suggestion for the word that an error of the parser names, or an empty string.
 
     >>> _nearest("unrecognized arguments: --formulaton=beam", ["--formulation", "--out"])
     ' (did you mean --formulation?)'
@@ -56,7 +56,7 @@ def _nearest(message: str, options: Iterable[str]) -> str:
 
 
 def _first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> str:
-    """Return a message about a missing argument, or one about a mistyped option that explains it.
+    """Return the parser's message, or one about the mistyped option that causes it.
 
     >>> given = ["arch25", "--ot", "best"]
     >>> _first_wrong("the following arguments are required: --out", given, ["--out"])
@@ -77,9 +77,9 @@ def _layout(prog: str) -> argparse.HelpFormatter:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Command:
-    """A command in a few words, and which class of `seqopt._cli.commands` says what it is asked.
+    """A command: a short description, and the class of `seqopt._cli.commands` with its options.
 
-    Its module has ``run`` as well, and is loaded when it is asked for.
+    Its module, which has ``run`` as well, is loaded on demand.
     """
 
     about: str
@@ -91,7 +91,7 @@ class _Command:
 
     @property
     def asked(self) -> Any:
-        """The class of what it is asked."""
+        """The class of its options."""
         return getattr(self.load(), self.where.partition(":")[2])
 
 
@@ -117,7 +117,7 @@ COMMANDS = {
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line, and whose help is a result like others."""
+    """A parser with one-line errors that prints help as a result on standard output."""
 
     color: bool  # of Python 3.14
     given: Sequence[str] = ()  # what it was asked to parse: a missing word may be a mistyped one
@@ -144,7 +144,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Show(argparse.Action):
-    """An option that prints a text, which is made then alone."""
+    """An option that prints a text, created on demand."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         show(self.const(parser))
@@ -152,9 +152,9 @@ class _Show(argparse.Action):
 
 
 def parser(asked: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser of the command line, or of the one command that is asked for.
+    """Return the parser of the command line, or of one command.
 
-    ``command`` names what is to be run. A wrong word ends the program with `Status.BAD_INPUT`.
+    ``command``: the only one to parse. A wrong word ends the program with `Status.BAD_INPUT`.
     """
     whole = _Parser(
         prog="seqopt",
@@ -188,7 +188,7 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
 
 @dataclass(frozen=True)
 class Printed:
-    """How an answer is printed, and whether what does not hold in it is the exit status."""
+    """Output format of an answer, and whether violations set the exit status."""
 
     quiet: bool = False
     json: bool = False
@@ -196,7 +196,7 @@ class Printed:
 
 
 def request(words: Sequence[str], tell: Any = None) -> tuple[str, Any, Printed]:
-    """Return the command that words name, and its options; a wrong word ends the program."""
+    """Parse words into a command and its options; a wrong word ends the program."""
     options = vars(parser(named_command(words)).parse_args(words))
     from seqopt._cli.signatures import given  # noqa: PLC0415  # of which help needs nothing
 
@@ -208,10 +208,10 @@ def request(words: Sequence[str], tell: Any = None) -> tuple[str, Any, Printed]:
 
 
 def first_screen(command: argparse.ArgumentParser) -> str:
-    """Return the help of a command on one screen: the whole of it where that fits.
+    """Return the help of a command on one screen, in full if that fits.
 
-    Else what must be given, what an example gives, and what has no dashes; of its help as much as
-    stands before the first semicolon.
+    Otherwise only required options, those of examples, and positional arguments, with their help up
+    to the first semicolon.
     """
     whole = command.format_help()
     if whole.count("\n") <= LINES or command._subparsers is not None:
@@ -238,5 +238,5 @@ def first_screen(command: argparse.ArgumentParser) -> str:
 
 
 def named_command(words: Sequence[str]) -> str:
-    """Return the command that words after ``seqopt`` ask for, empty if there is none."""
+    """Return the command among the words after ``seqopt``, empty if there is none."""
     return next((word for word in words if not word.startswith("-")), "")

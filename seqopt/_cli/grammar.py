@@ -1,4 +1,4 @@
-"""What the words of the command line stand for: limits, criteria, mortars, props, numbers."""
+"""Parsers of words of the command line: limits, criteria, mortars, props, numbers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PROPS = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma
 
 
 def parse_count(number: int | str, where: str, most: int, least: int = 1) -> int:
-    """Return a whole number within bounds; ``where``: argument, for messages."""
+    """Parse an integer within bounds; ``where``: argument, for messages."""
     text = str(number)
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
         raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
@@ -38,14 +38,14 @@ def parse_count(number: int | str, where: str, most: int, least: int = 1) -> int
 
 
 def parse_robots(robots: int | Words | None) -> tuple[str, ...]:
-    """Return names of robots from words with commas between them; nothing for none or a count."""
+    """Parse comma-separated names of robots; empty for None or a number."""
     text = "" if robots is None else str(robots)
     named = text and not text.isdecimal()
     return tuple(name.strip() for name in text.split(",")) if named else ()
 
 
 def with_payload(text: str, scene: Scene) -> Scene:
-    """Return a scene with robots that carry what words say, ``250`` N each or ``rob1=250``."""
+    """Return a scene with payloads from words: ``250``, N each, or ``rob1=250``."""
     name, equals, value = text.rpartition("=")
     names = [robot.name for robot in scene.robots]
     if equals and name not in names:
@@ -57,7 +57,7 @@ def with_payload(text: str, scene: Scene) -> Scene:
 
 
 def with_grips(grips: Number, scene: Scene) -> Scene:
-    """Return a scene with grips as stiff as a word says, ``rigid``, ``1e6`` or ``1e6x1e6x5e5``.
+    """Return a scene with grip stiffness from a word: ``rigid``, ``1e6`` or ``1e6x1e6x5e5``, N/m.
 
     ``turning=1e4`` after a comma is the rotational stiffness.
     """
@@ -91,7 +91,7 @@ def parse_numbers(
     zero: bool = False,
     advice: str = "",
 ) -> dict[str, float]:
-    """Return positive numbers by name, each from ``NAME=VALUE``; any name is known by default."""
+    """Parse positive numbers from ``NAME=VALUE``, by name; by default any name is accepted."""
     out: dict[str, float] = {}
     for text in texts:
         name, value = split_word(text)
@@ -103,7 +103,7 @@ def parse_numbers(
 
 
 def parse_options(formulation: Formulation | str, texts: Words) -> dict[str, Any]:
-    """Return options of a formulation, whose ``solve`` says which there are and of which type."""
+    """Parse options of a formulation, typed by the signature of its ``solve``."""
     formulation = as_formulation(formulation)
     known = formulation.options
     out: dict[str, Any] = {}
@@ -125,7 +125,7 @@ def parse_options(formulation: Formulation | str, texts: Words) -> dict[str, Any
 
 
 def parse_mortar(text: str | Mortar, where: str) -> Mortar:
-    """Return a mortar by its words; ``where`` is the argument, for messages."""
+    """Parse a mortar; ``where``: argument, for messages."""
     if isinstance(text, Mortar):  # of Python
         return text
     try:
@@ -137,7 +137,7 @@ def parse_mortar(text: str | Mortar, where: str) -> Mortar:
 
 
 def parse_standing(asked: Tilted) -> Standing | None:
-    """Return what is demanded of the stability of states, if anything is."""
+    """Return the stability requirement of the options, None if there is none."""
     if isinstance(asked.stands, Standing):  # of Python
         return asked.stands
     curing = asked.curing if isinstance(asked, Cured) else ()
@@ -157,7 +157,7 @@ def parse_standing(asked: Tilted) -> Standing | None:
 
 
 def parse_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
-    """Return the criterion of the options; ``usual``: the one that options of ranks refine."""
+    """Return the criterion of the options; ``usual``: the default that options of ranks modify."""
     said = {"crown": asked.crown, "ranked": asked.ranked}
     given = {name: text for name, text in said.items() if text is not None}
     named = asked.criterion
@@ -174,13 +174,13 @@ def parse_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
 
 
 def parse_resources(asked: Chosen, progress: Tell | None = None) -> Resources:
-    """Return what a computation may use."""
+    """Return the computing resources of the options."""
     most = None if asked.max_memory is None else parse_size(asked.max_memory)
     return Resources(asked.workers, None, asked.cache, most, progress)
 
 
 def parse_size(text: str) -> float:
-    """Return a number of bytes from words as ``2GB``, ``500 MB`` or ``1.5GiB``.
+    """Parse a size, as ``2GB``, ``500 MB`` or ``1.5GiB``, into bytes.
 
     >>> parse_size("1.5GB")
     1500000000.0
@@ -194,7 +194,7 @@ def parse_size(text: str) -> float:
 
 
 def parse_props(text: str, scene: Scene) -> tuple[Prop, ...]:
-    """Return props from words, as ``13,27:1e6,push,capacity=300`` or ``every:1e6``.
+    """Parse props, as ``13,27:1e6,push,capacity=300`` or ``every:1e6``.
 
     ``every`` is a node of each brick, ``all`` are all nodes, ``none`` are none; ``push`` and
     ``capacity`` are of all that are named.

@@ -1,4 +1,4 @@
-"""What commands take as scene, steps, engine and states: names, files, folders, Python values."""
+"""Inputs of commands: scene, steps, engine and states from names, files, folders or values."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ FORMS = "PLAN:STEP (a plan's folder or CSV file), a STATE.json, or a number of b
 
 
 class NamedSteps(NamedTuple):
-    """A closed sequence, and what it is called: its method, its title, or the stem of its file.
+    """A closed sequence with its name: its method, its title, or the stem of its file.
 
-    ``notes`` say which sequence it is where nobody asked for one.
+    ``notes``: the default that was chosen, if none was requested.
     """
 
     name: str
@@ -57,7 +57,7 @@ def is_folder(path: Path) -> bool:
 
 
 def given_scene(asked: options.Scened) -> Scene:
-    """Return the scene that is given, also as a plan or the folder of one."""
+    """Return the scene of the options, also from a plan or its folder."""
     scene = asked.scene
     if isinstance(scene, ShownBuild):
         return scene.engine.network.scene
@@ -67,7 +67,7 @@ def given_scene(asked: options.Scened) -> Scene:
 
 
 def given_plan(asked: options.Fixed) -> ShownBuild | Path | None:
-    """Return the plan whose steps are asked for, if one is named or stands for the scene."""
+    """Return the plan of --plan, or the one given in place of the scene, if any."""
     scene, plan = asked.scene, asked.plan
     if plan is not None:
         return plan if isinstance(plan, ShownBuild) else Path(plan)
@@ -79,16 +79,16 @@ def given_plan(asked: options.Fixed) -> ShownBuild | Path | None:
 
 
 def file_name(name: str | Path, end: str) -> Path:
-    """Return what a file about a scene is called where no name is given: in this folder."""
+    """Return the default file name about a scene, in the working directory."""
     return Path(re.sub(r"\W+", "-", re.sub(r"\.json$", "", Path(name).name)).strip("-") + end)
 
 
 def plan_folder(
     asked: options.Postures, given: options.BuiltFrom, *, free: bool = False
 ) -> tuple[Path, tuple[str, ...]]:
-    """Return the folder of a plan, which is made where a plan, a scene or its name is given.
+    """Return the folder of a plan, written to a temporary one for a plan or a scene.
 
-    The steps of a scene are usual ones, or the best ``free`` ones; notes say which.
+    A scene gets default steps, or the optimal ``free`` ones; notes name them.
     """
     notes: tuple[str, ...] = ()
     if isinstance(given, str | Path) and Path(given).is_dir():
@@ -110,10 +110,10 @@ def plan_folder(
 
 
 def find_steps(asked: options.Fixed, network: Network) -> NamedSteps:
-    """Return the closed sequence that a command is asked for, or the usual one.
+    """Return the requested closed sequence, or the default one.
 
-    Raises `SceneError`, `StepError` if the method is not for the scene, or robots are named beside
-    a plan.
+    Raises `SceneError`, `StepError` if the method is not applicable to the scene, or robots are
+    named beside a plan.
     """
     robots = grammar.parse_robots(asked.robots)
     scene, plan, method = network.scene, given_plan(asked), asked.method
@@ -144,7 +144,7 @@ def find_steps(asked: options.Fixed, network: Network) -> NamedSteps:
 def _usual(
     asked: options.Postures, network: Network, robots: Sequence[str]
 ) -> tuple[ShownBuild, tuple[str, ...]]:
-    """Return the build by the first fixed method that fits, else a plan, and which one it is."""
+    """Return the build of the first feasible fixed method, else a plan, and a note on it."""
     for name, method in METHODS.items():
         with suppress(StepError):
             steps = method(network, robots)
@@ -155,14 +155,14 @@ def _usual(
 
 
 def _free(asked: options.Postures, scene: Scene) -> tuple[Plan, tuple[str, ...]]:
-    """Return the best free schedule, and that it is this."""
+    """Return the optimal free schedule, and a note that says so."""
     plan = optimize(scene, FREE, progress=asked.tell)
     return plan, (f"steps: of the best free schedule, {plan.result}",)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Place:
-    """Where a build begins or ends, and the steps that led there, where they are known."""
+    """Where a build begins or ends, and the steps that led there, if known."""
 
     site: Site | None = None
     done: tuple[Step, ...] | None = ()
@@ -197,7 +197,7 @@ def kept_place(asked: options.Posed, keep: str, scene: Scene, begin: Place) -> t
 def read_place(scene: Scene, text: str, *, bare: bool = True) -> tuple[Scene, Place]:
     """Return a place from words, and the scene in an order that begins with its bricks.
 
-    ``bare``: whether a number of bricks stands for these with nobody holding any.
+    ``bare``: whether a number of bricks means a state without grips.
     """
     if text.isdecimal():
         grips = (None,) * len(scene.robots) if bare else None
@@ -214,7 +214,7 @@ def read_place(scene: Scene, text: str, *, bare: bool = True) -> tuple[Scene, Pl
 
 
 def _of_plan(scene: Scene, path: Path, step: int) -> Place:
-    """Return where a plan stands after a step; robots that it does not know hold nothing."""
+    """Return the place of a plan after a step; robots that it does not list hold nothing."""
     file = path / "plan.csv" if path.is_dir() else path
     columns = read_text(file).partition("\n")[0].split(",")
     known = [robot for robot in scene.robots if f"{robot.name}_node" in columns]
@@ -230,7 +230,7 @@ def _of_plan(scene: Scene, path: Path, step: int) -> Place:
 
 
 def between(moves: Schedule | FreeRules, begin: Place, end: Place) -> Schedule | FreeRules:
-    """Return the moves that are left between two places."""
+    """Return the moves between two places."""
     if begin.site is None and end.site is None:
         return moves
     if isinstance(moves, FreeRules):
@@ -244,7 +244,7 @@ def between(moves: Schedule | FreeRules, begin: Place, end: Place) -> Schedule |
 
 
 def find_scene(asked: options.Built) -> Scene:
-    """Return the scene that options describe; one of a range of --grips keeps its own."""
+    """Return the scene of the options; for a range of --grips with its own stiffness."""
     if asked.order == "search":
         raise ProblemError(
             "--order search: only the free schedule has it; give optimize --schedule free"
@@ -269,7 +269,7 @@ def in_seconds(asked: options.Timed, scene: Scene) -> Scene:
 
 
 def find_engine(asked: options.Computed, network: Network) -> Engine:
-    """Return the engine that a command is asked for; where none is named, that of the scene."""
+    """Return the requested engine, by default that of the scene."""
     mortar = None if asked.mortar is None else grammar.parse_mortar(asked.mortar, "--mortar")
     proven = isinstance(asked, options.Judged) and asked.stability
     of_verdicts = asked.engine not in LIMITED and proven
@@ -285,7 +285,7 @@ def find_engine(asked: options.Computed, network: Network) -> Engine:
 
 
 def posture_trouble(asked: options.Postures, scene: Scene) -> str:
-    """Compute postures of arms, or take those that are kept; return why there are none, if so."""
+    """Compute or load postures of arms; return the error message if there are none."""
     try:
         find_postures(scene, asked.cache, asked.tell)
     except (ExtraError, SceneError) as error:
@@ -294,7 +294,7 @@ def posture_trouble(asked: options.Postures, scene: Scene) -> str:
 
 
 def find_prover(asked: options.Judged, network: Network) -> BuildProver:
-    """Return what says which steps of builds stand, with the mortars that a command shows."""
+    """Return the prover of stability, with the mortars that a command shows."""
     demanded = grammar.parse_standing(asked) if isinstance(asked, options.Tilted) else None
     own = getattr(asked, "stands", None) or asked.mortar or "epoxy"
     mortar = grammar.parse_mortar(own, "--mortar") if demanded is None else demanded.mortar

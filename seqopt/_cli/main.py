@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class _Later(ModuleType):
-    """Stands for a library until something of it is asked for."""
+    """Proxy of a library, loaded on first access."""
 
     def __getattr__(self, name: str) -> object:
         if sys.modules.get(self.__name__) is self:
@@ -45,10 +45,10 @@ class _Later(ModuleType):
 
 
 def load(words: Sequence[str]) -> None:
-    """Load the libraries of the command that words ask for, if they ask for one.
+    """Load the libraries of the command among the words, if there is one.
 
-    They would meet its interrupts if they came later. Memory is not collected meanwhile, nor from
-    what is loaded later on: all of it stays.
+    Later imports would be subject to interrupts. Garbage collection is off meanwhile, and freezes
+    all loaded objects.
     """
     gc.disable()
     asked = named_command(words)

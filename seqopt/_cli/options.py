@@ -1,9 +1,9 @@
-"""What commands are asked: frozen values, whose docstrings are the help of the command line.
+"""Options of commands: frozen values, whose docstrings are the help of the command line.
 
 A class names its question first; then every option that it has, the word for its value, and the
 help. `seqopt._cli.arguments` makes parsers of them, `seqopt.doors` functions of Python: a field is
 annotated with what these take, and is in words once `seqopt._cli.signatures.given` has read it.
-What a docstring describes and no field holds is for whoever prints the answer.
+Options that are described but have no field concern the output alone.
 """
 
 from __future__ import annotations
@@ -84,12 +84,12 @@ class Asked:
     progress: Tell | None = None
 
     def __init_subclass__(cls) -> None:
-        """Make a frozen value of every class of what is asked."""
+        """Turn every subclass into a frozen dataclass with keyword-only fields."""
         dataclass(frozen=True, kw_only=True)(cls)
 
     @property
     def tell(self) -> Tell:
-        """What is told how far the command is."""
+        """The progress callback; by default it ignores reports."""
         return self.progress or (lambda _: None)
 
 

@@ -102,22 +102,16 @@ def read(path: Path) -> Instance:
     except FileError as error:
         raise FileError(f"{error}; it is no instance: write one with seqopt instance") from error
     _check(document, path)
-    document = _with_wholes(document)
+    for name in ("nodes", "arcs"):
+        document[name] = int(document[name])  # JSON Schema takes 5.0 for a whole number
+    for goal in document["goals"]:
+        goal["columns"] = [*map(int, goal["columns"])]
+    for cap in document["caps"]:
+        cap["column"] = None if cap["column"] is None else int(cap["column"])
     try:
         return _instance(document, _arrays(document, archive))
     except (ProblemError, ValueError) as error:
         raise FileError(f"{path}: {error}") from error
-
-
-def _with_wholes(document: dict[str, Any]) -> dict[str, Any]:
-    """Return a document whose whole numbers are such in Python: JSON Schema takes 5.0 for one."""
-    goals = [{**goal, "columns": [*map(int, goal["columns"])]} for goal in document["goals"]]
-    caps = [
-        {**cap, "column": None if cap["column"] is None else int(cap["column"])}
-        for cap in document["caps"]
-    ]
-    counts = {name: int(document[name]) for name in ("nodes", "arcs")}
-    return {**document, **counts, "goals": goals, "caps": caps}
 
 
 def _arrays(document: dict[str, Any], archive: Archive) -> dict[str, np.ndarray]:

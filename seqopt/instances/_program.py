@@ -178,7 +178,11 @@ def _goal(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, more: _Mo
     else:
         first, count = more.at[f"tail {k}"], len(goal.columns)
         out[first], out[first + 1 : first + 1 + count] = 1.0, goal.most
-        _tail(draft, instance.amounts[np.ix_(arc, np.array(goal.columns))], first)
+        for s, column in enumerate(goal.columns):  # u_s: what a total is above the threshold
+            columns = np.concatenate([np.arange(len(arc)), [first, first + 1 + s]])
+            values = np.concatenate([-instance.amounts[arc, column], [1.0, 1.0]])
+            parts = np.zeros(len(values), dtype=int), columns, values
+            draft.add(f"total_{s}", parts, (np.zeros(1), np.full(1, np.inf)))
     return out
 
 
@@ -192,15 +196,6 @@ def _peak(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, variable:
     columns = np.concatenate([np.arange(len(arc)), np.full(count, variable)])
     values = np.concatenate([-instance.amounts[arc, goal.columns[0]], np.ones(count)])
     draft.add("peak", (at, columns, values), (np.zeros(count), np.full(count, np.inf)))
-
-
-def _tail(draft: _Draft, amounts: Floats, first: int) -> None:
-    """Say what every total is above the threshold."""
-    for s, own in enumerate(amounts.T):
-        columns = np.concatenate([np.arange(len(own)), [first, first + 1 + s]])
-        values = np.concatenate([-own, [1.0, 1.0]])
-        parts = np.zeros(len(values), dtype=int), columns, values
-        draft.add(f"total_{s}", parts, (np.zeros(1), np.full(1, np.inf)))
 
 
 def _caps(draft: _Draft, instance: Instance, arc: Ints, more: _More) -> None:

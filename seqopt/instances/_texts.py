@@ -133,24 +133,20 @@ def as_cp_sat(instance: Instance) -> str:
     Amounts become whole numbers of 1/parts, rounded down; the model's objective has the scale.
     """
     found = program(instance)
-    parts = _parts(found)
-    return "\n".join(_cp_sat(instance, found, parts)) + "\n"
-
-
-def _parts(found: Program) -> float:
-    """Return in how many parts a unit is cut: none is lost if that can be."""
     numbers = np.concatenate([found.cost, found.matrix.data, found.low[np.isfinite(found.low)]])
-    for parts in PARTS:
+    for parts in map(float, PARTS):
         if np.allclose(np.rint(numbers * parts), numbers * parts, rtol=0.0, atol=1e-9):
-            return float(parts)
-    size = float(np.abs(numbers).max())
-    return float(10.0 ** np.floor(np.log10(FINEST / size)))
+            break
+    else:
+        parts = float(10.0 ** np.floor(np.log10(FINEST / float(np.abs(numbers).max()))))
+    return "\n".join(_cp_sat(instance, found, parts)) + "\n"
 
 
 def _cp_sat(instance: Instance, found: Program, parts: float) -> Iterator[str]:
     yield from (f"# {line}" for line in _comments(instance) if line)
     yield f"# a unit is {parts:.17g} parts"
-    most = _most(found, parts)
+    most = float(np.abs(found.matrix.data).max()) * parts * (found.matrix.shape[0] + 1)
+    most = min(most, 2.0**50)  # of a variable that is no arc: all amounts together
     for name, upper, whole in zip(found.names, found.upper, found.whole, strict=True):
         top = 1 if whole else int(min(upper * parts, most))
         yield f'variables {{ name: "{name}" domain: [0, {top}] }}'
@@ -168,12 +164,6 @@ def _cp_sat(instance: Instance, found: Program, parts: float) -> Iterator[str]:
         parts = parts * parts
     terms = f"vars: {_listed(costs)} coeffs: {_listed(values)}"
     yield f"objective {{ {terms} scaling_factor: {1 / parts!r} }}"
-
-
-def _most(found: Program, parts: float) -> float:
-    """Return what a variable that is no arc is at most: all amounts together."""
-    most = float(np.abs(found.matrix.data).max()) * parts * (found.matrix.shape[0] + 1)
-    return min(most, 2.0**50)
 
 
 def _linear(

@@ -1,7 +1,7 @@
-"""How formulations are called: what judges them stays as it was, and nonsense is a failure.
+"""Safe calls of formulations: the judge's data stay unchanged, malformed answers are failures.
 
-One rule for all formulations: what the judge uses has a checksum, before a formulation is called
-and after. Arrays that it unlocks and attributes that it sets are seen by it.
+One rule for all formulations: the judge's data have the same checksum before and after the call,
+which detects writes to unlocked arrays and attributes that were set.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ Result = TypeVar("Result")
 def called(
     name: str, judged: Callable[[], object], kind: type[Result], solve: Callable[[], object]
 ) -> Result:
-    """Return the answer, of a kind, of a formulation by name, which ``solve`` calls.
+    """Call ``solve`` of the formulation ``name`` and return its answer, of type ``kind``.
 
-    ``judged``: returns what its answer is judged by. Raises `SolverError` if the formulation raises
-    anything but an error of seqopt or an interrupt, returns something else, or changes what it is
-    judged by, also where it fails.
+    ``judged``: returns the data of the judge. Raises `SolverError` if the formulation raises
+    anything but an error of seqopt or an interrupt, returns another type, or changes these data,
+    even where it fails.
     """
     before = checksum(judged())
     try:
@@ -59,7 +59,7 @@ def called(
 
 @contextmanager
 def readable(name: str) -> Iterator[None]:
-    """Say that a formulation, by name, failed where what it returned cannot be read."""
+    """Raise a `SolverError` for errors of reading the answer of the formulation ``name``."""
     try:
         yield
     except (TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
@@ -67,16 +67,16 @@ def readable(name: str) -> Iterator[None]:
 
 
 def text(given: object) -> str:
-    """Return a text if it is one; a `TypeError` says that it is none."""
+    """Return a string unchanged; raise a `TypeError` for any other type."""
     if not isinstance(given, str):
         raise TypeError(f"{type(given).__name__} where a text belongs")
     return given
 
 
 def checksum(value: object) -> bytes:
-    """Return a checksum of a value: of its arrays, numbers, texts and fields, and of its methods.
+    """Return a 16-byte checksum of the arrays, numbers, strings, fields and methods of a value.
 
-    Engines count as themselves, with the scene that they are for: what they keep may grow.
+    Engines count by identity, with their scene: their caches may grow.
     """
     digest = hashlib.blake2b(digest_size=16)
     _add(digest, value)
@@ -107,7 +107,7 @@ def _add(digest: Any, value: object) -> None:
 
 
 def _parts(value: object) -> list[object]:
-    """Return the fields of a value, and what its class and itself call under which names."""
+    """Return the fields of a value, the methods of its class, and attributes that shadow them."""
     methods = [(name, id(thing)) for k in type(value).__mro__ for name, thing in vars(k).items()]
     held = getattr(value, "__dict__", {})
     if is_dataclass(value):
@@ -122,7 +122,7 @@ def _parts(value: object) -> list[object]:
 
 
 def _shadowing(value: object) -> list[str]:
-    """Return the methods of a value's class that it has under the same names itself."""
+    """Return names of instance attributes that shadow methods of the class."""
     return [n for n in getattr(value, "__dict__", {}) if callable(getattr(type(value), n, None))]
 
 
@@ -130,9 +130,9 @@ CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 
 
 def with_numbers(name: str, found: Solution, goals: int) -> Solution:
-    """Return the answer of a formulation by name with numbers where numbers belong.
+    """Return the answer of the formulation ``name`` with all entries converted to numbers.
 
-    Raises `SolverError` if a number is none, or there are not as many as goals.
+    Raises `SolverError` if one cannot be converted, or values and bounds are not one per goal.
     """
     with readable(name):
         states = tuple(tuple(map(_whole, state)) for state in found.states)
@@ -164,7 +164,7 @@ def with_numbers(name: str, found: Solution, goals: int) -> Solution:
 
 
 def _whole(given: object) -> int:
-    """Return a whole number that an array of these can hold."""
+    """Return an integer within the range of int64; raise a `ValueError` otherwise."""
     number = operator.index(given)  # type: ignore[arg-type]  # raises what `readable` tells
     if abs(number) > LARGEST_NUMBER:
         raise ValueError(f"{short(number)} stands for no node or brick")
@@ -172,7 +172,7 @@ def _whole(given: object) -> int:
 
 
 def _wholes(given: object) -> Ints:
-    """Return rows of whole numbers."""
+    """Return an integer array of rows; raise a `ValueError` if an entry is no integer."""
     out = np.asarray(given)
     whole = out.dtype.kind in "iuf" and out.ndim == 2
     if not whole or not ((np.abs(out) <= LARGEST_NUMBER) & (out % 1 == 0)).all():
@@ -181,7 +181,7 @@ def _wholes(given: object) -> Ints:
 
 
 def _motion(given: Floats) -> Floats:
-    """Return the motion of some bricks as numbers."""
+    """Return twists (n, 6) of bricks as a float array; raise a `ValueError` for other shapes."""
     out = np.array(given, dtype=float)
     if out.ndim != 2 or out.shape[1] != 6 or not len(out):
         raise ValueError(f"a motion of shape {out.shape}")
@@ -191,7 +191,7 @@ def _motion(given: Floats) -> Floats:
 def require_fit(
     budgets: Sequence[Budget], formulation: Formulation, options: Mapping[str, object]
 ) -> None:
-    """Raise a `ProblemError` unless a formulation takes budgets, if any, and has given options."""
+    """Raise a `ProblemError` unless a formulation supports the budgets and options given."""
     if budgets and not formulation.takes_budgets:
         able = [name for name, other in formulations("costs").items() if other.takes_budgets]
         raise ProblemError(
@@ -202,7 +202,7 @@ def require_fit(
 
 
 def require_time(formulation: Formulation, time_limit: float) -> None:
-    """Raise a `ProblemError` unless a time limit, s, is one, and the formulation can keep it."""
+    """Raise a `ProblemError` unless a time limit is a number from 0, s, and is supported."""
     if not isinstance(time_limit, Real) or not time_limit >= 0:
         raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
     limited = formulation.watched or "seconds" in formulation.options
@@ -211,6 +211,6 @@ def require_time(formulation: Formulation, time_limit: float) -> None:
 
 
 def require_proof(proof: object) -> None:
-    """Raise a `ProblemError` where a lazy search is to leave out the proof, all it is for."""
+    """Raise a `ProblemError` if a lazy search, which solves models for its proof, has none."""
     if not proof:
         raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")

@@ -32,7 +32,7 @@ PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this muc
 
 
 def smallest_conflict(instance: Instance) -> tuple[_Cap, ...]:
-    """Return the fewest caps of an instance proven to conflict: no path keeps all; or none."""
+    """Return the smallest set of caps proven infeasible together; empty if none is found."""
     counts, nothing = range(1, len(instance.caps) + 1), np.zeros(instance.arcs)
     for some in chain.from_iterable(combinations(instance.caps, count) for count in counts):
         own = instance.graph, nothing, _limited(some), 1.0
@@ -46,16 +46,16 @@ def _limited(caps: Sequence[_Cap]) -> list[tuple[int, float]]:
 
 
 def claimed(name: str, why: str, *, exact: bool) -> InfeasibleError | NothingFoundError:
-    """Return the error of a formulation, not proven; ``exact``: it looks at all plans."""
+    """Return an unproven infeasibility error; ``exact``: the formulation searches all plans."""
     if exact:
         return InfeasibleError(f"claimed by {name}, and not proven: {why}")
     return NothingFoundError(f"{name} found none, and there may be one: {why}")
 
 
 def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
-    """Return the error that names the caps in conflict; a `SolverError` where a path keeps all.
+    """Return the error that names the caps in conflict; a `SolverError` if a path is feasible.
 
-    ``name``, ``exact``: of the formulation that says that none does, as of `claimed`.
+    ``name``, ``exact``: of the formulation that claims infeasibility, as of `claimed`.
     """
     found = smallest_conflict(instance)
     limited, laid_down = _limited(instance.caps), instance.is_layered
@@ -86,12 +86,12 @@ ALLOWED = "says that no plan is allowed, and some are"
 def confirmed(
     problem: States, name: str, seconds: float = np.inf, *, exact: bool = True, explain: bool = True
 ) -> SeqoptError:
-    """Return the error that says why no plan is allowed, once it is proven that none is.
+    """Return the error that explains why a problem is infeasible, after proving that it is.
 
-    ``name``, ``exact``: of the formulation that says so, as of `claimed`; ``seconds``: after which
-    what is not proven is called claimed, and no more help is sought; ``explain``: whether help is
-    sought at all. Result: a `SolverError` where a plan is allowed, a `NothingFoundError` where it
-    is open whether some states stand.
+    ``name``, ``exact``: of the formulation that claims so, as of `claimed`; ``seconds``: limit of
+    proof and search for remedies, s, after which the error is called claimed; ``explain``: whether
+    remedies are sought. Result: a `SolverError` if a plan is feasible, a `NothingFoundError` if
+    the stability of some states is undecided.
     """
     end, capped = time.perf_counter() + seconds, problem.goals[len(problem.aims) :]
     goals = (*STEPS, *_of_criterion(problem), *capped)
@@ -123,7 +123,7 @@ def confirmed(
 
 
 def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) -> SeqoptError:
-    """Return the error that names what each budget needs at least, where plans exist without."""
+    """Return the error that names the least value of each budget; without budgets plans exist."""
     graph, states = found.graph()
     if not problem.is_timed:
         with suppress(InfeasibleError, NothingFoundError):
@@ -151,22 +151,22 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
 
 
 def _with_any_margin(problem: States) -> States:
-    """Return a problem in which states must have the margins that are asked for, however little."""
+    """Return the problem with every margin goal also as a constraint at its worst value."""
     for name in (goal.name for goal in problem.goals if goal.margins):
         problem = with_margin(problem, name, WORST[name])
     return problem
 
 
 def _of_criterion(problem: States) -> tuple[Amount, ...]:
-    """Return the aims that the criterion is asked for, which may forbid states."""
+    """Return the goals evaluated by the criterion, whose values may be infinite."""
     return tuple(goal for goal in problem.aims if goal.of_criterion)
 
 
 def _why_impossible(problem: States, seconds: float = np.inf) -> str:
-    """Return the brick at which all builds stop and what would help, known by then, in a line.
+    """Return one line: the brick at which all builds stop, and remedies found within ``seconds``.
 
-    An engine that has a ``rigid`` one leaves this to it: what is tried here may be far beyond what
-    joints carry, where discrete elements take seconds a state.
+    Of an engine with a ``rigid`` one the latter is used: loads tried here may be far beyond the
+    capacity of joints, where discrete elements take seconds per state.
     """
     engine = getattr(problem.engine, "rigid", problem.engine)
     problem = _with_any_margin(replace(problem, engine=engine))
@@ -188,7 +188,7 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
 
 
 def _barred_said(problem: States, level: int, state: Ints) -> str:
-    """Return which state that every plan passes is infeasible, and why, in words."""
+    """Describe the infeasible state that every plan passes, and the violated constraint."""
     each, falls = problem.each or (problem,), False
     what = f"step {level} of {problem.space.levels}, in which no grip is open,"
     if _is_bare_end(problem, level, state):
@@ -204,13 +204,13 @@ def _barred_said(problem: States, level: int, state: Ints) -> str:
 
 
 def _is_bare_end(problem: States, level: int, state: Ints) -> bool:
-    """Return whether a state is the finished structure that nobody holds."""
+    """Return whether a state is the finished structure without grips."""
     whole = problem.space.bricks_at(level) == len(problem.network.inner)
     return whole and not problem.space.grips(state).any()
 
 
 def _excess_said(problem: States, level: int, state: Ints) -> str:
-    """Return which limits a state exceeds, in words."""
+    """Describe the limits that a state exceeds."""
     states, _ = problem.responses(level, state)
     found = states.responses
     named = ((each, found[each.response]) for each in problem.limits if each.response in found)

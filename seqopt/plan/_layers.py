@@ -1,4 +1,4 @@
-"""Choose among candidates of moves: by their costs, or by the models that a search needs alone."""
+"""Solve layered problems of candidates: from all costs, or only from the models a search needs."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ EFFORT = ("seconds", "max_memory")  # of any formulation; responses have a memor
 
 
 def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
-    """Return a problem with budgets; shares are those of its optimum without any.
+    """Return a problem with budgets; a share refers to the optimum without budgets.
 
-    ``problem``: posed with the responses that the budgets name.
+    ``problem``: must evaluate the responses of the budgets.
     """
     budgets: list[Budget] = []
     for each in asked:
@@ -47,10 +47,10 @@ def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
 
 
 def solve_layers(graph: Layers, formulation: Formulation, run: Run) -> Plan:
-    """Return the plan of a formulation of candidates, of one scene or over scenarios.
+    """Solve layers by a formulation of candidates, for one scene or over scenarios.
 
-    Raises `InfeasibleError` if no choice is allowed; `ProblemError` if graph, formulation and
-    options do not fit together; `SolverError` if an answer is not what is claimed.
+    Raises `InfeasibleError` if no choice is feasible; `ProblemError` if graph, formulation and
+    options are incompatible; `SolverError` if an answer fails its check.
     """
     require_fit(graph.budgets, formulation, run.options)
     require_time(formulation, run.time_limit)
@@ -66,17 +66,14 @@ def solve_layers(graph: Layers, formulation: Formulation, run: Run) -> Plan:
 
 
 def on_the_way(plan: Plan) -> Plan:
-    """Return a plan, for whoever has more to do than to solve; an interrupt ends that too.
-
-    Raises `KeyboardInterrupt` if its formulation was interrupted.
-    """
+    """Return the plan; re-raise `KeyboardInterrupt` if its formulation was interrupted."""
     if plan.ended is End.INTERRUPTED:
         raise KeyboardInterrupt
     return plan
 
 
 def _solve_all(graph: Layers, formulation: Formulation, run: Run) -> Plan:
-    """Return the certified plan of a formulation that is given the costs of all choices."""
+    """Solve with the costs of all choices; return the certified plan."""
     seconds: dict[str, float] = {}
     with run.clock.needed("computing the responses of all choices"):
         stages = graph.seconds(formulation.aim or Aim.SUM)  # of costs: solving is timed alone
@@ -100,7 +97,7 @@ def _solve_all(graph: Layers, formulation: Formulation, run: Run) -> Plan:
 
 
 def _solve_windows(graph: Layers, formulation: Formulation, run: Run) -> Plan:
-    """Return the plan of a search that solves only the models it meets."""
+    """Solve by a window search that evaluates only the models it visits; without certificate."""
     alone = formulation.window_options
     if alone is None or run.options not in ({}, alone):
         known = formulations("costs")
@@ -127,7 +124,7 @@ def _solve_windows(graph: Layers, formulation: Formulation, run: Run) -> Plan:
 
 
 def _solve_lazily(graph: Layers, formulation: Formulation, run: Run) -> Plan:
-    """Return the certified plan of a search that solves only the models that the proof needs."""
+    """Solve with only the models that the optimality proof needs; return the certified plan."""
     if graph.scenes:
         raise ProblemError("the costs of all choices are needed; leave out lazy")
     if run.options:
@@ -147,7 +144,7 @@ def _solve_lazily(graph: Layers, formulation: Formulation, run: Run) -> Plan:
 
 
 def _checked(steps: tuple[Step, ...], graph: Layers) -> tuple[Step, ...]:
-    """Return steps in which arms can be, and robots bear bricks; else a `SolverError` says why."""
+    """Return steps after checking postures, shape and payloads; raise a `SolverError` otherwise."""
     engine, schedule = graph.engine, graph.schedule
     try:
         check_postures(schedule.scene, steps)

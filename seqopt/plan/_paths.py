@@ -1,9 +1,8 @@
-"""Choose a path through a graph, and have it judged: of an instance, or of candidates of moves."""
+"""Find a path through a graph, of an instance or of layers of candidates, and certify it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
@@ -12,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt._interrupts import answered
-from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, NothingFoundError, SolverError, TimeUpError
 from seqopt.graph.formulation import Finding, Formulation, FormulationKind, Run, Watch, timed
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
@@ -27,7 +25,7 @@ PROOF = "the proof"  # what it is called where there was no time for it
 
 
 class FoundPath(NamedTuple):
-    """A path through an instance: what is claimed of it, what is proven, and what it took, s."""
+    """A path through an instance: claimed solution, certificate, and run times by stage, s."""
 
     selection: Solution
     certificate: Certificate | None
@@ -37,16 +35,17 @@ class FoundPath(NamedTuple):
 def find_path(
     instance: Instance, formulation: Formulation, run: Run, offset: float = 0.0
 ) -> FoundPath:
-    """Return the path that a formulation chooses, judged where a proof is asked for.
+    """Find a path by a formulation, certified if a proof is requested.
 
-    ``offset``: what every path takes beside its arcs. An interrupt is told to the formulation, so
-    that it ends with the best path so far. Raises `InfeasibleError` if no path is within all caps;
-    `SolverError` if the answer is not what is claimed; `KeyboardInterrupt` if it was interrupted
-    and no path was at hand.
+    ``offset``: constant added to the first objective of every path. On an interrupt the formulation
+    returns its incumbent. Raises `InfeasibleError` if no path is within all caps; `SolverError` if
+    the answer fails its check; `KeyboardInterrupt` if there is no incumbent yet.
     """
     formulation.require_options(run.options)
     limit = min(run.left, run.options.get("seconds", math.inf))
-    watch = Watch(limit, _shifted(run.progress, offset))
+    tell = run.progress
+    shifted = None if tell is None else lambda found: tell(_moved(found, offset))
+    watch = Watch(limit, shifted if offset else tell)
     seconds = {"compile": 0.0}
     with timed(seconds, "solve"):
         selection = _selected(instance, formulation, run, watch, offset)
@@ -67,7 +66,7 @@ def find_path(
 def _selected(
     instance: Instance, formulation: Formulation, run: Run, watch: Watch, offset: float
 ) -> Solution:
-    """Return what a formulation says, with numbers where numbers belong; or why there is none."""
+    """Return the formulation's solution, converted to numbers; raise why there is none."""
     name = formulation.name
     limit = {} if math.isinf(run.left) else {"seconds": run.left}
     told = {"watch": watch} if formulation.watched else limit
@@ -99,15 +98,6 @@ def _selected(
     return replace(selection, stopped=stopped, trace=watch.trace)
 
 
-def _shifted(
-    progress: Callable[[Finding], object] | None, offset: float
-) -> Callable[[Finding], object] | None:
-    """Return what is told findings with what every path takes beside."""
-    if progress is None or not offset:
-        return progress
-    return lambda found: progress(_moved(found, offset))
-
-
 def _moved(found: Finding, offset: float) -> Finding:
     return replace(found, objective=found.objective + offset, bound=found.bound + offset)
 
@@ -115,7 +105,7 @@ def _moved(found: Finding, offset: float) -> Finding:
 def _raised(
     selection: Solution, certificate: Certificate | None, offset: float
 ) -> tuple[Solution, Certificate | None]:
-    """Return the same with what every path takes beside its arcs."""
+    """Return solution and certificate with ``offset`` added to the first value and bound."""
     values, bounds = ((v[0] + offset, *v[1:]) for v in (selection.objective, selection.bound))
     trace = tuple(_moved(found, offset) for found in selection.trace)
     selection = replace(selection, objective=values, bound=bounds, trace=trace)
@@ -126,7 +116,7 @@ def _raised(
 
 
 def judged(instance: Instance, formulation: Formulation, found: Solution) -> Certificate:
-    """Return the certificate of a path, by what the formulation says proves its bounds."""
+    """Return the certificate of a path from the multipliers and labels of its formulation."""
     nodes = [state[0] for state in found.states]
     answer = Answer("nodes", np.array(nodes), found.objective, tuple(_claims(instance, found)))
     try:
@@ -148,7 +138,7 @@ def judged(instance: Instance, formulation: Formulation, found: Solution) -> Cer
 
 
 def _claims(instance: Instance, found: Solution) -> list[Claim]:
-    """Return what proves the bound of every goal, as far as the formulation says."""
+    """Return the claimed bound of each goal with its multipliers, as far as they are given."""
     kinds = [goal.kind for goal in instance.goals]
     if instance.asks_time:
         return _of_times(instance, found, kinds)
@@ -167,21 +157,16 @@ def _claims(instance: Instance, found: Solution) -> list[Claim]:
 
 
 def _of_times(instance: Instance, found: Solution, kinds: list[str]) -> list[Claim]:
-    """Return what proves times: labels where there are any, and shares."""
+    """Return claims of makespan bounds: labels, if any, and shares of robot kinds, by arc."""
     first = 0 if instance.caps else kinds.index(TIME)
     own = [Claim() for _ in kinds]
     for k, proof in enumerate(found.proofs[: len(kinds) - first], start=first):
         if kinds[k] == TIME and len(proof.prices):
-            shares, labels = _shares(instance, proof.prices), None
+            assert instance.timed is not None  # multipliers are of robots
+            _, firsts = np.unique(instance.timed.kinds, return_index=True)
+            shares, labels = np.asarray(proof.prices[:, [0, *(1 + firsts)]]), None
             if len(proof.labels):
                 labels = proof.states[:, 1], proof.labels
             value = None if labels is None else found.bound[k]
             own[k] = Claim(value, shares=shares, labels=labels)
     return own
-
-
-def _shares(instance: Instance, prices: Floats) -> Floats:
-    """Return the share of all, and of a robot of every kind, of prices (L, 1 + c) by column."""
-    assert instance.timed is not None  # prices are of robots
-    _, firsts = np.unique(instance.timed.kinds, return_index=True)
-    return np.asarray(prices[:, [0, *(1 + firsts)]])

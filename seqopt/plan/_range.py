@@ -1,7 +1,7 @@
-"""Plans within the linear range wherever any keeps it, by a model that is enough for their steps.
+"""Plans within the linear range where feasible, by a model whose assumptions their steps keep.
 
-A plan that is the best of all and keeps the range is the best that keeps it: so the range is asked
-of the plan's own steps first, and becomes a limit of the problem only where they leave it.
+An optimal plan within the range is optimal among those within it: the range is first checked for
+the steps of the plan, and becomes a constraint of the problem only if they violate it.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ Found = TypeVar("Found")
 
 
 def leaves(moved: Moved) -> bool:
-    """Return whether nodes move farther than the linear range allows."""
+    """Return whether displacements exceed the linear range."""
     return moved.share > 1 + LIMIT_TOLERANCE
 
 
 def keeping(found: Found, moved: Moved, again: Callable[[], Found]) -> tuple[Found, str]:
-    """Return what was found if it keeps the range, or what is found within it.
+    """Return a result within the linear range, and a reason if there is none.
 
-    ``moved``: by what was found; ``again``: finds it within the range. Where nothing is found, the
-    first stays, with a few words that say why.
+    ``moved``: displacements of ``found``; ``again``: solves with the range as a constraint. If it
+    raises an error, ``found`` is returned, with the reason in words.
     """
     if not leaves(moved):
         return found, ""
@@ -51,12 +51,12 @@ def keeping(found: Found, moved: Moved, again: Callable[[], Found]) -> tuple[Fou
 
 
 def engines_of(plan: Plan) -> Sequence[Engine]:
-    """Return what computes responses where limits hold: of all scenarios, or of the scene."""
+    """Return the engines whose responses are constrained: of all scenarios, or of the scene."""
     return plan.graph.scenarios or (plan.engine,)
 
 
 def measured(plan: Plan, clock: Clock) -> Plan:
-    """Return a plan with how far its steps move nodes, as far as there is time to know it."""
+    """Return a plan with its largest displacement, if it can be computed in time."""
     moved = clock.spare(RANGE, lambda: most_moved(engines_of(plan), plan.steps), None)
     if moved is None and clock.left_out[RANGE] == INTERRUPT:
         return interrupted(plan)
@@ -64,15 +64,15 @@ def measured(plan: Plan, clock: Clock) -> Plan:
 
 
 def interrupted(plan: Plan) -> Plan:
-    """Return a plan after which somebody asked for an end."""
+    """Return a plan marked as stopped by an interrupt."""
     return replace(plan, selection=replace(plan.selection, stopped=INTERRUPT))
 
 
 def best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:
-    """Return the best plan of a problem that keeps the linear range, or of all where none does.
+    """Return the best plan within the linear range, or the best of all if none is feasible.
 
-    ``solved``: returns the best plan of the problem itself, or of the same with the limit;
-    ``clock``: of both. An interrupt of the second leaves the first.
+    ``solved``: solves the problem, with or without the constraint; ``clock``: shared by both
+    solves. If the second is interrupted, the first plan is returned.
     """
     plan = measured(solved(problem), clock)
     if problem.says_range or plan.moved is None:
@@ -89,11 +89,11 @@ def best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Cloc
 
 
 def at_sufficient_level(plan: Plan, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:
-    """Return a plan, or the one of the next engine where steps leave the elastic limits of joints.
+    """Return a plan, or that of the next engine if steps exceed the elastic limits of joints.
 
-    Candidates are compared by joints that never fail; within these limits a more detailed engine
-    would answer the same. The plan stays where solving again is much work, or fails: it says itself
-    which limits its steps leave.
+    Candidates are compared with joints that never fail; within the limits a more detailed engine
+    gives the same responses. The plan stays if solving again is much work or fails: it reports
+    the limits that its steps exceed.
     """
     chooser, problem = _chooser_of(plan.engine), plan.problem
     if chooser is None or not isinstance(problem, Problem) or plan.ended is End.INTERRUPTED:

@@ -1,7 +1,7 @@
-"""What can be loosened in a problem without a plan, and how little of it is enough.
+"""Remedies of infeasible problems: constraints to relax, and the least sufficient relaxation.
 
-Every filter says how it can be loosened: rules, standing, payloads, arms, limits and others. Beside
-them reaches and grips are tried. A remedy counts where a plan exists with it alone.
+Every filter lists its relaxations: rules, standing, payloads, arms, limits and others. In addition
+reaches and grips are tried. A remedy counts if it alone makes the problem feasible.
 """
 
 from __future__ import annotations
@@ -41,33 +41,33 @@ from seqopt.sequence.two_robots import _enough_reach
 
 
 class LateError(Exception):
-    """Time is over."""
+    """The time limit of a search for remedies is reached."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """Explores the states that plans may pass, until a time of the clock."""
+    """Explores the reachable states of a problem, until ``end``, a time of `time.perf_counter`."""
 
     end: float = np.inf
 
     def tell(self, _: Explorer) -> None:
-        """Raise an error once time is over."""
+        """Raise a `LateError` after the time limit."""
         if time.perf_counter() > self.end:
             raise LateError
 
     def __call__(self, problem: States) -> Explorer:
-        """Return the states that plans of a problem may pass."""
+        """Return the explored states of a problem."""
         return explore(problem, tell=self.tell)
 
     def exists(self, problem: States) -> bool:
-        """Return whether a problem has a plan; what stands is asked of few of its states."""
+        """Return whether a problem is feasible; stability is proven only of the states needed."""
         problem = replace(problem, goals=STEPS)
         if not problem.demands:
             return self(problem).whole
         return barred(problem) is None and self.standing(problem).exists(problem)
 
     def standing(self, problem: States) -> StandingLook:
-        """Return the states of a problem, whether they stand or not, of which that is asked."""
+        """Return the states without the stability requirement, which is checked lazily."""
         return StandingLook(replace(problem, goals=STEPS, standing=None, settled=()), self.tell)
 
 
@@ -75,7 +75,7 @@ LOOK = Look()
 
 
 def worst_least(problem: States, response: str, look: Look = LOOK) -> float:
-    """Return the least peak of a response among plans, SI units; infinite if there is no plan.
+    """Return the least peak of a response over all plans, SI units; infinite if infeasible.
 
     ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``.
     """
@@ -85,10 +85,10 @@ def worst_least(problem: States, response: str, look: Look = LOOK) -> float:
 
 @dataclass(frozen=True)
 class Remedy:
-    """What opens a way alone.
+    """A relaxation that makes the problem feasible.
 
-    ``name``: what it is; ``enough``: returns how little of it is enough, in words, empty where
-    robots would have to carry too much; ``rules``: in words of the command line, if it is these.
+    ``name``: the constraint; ``enough``: returns the least sufficient relaxation in words, empty
+    if robots would carry more than all loads; ``rules``: as command-line words, if it is of rules.
     """
 
     name: str
@@ -97,7 +97,7 @@ class Remedy:
     of_arms: bool = False
 
     def beside(self, rule: str) -> Remedy:
-        """Return the remedy together with a rule that is loosened."""
+        """Return the remedy combined with a relaxed rule."""
         name, rules = f"{rule} together with {self.name}", (rule, *self.rules)
         typed = f"{name} (--rule {' --rule '.join(rules)})" if self.rules else name
         return Remedy(name, lambda: typed, rules if self.rules else ())
@@ -105,15 +105,15 @@ class Remedy:
 
 @dataclass(frozen=True)
 class Remedies:
-    """What opens a way in a problem without a plan, where ``look`` finds one."""
+    """The remedies of an infeasible problem; ``look`` decides feasibility."""
 
     problem: States
     look: Look
 
     def said(self, *, finished: bool) -> str:
-        """Return what helps, as the end of a line.
+        """Describe the remedies, as the end of a line.
 
-        ``finished``: whether the finished structure, which nobody holds, is infeasible.
+        ``finished``: whether the finished structure without grips is infeasible.
         """
         if finished:  # no robot can do anything about it
             ways = [*self._stronger(), *self._limits()]
@@ -133,7 +133,7 @@ class Remedies:
         return f"; robots would have to carry more than all weights and loads; {HARD}"
 
     def _alone(self) -> Iterator[Remedy]:
-        """Yield rules, each loosened as little as is enough alone, and all else that is enough."""
+        """Yield every single relaxation that suffices; of each rule only the least."""
         done: set[str] = set()
         for _, text, problem in self._ways("rules"):
             rule, _, _ = text.partition("=")
@@ -144,7 +144,8 @@ class Remedies:
                     enough = partial(self._payload_if_ignored, problem)
                 yield Remedy(text, enough, (text,))
         yield from self._stronger()
-        yield from self._arms()
+        arms = (text for _, text, problem in self._ways("arms") if self.look.exists(problem))
+        yield from (_as_it_is(text, of_arms=True) for text in islice(arms, 1))
         scene = self._scene
         if self._is_made and not (scene.has_arms or self.problem.scenarios):
             yield from map(_as_it_is, _enough_reach(scene, self._exists_in))
@@ -154,40 +155,35 @@ class Remedies:
             yield _as_it_is(soft)
 
     def _in_pairs(self, alone: list[Remedy]) -> Iterator[Remedy]:
-        """Yield what opens a way together with a rule; other arms only where they do not alone."""
+        """Yield pairs of a relaxed rule and a remedy; other arms only if insufficient alone."""
         for _, text, problem in self._ways("rules"):
             for other in Remedies(problem, self.look)._alone():
                 if not (alone and other.of_arms):
                     yield other.beside(text)
 
     def _ways(self, *names: str) -> Iterator[tuple[str, str, States]]:
-        """Yield how some filters can be loosened: their names, words, and the problem with that."""
+        """Yield relaxations of a kind of filter: name, words, and the relaxed problem."""
         for each in self.problem.every_filter:
             if each.name in names:
                 yield from ((each.name, *way) for way in each.ways(self.problem))
 
     def _payload_if_ignored(self, problem: States) -> str:
-        """Return the payload that is enough where a problem ignores them; in words, as below."""
+        """Return the least payload, as the peak force of a problem without payloads; in words."""
         held = worst_least(problem, LARGEST, self.look)
         if held > whole_load(problem.network):
             return self._softer()
         return _payload_said(max(held, self._stops.heaviest))
 
     def _stronger(self) -> Iterator[Remedy]:
-        """Yield what alone is enough for states to stand: no need to, or robots that carry more."""
+        """Yield relaxations of stability and payload that suffice alone."""
         enough = {"stands": self._enough_bond}
         enough |= {"payload": self._enough_payload} if self._stops.asks_payload else {}
         for name, text, problem in self._ways(*enough):
             if self.look.exists(problem):
                 yield Remedy(text, enough[name])
 
-    def _arms(self) -> Iterator[Remedy]:
-        """Yield other arms: that keep apart by themselves, or if they alone do not do."""
-        found = (text for _, text, problem in self._ways("arms") if self.look.exists(problem))
-        yield from (_as_it_is(text, of_arms=True) for text in islice(found, 1))
-
     def _limits(self) -> Iterator[Remedy]:
-        """Yield the limits, and filters of others, without which alone there is a plan."""
+        """Yield the limits, and filters of plug-ins, whose removal alone suffices."""
         labels = {limit.label: limit for limit in self.problem.limits}
         for name, text, problem in self._ways(*labels, *map(str, self.problem.filters)):
             if self.look.exists(problem):
@@ -195,7 +191,7 @@ class Remedies:
                 yield _as_it_is(text) if raised is None else Remedy(text, raised)
 
     def _props(self) -> Iterator[Remedy]:
-        """Yield that props help, if one at every brick does."""
+        """Yield props as a remedy, if one at every brick suffices."""
         scene = self._scene
         if scene.props or not self._is_made or self.problem.scenarios:
             return
@@ -204,11 +200,11 @@ class Remedies:
             yield _as_it_is("a prop at every brick, if not fewer")
 
     def _softer(self) -> str:
-        """Return with how soft grips there is a plan, in words; empty if with none."""
+        """Describe the stiffest sufficient grips; empty if none suffice."""
         return softer_grips(self.problem.engine, self._exists_in)
 
     def _enough_bond(self) -> str:
-        """Return the least bond with which all states stand."""
+        """Return the least bond, Pa, with which a plan exists, in words; found by bisection."""
         if any(demand.tilt for demand in self.problem.demands):
             return STANDING
         own, bare = (
@@ -227,7 +223,7 @@ class Remedies:
             return STANDING
 
     def _enough_payload(self) -> str:
-        """Return the least payload of all robots with which a plan exists, to three digits."""
+        """Return the least common payload with which a plan exists, to three digits, in words."""
 
         def exists(payload: float) -> bool:
             return self.look.exists(self.problem.carrying(payload))
@@ -246,7 +242,7 @@ class Remedies:
         return _payload_said(most * step)
 
     def _enough_limit(self, limit: Limit) -> str:
-        """Return how far a limit has to be raised, of all with its label."""
+        """Return the least feasible bound of all limits with a label, in words."""
         found = [each for each in self.problem.limits if each.label == limit.label]
         name, bound = found[0].response, found[0].bound
         if not (name in STATE_RESPONSES or is_tolerance(name)):
@@ -268,7 +264,7 @@ class Remedies:
 
     @property
     def _is_made(self) -> bool:
-        """Whether the engine can be made anew, of another scene."""
+        """Whether the engine can be rebuilt for another scene."""
         return recipe_of(self.problem.engine) is not None
 
     @cached_property

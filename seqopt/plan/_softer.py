@@ -1,7 +1,7 @@
-"""What helps where robots would hold more than they can: a payload, or grips that give way.
+"""Remedies of exceeded payloads: a larger payload, or more compliant grips.
 
-Rigid grips hold nodes where they are planned, whatever moves the structure: that may ask many times
-its weight of a robot. No payload is the remedy then; softer grips are, as far as they are found to.
+Rigid grips keep nodes in place against every movement of the structure, with forces that may be
+many times its weight. Then softer grips, if any suffice, are the remedy, and not a larger payload.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ STIFFNESSES = (1e8, 1e7, 1e6, 1e5, 1e4, 1e3)  # of grips, N/m, the stiffest that
 
 
 def whole_load(network: Network) -> float:
-    """Return the sizes of all weights, loads and wind in sum, N: no robot needs to carry more."""
+    """Return the sum of the sizes of all weights, loads and wind, N: the most any robot carries."""
     applied = network.applied(len(network.inner))[:, :3]
     return float(np.linalg.norm(np.concatenate([network.weight, applied]), axis=1).sum())
 
 
 def _payload_advice(engine: Engine, steps: Sequence[Step], over: Sequence[Excess]) -> str:
-    """Return what helps in a plan in which payloads are exceeded, as of `overloads`, in words."""
+    """Describe remedies of the exceeded payloads of a plan, as of `overloads`."""
     network = engine.network
     held = max((each.largest for each in over if each.brick is None), default=0.0)
     if held <= whole_load(network):
@@ -52,12 +52,12 @@ HARD = "softer grips were not found to help; ground that moves less, or softer s
 
 
 def ground_moves(scene: Scene) -> bool:
-    """Return whether some ground end moves."""
+    """Return whether any ground end has a movement."""
     return any(any(ground.movement or ()) for ground in scene.grounds)
 
 
 def softer_grips(engine: Engine, exists: Callable[[Scene], bool]) -> str:
-    """Return the stiffest softer grips of a scene with which something exists, in words; or ""."""
+    """Describe the stiffest sufficient grips below those of the scene; empty if there are none."""
     scene = engine.network.scene
     own = [float(np.min(robot.stiffness)) for robot in scene.robots if robot.stiffness]
     if recipe_of(engine) is None or scene.has_arms:

@@ -29,7 +29,7 @@ AIMS = {SUM: Aim.SUM, PEAK: Aim.PEAK}
 
 
 def able(instance: Instance) -> tuple[str, ...]:
-    """Return the names of formulations that an instance fits, the usual one first."""
+    """Return the names of applicable formulations of an instance, the default first."""
     every = formulations()
     asked = ("time" if instance.asks_time else "goals", "instance")
     found = [n for n, f in every.items() if f.fits(*asked) and not f.aim]
@@ -44,10 +44,10 @@ def able(instance: Instance) -> tuple[str, ...]:
 
 
 def solve_instance(instance: Instance, named: Formulation | str | None, run: Run) -> Plan:
-    """Return the plan of a formulation, of which an instance has the nodes and no steps.
+    """Solve an instance by a formulation; the plan has the nodes of a path and no steps.
 
-    Raises `ProblemError` if the formulation does not fit; `SolverError` if its answer is not what
-    is claimed.
+    Raises `ProblemError` if the formulation is not applicable; `SolverError` if its answer fails
+    the check.
     """
     names = able(instance)
     formulation = as_formulation(named or names[0])
@@ -68,11 +68,10 @@ COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know w
 
 
 def solve_states(graph: States, formulation: Formulation, run: Run) -> Plan:
-    """Return the plan of a formulation of states, judged where a proof is asked for.
+    """Solve a problem of states by a formulation, certified if a proof is requested.
 
-    Raises `InfeasibleError`, naming the brick at which it stops, and the rule or limit whose
-    loosening opens a way; `ProblemError` if there is no such option; `SolverError` if the answer is
-    not what its formulation claims.
+    Raises `InfeasibleError`, naming the brick at which builds stop, and the rule or limit to relax;
+    `ProblemError` if there is no such option; `SolverError` if the answer fails its check.
     """
     formulation.require_options(run.options)
     if run.lazy:  # it is at any rate
@@ -114,7 +113,7 @@ def _selected(
     *,
     explain: bool,
 ) -> Solution:
-    """Return what a formulation says, with numbers where numbers belong; or why there is none."""
+    """Return the formulation's solution, converted to numbers; raise why there is none."""
     (problem, twin), start, name = problems, time.perf_counter(), formulation.name
     limit = float(options.get("seconds", inf))
     solve = partial(formulation.solve, problem, **options)

@@ -1,4 +1,4 @@
-"""What is known of a plan, of the order that it is for, and of the postures of its robots."""
+"""Optimality status of a plan, of its build order, and of the postures of its robots."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
 
 class Status(StrEnum):
-    """What is known of a plan."""
+    """Optimality status of a plan."""
 
     OPTIMAL = "optimal"  # proven
     OUTSIDE = "optimal in the linear model alone"  # or claimed so; it does not hold of the plan
@@ -25,7 +25,7 @@ class Status(StrEnum):
 
 
 def bare_summary(plan: Any) -> dict[str, object]:
-    """Return the summary of a plan of an instance, or of costs alone: a path without steps."""
+    """Return the summary of a plan without steps: of an instance, or of given costs."""
     proof = plan.certificate
     known: dict[str, object] = getattr(plan.problem, "facts_of", dict)()
     bounds = () if proof is None else proof.bounds
@@ -55,7 +55,7 @@ def order_bound(plan: Any) -> tuple[float, bool]:
 
 
 def order_facts(plan: Any) -> dict[str, object]:
-    """Return what the summary of a plan says of its order, where that was sought, for JSON."""
+    """Return the entries of a summary about the optimized order, ready for JSON."""
     bound, proven = order_bound(plan)
     return {
         "order": [*plan.order],
@@ -69,7 +69,7 @@ def order_facts(plan: Any) -> dict[str, object]:
 
 
 def order_bound_said(plan: Any) -> str:
-    """Return the lower bound of all orders, and whether it is proven, in words."""
+    """Describe the lower bound over all orders, and whether it is proven."""
     bound, proven = order_bound(plan)
     if not isfinite(bound):
         return "others are not looked at yet"

@@ -1,8 +1,7 @@
-"""Where builds without a plan stop: by rules of a free schedule, or by the steps of a schedule."""
+"""Where infeasible builds stop: by rules of a free schedule, or by the steps of a schedule."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
@@ -17,7 +16,7 @@ from seqopt.sequence.schedule import Schedule
 
 @dataclass(frozen=True)
 class StepStops:
-    """Where the steps of a schedule stop: its grips may hold up more than payloads."""
+    """Where the steps of a schedule stop: its grips may carry more than payloads."""
 
     problem: States
     schedule: Schedule
@@ -35,7 +34,7 @@ class StepStops:
         return unbearable(self.scenes, self.schedule.steps, self.schedule.begin)
 
     def where(self, reached: int) -> str:
-        """Return the first step without a feasible state, and who cannot bear a brick."""
+        """Name the first step without a feasible state, and a robot that cannot carry its brick."""
         heavy = "".join(f": in step {n} {why}" for n, why in [*self._unbearable.items()][:1])
         last = self.problem.space.levels
         return f"step {reached + 1} of {last} has no state that is allowed{heavy}"
@@ -69,7 +68,7 @@ class RuleStops:
         return bool(self.problem.demands) and self.rules.payload is Payload.KEPT
 
     def where(self, reached: int) -> str:
-        """Return the brick that is never placed or removed, and what is too heavy from there on."""
+        """Name the brick that is never placed or removed, and the next that is too heavy."""
         placed, space = self.scenes[0].placed, self.problem.space
         end, down = space.bricks_at(space.levels), self.rules.takes_down
         if reached == space.levels:
@@ -78,27 +77,20 @@ class RuleStops:
         left = range(at, end, -1) if down else range(at, end + 1)
         done = "removed" if down else "placed"
         where = f"brick {placed[at - 1].name} ({at} of {len(placed)}) is never {done}"
-        return f"{where}{self._too_heavy(left)}"
-
-    def _too_heavy(self, left: Sequence[int]) -> str:
-        """Return which brick is too heavy, as the end of a line: the next, or one that none lifts.
-
-        ``left``: brick counts with each brick that is to be carried.
-        """
         book = RuleBook(self.problem.network, self.rules, self.problem.worlds)
         for bricks in left:
             near = [r for r in book.team if book.named(r) and book.newest_nodes[r, bricks]]
             heavy = book.too_heavy(bricks, near)
             if heavy and (bricks == left[0] or not any(book.places(r, bricks) for r in near)):
-                return f": {heavy}"
-        return ""
+                return f"{where}: {heavy}"  # the next brick, or one that no robot can lift
+        return where
 
 
 Stops = StepStops | RuleStops
 
 
 def stops_of(problem: States) -> Stops:
-    """Return where builds of a problem stop."""
+    """Return the stops of a problem, by the kind of its schedule."""
     rules, scenes = problem.rules, (problem.network.scene, *problem.worlds)
     if isinstance(rules, Schedule):
         return StepStops(problem, rules, scenes)

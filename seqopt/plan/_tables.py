@@ -1,4 +1,4 @@
-"""Tables of a plan: what was chosen move by move, and what it was chosen from."""
+"""Tables of a plan: the choice of each move, and its alternatives."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def chosen_table(
 ) -> pd.DataFrame:
     """Return the choice and its costs, move by move, as of `seqopt.plan.plan.Plan.table`.
 
-    ``search``: what was looked at, where not all models were solved; ``grips``: of the plan.
+    ``search``: the evaluated models, if not all were; ``grips``: of the plan.
     """
     rows = []
     for k, (before, now) in enumerate(pairwise((0, *choice))):
@@ -80,7 +80,7 @@ def alternatives(
 ) -> pd.DataFrame:
     """Return responses and cost of every evaluated choice, as of `Plan.alternatives`.
 
-    ``search``: what was looked at along the choice, where not all models were solved.
+    ``search``: the models evaluated along the choice, if not all were.
     """
     parts = []
     for posed, choices, before in _looked_at(problem, choice, search):
@@ -98,7 +98,7 @@ def alternatives(
 def _looked_at(
     problem: Layers, choice: tuple[int, ...], search: WindowSearch | None
 ) -> Iterator[tuple[Layers, StepChoices, int | None]]:
-    """Yield steps and, where only one choice before is kept, the node of that choice."""
+    """Yield the evaluated steps with their layers and, if the earlier move is fixed, its node."""
     if search is not None or not problem.evaluation.streams:
         explored = (problem,) if search is None else search.explored
         yield from ((posed, each, None) for posed in explored for each in posed.evaluation.steps)

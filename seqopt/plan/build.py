@@ -1,4 +1,4 @@
-"""What every plan can show: its grips as a table, pictures of its steps, and a page."""
+"""Views that all plans share: a table of grips, pictures of steps, and a page."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class ShownBuild(Shown):
-    """Base class of plans: builds in which every grip is known.
+    """Base class of plans: builds whose grips are all chosen.
 
     A subclass has an engine, steps, and the responses of these steps.
     """
@@ -40,7 +40,7 @@ class ShownBuild(Shown):
 
         @property
         def engine(self) -> Engine:
-            """What computes the responses."""
+            """The engine that computes the responses."""
 
         @property
         def steps(self) -> tuple[Step, ...]:
@@ -56,7 +56,7 @@ class ShownBuild(Shown):
 
         @property
         def seconds(self) -> Mapping[str, float]:
-            """What finding it took, by stage, s."""
+            """Run times by stage, s."""
 
         @property
         def standing(self) -> Standing | None:
@@ -67,7 +67,7 @@ class ShownBuild(Shown):
 
     @cached_property
     def departures(self) -> tuple[Departure, ...]:
-        """The limits of the linear range that steps leave: there the responses mean nothing."""
+        """The limits of the linear range that steps exceed: their responses are not valid."""
         return self._within.departures(self._columns)
 
     @cached_property
@@ -80,7 +80,7 @@ class ShownBuild(Shown):
 
     @cached_property
     def enough(self) -> Enough:
-        """Which model was enough for the steps, what others would change, what is left out."""
+        """The sufficient model of the steps, what others would change, what is not modeled."""
         return what_was_enough(self._within, {"": self._columns})
 
     def grips(self) -> pd.DataFrame:
@@ -110,7 +110,7 @@ class ShownBuild(Shown):
         return step_verdicts(self.engine.network, self.steps, find_mortar(mortar))
 
     def props(self) -> pd.DataFrame:
-        """Return what every prop of the scene bears, and from when to when it holds.
+        """Return the forces of all props of the scene, and the steps in which they act.
 
         Result: a row per prop: ``node``, ``brick``, ``from_step``, ``to_step``,
         ``largest_force_N``, ``at_step``, and of one that only pushes ``least_push_N``, negative
@@ -119,7 +119,7 @@ class ShownBuild(Shown):
         return props_table(self.engine, self.steps)
 
     def tolerances(self) -> pd.DataFrame:
-        """Return how far every grip may be from where it should be, in the worst direction.
+        """Return the tolerance of grip positions of every step, in the worst direction.
 
         Result: a row per step: ``tolerance_mm`` (infinite where nobody holds), ``proven_mm``, up to
         which no robot exceeds its payload, and what ``stops`` grips from being farther off. Raises
@@ -128,7 +128,7 @@ class ShownBuild(Shown):
         return tolerance_table(self.engine, self.steps)
 
     def times(self) -> pd.DataFrame:
-        """Return who does what when, at the earliest, in the order of the steps.
+        """Return the earliest start and end times of all actions, in the order of the steps.
 
         Result: a row per step: ``step``, ``type``, ``bricks``, ``robots`` who act, ``node`` that is
         taken, from when the robot ``prepares_s`` and is ``ready_s`` (none where robots let go),
@@ -143,7 +143,7 @@ class ShownBuild(Shown):
 
     @property
     def makespan(self) -> float | None:
-        """How long the build takes, s; None if it is not known how long robots take."""
+        """The makespan of the build, s; None if durations are not known."""
         if not self._timed:
             return None
         scene = self.engine.network.scene
@@ -157,11 +157,11 @@ class ShownBuild(Shown):
 
     @cached_property
     def _waits(self) -> Any:
-        """Says how long steps wait for mortar; None where none cures."""
+        """The model of curing, from which steps wait; None without curing."""
         return offered("mortar_waits")(self.engine.network, self.standing)
 
     def reassigned(self) -> tuple[Step, ...]:
-        """Return the same grips in the same order by robots with which the build takes least.
+        """Return the same grips in the same order, assigned to robots with the least makespan.
 
         A robot may have a grip that it reaches, that is within its payload, and at which it gives
         way as the one who had it. Raises `StepError` if it is not known how long robots take, or
@@ -191,7 +191,7 @@ class ShownBuild(Shown):
 
     @property
     def _timed(self) -> bool:
-        """Whether it is known how long it takes: of a part only if where it begins is."""
+        """Whether the makespan is known: of a part only if its beginning is."""
         whole = bool(self.steps) and self.steps[0].number == 1
         robots = self.engine.network.scene.robots
         known = bool(robots) and all(robot.durations is not None for robot in robots)

@@ -1,4 +1,4 @@
-"""Pareto sets of choices, states or orders: what no plan beats, their proof, and picking one."""
+"""Pareto sets of choices, states or orders: non-dominated plans, their proof, and picking one."""
 
 from __future__ import annotations
 
@@ -44,22 +44,10 @@ DIGITS = 9  # after the first
 EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
 
 
-def _rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -> Floats:
-    """Return what every number is rounded up to multiples of, (k,); zero where it is not.
-
-    Raises `ProblemError` if a name is none of these, or a step is no positive number.
-    """
-    for name, step in (rounding or {}).items():
-        if name not in names or not 0 < step < np.inf:
-            known = ", ".join(names)
-            raise ProblemError(f"round {name}={step:g}: give a positive step for one of {known}")
-    return np.array([(rounding or {}).get(name, 0.0) for name in names])
-
-
 def _rounded_up(values: Floats, steps: Floats) -> Floats:
-    """Return values (..., k) rounded up to multiples of steps (k,), to ten digits where that is 0.
+    """Round values (..., k) up to multiples of steps (k,), or to ten digits where a step is 0.
 
-    What differs by less than ten digits is the same: no plan is better by an error of rounding.
+    Values that agree to ten digits become equal: no plan dominates by a rounding error.
     """
     safe = np.where(steps > 0, steps, 1.0)
     size = np.abs(np.where((values != 0) & np.isfinite(values), values, 1.0))
@@ -69,11 +57,11 @@ def _rounded_up(values: Floats, steps: Floats) -> Floats:
 
 
 class FrontProblem:
-    """The schedule of a problem whose goals are all to be small at once: what formulations get.
+    """A multi-objective problem: the input of formulations of Pareto sets.
 
     ``problem``: its goals are responses, margins of stability, and of a free schedule steps and
-    regrips; ``rounding``: what numbers are rounded up to multiples of, by name, SI units; none by
-    default. Raises `ProblemError` if the goals are others, or a rounding is no positive number.
+    regrips; ``rounding``: steps to whose multiples values are rounded up, by goal, SI units; none
+    by default. Raises `ProblemError` for other goals, or a step that is no positive number.
     """
 
     def __init__(self, problem: States, rounding: Mapping[str, float] | None = None) -> None:
@@ -83,13 +71,20 @@ class FrontProblem:
                 raise ProblemError(
                     f"pareto: {goal} adds up along a plan; give responses, steps and regrips"
                 )
-        self._round, self._rounding = _rounding_steps(self.names, rounding), rounding
+        for name, step in (rounding or {}).items():
+            if name not in self.names or not 0 < step < np.inf:
+                raise ProblemError(
+                    f"round {name}={step:g}: give a positive step for one of "
+                    f"{', '.join(self.names)}"
+                )
+        self._round = np.array([(rounding or {}).get(name, 0.0) for name in self.names])
+        self._rounding = rounding
 
     def __repr__(self) -> str:
         return f"<FrontProblem of {self._problem}>"
 
     def anew(self) -> FrontProblem:
-        """Return the same problem with nothing known of it, for its judge."""
+        """Return a copy with an empty cache, for the judge."""
         return FrontProblem(replace(self._problem), self._rounding)
 
     @property
@@ -103,7 +98,7 @@ class FrontProblem:
 
     @cached_property
     def _explored(self) -> tuple[Visited, Space]:
-        """All states that are allowed, and their space; `InfeasibleError` if no build ends."""
+        """All feasible states, and their space; raises `InfeasibleError` if no build ends."""
         found = explore(self._problem, tell=_require_memory)
         if not found.whole:
             raise confirmed(self._problem, "the search")
@@ -120,11 +115,11 @@ class FrontProblem:
 
     @cached_property
     def _counted(self) -> list[int]:
-        """Which goals count moves: bounds on them hold along a path, not state by state."""
+        """Indices of goals that add up over moves: their bounds constrain paths, not states."""
         return [k for k, goal in enumerate(self._problem.goals) if not goal.is_peak]
 
     def best_below(self, bounds: Floats) -> Solution | None:
-        """Return a plan with values below bounds (k,) that no plan dominates, SI units."""
+        """Return a non-dominated plan with values below bounds (k,), SI units, if there is any."""
         below = self._below(bounds)
         if not below.ends[reached(below)].any():
             return None
@@ -142,7 +137,7 @@ class FrontProblem:
         return Solution(states, values, values, order=order)
 
     def _below(self, bounds: Floats) -> Graph:
-        """Return the moves to states whose values are all below bounds."""
+        """Return the subgraph of the moves to states whose peaks are all below bounds."""
         graph, kept = self._visited.graph, np.ones(len(self._visited.graph.source), dtype=bool)
         bounds = bounds.copy()
         bounds[self._counted] = np.inf
@@ -151,7 +146,7 @@ class FrontProblem:
         return graph.only(kept)
 
     def _fewest(self, graph: Graph, bounds: Floats) -> Graph | None:
-        """Return the paths with as many grips held at the end as those with the fewest moves."""
+        """Return the subgraph of the number of grips at the end that minimizes (steps, regrips)."""
         steps, regrips = self._of(STEPS), self._of(REGRIPS)
         found = []
         for held in range(self._problem.space.robots + 1):
@@ -166,7 +161,7 @@ class FrontProblem:
         return self._problem.goals.index(amount)
 
     def is_empty_below(self, bounds: Floats) -> bool:
-        """Return whether no plan is below bounds (k,): another route, from the empty site."""
+        """Return whether no plan is below bounds (k,), by distances from the empty site."""
         graph = self._below(bounds)
         if not self._counted:
             return not graph.ends[reached(graph)].any()
@@ -200,7 +195,7 @@ class FrontProblem:
         return _rounded_up(np.array(found), self._round)
 
     def engine(self, plan: Solution) -> Engine:
-        """Return what computes the responses of a plan, of the scene in its build order."""
+        """Return the engine of a plan, for the scene in its build order."""
         return self._of_plan(plan).engine
 
     def _of_plan(self, plan: Solution) -> States:
@@ -210,7 +205,7 @@ class FrontProblem:
 
 
 def _require_memory(found: Explorer) -> None:
-    """Raise an error if states, twice while they grow, do not fit."""
+    """Raise a `ProblemError` if the explored states exceed the free memory."""
     if found.nbytes > free_memory():
         raise ProblemError(
             "pareto: the states do not fit the memory; give an order, or rules with fewer states"
@@ -248,7 +243,7 @@ class Front(Terse):
 
 
 def _moved(front: Front) -> tuple[Moved, ...]:
-    """Return how far the steps of every plan move nodes, over what the linear range allows."""
+    """Return the largest displacement of every plan, over the limit of the linear range."""
     pairs = zip(front.engines, front.steps, strict=True)
     return tuple(most_moved((engine,), steps) for engine, steps in pairs)
 
@@ -264,13 +259,13 @@ def find_front(
 ) -> Front:
     """Return the Pareto set of a problem, its points recomputed and its completeness judged.
 
-    ``problem``: whose goals are all to be small at once; ``rounding``: what numbers are rounded up
-    to multiples of, by name, SI units, which thins the set; of a problem that is posed. Its plans
-    keep the linear range if any does, unless a limit on ``linear_range`` says otherwise.
-    ``seconds``: after which the points found are returned; ``progress``: told how far it is, in a
-    few words or as a `seqopt.work.Stage`; ``clock``: of all there is to do, the proof too. Raises
-    `InfeasibleError` if no plan is allowed; `SolverError` if a plan is not worth what is claimed,
-    or the set lacks a point; `TimeUpError` if there is none in time.
+    ``problem``: its goals are minimized simultaneously; ``rounding``: of a posed problem, steps to
+    whose multiples values are rounded up, by goal, SI units, which thins the set. Its plans are
+    within the linear range if any is, unless a limit on ``linear_range`` says otherwise.
+    ``seconds``: limit of the search, which then returns the points found; ``progress``: called
+    with the progress, as words or a `seqopt.work.Stage`; ``clock``: of search and proof. Raises
+    `InfeasibleError` if no plan is feasible; `SolverError` if the values of a plan differ from
+    those claimed, or a point is missing; `TimeUpError` if no plan is found in time.
     """
     formulation = as_formulation(formulation, "front")
     if not isinstance(problem, Problem):
@@ -303,7 +298,7 @@ def find_front(
 def _front_of(
     problem: FrontProblem, formulation: Formulation, seconds: float, progress: Tell, clock: Clock
 ) -> Front:
-    """Return the Pareto set of a problem, judged."""
+    """Return the Pareto set of a problem, its points recomputed, with the proof of completeness."""
     start = time.perf_counter()
     twin, name = problem.anew(), formulation.name  # which no formulation can reach
     limit = min(seconds, clock.left)
@@ -338,7 +333,7 @@ def _front_of(
 def _found(
     name: str, problems: tuple[FrontProblem, FrontProblem], solve: Callable[[], object]
 ) -> list[Solution]:
-    """Return the plans of a formulation, in numbers; raise that there is none once it is proven."""
+    """Return the plans of a formulation; raise `InfeasibleError` if infeasibility is proven."""
     twin = problems[1]
     try:
         plans = called(name, lambda: problems, tuple, solve)
@@ -356,7 +351,7 @@ def _found(
 
 
 def _require_complete(problem: FrontProblem, points: Floats, progress: Tell) -> None:
-    """Raise an error if a plan exists that no point dominates: bounds are searched again."""
+    """Raise a `SolverError` if a plan is below an upper bound of the non-dominated region."""
     bounds = upper_bounds(points)
     for bound in with_progress("proving that no plan is missing", bounds, progress):
         if not problem.is_empty_below(bound):
@@ -364,10 +359,10 @@ def _require_complete(problem: FrontProblem, points: Floats, progress: Tell) -> 
 
 
 def upper_bounds(points: Floats) -> Floats:
-    """Return the corners (m, k) below which lies all that no point (n, k) dominates.
+    """Return the local upper bounds (m, k) of the region that no point (n, k) dominates.
 
-    Points are taken by their last number, ascending; up to the next one only those before it
-    count, so that the corners are those of sets with one number less.
+    Points are swept by their last value, ascending; between two such values only the points before
+    count, which reduces the corners to those of sets with k - 1 values.
     """
     if points.shape[1] == 1:
         return np.array([[points.min(initial=np.inf)]])
@@ -399,11 +394,11 @@ def _table(problem: FrontProblem, points: Floats, plans: Sequence[Sequence[Step]
 
 
 def pick(table: pd.DataFrame, least: str, under: Mapping[str, float] | None = None) -> int:
-    """Return the row of a Pareto set with the least of one number among those below bounds.
+    """Return the row of a Pareto set with the least value of a column, subject to upper bounds.
 
-    ``table``: of a `Front`; ``least``: a column; ``under``: what columns must stay below, SI units.
-    Result: its place, from 0; of several the first. Raises `ProblemError` if there is no such
-    column, or no row is below all bounds.
+    ``table``: of a `Front`; ``least``: the column; ``under``: strict bounds by column, SI units.
+    Result: index of the row, from 0; ties go to the first. Raises `ProblemError` if there is no
+    such column, or no row satisfies the bounds.
     """
     under = dict(under or {})
     for name in (least, *under):

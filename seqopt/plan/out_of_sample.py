@@ -1,8 +1,8 @@
-"""The value of a robust plan in scenarios that it was not made for.
+"""Out-of-sample evaluation of a robust plan.
 
 A plan that is good over some scenarios may be fitted to these only. It is therefore judged on
 others and compared with two plans: the nominal plan, which uses no scenario, and the best plan for
-each single scenario (wait and see), which no plan can beat.
+each single scenario (wait and see), which is a lower bound.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PLANS = ("robust", "nominal", "knows_it")
 
 @dataclass(frozen=True, repr=False)
 class Trial(Terse):
-    """Plans, scenario by scenario.
+    """Values of plans, scenario by scenario.
 
     ``plan``: what was judged; ``known``: the layers over scenarios that it was chosen from;
     ``nominal``: the exact optimum of the nominal scene, of the same aim in one scenario; ``table``:
@@ -53,11 +53,11 @@ class Trial(Terse):
 
     @property
     def known(self) -> tuple[Scene, ...]:
-        """The scenarios that the plan was chosen by."""
+        """The scenarios of the optimization."""
         return self.layers.scenes
 
     def summary(self) -> dict[str, dict[str, float]]:
-        """Return what the aim makes of every set of scenarios, by plan; some may be infinite."""
+        """Return the robust objective of each set of scenarios, by plan; some may be infinite."""
         aim = self.layers.over
         column = "peak" if aim.aim is Aim.PEAK else "total"
         return {
@@ -67,7 +67,7 @@ class Trial(Terse):
 
 
 def judge_unseen(plan: Plan, scenes: Layers | Scenarios | Sequence[Scene]) -> Trial:
-    """Return the value of a plan in other scenarios, beside two plans for comparison.
+    """Evaluate a plan in other scenarios, with two plans for comparison.
 
     ``plan``: of candidates over scenarios; ``scenes``: not those it was made for: drawn with
     another seed. Or the layers over them, whose costs may be known. Result: also of the nominal
@@ -94,7 +94,7 @@ def judge_unseen(plan: Plan, scenes: Layers | Scenarios | Sequence[Scene]) -> Tr
 
 
 def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
-    """Return the worst values of a plan, margins aside, in scenarios it was not chosen by."""
+    """Return the worst values of a plan, without margins, over unseen scenarios."""
     graph = plan.states
     goals = tuple(goal for goal in graph.goals if not goal.margins)
     if not goals:
@@ -107,12 +107,12 @@ def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
 
 
 def best_choice(costs: LayeredCosts, aim: Aim) -> tuple[int, ...]:
-    """Return the best choice of an aim; of those of least peak the one of least sum."""
+    """Return an optimal choice; among those of least peak one of least sum."""
     return best_in_order([(costs, aim), (costs, Aim.SUM)])
 
 
 def _row(costs: ScenarioCosts, aim: Aim, choices: Sequence[tuple[int, ...]]) -> dict[str, float]:
-    """Return what three plans cost in a scenario."""
+    """Return total and peak cost of the three plans in a scenario."""
     try:
         best = best_choice(aim.costs(costs), aim)
     except InfeasibleError:

@@ -16,8 +16,10 @@ from seqopt.engines.registry import provenance
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind
 from seqopt.graph.instance import Instance
 from seqopt.graph.layers.layers import Layers
+from seqopt.graph.layers.ranking import Objectives, objectives
 from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
+from seqopt.judge._step_checks import certified
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan._status import ENDS, Status, bare_summary, order_facts
 from seqopt.plan.build import ShownBuild
@@ -41,13 +43,12 @@ from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
 
 if TYPE_CHECKING:
-    from seqopt.graph.layers.ranking import Objectives
     from seqopt.plan.search._window_search import WindowSearch
 
 
 @dataclass(frozen=True, repr=False)
 class Plan(ShownBuild):
-    """A solved problem: every grip of a build, and how good that is.
+    """A solved problem: every grip of a build, with objective values and bounds.
 
     Attributes
     ----------
@@ -108,18 +109,18 @@ class Plan(ShownBuild):
 
     @property
     def is_far(self) -> bool:
-        """Whether nodes are known to move farther than the linear range allows."""
+        """Whether displacements are known to exceed the linear range."""
         return self.moved is not None and self.moved.share > 1 + LIMIT_TOLERANCE
 
     @property
     def outside(self) -> bool:
-        """Whether steps leave the linear range in any way: then what is computed means little."""
+        """Whether steps exceed any limit of the linear range: then responses are not valid."""
         opens = self.moved is not None and isinstance(self.engine, OpeningEngine)
         return self.is_far or bool(self.steps and not opens and self.departures)
 
     @cached_property
     def departures(self) -> tuple[Departure, ...]:
-        """The limits of the linear range that steps leave, in the scene or in any scenario."""
+        """The limits of the linear range that steps exceed, in the scene or in any scenario."""
         found = self._within.departures(self._columns)
         if self.moved is None or not self.is_far or any(d.what == FAR_OFF for d in found):
             return found
@@ -128,22 +129,22 @@ class Plan(ShownBuild):
 
     @property
     def layers(self) -> Layers:
-        """The layers of candidates that it was chosen from; a `ProblemError` says if none were."""
+        """The layers of candidates; raises `ProblemError` if states were chosen."""
         return self.graph.as_layers
 
     @property
     def states(self) -> States:
-        """The states that it was chosen from; a `ProblemError` says if there were none."""
+        """The graph of states; raises `ProblemError` if candidates were chosen."""
         return self.graph.as_states
 
     @property
     def _of_scene(self) -> States | Layers:
-        """What it was chosen from, of the scene itself; a `ProblemError` if that is costs alone."""
+        """The graph of the scene itself; raises `ProblemError` if only costs were given."""
         return self.graph.alone_in_scene
 
     @property
     def engine(self) -> Engine:
-        """What computes the responses, of the scene in the order of the plan."""
+        """The engine of the responses, for the scene in the order of the plan."""
         return self._of_scene.engine
 
     @property
@@ -170,7 +171,7 @@ class Plan(ShownBuild):
 
     @property
     def order(self) -> Order:
-        """The names of all bricks in the order that was found; empty where it is given."""
+        """The names of all bricks in the optimized order; empty if the order was given."""
         return self.selection.order
 
     @property
@@ -180,19 +181,19 @@ class Plan(ShownBuild):
 
     @property
     def objective(self) -> dict[str, float]:
-        """The value of every goal by its name; of a tilt, what is survived, in degrees."""
+        """The value of every goal by its name; of a tilt the critical one, in degrees."""
         claimed, proof = self.selection.objective, self.certificate
         if proof is not None:
             return self.in_display_units(proof.values)
         return self.in_display_units(claimed) if isfinite(claimed[0]) else {}
 
     def in_display_units(self, values: Sequence[float]) -> dict[str, float]:
-        """Return values of the first goals by their names."""
+        """Return values of the first goals by their names, a tilt in degrees."""
         return self.graph.in_display_units(self.formulation.aim, values)
 
     @property
     def gap(self) -> float | None:
-        """What is proven to be left between value and bound, over the value; None without proof."""
+        """Relative optimality gap that is proven; None without proof."""
         if self.certificate is None or not isfinite(self.certificate.gap):
             return None
         return _known_gap(self.certificate.gap)
@@ -204,22 +205,22 @@ class Plan(ShownBuild):
 
     @property
     def stopped(self) -> str:
-        """Why a search of states or orders ended early: ``time``, ``memory``, ``size``, say."""
+        """Why a search of states or orders ended early, as ``time``, ``memory`` or ``size``."""
         return self.selection.stopped
 
     @property
     def trace(self) -> tuple[Finding, ...]:
-        """What the formulation knew at which time; of states nothing."""
+        """Incumbents and bounds over time; empty for states."""
         return self.selection.trace
 
     @property
     def among(self) -> str:
-        """Which candidates alone were looked at, in words; empty for all."""
+        """Which candidates were considered, in words; empty for all."""
         return self._of_scene.among
 
     @property
     def status(self) -> Status:
-        """What is known of the plan, among the candidates that were looked at.
+        """Optimality status of the plan, among the candidates that were considered.
 
         A margin of stability is optimal within the gap, which ``result`` and the summary name.
         """
@@ -238,7 +239,7 @@ class Plan(ShownBuild):
     def result(self) -> str:
         """The value of the plan, and what is proven about it, in words.
 
-        Where steps leave the linear range, it says so first.
+        It begins with a warning if steps exceed the linear range.
         """
         return f"{OUTSIDE}: {self._value}" if self.outside else self._value
 
@@ -249,7 +250,7 @@ class Plan(ShownBuild):
 
     @property
     def choice(self) -> tuple[int, ...]:
-        """The candidate chosen for every move; a `ProblemError` says if states were chosen."""
+        """The chosen candidate of every move; raises `ProblemError` if states were chosen."""
         return self.graph.chosen_candidates(self.selection.states)
 
     @property
@@ -263,7 +264,7 @@ class Plan(ShownBuild):
 
     @property
     def explored(self) -> tuple[Layers, ...]:
-        """The layers whose responses were computed: the whole, or what a search needed."""
+        """The layers whose responses were computed: all, or those that a search needed."""
         return (self.layers,) if self.search is None else self.search.explored
 
     @property
@@ -276,7 +277,7 @@ class Plan(ShownBuild):
 
     @property
     def models_needed(self) -> int:
-        """How many different models the formulation looks at: fewer where it asks for windows."""
+        """How many different models the formulation needs: fewer for window searches."""
         return self._window_models if self.formulation.windowed == () else self.models
 
     @property
@@ -285,7 +286,7 @@ class Plan(ShownBuild):
 
     @property
     def regrips(self) -> int:
-        """How many grips are taken beside those that place a brick."""
+        """Number of grips taken besides those that place a brick."""
         return sum(step.kind is StepKind.REPOSITION for step in self.steps)
 
     @cached_property
@@ -311,7 +312,7 @@ class Plan(ShownBuild):
         return columns
 
     def table(self) -> pd.DataFrame:
-        """Return what was chosen: every move with what it costs, or every grip where states were.
+        """Return the choice: moves with their costs, or grips if states were chosen.
 
         Result: a row per move: ``move``, ``step``, ``to_step`` (the last in which the node is
         held), ``bricks``, ``robot``, ``brick``, ``node``, ``largest_force_N``, ``candidates`` (how
@@ -328,7 +329,7 @@ class Plan(ShownBuild):
         return _tables.chosen_table(self.layers, self.choice, aim, self.search, self.grips())
 
     def alternatives(self) -> pd.DataFrame:
-        """Return the responses and the cost of every choice that was evaluated.
+        """Return the responses and the cost of every evaluated choice.
 
         Result: a row per choice, by step; ``second_node`` where two moves are open. SI units. Where
         the responses of all choices are not kept, those that go with the plan's choices before.
@@ -349,8 +350,6 @@ class Plan(ShownBuild):
             or self.graph.scenarios
         ):
             return {"objectives": None, "gap_parts": None}
-        from seqopt.graph.layers.ranking import objectives  # noqa: PLC0415  # only in summaries
-
         heuristic = self.formulation.kind is FormulationKind.HEURISTIC
         return objectives(self.layers, self.choice, heuristic=heuristic)
 
@@ -361,8 +360,6 @@ class Plan(ShownBuild):
         `seqopt.stability.steps.stability_table`.
         """
         if mortar is None and self.standing is not None:
-            from seqopt.judge._step_checks import certified  # noqa: PLC0415  # of states
-
             return stability_table(self.steps, certified(self.states, self.steps))
         return super().stability("dry" if mortar is None else mortar)
 
@@ -386,7 +383,7 @@ class Plan(ShownBuild):
         return _summarized(self) if self.steps else bare_summary(self)
 
     def brief(self) -> dict[str, object]:
-        """Return what is known of the plan without its responses: the first lines of a summary."""
+        """Return the entries of the summary that need no responses."""
         return {
             "scene": self.scene_name,
             "schedule": self.method,

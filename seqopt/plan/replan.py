@@ -1,4 +1,4 @@
-"""What becomes of a plan where the build, or what is known of it, has changed."""
+"""Changes of a plan after changes of the build or of its data."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def without(
 def _while_missing(
     scene: Scene, stand: set[int], rest: Sequence[int]
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return which bricks ground or joints tie to what stands, and which wait for those missing."""
+    """Return bricks tied to the standing part or the ground, and those that wait."""
     beside: dict[int, set[int]] = {name: set() for name in scene.build_order}
     for first, second in (joint.bricks for joint in scene.joints):
         beside[first].add(second)
@@ -71,7 +71,7 @@ def _while_missing(
 
 
 def goes_on(states: States, steps: Sequence[Step]) -> dict[str, float]:
-    """Return what goals take of steps that go on from where builds of a problem begin.
+    """Return the goals' values of steps that continue from the beginning of a problem.
 
     Raises a `SeqoptError` that names what they break.
     """
@@ -94,7 +94,7 @@ def goes_on(states: States, steps: Sequence[Step]) -> dict[str, float]:
 
 
 def compared(plan: Plan, old: Sequence[Step]) -> dict[str, object]:
-    """Return what a new plan changes: the old rest, and the first step that differs.
+    """Return the changes of a new plan: values of the old rest, and the first step that differs.
 
     ``old``: the steps that were planned from where the new plan begins. Result: ``as_planned``,
     what goals take of them now, or ``broken``, why they cannot go on; ``differs``, the number of

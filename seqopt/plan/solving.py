@@ -13,6 +13,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, Run, as_formulation
+from seqopt.graph.instance import Instance
 from seqopt.graph.layers.layers import Layers, candidate_layers, in_scenarios
 from seqopt.graph.source import Source
 from seqopt.graph.states._checks import check_parts
@@ -33,8 +34,6 @@ from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 
 if TYPE_CHECKING:
-    from seqopt.graph.instance import Instance
-
     Graph = Layers | States
 
 AIMS = {Aim.SUM: SUM, Aim.PEAK: MINMAX}
@@ -91,13 +90,19 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     worlds = {"scenarios": scenarios, "over": over, "orders": orders}
     more = {"also": also, "resources": resources}
     problem = Problem.asked(simplest(engine), moves, criterion, **asked, **worlds, **more)
-    posed = replace(problem, criterion=_scaled_criterion(problem))
+    graph: Graph
+    if graph_kind(problem) != CANDIDATES:
+        graph = states_of(problem)
+    else:
+        parse_budgets(problem.budgets)
+        graph = _scenarios(problem) if problem.scenarios else _plain_layers(problem)
+    posed = replace(problem, criterion=graph.criterion)  # with the numbers of the scene
     posed.graphs.update(problem.graphs)
     return posed
 
 
 def graph_kind(problem: Problem) -> str:
-    """Return which graph answers a problem if no formulation says: one of those above."""
+    """Return the default kind of graph of a problem."""
     if problem.orders is not None:
         return ORDERS
     asked = problem.is_timed or problem.goals or problem.filters or problem.stands is not None
@@ -110,7 +115,7 @@ def in_layers(moves: Schedule | FreeRules) -> bool:
 
 
 def usual(problem: Problem) -> str:
-    """Return the name of the formulation that solves a problem if none is named."""
+    """Return the name of the default formulation of a problem."""
     if problem.orders is not None:
         return "order_search"
     if problem.is_timed:
@@ -123,7 +128,7 @@ def usual(problem: Problem) -> str:
 
 
 def graph_of(problem: Problem, kind: str = "") -> Any:
-    """Return the graph of choices of a problem; what was computed for it before is kept.
+    """Return the graph of choices of a problem, cached with what was computed for it.
 
     ``kind``: ``candidates``, ``states`` or ``orders``; by default as `graph_kind`. Raises
     `ProblemError` if the problem has no such graph.
@@ -144,14 +149,6 @@ def states_of(problem: Problem) -> States:
     """Return the states and moves of a problem."""
     found: States = graph_of(problem, STATES if problem.orders is None else ORDERS)
     return found
-
-
-def _scaled_criterion(problem: Problem) -> Criterion:
-    """Return the criterion with the numbers of the scene; raise what the usual graph says."""
-    if graph_kind(problem) != CANDIDATES:
-        return states_of(problem).criterion
-    parse_budgets(problem.budgets)
-    return (_scenarios(problem) if problem.scenarios else _plain_layers(problem)).criterion
 
 
 def _plain_layers(problem: Problem) -> Layers:
@@ -184,7 +181,7 @@ def _scenarios(problem: Problem) -> Layers:
 
 
 def _require_candidates(problem: Problem) -> None:
-    """Raise an error if something is asked that layers of candidates do not know."""
+    """Raise a `ProblemError` for goals and constraints that layers of candidates do not support."""
     of_states = problem.goals not in ((), *((goal,) for goal in AIMS.values()))
     why = {
         "orders": problem.orders is not None,
@@ -200,7 +197,7 @@ def _require_candidates(problem: Problem) -> None:
 
 
 def _states(problem: Problem) -> States:
-    """Return the states of a problem, with all that is asked of them."""
+    """Return the graph of states of a problem, with goals, constraints and scenarios."""
     from seqopt.sequence._rule_space import FreeSpace  # noqa: PLC0415  # of states alone
 
     over = problem.over if problem.scenarios else WORST_PEAK
@@ -254,7 +251,7 @@ BUILDERS: dict[str, Callable[[Problem], Graph]] = {
 
 
 def _solver(kind: str) -> Callable[[Any, Formulation, Run], Plan]:
-    """Return what makes the plan of a formulation of some graph."""
+    """Return the solver of a kind of graph."""
     if kind == CANDIDATES:
         return solve_layers
     from seqopt.plan._states import solve_states  # noqa: PLC0415  # with their proofs
@@ -314,10 +311,10 @@ def solve(
 
 
 def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
-    """Return the plan of a problem, or of a graph of choices that is given: `solve` in parts.
+    """Solve a problem or a given graph of choices, within the limits of a run.
 
-    What a run has no time for is left out, which its clock notes: with the proof a plan has values
-    and bounds that are claimed. Raises `TimeUpError` if there is no plan by then.
+    Parts without time are skipped and noted by the clock: without the proof, values and bounds are
+    claimed only. Raises `TimeUpError` if there is no plan in time.
     """
     if not isinstance(problem, Problem):
         return _of_graph(problem, formulation, run)
@@ -350,7 +347,7 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
 
 
 def questions_of(problem: Problem) -> tuple[str, ...]:
-    """Return what a formulation must answer to solve a problem."""
+    """Return the questions that a formulation of a problem must support."""
     if problem.orders is not None:
         return ("order",)
     if problem.is_timed:
@@ -361,7 +358,7 @@ def questions_of(problem: Problem) -> tuple[str, ...]:
 
 
 def _kind_for(problem: Problem, formulation: Formulation) -> str:
-    """Return which graph of a problem a formulation is given."""
+    """Return the kind of graph of a problem that a formulation takes."""
     kind = graph_kind(problem)
     totals = problem.scenarios and problem.over.aim is Aim.SUM
     if kind == CANDIDATES and formulation.of_states and not totals:
@@ -371,9 +368,8 @@ def _kind_for(problem: Problem, formulation: Formulation) -> str:
 
 
 def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
-    """Return the plan of a graph of choices that is given, or of an instance."""
-    from seqopt.graph.instance import Instance  # noqa: PLC0415  # few are given
-    from seqopt.plan._states import solve_instance  # noqa: PLC0415
+    """Solve a given graph of choices or instance."""
+    from seqopt.plan._states import solve_instance  # noqa: PLC0415  # few are given
 
     if isinstance(problem, Instance):
         return solve_instance(problem, formulation, run)

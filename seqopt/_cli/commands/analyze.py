@@ -143,7 +143,7 @@ def _notes(
     table: pd.DataFrame,
     enough: Enough | None,
 ) -> Iterator[str]:
-    """Yield levels, what is unchecked or enough, payloads and props exceeded, idle robots."""
+    """Yield notes on levels, unchecked limits, sufficient models, payloads, idle robots."""
     scene = within.engine.network.scene
     yield from remarks.level_notes(asked, within.engine)
     yield from within.unchecked
@@ -156,7 +156,7 @@ def _notes(
 def _solved(
     engine: Engine, answers: Iterable[_Answered], faults: dict[int, SeqoptError]
 ) -> Iterator[tuple[Step, Fields]]:
-    """Yield the steps that an engine solved; the others go to ``faults``, by their numbers."""
+    """Yield solved steps with fields; errors of the others go to ``faults``, by step number."""
     for step, found in answers:
         if isinstance(found, Fields):
             yield step, found
@@ -165,7 +165,7 @@ def _solved(
 
 
 def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:
-    """Return why a step was not solved: a solver's failure is none where the step falls."""
+    """Return the error of a step: of a step that falls a mechanism, not a solver's failure."""
     if isinstance(error, MechanismError):
         return error
     recipe = recipe_of(engine)
@@ -195,7 +195,7 @@ def _counted(table: pd.DataFrame, faults: Mapping[int, SeqoptError]) -> str:
 
 
 def _faults_said(faults: Mapping[int, SeqoptError], steps: int) -> tuple[str, ...]:
-    """Return which steps are mechanisms, and which a solver failed at, a line each."""
+    """Return lines naming the steps that are mechanisms, and those where the solver failed."""
     out = []
     for what, kind in (("mechanism", MechanismError), ("solver failed", SolverError)):
         own = {number: error for number, error in faults.items() if isinstance(error, kind)}
@@ -207,7 +207,7 @@ def _faults_said(faults: Mapping[int, SeqoptError], steps: int) -> tuple[str, ..
 
 
 def _status_of(faults: Mapping[int, SeqoptError], ended: Status) -> Status:
-    """Return the exit status of steps that were not solved, if there are any."""
+    """Return the exit status, given the errors of steps."""
     if ended is not Status.DONE or not faults:
         return ended
     failed = any(isinstance(error, SolverError) for error in faults.values())
@@ -217,7 +217,7 @@ def _status_of(faults: Mapping[int, SeqoptError], ended: Status) -> Status:
 def _with_tolerances(
     asked: Analyze, engine: Engine, steps: Sequence[Step], table: pd.DataFrame
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Return a table with tolerances of grips, if --tolerance asks for them, and notes on these."""
+    """Return a table with the tolerances of grips that --tolerance requests, and notes on them."""
     if asked.tolerance is None:
         return table, ()
     table = with_tolerances(engine, steps, table)
@@ -239,7 +239,7 @@ def _with_tolerances(
 def _late(
     asked: Analyze, computed: int, steps: int, engine: Engine, clock: Clock
 ) -> tuple[tuple[str, ...], Status]:
-    """Return a line if steps ended before the last one, else none, and the status of that."""
+    """Return notes and status of an analysis that ended before the last step."""
     if computed == steps:
         return (), Status.DONE
     so_far = f"{computed} of {steps} steps computed" if computed else "no step computed"
@@ -259,7 +259,7 @@ _Answered = tuple[Step, Fields | SeqoptError]
 def _step_answers(
     asked: Analyze, within: LinearRange, steps: Sequence[Step]
 ) -> Iterator[_Answered]:
-    """Return steps with fields, or the error, from scratch or with what earlier steps lock in."""
+    """Return steps with fields or errors, from scratch or as staged construction."""
     each, engine = with_progress("steps", steps, asked.tell), within.engine
 
     def answer(step: Step) -> Fields | SeqoptError:
@@ -279,7 +279,7 @@ def _step_answers(
 
 
 def _in_time(answers: Iterator[_Answered], clock: Clock) -> Iterator[_Answered]:
-    """Yield answers that come in time; those before an interrupt are not lost."""
+    """Yield answers until the time limit or an interrupt."""
     while True:
         try:
             with ending(clock.left):

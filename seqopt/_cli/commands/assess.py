@@ -110,7 +110,7 @@ class AssessWords(Assess):
 
 
 def answer_load_factor(asked: AssessWords) -> Answer:
-    """Answer how much load every step of a sequence bears."""
+    """Return the load factor of every step of a sequence."""
     scene = inputs.find_scene(asked)
     outputs.require_out(asked)
     network, mortars = build_network(scene), _mortars(asked)
@@ -150,7 +150,7 @@ def answer_load_factor(asked: AssessWords) -> Answer:
 
 
 def run(asked: AssessWords) -> Answer:
-    """Assess every step of a sequence, or map builds; tables are written whatever the verdicts."""
+    """Assess every step of a sequence, or map builds; write tables for any verdict."""
     if asked.map is not None:
         from seqopt._cli.commands.mapping import answer_map  # noqa: PLC0415  # for maps only
 
@@ -197,10 +197,10 @@ def run(asked: AssessWords) -> Answer:
 
 
 def _mortars(asked: AssessWords) -> dict[str, Mortar]:
-    """Return the mortar that is named, or dry joints and the epoxy, by what they are called.
+    """Return mortars by name: the one requested, or dry joints and epoxy.
 
-    The last is what the build counts on. Numbers that are given take the place of its own, and
-    friction in dry joints as well.
+    The last one decides the exit status. Options replace its properties, and the friction of dry
+    joints as well.
     """
     given = {
         name: value
@@ -225,7 +225,7 @@ def _verdicts(
 
 
 def _margins(asked: AssessWords, steps: Sequence[Step]) -> tuple[tuple[str, ...], range]:
-    """Return which margins are asked for, and the numbers of which steps."""
+    """Return the requested margins, and the numbers of their steps."""
     margins = find_margins(asked.margins or ("all" if asked.steps else ()))
     if asked.steps is None:
         return margins, range(1, len(steps) + 1)

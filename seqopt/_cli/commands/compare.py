@@ -71,7 +71,7 @@ def run(asked: Compare) -> Answer:
 
 
 class Found(NamedTuple):
-    """A comparison, and what it is compared by."""
+    """A comparison with its reference methods."""
 
     engine: Engine
     criterion: Criterion
@@ -80,7 +80,7 @@ class Found(NamedTuple):
 
 
 def find(asked: Compare) -> Found:
-    """Compare all ways to build a scene; with what it is compared by."""
+    """Compare all ways to build a scene."""
     scene = inputs.find_scene(asked)
     find_postures(scene, asked.cache, asked.tell)
     engine = inputs.find_engine(asked, build_network(scene))
@@ -94,7 +94,7 @@ def find(asked: Compare) -> Found:
 
 
 def answered(asked: Compare, found: Found) -> Answer:
-    """Write a comparison, and return what is in it."""
+    """Write a comparison, and return its answer."""
     engine, criterion, prover, result = found
     scene = engine.network.scene
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
@@ -144,7 +144,7 @@ def _where(folder: Path, *, speed: bool) -> str:
 
 
 def _facts(result: Comparison) -> dict[str, object]:
-    """Return rows, notes and what the paper prints, for scripts."""
+    """Return rows, notes and the published values, for scripts."""
     table = result.table.assign(
         steps=[len(result.tables[name]) for name in result.table.index],
         paper=pd.Series({name: printed_largest(result, name) for name in result.table.index}),

@@ -1,7 +1,7 @@
-"""The command ``completion``: what a shell needs to complete words of seqopt.
+"""The command ``completion``: a script for shell completion.
 
-The script is written once, by shtab, and holds all names: completing a word takes no time, where a
-program that is asked at every key would take as long as it takes to start.
+The script is generated once, by shtab, and holds all names: completion then needs no start of
+Python.
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ class Completion(options.Asked):
 
 
 def run(asked: Completion) -> Answer:
-    """Return the script with which a shell completes words of seqopt."""
+    """Return the completion script of a shell."""
     script = shtab.complete(_completed(parser()), asked.shell)
     return Answer(facts={"shell": asked.shell, "script": script}, data=script + "\n")
 
 
 def _completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
-    """Return the parser of all commands, changed: its arguments know what may follow them."""
+    """Add completions to the arguments of the parser, in place, and return it."""
     known = {name: words(names) for name, names in _names().items()}
     known |= {
         "scene": words([*builtin_scenes(), *(f"{kind}:" for kind in KINDS)], files=True),
@@ -82,7 +82,7 @@ def _commands(whole: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParse
 
 
 def _names() -> dict[str, list[str]]:
-    """Return the names that an argument takes, by its place among the options."""
+    """Return the names that arguments accept, by destination."""
     responses = [*CHOICE_RESPONSES]
     return {
         "formulation": [*formulation_names()],
@@ -102,7 +102,7 @@ def _names() -> dict[str, list[str]]:
 
 
 def words(names: Iterable[str], *, files: bool = False) -> dict[str, object]:
-    """Return how each shell completes one of some words, or the path of a file too, for shtab."""
+    """Return shtab's completion of given words, with ``files`` also of paths, by shell."""
     listed = " ".join(names)
     name = f"_seqopt_{sha256(listed.encode()).hexdigest()[:8]}"
     more = '; compgen -f -- "$1"' if files else ""

@@ -98,14 +98,20 @@ def run(asked: Import) -> Answer:
 
 
 def _given(asked: Import) -> Given:
-    """Return what the words say where the file does not."""
-    keys = asked.supports
+    """Return the options that complete the data of the file."""
+    keys, law = asked.supports, None
+    if asked.stiffness is not None:
+        pair, where = asked.stiffness.split(","), f"--stiffness {asked.stiffness}"
+        if len(pair) != 2:
+            raise ProblemError(f"{where}: give two numbers, as 1.5e9,1.5e8")
+        along, across = (number_word(number, where) for number in pair)
+        law = JointLaw(translational=(along, across, across))
     return Given(
         unit=asked.unit,
         up=asked.up,
         density=asked.density,
         supports=None if keys is None else [key.strip() for key in keys.split(",") if key.strip()],
-        law=_law(asked.stiffness),
+        law=law,
         gap=asked.gap,
         detect=asked.detect,
         accept_overlaps=asked.accept_overlaps,
@@ -113,13 +119,3 @@ def _given(asked: Import) -> Given:
         name=asked.name,
         progress=asked.tell,
     )
-
-
-def _law(text: str | None) -> JointLaw | None:
-    if text is None:
-        return None
-    words = text.split(",")
-    if len(words) != 2:
-        raise ProblemError(f"--stiffness {text}: give two numbers, as 1.5e9,1.5e8")
-    along, across = (number_word(word, f"--stiffness {text}") for word in words)
-    return JointLaw(translational=(along, across, across))

@@ -59,7 +59,7 @@ class InstanceWords(Instance, Optimize):
 
 
 def run(asked: InstanceWords) -> Answer:
-    """Write the instance of the problem that is asked for."""
+    """Write the instance of a problem."""
     if asked.path is not None:
         return answered(asked, find(asked))
     path = inputs.file_name(inputs.given_scene(asked).name, ".npz")
@@ -70,7 +70,7 @@ def run(asked: InstanceWords) -> Answer:
 
 
 def find(asked: InstanceWords) -> Graph:
-    """Return the instance of the problem that is asked for; the file where it goes names it."""
+    """Return the instance of a problem, by default named after its file."""
     path = asked.path
     if path and path.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
@@ -87,7 +87,7 @@ def find(asked: InstanceWords) -> Graph:
 
 
 def answered(asked: InstanceWords, found: Graph) -> Answer:
-    """Write an instance, apart from what the command reads, and return what is in it."""
+    """Write an instance, to a path that is no input, and return its answer."""
     path = asked.path
     assert path is not None
     asked.tell("writing the instance")
@@ -100,7 +100,7 @@ def answered(asked: InstanceWords, found: Graph) -> Answer:
 
 
 def _made_by(words: Sequence[str]) -> str:
-    """Return the command without where it writes and what it prints."""
+    """Return the command line without options of output."""
     kept = list[str]()
     left = iter(words)
     for word in left:

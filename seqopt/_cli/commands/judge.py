@@ -42,7 +42,7 @@ class Judge(options.Asked):
 
 
 def run(asked: Judge) -> Answer:
-    """Check a solution, and say what is proven of it."""
+    """Check a solution and its bounds, and return the certificate."""
     instance = read_instance(asked.instance)
     bounds = () if asked.bound is None else asked.bound
     try:
@@ -67,7 +67,7 @@ def run(asked: Judge) -> Answer:
 
 
 def _said(instance: Instance, proof: Certificate) -> list[str]:
-    """Return what is proven, goal by goal."""
+    """Describe value, bound and gap, goal by goal."""
     lines = [f"{instance.name}: the path leads from node 0 to an end"]
     lines[0] += " within all caps" if instance.caps else ""
     caps = {cap.name: cap.most for cap in instance.caps}

@@ -1,4 +1,4 @@
-"""Where builds of a scene fail: what ``assess --map`` answers."""
+"""Failure maps of builds: the answer of ``assess --map``."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STEEPEST = 45.0  # degrees
 
 
 def answer_map(asked: options.Fixed, over: str, holds: Sequence[str]) -> Answer:
-    """Answer where builds of a scene fail, over an axis and what holds their joints."""
+    """Return the failure map of builds over an axis and the mortar of joints."""
     scene = inputs.find_scene(asked)
     axis, values = _axis(over)
     for name in holds:
@@ -59,7 +59,7 @@ def answer_map(asked: options.Fixed, over: str, holds: Sequence[str]) -> Answer:
 
 
 def _axis(text: str) -> tuple[str, tuple[float, ...]]:
-    """Return the axis of a map, and its values; none where the usual ones are meant."""
+    """Return the axis of a map, and its values; None for the default ones."""
     axis, _, values = text.partition("=")
     if axis not in (*WAYS, BRICKS):
         known = f"{', '.join(WAYS)} or {BRICKS}"
@@ -85,10 +85,10 @@ def _over_bricks(
     builds: Builds,
     over: tuple[str, Sequence[str], Sequence[float]],
 ) -> tuple[Scene, Builds, FailureMap, list[str]]:
-    """Return the map over the number of bricks, and why it is not possible, or not for all.
+    """Return the map over the number of bricks, and reasons for missing entries.
 
-    With it the scene and the builds of which it is shown how steps fall. A scene whose bricks
-    cannot be counted otherwise, or a plan, is mapped along its build.
+    Also the scene and the builds whose failing steps are drawn. A plan, or a scene of a fixed
+    number of bricks, is mapped along its build.
     """
     (text, holds, counts), now = over, len(scene.bricks)
     try:
@@ -118,7 +118,7 @@ def _over_bricks(
 
 
 def _builds(asked: options.Fixed, scene: Scene) -> tuple[Builds, list[str]]:
-    """Return the builds that are asked for, by name, and why others are not possible."""
+    """Return the requested builds by name, and the reasons why others are infeasible."""
     if asked.method is None and inputs.given_plan(asked) is None:
         return usual_builds(scene, asked.tell)
     name, steps, _ = inputs.find_steps(asked, build_network(scene))

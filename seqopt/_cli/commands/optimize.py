@@ -100,7 +100,7 @@ class Optimize(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Found:
-    """A plan, what was asked, and what there is time to say of it: from its responses to a page."""
+    """A plan with its request, and the evaluations that the time limit allows."""
 
     posed: PosedProblem
     plan: Plan
@@ -111,7 +111,7 @@ class Found:
 
     @cached_property
     def trial(self) -> Trial | None:
-        """Beside other plans, where candidates were chosen over scenarios."""
+        """The out-of-sample evaluation, if candidates were chosen over scenarios."""
         unseen = self.posed.unseen
         if unseen is None or not self.plan.graph.candidates:
             return None
@@ -121,7 +121,7 @@ class Found:
 
     @cached_property
     def analyzed(self) -> bool:
-        """Whether there was time for responses, linear range and overloads of the plan."""
+        """Whether responses, linear range and overloads of the plan were computed in time."""
 
         def analyze() -> bool:
             _ = self.plan.departures, self.plan.enough, self.plan.overloads
@@ -131,7 +131,7 @@ class Found:
 
     @cached_property
     def summary(self) -> dict[str, object]:
-        """The summary of the plan, or what there was time for of it."""
+        """The summary of the plan, as far as computed in time."""
         brief = self.plan.brief()
         if not self.analyzed:
             return brief
@@ -139,7 +139,7 @@ class Found:
 
     @cached_property
     def verdicts(self) -> dict[str, tuple[BuildVerdicts, ...]]:
-        """Which steps of the plan stand."""
+        """Stability verdicts of the steps of the plan."""
         builds = {self.plan.title: self.plan.steps}
         found = self.clock.spare(VERDICTS, lambda: self.prover.of_builds(builds), None)
         if found is None:  # nobody is to ask again
@@ -147,12 +147,12 @@ class Found:
         return found or {}
 
     def proving(self) -> AbstractContextManager[None]:
-        """Let another process begin to prove what stands: a command may start one, no script."""
+        """Start the proof of stability in another process, as commands may, unlike scripts."""
         return self.prover.begun(self.plan.steps) if self.clock.left else nullcontext()
 
     @cached_property
     def report(self) -> dict[str, object]:
-        """The summary, and what the command adds to it."""
+        """The summary with the entries that the command adds."""
         plan = self.plan
         loop = plan.method == "three-robot" and plan.graph.candidates
         counts = paper_models(plan.layers.schedule) if loop else ()
@@ -186,7 +186,7 @@ def run(asked: Optimize) -> Answer:
 
 
 def find(asked: Optimize, change: Change | None = None) -> Found:
-    """Choose every open grip of a build, or every step; ``change``: what has changed before."""
+    """Choose every open grip of a build, or every step; ``change``: applied to scene and start."""
     clock = Clock(asked.time_limit)
     outputs.require_out(asked, *outputs.ALWAYS)
     start = time.perf_counter()
@@ -218,7 +218,7 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
 
 
 def answered(asked: Optimize, found: Found) -> Answer:
-    """Write a plan, and return what it is worth; what there is no time for is left out."""
+    """Write a plan, and return its answer, without the parts that exceed the time limit."""
     made: dict[str, bytes | str] = {}
     if found.analyzed and found.summary and asked.path is not None:  # what says most comes first
         tables = partial(outputs.plan_files, found.plan, choices=asked.tables == "all")
@@ -228,7 +228,7 @@ def answered(asked: Optimize, found: Found) -> Answer:
 
 
 def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes | str]:
-    """Return the files of a plan by name, with its tables and tasks; at least what it is alone."""
+    """Return the files of a plan by name, at least table, summary and scene."""
     plan, made = found.plan, dict[str, bytes | str]()
     tasks = {kind: str(tables[f"tasks.{kind}"]) for kind in ("csv", "json") if tables}
     if found.analyzed:
@@ -246,7 +246,7 @@ def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes |
 
 
 def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], Plan]) -> str:
-    """Return what the best build from an empty site takes, beside one that goes on; in words."""
+    """Describe the optimum from an empty site, for comparison with a continued build."""
     if whole is None or plan.certificate is None:
         return ""
     begin = plan.steps[0].number - 1
@@ -264,14 +264,14 @@ def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], P
 
 
 def _values(plan: Plan) -> str:
-    """Return the values of a plan and how many steps it has, in words."""
+    """Describe the values and the number of steps of a plan."""
     values = [f"{name} {value_text(name, v)}" for name, v in plan.objective.items()]
     steps = [] if "steps" in plan.objective else [f"{len(plan.steps)} steps"]
     return f"{OUTSIDE}: " * plan.is_far + ", ".join([*values, *steps])
 
 
 def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
-    """Return what a plan is worth, once it is written."""
+    """Build the answer of a written plan."""
     plan = found.plan
     scene, early = plan.engine.network.scene, plan.ended is End.INTERRUPTED
     over = remarks.exceeded(scene, plan._columns) if found.analyzed and not early else ()
@@ -297,7 +297,7 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
 
 
 def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
-    """Yield what robots hold, what a plan was chosen by, how it was found, and what stands."""
+    """Yield lines on grips, objective, search and stability of a plan."""
     plan, scene = found.plan, found.plan.engine.network.scene
     held = ""
     if found.analyzed:
@@ -323,7 +323,7 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
 
 
 def _notes(asked: Optimize, found: Found) -> Iterator[str]:
-    """Yield what is worth knowing of a plan: levels, rules, scales, proof, idle robots, time."""
+    """Yield notes on levels, rules, scales, proof, idle robots and time."""
     plan, problem = found.plan, found.posed.problem
     scene, criterion = plan.engine.network.scene, problem.criterion.name
     yield from remarks.level_notes(asked, plan.engine)
@@ -343,7 +343,7 @@ def _notes(asked: Optimize, found: Found) -> Iterator[str]:
 
 
 def _value(found: Found) -> str:
-    """Return what a plan was chosen by, and what is proven of that."""
+    """Describe objective, bound and gap of a plan."""
     plan = found.plan
     if plan.order:
         values = ", ".join(f"{name} {value_text(name, v)}" for name, v in plan.objective.items())
@@ -360,7 +360,7 @@ def _value(found: Found) -> str:
 
 
 def _proof(plan: Plan) -> str:
-    """Return which proof was enough, and what another could still change."""
+    """Describe the proof of optimality, and its limits."""
     proof, looked = plan.certificate, f"{plan.models:,} models"
     if proof is None and plan.ended is End.STOPPED:
         return "left out, time is over; values and bounds are claimed"

@@ -1,4 +1,4 @@
-"""The command ``pareto``: all plans that no other one beats in every aim at once."""
+"""The command ``pareto``: all non-dominated plans."""
 
 from __future__ import annotations
 
@@ -115,13 +115,13 @@ class _Picked(GivenSequence):
 
 
 def run(asked: ParetoWords) -> Answer:
-    """Find all plans that no other beats in every aim, and write them."""
+    """Find all non-dominated plans, and write them."""
     return answered(asked, find(asked))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Found:
-    """A Pareto set, what was asked, and what there is time to say of it."""
+    """A Pareto set with its request, and the evaluations that the time limit allows."""
 
     problem: Problem
     value: Front
@@ -130,19 +130,19 @@ class Found:
 
     @cached_property
     def provers(self) -> dict[Engine, BuildProver]:
-        """What says which steps stand, by the engine of a build order."""
+        """Provers of stability, by the engine of a build order."""
         return {own: self.prover(own.network) for own in {*self.value.engines}}
 
     @cached_property
     def methods(self) -> Mapping[str, pd.DataFrame]:
-        """Fixed methods beside, as far as there is time."""
+        """Plans of fixed methods for comparison, if computed in time."""
         return self.clock.spare(
             "fixed methods beside", lambda: fixed_methods(self.problem.engine), {}
         )
 
     @cached_property
     def departures(self) -> dict[str, tuple[Departure, ...]]:
-        """How plans leave the linear range, for those that do, by name."""
+        """Exceeded limits of the linear range, by plan."""
 
         def departures() -> dict[str, tuple[Departure, ...]]:
             left: dict[str, tuple[Departure, ...]] = {}
@@ -154,14 +154,14 @@ class Found:
 
     @property
     def counts(self) -> dict[str, object]:
-        """How many points there are, whether that is all, and how long it took."""
+        """Number of points, completeness, and run times."""
         front = self.value
         counts = {"points": len(front.steps), "complete": front.complete}
         return {**counts, "seconds": dict(front.seconds)}
 
 
 def find(asked: ParetoWords) -> Found:
-    """Find all plans that no other beats in every aim."""
+    """Find all non-dominated plans."""
     outputs.require_out(asked)
     clock = Clock(asked.seconds)
     with clock.needed("posing the problem"):
@@ -175,7 +175,7 @@ def find(asked: ParetoWords) -> Found:
 
 
 def answered(asked: ParetoWords, found: Found) -> Answer:
-    """Write a Pareto set, and return what is in it; what there is no time for is left out."""
+    """Write a Pareto set, and return its answer, without the parts that exceed the time limit."""
     front, free, clock = found.value, states_of(found.problem), found.clock
     scene = free.engine.network.scene
     files: Mapping[str, bytes | str] = {}
@@ -218,7 +218,7 @@ def answered(asked: ParetoWords, found: Found) -> Answer:
 
 
 def _chosen(asked: ParetoWords, name: str, found: Found) -> tuple[int, dict[str, object], str]:
-    """Return which plan is picked, its point, and that in words."""
+    """Return the index of the picked plan, its point, and its description."""
     if asked.under and not found.methods and found.clock.left_out:
         raise TimeUpError(f"--pick {name}: --under was not looked at; give more")
     chosen = pick(found.value.table, name, _under(asked.under, found))
@@ -246,7 +246,7 @@ def _files(
 def _write_picked(
     folder: Path, name: str, found: Found, chosen: int, picked: Mapping[str, object]
 ) -> None:
-    """Write the plan that is picked, a folder as of any plan."""
+    """Write the folder of the picked plan."""
     own = found.value.engines[chosen]
     result = f"one of {len(found.value.steps)} plans"
     plan = _Picked(own, found.value.steps[chosen], f"plan with the least {name}", result=result)
@@ -300,12 +300,12 @@ def _front_files(asked: ParetoWords, found: Found) -> dict[str, bytes | str]:
 
 
 def _names(front: Front) -> list[str]:
-    """Return what the plans of a Pareto set are called, in the order of its rows."""
+    """Return the names of the plans of a Pareto set, by row."""
     return [f"point {number}" for number in range(1, len(front.steps) + 1)]
 
 
 def _by_engine(front: Front) -> dict[Engine, dict[str, Sequence[Step]]]:
-    """Return the steps of plans by name, those of one build order under their engine."""
+    """Return the steps of plans by name, grouped by the engine of their build order."""
     found = defaultdict[Engine, dict[str, Sequence[Step]]](dict)
     for name, own, steps in zip(_names(front), front.engines, front.steps, strict=True):
         found[own][name] = steps
@@ -319,7 +319,7 @@ def _numbered(front: Front) -> pd.DataFrame:
 
 
 def _under(texts: Sequence[str], found: Found) -> dict[str, float]:
-    """Return bounds from words: RESPONSE=VALUE, or the name of a method to beat."""
+    """Parse bounds: RESPONSE=VALUE, or the name of a method, whose values are the bounds."""
     out: dict[str, float] = {}
     for text in texts:
         methods = {} if "=" in text else found.methods

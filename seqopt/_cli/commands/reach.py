@@ -37,7 +37,7 @@ class Reach(options.Written, options.Postures, options.Built):
 
 
 def run(asked: Reach) -> Answer:
-    """Say what arms reach, and write it if asked."""
+    """Return the reached nodes and postures of arms, and write tables on request."""
     scene = inputs.find_scene(asked)
     outputs.require_out(asked)
     find_postures(scene, asked.cache, asked.tell)
@@ -60,7 +60,7 @@ def run(asked: Reach) -> Answer:
 
 
 def _files(scene: Scene, table: pd.DataFrame) -> dict[str, bytes | str]:
-    """Return the tables, and the picture if it can be drawn, by file name."""
+    """Return the files by name: tables, and the picture if matplotlib is installed."""
     files: dict[str, bytes | str] = {"reach.csv": csv_text(table)}
     if not scene.has_arms:
         return files

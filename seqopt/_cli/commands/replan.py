@@ -108,14 +108,14 @@ class ReplanWords(
 
 
 def run(asked: ReplanWords) -> Answer:
-    """Plan the rest of a build, and say what changes."""
+    """Plan the rest of a build, and return the changes."""
     found = find(asked)
     with found.new.proving():
         return answered(asked, found)
 
 
 class Found(NamedTuple):
-    """The folder of a plan, what is asked of ``optimize``, and the plan of the rest."""
+    """The folder of a plan, the request to ``optimize``, and its result."""
 
     folder: Path
     base: optimize.Optimize
@@ -129,7 +129,7 @@ class Found(NamedTuple):
 
 
 def find(asked: ReplanWords) -> Found:
-    """Plan the rest of a build; with what was asked, as of ``optimize``."""
+    """Plan the rest of a build; return it with the request to ``optimize``."""
     for name, text in (("at", asked.at), ("robots", asked.robots or "0")):
         if not str(text).isdecimal():
             raise StepError(f"--{name} {text}: give a number")
@@ -149,7 +149,7 @@ def find(asked: ReplanWords) -> Found:
 
 
 def answered(asked: ReplanWords, found: Found) -> Answer:
-    """Write the new plan, and say what it changes."""
+    """Write the new plan, and return its changes."""
     folder, base, new, notes = found
     scene = load_scene(folder / "scene.json")
     steps = read_plan(scene, folder / "plan.csv")
@@ -178,7 +178,7 @@ def answered(asked: ReplanWords, found: Found) -> Answer:
 
 
 def _as_optimize(asked: ReplanWords, folder: Path) -> optimize.Optimize:
-    """Return what is asked, as of ``optimize``, which goes on from the step."""
+    """Return the request to ``optimize`` that continues from the step."""
     shared = {each.name for each in fields(asked)} & {e.name for e in fields(optimize.Optimize)}
     given = {name: getattr(asked, name) for name in shared}
     told = _told(folder, lost=bool(asked.lost))
@@ -193,7 +193,7 @@ def _as_optimize(asked: ReplanWords, folder: Path) -> optimize.Optimize:
 
 
 def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
-    """Return the options of a plan from its summary; ``lost``: with the default of fewer robots."""
+    """Return options of a plan from its summary; ``lost``: with the defaults of fewer robots."""
     try:
         told = parse_json(read_text(folder / "summary.json"), "summary")
     except FileError:
@@ -226,7 +226,7 @@ def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
 def _changed(
     asked: ReplanWords, scene: Scene, begin: inputs.Place
 ) -> tuple[Scene, inputs.Place, str]:
-    """Return scene and place after what has changed, and the robots that take part, by name."""
+    """Return scene and place after the changes, and the names of participating robots."""
     assert begin.site is not None
     missing = options.listed(asked.missing)
     if wrong := [text for text in missing if not text.isdecimal()]:
@@ -244,7 +244,7 @@ def _changed(
 
 
 def _in_words(facts: Mapping[str, Any]) -> Sequence[str]:
-    """Return what a new plan changes, in lines."""
+    """Describe the changes of a new plan, in lines."""
     was = facts["as_planned"]
     if was is None:
         line = f"as planned the build cannot go on: {facts['broken']}"

@@ -75,7 +75,7 @@ def run(asked: SceneAsked) -> Answer:
 
 
 def _network_facts(network: Network) -> dict[str, object]:
-    """Return how large the network of a scene is, what it weighs, and what its robots can do."""
+    """Return size and weight of a scene's network, and properties of its robots."""
     scene = network.scene
     count = len(scene.bricks)
     return {
@@ -111,7 +111,7 @@ def _list(asked: SceneAsked) -> Answer:
 
 
 def _grip(robot: Robot | Prop) -> str:
-    """Return how stiff a robot's grip is, in words; nothing where it is rigid."""
+    """Describe the stiffness of a robot's grip; empty if it is rigid."""
 
     def said(stiffness: Any) -> str:
         each = stiffness if len({*stiffness}) > 1 else stiffness[:1]

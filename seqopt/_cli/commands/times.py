@@ -66,7 +66,7 @@ class Times(options.Cured, options.Timed, options.Fixed):
 
 
 def run(asked: Times) -> Answer:
-    """Say how long a build takes, and write its times if asked."""
+    """Return the makespan of a build, and write its schedule on request."""
     outputs.require_out(asked, "plan.csv", "times.csv")
     scene, taken = inputs.find_scene(asked), list[str]()
     if not (asked.durations or has_durations(scene)):
@@ -115,7 +115,7 @@ def run(asked: Times) -> Answer:
 def _build(
     asked: Times, network: Network, steps: Sequence[Step]
 ) -> tuple[GivenSequence, float, float | None]:
-    """Return a build, when it ends, s, and when it ends reassigned, if that is asked."""
+    """Return a build, its makespan, s, and that of the best assignment, if requested."""
     standing = grammar.parse_standing(asked)
     if standing is not None and not asked.curing:
         raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
@@ -134,7 +134,7 @@ def _build(
 
 
 def _aged(asked: Times, build: GivenSequence) -> pd.DataFrame | None:
-    """Return the responses of a build with joints as stiff as they are, where that is asked."""
+    """Return the responses of a build with the stiffness of joints at their age, if requested."""
     if not asked.stiffens:
         return None
     network = build.engine.network
