@@ -1,4 +1,4 @@
-"""What commands write: folders that appear whole, apart from what the command reads."""
+"""Outputs of commands: folders that are written atomically and never overwrite inputs."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder
 
 
 def figure_notes(written: object = True) -> tuple[str, ...]:  # noqa: FBT002  # what is written
-    """Return why figures are left out of what is written: what draws them is an extra."""
+    """Return a note that figures are left out if matplotlib is not installed."""
     if not written or find_spec("matplotlib") is not None:
         return ()
     return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
 
 
 def picture(name: str, draw: Callable[[Any], Any]) -> dict[str, bytes]:
-    """Return a picture as files by name, if it can be drawn; ``draw`` is given all charts."""
+    """Return files of a picture by name, empty without matplotlib; ``draw`` takes the charts."""
     if figure_notes():
         return {}
     from seqopt.report import charts  # noqa: PLC0415  # matplotlib is an extra
@@ -45,7 +45,7 @@ def picture(name: str, draw: Callable[[Any], Any]) -> dict[str, bytes]:
 
 
 def steps_table(plan: ShownBuild) -> pd.DataFrame:
-    """Return the steps of a plan without any response: as much as reading it again takes."""
+    """Return the steps of a plan without responses: the columns that reading it needs."""
     robots = plan.engine.network.scene.robots
     rows = [(s.number, s.kind.value, s.bricks, *s.grips) for s in plan.steps]
     names = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in robots)]
@@ -57,7 +57,7 @@ def steps_table(plan: ShownBuild) -> pd.DataFrame:
 def bare_files(
     plan: ShownBuild, table: pd.DataFrame, report: Mapping[str, object]
 ) -> dict[str, bytes | str]:
-    """Return what a plan is, by file name: a table of its steps, its scene, and its summary."""
+    """Return the essential files of a plan by name: its steps, its scene, and its summary."""
     return {
         "plan.csv": csv_text(table),
         "summary.json": json.dumps(_plain(report), indent=2) + "\n",
@@ -66,7 +66,7 @@ def bare_files(
 
 
 def plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
-    """Return tables and tasks of a plan by file name; ``choices``: with those of every choice."""
+    """Return tables and tasks of a plan by file name; ``choices``: also of every choice."""
     tables = {"plan": plan.responses()}
     if plan.graph.candidates:
         tables["selection"] = plan.table()
@@ -83,12 +83,12 @@ def plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
 
 
 def time_files(plan: ShownBuild) -> dict[str, bytes]:
-    """Return the chart of a build over seconds, where it is known how long robots take."""
+    """Return the Gantt chart of a build by file name, if durations are known."""
     return {} if plan.makespan is None else picture("times", lambda _: plan.gantt())
 
 
 def task_files(plan: Plan) -> dict[str, str]:
-    """Return what robots do, for those who program them, by file name."""
+    """Return the tasks of robots for their programming, by file name."""
     from seqopt.exchange._tasks import _in_postures, plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
 
     scene = plan.engine.network.scene
@@ -99,14 +99,14 @@ def task_files(plan: Plan) -> dict[str, str]:
 
 
 def _plain(value: object) -> Any:
-    """Return what JSON can hold: null in the place of numbers that are not finite."""
+    """Convert a value for JSON, with null in place of numbers that are not finite."""
     return json.loads(json.dumps(value), parse_constant=lambda _: None)
 
 
 def put_table(
     path: Path | None, table: pd.DataFrame | Sequence[Mapping[str, object]], said: str
 ) -> dict[str, Any]:
-    """Write a table, and return what an answer says of it: without a file it is the data."""
+    """Write a table, and return the entries of its answer; without a file the table is the text."""
     text = rows_text(table) if isinstance(table, Sequence) else csv_text(table)
     if path is None:
         return {"data": text}
@@ -115,7 +115,7 @@ def put_table(
 
 
 def written_to(folder: Path | None, *, page: bool = True, what: str = "it step by step") -> str:
-    """Return where a folder with a page was written, and what that shows, or how to have one."""
+    """Describe the folder and its page, or how to request one."""
     if folder is None:
         return "--out DIR writes the plan, its tables and a page that shows it step by step"
     return f"written to {folder}" + f"; {folder / PAGE} shows {what}" * page
@@ -124,7 +124,7 @@ def written_to(folder: Path | None, *, page: bool = True, what: str = "it step b
 def write_outputs(
     asked: options.Written, files: Callable[[], Mapping[str, bytes | str]]
 ) -> tuple[Path, ...]:
-    """Write the folder that a command was asked for, whole, if it was asked for one; return it.
+    """Write the requested output folder atomically, if there is one; return the paths.
 
     Raises `FileError` if a file would overwrite what the command reads, or cannot be written.
     """
@@ -138,9 +138,9 @@ def write_outputs(
 
 
 def require_out(asked: options.Written, *names: str) -> None:
-    """Raise `FileError`, before anything is computed, if the folder asked for cannot be made.
+    """Raise `FileError`, before anything is computed, if the output folder cannot be created.
 
-    Nor may what will have one of some names in it be what the command reads.
+    Files that will be written there under given names must not be inputs.
     """
     if asked.path is not None:
         require_folder(asked.path)
@@ -148,12 +148,12 @@ def require_out(asked: options.Written, *names: str) -> None:
 
 
 def keep_apart(asked: options.Asked, *outputs: Path | None) -> None:
-    """Raise `FileError` if outputs are one file, or one that the command reads."""
+    """Raise `FileError` if two outputs are the same file, or one is an input."""
     require_apart([path for path in outputs if path is not None], _inputs(asked))
 
 
 def _inputs(asked: options.Asked) -> list[Path]:
-    """Return the files that a command reads, those in the folder of a plan among them."""
+    """Return the input files of a command, including those in the folder of a plan."""
     given = (getattr(asked, name, None) for name in ("scene", "plan", "schedule"))
     named = [Path(name) for name in given if isinstance(name, str | Path)]
     folders = [path for path in named if inputs.is_folder(path)]

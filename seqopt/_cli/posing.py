@@ -1,4 +1,4 @@
-"""The problem that the words of the command line pose, over scenarios too."""
+"""Pose the problem of a command line, also over scenarios."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ Change: TypeAlias = Callable[
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PosedProblem:
-    """The problem that a command is asked, the scenarios, and those that judge the plan."""
+    """The problem of a command, its scenarios, and those of the out-of-sample evaluation."""
 
     problem: Problem
     whole: Problem | None = None  # the same from an empty site, if it begins elsewhere
@@ -64,10 +64,10 @@ class PosedProblem:
 
 
 def pose_problem(asked: options.Posed, change: Change | None = None) -> PosedProblem:
-    """Return the problem that the command ``optimize`` or ``pareto`` is asked for.
+    """Return the problem of the command ``optimize`` or ``pareto``.
 
-    ``change``: what has changed where the build begins. Raises `ProblemError` or `StepError` if
-    words do not go together, naming one.
+    ``change``: applied to scene and start. Raises `ProblemError` or `StepError` that names an
+    option if options are incompatible.
     """
     choice = _choice(asked)
     of_states = _wants_states(asked, choice)
@@ -109,12 +109,12 @@ def pose_problem(asked: options.Posed, change: Change | None = None) -> PosedPro
 
 
 def _choice(asked: options.Posed) -> options.Chosen:
-    """Return what is asked of a choice; of a Pareto set nothing is."""
+    """Return the options of a choice; defaults for a Pareto set."""
     return asked if isinstance(asked, options.Chosen) else options.Chosen()
 
 
 def _aged(asked: options.Posed, scene: Scene, begin: inputs.Place) -> inputs.Place:
-    """Return where a build begins with the ages of bricks, where mortar cures: as the plan was."""
+    """Return the start of a build, with curing mortar including the ages of bricks in the plan."""
     standing = grammar.parse_standing(asked) if begin.done else None
     if begin.site is None or not begin.done or standing is None or standing.curing is None:
         return begin
@@ -133,7 +133,7 @@ def _aged(asked: options.Posed, scene: Scene, begin: inputs.Place) -> inputs.Pla
 def _ends(
     asked: options.Posed, scene: Scene, change: Change | None
 ) -> tuple[Scene, inputs.Place, inputs.Place, int | options.Words | None]:
-    """Return where a build begins and ends, the scene after what has changed, who takes part."""
+    """Return scene after the changes, start, end, and participating robots of a build."""
     scene, begin = inputs.find_place(asked.begin, "from", scene)
     begin, robots = _aged(asked, scene, begin), asked.robots
     if change is not None:
@@ -148,7 +148,7 @@ def _ends(
 
 
 def _wants_states(asked: options.Posed, choice: options.Chosen) -> bool:
-    """Return whether states of the build are to be chosen, and not candidates of moves."""
+    """Return whether options ask for a choice of states rather than of candidates."""
     if asked.schedule == FREE or asked.aim or asked.stands or asked.order == SEARCH:
         return True
     named = choice.formulation
@@ -156,7 +156,7 @@ def _wants_states(asked: options.Posed, choice: options.Chosen) -> bool:
 
 
 def _require_known(asked: options.Posed, choice: options.Chosen, *, of_states: bool) -> None:
-    """Raise an error if options are given that states, or candidates, do not have."""
+    """Raise a `ProblemError` for options that states, or candidates, do not support."""
     down, free = Direction.TAKE_DOWN.value, asked.schedule == FREE
     for name in ALONE:
         if choice.robust is None and getattr(choice, name):
@@ -176,7 +176,7 @@ def _require_known(asked: options.Posed, choice: options.Chosen, *, of_states: b
 def _scenarios(
     asked: options.Chosen, scene: Scene
 ) -> tuple[RobustAim | None, Scenarios | None, Scenarios | None]:
-    """Return the aim over scenarios, those to choose by, and those of the next seed that judge."""
+    """Return the robust aim, the scenarios, and the unseen ones of the next seed."""
     if asked.robust is None:
         return None, None, None
     try:
@@ -190,7 +190,7 @@ def _scenarios(
 
 
 def _drawn(scene: Scene, vary: options.Numbers, count: int, seed: int) -> Scenarios:
-    """Return samples of a scene."""
+    """Return random samples of a scene."""
     spread = grammar.parse_numbers("--vary", vary, SPREADS, zero=True, advice=", as stiffness=3")
     factor, grips = spread.pop("stiffness", 3.0), spread.pop("grips", 1.0)
     for name, each in (("stiffness", factor), ("grips", grips)):

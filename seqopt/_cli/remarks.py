@@ -1,4 +1,4 @@
-"""What several commands say beside their answers: levels, payloads, arms, waits, verdicts."""
+"""Notes shared by commands: levels, payloads, arms, waits, verdicts."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from seqopt.work._clock import INTERRUPT, TIME, Clock
 
 
 def size_line(scene: Scene) -> str:
-    """Return what a scene is called and how large it is, in words."""
+    """Describe name and size of a scene."""
     size = f"{len(scene.bricks)} bricks, {len(scene.joints)} joints"
     return f"{scene.name}: {size}, {len(scene.grounds)} ground ends"
 
 
 def level_notes(asked: options.Computed, engine: Engine) -> tuple[str, ...]:
-    """Return which levels a choosing engine took, and why; where none is named, only discrete."""
+    """Describe the levels an ``auto`` engine took, and why; if it is the default, only discrete."""
     named = asked.engine is not None
     if (chooser := _chooser_of(engine)) is not None:
         choice = chooser.choice
@@ -52,18 +52,18 @@ def level_notes(asked: options.Computed, engine: Engine) -> tuple[str, ...]:
 
 
 def exceeded(scene: Scene, *tables: _Columns) -> tuple[str, ...]:
-    """Return the payloads, also of props, that are exceeded in responses of steps, in words."""
+    """Describe the payloads, and capacities of props, that steps exceed."""
     found = ((*overloads(scene, table), *_prop_faults(scene, table)) for table in tables)
     return tuple(str(excess) for each in found for excess in each)
 
 
 def carrying_notes(scene: Scene, steps: Sequence[Step]) -> tuple[str, ...]:
-    """Return which robots place or take away bricks that are heavier than their payload."""
+    """Describe robots that place or remove bricks heavier than their payload."""
     return tuple(f"payload exceeded: {excess}" for excess in _carrying_excesses(scene, steps))
 
 
 def rule_notes(rules: FreeRules | Schedule, scene: Scene) -> tuple[str, ...]:
-    """Return which rule is looser than usual because few robots take part, if nobody gave it."""
+    """Describe the default rule that is relaxed because few robots take part, if it is."""
     if not isinstance(rules, FreeRules) or rules.least_grips is not None:
         return ()
     team, least = len(rules.team(scene)), rules.fewest_grips(scene)
@@ -74,7 +74,7 @@ def rule_notes(rules: FreeRules | Schedule, scene: Scene) -> tuple[str, ...]:
 
 
 def waits_said(build: ShownBuild) -> Iterator[str]:
-    """Yield how long a build waits for mortar, and for which joints the longest; judged before."""
+    """Yield the total wait for mortar of a judged build, and the joints with the longest waits."""
     if build.standing is None or build.standing.curing is None:
         return
     table = build.times()
@@ -95,13 +95,13 @@ def waits_said(build: ShownBuild) -> Iterator[str]:
 
 
 def refused(prover: BuildProver) -> tuple[str, ...]:
-    """Return why verdicts are missing, if they are, and what they leave out."""
+    """Return notes on missing verdicts, and on effects that they neglect."""
     said = (f"stability: not proven; {prover.refusal}",) if prover.refusal else ()
     return (*said, *settlement_notes(prover.scene)) if prover.asks else said
 
 
 def settlement_notes(scene: Scene) -> tuple[str, ...]:
-    """Return that movements of the ground enter no verdict, if it moves."""
+    """Return a note that verdicts neglect movements of the ground, if there are any."""
     said = _settlement_said(scene)
     return (f"stability: {said}",) if said else ()
 
@@ -110,7 +110,7 @@ WHY = {TIME: "time is over", INTERRUPT: "interrupted"}
 
 
 def in_time(answer: Answer, clock: Clock, interrupted: str) -> Answer:
-    """Return an answer that names what there was no time for, or that was interrupted."""
+    """Return an answer with the parts skipped by the time limit, or its interrupt."""
     left = clock.left_out.values()
     each = {why: [what for what, own in clock.left_out.items() if own == why] for why in left}
     said = (f"not done, {WHY[why]}: {', '.join(names)}" for why, names in each.items())
@@ -122,7 +122,7 @@ def in_time(answer: Answer, clock: Clock, interrupted: str) -> Answer:
 
 
 def marked(answer: Answer, outside: Sequence[object]) -> Answer:
-    """Return an answer that begins with how results leave the linear range, and what to do."""
+    """Return an answer preceded by exceeded limits of the linear range, and the remedy."""
     left = [str(departure) for departure in outside]
     answer = replace(answer, facts={**answer.facts, "outside_linear_range": left})
     if not left:
@@ -134,7 +134,7 @@ def marked(answer: Answer, outside: Sequence[object]) -> Answer:
 
 
 def kept_range(answer: Answer, beyond: str | None) -> Answer:
-    """Return an answer whose status says it if a plan leaves the limit of the linear range."""
+    """Return an answer whose status reports a plan beyond the limit on the linear range."""
     if beyond is None or answer.status is not Status.DONE:
         return answer
     said = f"seqopt: {OUTSIDE}: {beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
@@ -148,9 +148,9 @@ def held_to(
     verdicts: Mapping[str, Sequence[BuildVerdicts]] | None = None,
     unreached: Sequence[str] = (),
 ) -> Answer:
-    """Return an answer, `marked`, with payloads that are `exceeded` and the faults of --strict.
+    """Return a `marked` answer with `exceeded` payloads, which --strict turns into its status.
 
-    ``verdicts``: by build, with the mortar of the scene last; ``unreached``: what arms cannot do.
+    ``verdicts``: by build, the decisive mortar last; ``unreached``: steps infeasible for arms.
     """
     answer, falls = marked(answer, outside), list[str]()
     facts = {**answer.facts, "payloads_exceeded": list(over)}

@@ -1,4 +1,4 @@
-"""Parsers and values of commands, made of the classes that say what these are asked."""
+"""Parsers and values of commands, derived from the classes of their options."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ _Asked = TypeVar("_Asked", bound=Asked)
 
 @dataclass
 class Page:
-    """What docstrings of a command say: lines by heading, the first without one, and options."""
+    """Parsed docstrings of a command: lines by heading, the first one empty, and options."""
 
     lines: dict[str, list[str]] = field(default_factory=dict)
     options: dict[str, tuple[str, str, str]] = field(default_factory=dict)  # question, value, help
 
     def read(self, docstring: str) -> None:
-        """Add a docstring."""
+        """Parse and add a docstring."""
         title = name = ""
         for line in cleandoc(docstring).splitlines():
             if not line or line.startswith("---"):
@@ -63,7 +63,7 @@ class Page:
 
 
 def page_of(kind: type[Asked]) -> Page:
-    """Return what docstrings say of a command: first of what it shares with others."""
+    """Return the parsed docstrings of a command, those of its base classes first."""
     command, *shared, root, _ = kind.__mro__
     page, known = Page(), {each.name: each for each in fields(kind)}
     for part in (*reversed(shared), command, root):
@@ -80,7 +80,7 @@ def page_of(kind: type[Asked]) -> Page:
 
 
 def fill(command: argparse.ArgumentParser, kind: type[Asked]) -> None:
-    """Give a parser the options of a command, by question, and what its help says."""
+    """Add the options of a command, by heading, and its help to a parser."""
     page = page_of(kind)
     command.description = wrapped(" ".join(page.lines.get("", ())))
     if usages := page.lines.get("Usage"):
@@ -132,16 +132,16 @@ def _flag(name: str) -> str:
 
 
 def given(kind: type[_Asked], values: Mapping[str, Any]) -> _Asked:
-    """Return what a command is asked, from values of Python; numbers and lists become words.
+    """Return the options of a command from Python values; numbers and lists become words.
 
-    What is None is left to the command. Raises `ProblemError` if a word is none of a choice.
+    None means the command's default. Raises `ProblemError` for words that are no choice.
     """
     known = {each.name: each for each in fields(kind)}
     return kind(**{name: _value(known[name], v) for name, v in values.items() if v is not None})
 
 
 def _value(known: Field[Any], value: Any) -> Any:
-    """Return the value of an option as the command line would read it; values stay values."""
+    """Parse a value as the command line does; other Python objects stay unchanged."""
     if isinstance(value, bool):
         return value
     if isinstance(known.default, tuple):
@@ -162,7 +162,7 @@ def _value(known: Field[Any], value: Any) -> Any:
 
 
 def _number(known: Field[Any], value: float | str) -> float:
-    """Return the number of an option; ``advice`` of it stands beside what is wrong with it."""
+    """Parse the number of an option; errors end with its ``advice``."""
     flag, zero = known.metadata.get("flag", _flag(known.name)), known.metadata.get("zero", False)
     try:
         return number_word(str(value), flag, zero=zero)
@@ -171,7 +171,7 @@ def _number(known: Field[Any], value: float | str) -> float:
 
 
 def _text(value: Any) -> Any:
-    """Return numbers, paths and lists as words; what is none of these stays."""
+    """Return numbers, paths and lists as words, other values unchanged."""
     if isinstance(value, int | float | os.PathLike):
         return os.fspath(value) if isinstance(value, os.PathLike) else f"{value!r}"
     if isinstance(value, list | tuple | range):

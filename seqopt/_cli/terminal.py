@@ -1,7 +1,7 @@
-"""What a command says, and what it does where nobody can hear it.
+"""Terminal output of commands, also where streams are closed.
 
-Results go to standard output, everything else a line each to standard error, which a terminal has
-wrapped. Names come from files of others: what steers a terminal is written as its code.
+Results go to standard output, everything else a line each to standard error, wrapped on a terminal.
+Names come from foreign files: control characters are escaped.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ BEGIN = re.compile(
 
 
 def columns() -> int:
-    """Return how many columns text may take: those of ``COLUMNS`` or the terminal, else 80."""
+    """Return the width of text in columns: of ``COLUMNS`` or the terminal, else 80."""
     return min(max(shutil.get_terminal_size((80, 24)).columns, NARROWEST), WIDEST)
 
 
 def wrapped(text: str, width: int | None = None, first: str = "", rest: str | None = None) -> str:
-    """Return a text as lines that fit the terminal; words longer than a line stay whole.
+    """Wrap a text to the terminal; words longer than a line stay whole.
 
-    ``first`` and ``rest`` are what the first line and all others begin with; the latter by default
-    blanks as wide as the former.
+    ``first``, ``rest``: prefixes of the first line and of all others; the latter by default blanks
+    of the same width.
 
     >>> print(wrapped("one two three four", 12, "- "))
     - one two
@@ -54,7 +54,7 @@ def wrapped(text: str, width: int | None = None, first: str = "", rest: str | No
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Return whether a person looks at a stream."""
+    """Return whether a stream is a terminal."""
     try:
         return stream is not None and stream.isatty()
     except ValueError:  # it is closed
@@ -62,7 +62,7 @@ def is_terminal(stream: TextIO | None) -> bool:
 
 
 def colored(stream: TextIO | None) -> bool:
-    """Return whether a stream takes colors: ``NO_COLOR`` and ``FORCE_COLOR`` go before it."""
+    """Return whether to color a stream; ``NO_COLOR`` and ``FORCE_COLOR`` take precedence."""
     if os.environ.get("NO_COLOR"):
         return False
     if os.environ.get("FORCE_COLOR"):
@@ -71,12 +71,12 @@ def colored(stream: TextIO | None) -> bool:
 
 
 def painted(text: str, style: str, stream: TextIO | None) -> str:
-    """Return text in one of `STYLES` where the stream that it goes to takes colors."""
+    """Return text in one of `STYLES`, if its stream is colored."""
     return f"\033[{STYLES[style]}m{text}\033[0m" if colored(stream) else text
 
 
 def harmless(text: str, kept: str = "") -> str:
-    r"""Return text in which what steers a terminal, save what is kept, is replaced by its code.
+    r"""Return text with control characters escaped, except those in ``kept``.
 
     >>> harmless("rob" + chr(27) + "[2J")
     'rob\\x1b[2J'
@@ -89,14 +89,14 @@ def harmless(text: str, kept: str = "") -> str:
 
 
 def show(text: str) -> None:
-    """Write a result, its last end of line too; a `FileError` says that nobody reads it."""
+    """Write a result, newline included, to standard output; raise `FileError` if that is closed."""
     if sys.stdout is None:
         raise FileError("standard output is closed, and there is a result to write; open it")
     sys.stdout.write(harmless(text, "\n\t"))
 
 
 def show_text(text: str, headings: Sequence[str] = ()) -> None:
-    """Write lines for people to standard output, some as headings; a terminal has them wrapped.
+    """Write lines to standard output, some as headings, wrapped on a terminal.
 
     Raises `FileError` if standard output is closed.
     """
@@ -112,7 +112,7 @@ def show_text(text: str, headings: Sequence[str] = ()) -> None:
 
 
 def complain(text: str, style: str = "bad") -> None:
-    """Print a line on standard error, or nothing where that is closed or full."""
+    """Print a line on standard error; ignore a closed or full one."""
     if len(text) > LONGEST:
         text = f"{text[: LONGEST // 2]} … {text[-LONGEST // 4 :]}"
     text = harmless(text)
@@ -127,12 +127,12 @@ def complain(text: str, style: str = "bad") -> None:
 
 
 def note(text: str) -> None:
-    """Print what is worth knowing on standard error; else as `complain`."""
+    """Print a note on standard error; else as `complain`."""
     complain(text, "doubt")
 
 
 def flush() -> None:
-    """Write what standard output still holds back.
+    """Flush standard output.
 
     Raises `OSError` if it cannot be written; what is left is given up.
     """
@@ -145,15 +145,15 @@ def flush() -> None:
 
 
 def silence(stream: TextIO) -> None:
-    """Let a stream that failed lead nowhere, so that the end of the program is quiet."""
+    """Redirect a failed stream to the null device, so that the interpreter exits without errors."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 @contextmanager
 def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
-    """Print warnings about a scene or plug-in as a line each, or none if it is to be quiet.
+    """Print warnings about scenes and plug-ins, a line each; none if ``quiet``.
 
-    What is not finite is an error of its own.
+    NumPy's warnings are ignored: values that are not finite raise errors of their own.
     """
     import numpy as np  # noqa: PLC0415  # help needs none of it
 

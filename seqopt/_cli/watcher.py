@@ -17,11 +17,10 @@ TAIL = ": 100 % |12345678901234567890| about 100 min left "  # beside which word
 
 
 class Watcher:
-    """Shows on standard error what a command does, how far it is and how long it will take.
+    """Shows the stage, progress and remaining time of a command on standard error.
 
-    A stage whose share is known has a bar and the time left; of any other the time that it took so
-    far is shown. Nothing is shown unless standard error is a terminal or that of a notebook, nor in
-    the first second.
+    A stage of known share has a bar and the remaining time, any other the elapsed time. Nothing is
+    shown unless standard error is a terminal or that of a notebook, nor in the first second.
 
     >>> with Watcher() as tell:  # of a test standard error is no terminal
     ...     tell("looking")
@@ -69,7 +68,7 @@ class Watcher:
                 self._show()
 
     def _tick(self) -> None:
-        """Look at the clock now and then: a stage may be silent for long."""
+        """Refresh the line periodically: a stage may not report for long."""
         while not self._over.wait(TICK):
             with self._lock:
                 self._show()
@@ -99,7 +98,7 @@ class Watcher:
         self._wide = len(line)
 
     def _left(self, now: float) -> float:
-        """Return how long the stage will still take, s; nothing where that is not known."""
+        """Return the remaining time of the stage, s; zero if it is not known."""
         stage = self._stage
         if stage.left is not None:
             return stage.left - (now - self._told)
