@@ -68,7 +68,7 @@ def values(arch25):
         *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, network.compliances, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
-        *(SPACE, plane, tree, operator, parts, share(network)),
+        *(SPACE, plane, tree, operator, operator.doubts, parts, share(network)),
         mixed_system(parts, grips),
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),

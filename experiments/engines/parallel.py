@@ -1,7 +1,8 @@
-"""Claim: two processes answer a large scene's states at least 1.6 times as fast as one.
+"""Claim: two processes answer a large scene's states at least 1.6 times as fast as one, by fields.
 
 That is by the time that they compute, with a core each: on a shared machine the clock says more of
-others. The answers are the same to the last bit, on Dask's local cluster too.
+others. Where compiled loops are installed one process keeps two cores busy already, which is
+measured beside it. The answers are the same to the last bit, on Dask's local cluster too.
 
 Method: the states of the three-robot loop's steps with one open grip, those that a search without
 proof needs, of the vault of 338 bricks (``--scene`` takes another: ``chain100``, ``wall``, or a
@@ -29,6 +30,8 @@ from experiments.harness.claim import Claim, Finding, Option, Options, Times, on
 from experiments.harness.results import RESULTS
 from experiments.harness.scenes import half_circle, running_bond
 from seqopt import Network, Schedule, build_network, load_scene, make_engine, three_robot_loop
+from seqopt.engines.rigid._extremes import can_compile
+from seqopt.responses import _choices
 from seqopt.responses._blocks import StepChoices
 from seqopt.responses._choices import Evaluation
 from seqopt.responses.resources import Resources
@@ -37,7 +40,7 @@ from seqopt.work._workers import hire, map_ordered
 TWO = 1.6  # times as fast as one process that two have to be
 WANTED = frozenset({"T_max", "M_sup", "D_max", "F_largest"})
 ROUNDS = 1
-SMALL = "chain30"
+SMALL = "chain30"  # too small for compiled loops
 STORE = RESULTS / "parallel.csv"
 
 
@@ -103,6 +106,27 @@ def overhead(resources: Resources, calls: int = 64) -> float:
         return (time.perf_counter() - start) / calls
 
 
+@contextmanager
+def loops(kind: str) -> Iterator[None]:
+    """Have extremes by compiled loops where there is much to do, or always by fields."""
+    usual = _choices.COMPILED
+    try:
+        _choices.COMPILED = usual if kind == "compiled" else np.inf
+        yield
+    finally:
+        _choices.COMPILED = usual
+
+
+def measured(name: str, rounds: int, *, single: bool) -> pd.DataFrame:
+    """Return a row per way, by fields and, where they are installed and used, by compiled loops."""
+    kinds = ("fields", "compiled") if can_compile() and name != SMALL else ("fields",)
+    tables = []
+    for kind in kinds:
+        with loops(kind):
+            tables.append(by_ways(name, rounds, single=single).assign(loops=kind))
+    return pd.concat(tables, ignore_index=True)
+
+
 def by_ways(name: str, rounds: int, *, single: bool) -> pd.DataFrame:
     """Return a row per way, the ways having taken turns."""
     network, load = network_of(name), os.getloadavg()[0]
@@ -141,13 +165,13 @@ def by_ways(name: str, rounds: int, *, single: bool) -> pd.DataFrame:
 
 
 def holds(table: pd.DataFrame) -> bool:
-    two = table[table["way"] == "two processes"]
+    two = table[(table["way"] == "two processes") & (table["loops"] == "fields")]
     return bool(table["same"].all() and len(two) and (two["times_as_fast_by_cpu"] >= TWO).all())
 
 
 def experiment(options: Options) -> Finding:
     name = SMALL if options.quick else options.scene
-    table = by_ways(name, 1 if options.quick else ROUNDS, single=not options.pairs)
+    table = measured(name, 1 if options.quick else ROUNDS, single=not options.pairs)
     print(table.to_string(index=False, float_format="%.4g"))
     old = pd.read_csv(STORE) if STORE.exists() else table[:0]
     kept = old[(old["scene"] != name) | (old["states"] != table["states"][0])]

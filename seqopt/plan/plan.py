@@ -304,7 +304,10 @@ class Plan(ShownBuild):
 
     @cached_property
     def _columns(self) -> _Columns:
-        fields = _each_fields(self.engine, self.steps, Want.ALL)
+        met = {} if self.search is None else self.search.fields
+        new = (step for step in self.steps if step.number not in met)
+        others = _each_fields(self.engine, new, Want.ALL)
+        fields = (met.get(step.number) or next(others) for step in self.steps)
         # of all fields, which what steps leave is judged by too
         answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))
         columns = _response_columns(self.engine.network, answers)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from seqopt.engines.interface import Want
-from seqopt.engines.rigid import _extremes
+from seqopt.engines.rigid import _extremes, _grown, _growth
 from seqopt.engines.rigid._extremes import extremes_in, extremes_of, rows_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
@@ -82,6 +82,55 @@ def test_what_rows_do_not_answer_is_that_of_the_fields(alter):
     sets = sets_of(engine.network, bricks, 2, 40)
     found = engine._extremes(bricks, sets, Want.RESPONSES, compiled=True)
     assert apart(found, of_fields(engine, bricks, sets, Want.RESPONSES)) <= CLOSE
+
+
+@needs_numba
+@once
+@pytest.mark.parametrize("want", SOME)
+@pytest.mark.parametrize("grips", [1, 3, 4])
+def test_few_sets_of_a_large_structure_are_read_from_what_grows(grips, want):
+    network = build_network(load_scene("dome163"))
+    engine = ComplianceEngine(network)
+    for bricks in (40, 41, 70):  # joints of which one brick is there alone move with it
+        sets = sets_of(network, bricks, grips, 100)
+        known, index = network.index_of_grip
+        pair = known[np.isin(index, [bricks, bricks + 1])]  # on one brick
+        sets[0] = [*pair, *np.setdiff1d(sets[0], pair)][:grips]
+        found = engine._extremes(bricks, sets, want, compiled=True)
+        assert not engine._kept  # no operator was made
+        answer = of_fields(ComplianceEngine(network), bricks, sets, want)
+        asked = [want & Want.EDGES, want & Want.EDGES, want & Want.DISPLACEMENTS]
+        asked += [want & Want.SUPPORT, True]
+        pairs = zip(found, answer, asked, strict=True)
+        known = [(one, other) if ask else (one, one) for one, other, ask in pairs]
+        assert apart(*zip(*known, strict=True)) <= CLOSE
+
+
+@needs_numba
+@once
+def test_a_wrong_growth_is_seen():
+    """The control of the comparison above."""
+    network = build_network(load_scene("dome163"))
+    engine = ComplianceEngine(network)
+    sets = sets_of(network, 40, 3, 100)
+    true = engine._extremes(40, sets, Want.RESPONSES, compiled=True)
+    engine._builder.growth.wrench[:] *= 1 + 1e-9
+    found = engine._extremes(40, sets, Want.RESPONSES, compiled=True)
+    assert apart(found, true) > CLOSE
+
+
+@needs_numba
+@once
+def test_no_number_depends_on_how_many_threads_share_the_sets(monkeypatch):
+    network = build_network(load_scene("dome163"))
+    sets, found = sets_of(network, 60, 3), []
+    for threads in (1, 3):
+        for module in (_grown, _growth):
+            monkeypatch.setattr(module, "cores", lambda threads=threads: threads)
+        monkeypatch.setattr(_growth, "_AT_ONCE", 2**12)
+        engine = ComplianceEngine(network)
+        found.append(engine._extremes(60, sets, Want.RESPONSES, compiled=True))
+    assert all(map(np.array_equal, *found))
 
 
 @pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=[needs_numba, once])])

@@ -195,6 +195,24 @@ def test_an_operator_per_brick_count_would_be_seen():
     assert kept_bytes(half_circle(64), most=np.inf) > PER_PAIR * 64**2 + 2e5
 
 
+def test_the_last_brick_count_but_one_is_recalled():
+    """Loops that closed since are opened again, in some rows alone."""
+    scene = running_bond(4, 5)
+    net, total, held = build_network(scene), len(scene.bricks), [2, 7, 9]
+    for bricks in (10, 13, total - 1):
+        builder = OperatorBuilder(net, grow_tree(net))
+        builder.growth.remembers = True
+        builder.growth.reach(bricks + 1)
+        found = builder.operator(bricks, held)
+        assert builder.growth.bricks == bricks + 1  # nothing began anew
+        fresh = OperatorBuilder(net, grow_tree(net)).operator(bricks, held)
+        for name in ("flexibility", "dead_displacement", "twist", "wrench", "loss"):
+            a, b = (getattr(each, name) for each in (found, fresh))
+            assert np.abs(a - b).max() <= 1e-11 * np.abs(b).max(), name
+    assert builder.operator(total - 2, held).bricks == total - 2
+    assert builder.growth.bricks == total - 2
+
+
 def test_rows_of_gripped_bricks_alone():
     net = half_circle(50)
     some, every = (OperatorBuilder(net, grow_tree(net)).operator(50, h) for h in ([7, 30], None))

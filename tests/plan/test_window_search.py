@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.harness.scenes import half_circle
+from seqopt.engines.rigid._extremes import can_compile
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SolverError
 from seqopt.graph.layers.layers import candidate_layers, windows
 from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit
+from seqopt.responses import _choices
+from seqopt.responses.table import analyze
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED
 
@@ -43,6 +48,24 @@ def test_the_table_says_what_the_next_one_costs(engine25):
     last = np.sort(found.costs(21))
     assert table["cost"].iloc[-1] == last[0]
     assert table["margin"].iloc[-1] == last[1] - last[0]
+
+
+@pytest.mark.skipif(not can_compile(), reason="no numba")
+@pytest.mark.xdist_group("compiled loops")
+def test_the_search_answers_steps_on_its_way(monkeypatch):
+    """Large structures grow once for a plan and its table."""
+    monkeypatch.setattr(_choices, "COMPILED", 0.0)
+    network = half_circle(60)
+    engine, known = ComplianceEngine(network), three_robot_loop(network)
+    plan = solve(candidate_layers(engine, known, EQUATIONS), "cascade", proof=False)
+    late = {step.number for step in plan.steps if step.bricks > 40}
+    assert late <= plan.search.fields.keys() | {plan.steps[-1].number}
+    found, fresh = plan.responses(), analyze(ComplianceEngine(network), plan.steps)
+    for column in fresh.select_dtypes("number"):
+        a, b = (table[column].to_numpy(float) for table in (found, fresh))
+        assert np.allclose(
+            a, b, rtol=0, atol=1e-9 * max(np.nanmax(np.abs(b)), 1e-9), equal_nan=True
+        )
 
 
 def test_a_dead_end_is_named(engine25):

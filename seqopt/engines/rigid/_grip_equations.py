@@ -16,7 +16,7 @@ from scipy.linalg import lapack
 from seqopt.arrays import Bools, Floats, Ints, frozen
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import _couples
-from seqopt.engines.rigid._operator import ComplianceOperator
+from seqopt.engines.rigid._operator import ComplianceOperator, Doubts
 
 
 class Pairs(NamedTuple):
@@ -194,7 +194,7 @@ def grip_forces(
 
 
 def well_conditioned(
-    operator: ComplianceOperator,
+    operator: ComplianceOperator | Doubts,
     index: Ints,
     found: _GripForces,
     most: float,
@@ -202,12 +202,14 @@ def well_conditioned(
 ) -> Bools:
     """Return which sets' forces (S,) rounding changes little enough.
 
-    ``most``: largest of `_doubts` that is accepted; ``compliance``: as of `grip_forces`.
+    ``operator``: or, of rigid grips, its doubts alone; ``most``: largest of `_doubts` that is
+    accepted; ``compliance``: as of `grip_forces`.
     """
+    doubts = operator.doubts if isinstance(operator, ComplianceOperator) else operator
     lowest, least = found.lowest, np.inf
     if compliance.moved is None:  # else forces may undo what the weight does
         own = 0.0 if compliance.rigid else 2.0  # of what soft grips yield, that forces undo as well
-        least = len(found.pivot) * operator.worst_doubt + own
+        least = len(found.pivot) * doubts.worst + own
     out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
         return out
@@ -220,7 +222,7 @@ def well_conditioned(
 
 
 def _doubts(
-    operator: ComplianceOperator,
+    operator: ComplianceOperator | Doubts,
     index: Ints,
     found: _GripForces,
     compliance: GripCompliance = RIGID,
@@ -232,11 +234,12 @@ def _doubts(
     leaves undetermined.
     """
     size = np.abs(found.force.T)
-    root, own, scale = operator.doubts.take(np.ascontiguousarray(index.T), axis=1)
+    doubts = operator.doubts if isinstance(operator, ComplianceOperator) else operator
+    root, own, scale = doubts.shares.take(np.ascontiguousarray(index.T), axis=1)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         own += (root * size).sum(axis=0)
         own *= scale
-        if not compliance.rigid:
+        if isinstance(operator, ComplianceOperator) and not compliance.rigid:
             own = _with_compliance(operator, own, size, root / scale, compliance)
         own /= found.pivot
         most = size.max(axis=0, initial=np.finfo(float).tiny)

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -80,6 +81,18 @@ _SAMPLE = 600  # motions that are compared with each other, about
 _MOST = 0.95  # share of all pairs of motions in space whose asymmetry counts as rounding
 
 
+class _Before(NamedTuple):
+    """The last brick count but one: its weight's answers, its loss, and what has changed since.
+
+    ``closing`` (1 + kb, n), ``changes`` of n rows: what loops added to twists and wrenches.
+    """
+
+    weighed: list[Floats]
+    loss: Floats
+    closing: Floats
+    changes: list[Floats]
+
+
 class Growth:
     """The answers of a growing structure to its weight and to unit wrenches on its bricks.
 
@@ -91,8 +104,11 @@ class Growth:
     ``tree``: on which the bricks hang. ``basis``: k directions in which bricks are loaded and move;
     all by default. ``twist`` (1 + kB, kB): of the bricks, m and rad; ``wrench`` (1 + kB, kS): of
     every spring on its second body, N and N m; ``loss`` (B,): how much more than the last digit of
-    a brick's motions is rounding, as what moved it further before is gone.
+    a brick's motions is rounding, as what moved it further before is gone; ``remembers``: whether
+    `answers` takes the last brick count but one from the last, which differs in rounding.
     """
+
+    remembers = False
 
     def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
         self._network, self._tree, self._basis = network, tree, basis
@@ -111,6 +127,7 @@ class Growth:
         self.wrench = np.zeros((1 + most, self._size * self._acting[-1]))
         self.bricks = self._closed = 0
         self._weighed: list[list[Floats]] = []
+        self._before: _Before | None = None
         self._start()
 
     def reach(self, bricks: int) -> None:
@@ -125,28 +142,46 @@ class Growth:
             self.bricks = bricks
             self._tie(np.arange(self._acting[bricks]))
             del self._weighed[bricks - self._closed + 1 :]
+            self._before = None
             for array, row in zip((self.twist, self.wrench), self._weighed[-1], strict=True):
                 array[0, : len(row)] = row
         while self.bricks < bricks:
+            weighed, loss = self._weighed[-1], self.loss[: self.bricks].copy()
             self._add()
+            closing, changes = np.empty((1 + self._moves, 0)), [np.empty((0, 1))] * 2
             mine = np.arange(*self._acting[self.bricks - 1 : self.bricks + 1])
             others = mine[mine != self._tree.spring[self.bricks - 1]]
             if others.size:
-                self._close(others)
+                closing, changes = self._close(others)
                 self._closed, self._weighed = self.bricks, []
+            self._before = _Before(weighed, loss, closing, changes)
             self._weighed.append([each.copy() for each in self._answers(0)])
+
+    def recalls(self, bricks: int) -> bool:
+        """Return whether `answers` of a brick count are there, or nearly so."""
+        last = self.remembers and self._before is not None
+        return self.bricks - last <= bricks <= self.bricks
 
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats, Floats]:
         """Return what so many bricks do under the weight, and unit wrenches on some bricks (h,).
 
         Results: twists and wrenches, 1 + kh rows; the loss (h,).
         """
-        self.reach(bricks)
-        rows: slice | Ints = slice(1 + self._moves)
+        if not self.recalls(bricks):
+            self.reach(bricks)
+        rows: slice | Ints = slice(1 + self._size * bricks)
         if len(held) < bricks:
             every = 1 + self._size * held[:, None] + np.arange(self._size)
             rows = np.concatenate([[0], every.ravel()])
-        return *self._answers(rows), self.loss[held]
+        twist, wrench = self._answers(rows)
+        if bricks == self.bricks or self._before is None:
+            return twist, wrench, self.loss[held]
+        weighed, loss, closing, changes = self._before
+        found = []
+        for now, change, row in zip((twist, wrench), changes, weighed, strict=True):
+            found.append((now - closing[rows] @ change)[:, : len(row)])
+            found[-1][0] = row
+        return found[0], found[1], loss[held]
 
     @property
     def nbytes(self) -> int:
@@ -168,6 +203,7 @@ class Growth:
         self.bricks = self._closed = 0
         self._left = 1.0  # rounding when the twists were summed anew
         self._weighed = [[np.empty(0)] * 2]
+        self._before = None
         self._tie(np.arange(0))
         self.twist[0] = self.wrench[0] = 0.0
 
@@ -217,8 +253,8 @@ class Growth:
         """Return the columns of what a spring transmits."""
         return slice(self._size * spring, self._size * spring + self._size)
 
-    def _close(self, springs: Ints) -> None:
-        """Let springs act that close loops."""
+    def _close(self, springs: Ints) -> tuple[Floats, list[Floats]]:
+        """Let springs act that close loops; return what is added, as of `_Before`."""
         k, rows = self._size, slice(0, 1 + self._moves)
         gaps = np.concatenate([self._gap(s) for s in springs], axis=1)
         answers = self._answers(rows)
@@ -228,8 +264,8 @@ class Growth:
         factors = linalg.lu_factor(0.5 * (system + system.T))
         closing = -linalg.lu_solve(factors, gaps.T).T
         closing -= linalg.lu_solve(factors, (gaps + closing @ system).T).T
-        before = self._own().copy()
-        _add_products(answers, closing, [np.ascontiguousarray(gaps[1:].T), pulled])
+        changes, before = [np.ascontiguousarray(gaps[1:].T), pulled], self._own().copy()
+        _add_products(answers, closing, changes)
         for i, spring in enumerate(springs.tolist()):
             self.wrench[rows, self._of(spring)] = closing[:, k * i : k * i + k]
         self._tie(springs, self._ties)
@@ -237,6 +273,7 @@ class Growth:
         self.loss[: self.bricks] *= np.maximum(lost, 1.0)
         if self.loss[: self.bricks].max() > max(_TAKEN, _WORSE * self._left):
             self._sum_again()
+        return closing, changes
 
     def _own(self) -> Floats:
         """Return how far unit wrenches move their own bricks, (kb,)."""

@@ -34,6 +34,37 @@ _FEW = 200  # loads whose responses take little, and are always made once for al
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Doubts(FrozenValue):
+    """How far rounding may reach: of every load what it moves itself, the weight, and lost digits.
+
+    Arrays are the flexibility's diagonal, ``dead_displacement`` and ``loss`` (l,) of
+    `ComplianceOperator`.
+    """
+
+    flexibility: Floats
+    dead: Floats
+    loss: Floats
+
+    @cached_property
+    def shares(self) -> Floats:
+        """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
+        own = np.maximum(np.abs(self.flexibility), np.finfo(float).tiny)
+        root = np.sqrt(own * self.loss)
+        return frozen(np.stack([root, np.abs(self.dead) * self.loss / root, root / own]))
+
+    @cached_property
+    def worst(self) -> float:
+        """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
+
+        As `_doubts` of `seqopt.engines.rigid._grip_equations`: forces undo the displacements, so
+        these are no more in doubt than what the forces add up to.
+        """
+        most = np.abs(self.flexibility).max(initial=0.0)
+        own = np.sqrt(most * self.loss.max(initial=1.0))
+        return float(2 * own * self.shares[2].max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class ComplianceOperator(FrozenValue):
     """What loads on a partial structure of b bricks move and stress; rows of arrays are loads.
 
@@ -104,28 +135,9 @@ class ComplianceOperator(FrozenValue):
         return frozen(np.stack([self.axis, -self.axis], axis=1).reshape(-1, self.directions))
 
     @cached_property
-    def doubts(self) -> Floats:
-        """What rounding may leave of the answers to its loads, (3, l).
-
-        Roots of flexibilities with their lost digits, what the weight adds to the sum of them, and
-        what makes that a force.
-        """
-        diagonal = np.abs(self.flexibility.diagonal())
-        own = np.maximum(diagonal, np.finfo(float).tiny)
-        root = np.sqrt(own * self.loss)
-        weight = np.abs(self.dead_displacement) * self.loss / root
-        return frozen(np.stack([root, weight, root / own]))
-
-    @cached_property
-    def worst_doubt(self) -> float:
-        """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
-
-        As `_doubts` of `seqopt.engines.rigid._grip_equations`: forces undo the displacements, so
-        these are no more in doubt than what the forces add up to.
-        """
-        most = np.abs(self.flexibility.diagonal()).max(initial=0.0)
-        own = np.sqrt(most * self.loss.max(initial=1.0))
-        return float(2 * own * self.doubts[2].max(initial=0.0))
+    def doubts(self) -> Doubts:
+        """What rounding may leave of the answers to its loads."""
+        return Doubts(self.flexibility.diagonal(), self.dead_displacement, self.loss)
 
     def covers(self, bricks: Ints) -> bool:
         """Return whether loads act at the nodes of bricks."""

@@ -54,12 +54,13 @@ from seqopt.engines.rigid._grip_equations import (
     well_conditioned,
 )
 from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few
+from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few, load_rows
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.work._threads import one_thread
 
 if TYPE_CHECKING:
+    from seqopt.engines.rigid._grown import GrownExtremes
     from seqopt.engines.rigid._refinement import Refinements
 
 _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
@@ -179,6 +180,19 @@ def _solve_fast_extremes(
     return found, size, apart
 
 
+def _solve_grown_extremes(
+    grown: GrownExtremes, columns: Ints, want: Want, accuracy: float
+) -> tuple[Floats, Floats, Bools]:
+    """Return the same straight from what grows with the build."""
+    index = load_rows(columns, 3, 0)
+    force, pivot = grown.forces(columns)
+    apart = ~well_conditioned(grown.doubts, index, _GripForces(force, pivot), accuracy / _UNSEEN)
+    force[apart] = 0.0
+    found = grown.extremes(columns, force, want)
+    size = np.sqrt((force.reshape(*columns.shape, 3) ** 2).sum(axis=2))
+    return found, size, apart | ~np.isfinite(found).all(axis=0)
+
+
 _KEPT = 32e6  # bytes of operators that may stay when another is made
 _SCREEN = 1e-6  # the same, of what is only to be compared
 _EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
@@ -259,16 +273,24 @@ class ComplianceEngine(NamedEngine):
             return extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
-        few = are_few(bricks * len(self._basis.force), len(columns))
-        if few and bricks <= min(self._uniform, len(self._tree.spring)):
+        if bricks <= min(self._uniform, len(self._tree.spring)):
             accuracy = self._accepted(want)
-            operator = self._operator(bricks, columns)
-            found, size, apart = _solve_fast_extremes(operator, columns, want, accuracy)
+            if are_few(bricks * len(self._basis.force), len(columns)):
+                operator = self._operator(bricks, columns)
+                found, size, apart = _solve_fast_extremes(operator, columns, want, accuracy)
+            elif self._grown is not None and self._builder.growth.bricks <= bricks:
+                self._grown.reach(bricks)
+                found, size, apart = _solve_grown_extremes(self._grown, columns, want, accuracy)
         if np.count_nonzero(apart):
             fields = self._found(bricks, columns[apart], RIGID, want)
             rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
+
+    def _recalls(self, bricks: int) -> bool:
+        """Return whether fields of a brick count are had from what grew for extremes."""
+        grown: GrownExtremes | None = vars(self).get("_grown")
+        return grown is not None and self._builder.growth.recalls(bricks)
 
     def _accepted(self, want: Want) -> float:
         """Return the largest error of fields that is accepted, over the largest entry of each."""
@@ -300,6 +322,17 @@ class ComplianceEngine(NamedEngine):
     def _builder(self) -> OperatorBuilder:
         """Made when the first operator is: a scene that is loose from the start has none."""
         return OperatorBuilder(self._network, self._tree, self._basis)
+
+    @cached_property
+    def _grown(self) -> GrownExtremes | None:
+        """What answers few grip sets of large structures, where loops are made for the scene."""
+        rests = not self._network.springs.movement.any()
+        plain = self._basis is SPACE and rests and not self._builder.moments
+        if not plain:
+            return None
+        from seqopt.engines.rigid._grown import GrownExtremes  # noqa: PLC0415  # of large scenes
+
+        return GrownExtremes(self._builder)
 
     def _refined(
         self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want

@@ -10,18 +10,23 @@ window after the other, and knows nothing of what it misses.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from seqopt.arrays import Floats, Terse
+from seqopt.engines.interface import Fields, Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MemoryShortError, NothingFoundError, TimeUpError
 from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.layers import Layers, possible_after, windows
 from seqopt.problem.problem import Aim
-from seqopt.sequence.schedule import Schedule
+from seqopt.responses.table import step_fields
+from seqopt.sequence.schedule import OpenGrip, Schedule
+from seqopt.sequence.steps import Step
 
 
 @dataclass(frozen=True, repr=False)
@@ -30,12 +35,13 @@ class WindowSearch(Terse):
 
     ``alone``: the steps in which one move is open; ``shared``: of every move, the steps shared with
     the move before, whose choice is made; it may be empty; ``choice``: the chosen candidate of
-    every move.
+    every move; ``fields``: by number, of steps that an engine answered on the way.
     """
 
     alone: Layers
     shared: tuple[Layers, ...]
     choice: tuple[int, ...]
+    fields: Mapping[int, Fields] = field(default_factory=dict, compare=False)
 
     @property
     def explored(self) -> tuple[Layers, ...]:
@@ -71,10 +77,12 @@ def search_windows(problem: Layers, watch: Watch | None = None) -> WindowSearch:
                 _ = walk.shared[k].sums  # looked at now
                 walk.know((k,))
                 walk.choose(k)
+                walk.note()
             walk.know(())
+            walk.note()
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(walk.so_far()) from stop
-    return WindowSearch(walk.alone, tuple(walk.shared), tuple(walk.choice))
+    return WindowSearch(walk.alone, tuple(walk.shared), tuple(walk.choice), walk.fields)
 
 
 class _Walk:
@@ -93,6 +101,8 @@ class _Walk:
         self._own = Joined([len(move.candidates) for move in self._schedule.moves], np.add)
         self.shared: list[Layers] = []
         self.choice: list[int] = []
+        self.fields: dict[int, Fields] = {}
+        self._noted = 0  # steps
         self._known = 0.0  # bricks up to which steps with one open grip are
 
     def know(self, moves: tuple[int, ...]) -> None:
@@ -125,6 +135,18 @@ class _Walk:
                 "choices before it; relax a limit, or let a formulation look at all choices"
             )
         self.choice.append(int(np.argmin(costs)))
+
+    def note(self) -> None:
+        """Ask for all fields of steps that are chosen, where an engine has them at hand now."""
+        engine, steps, chosen = self.whole.engine, self._schedule.steps, len(self.choice)
+        for step in steps[self._noted :]:
+            if any(move >= chosen for move in step.moves):
+                return
+            self._noted += 1
+            if isinstance(engine, ComplianceEngine) and engine._recalls(step.bricks):
+                grips = (self._node(g.move) if isinstance(g, OpenGrip) else g for g in step.grips)
+                known = Step(step.number, step.kind, step.bricks, tuple(grips))
+                self.fields[step.number] = step_fields(engine, known, Want.ALL)
 
     def so_far(self) -> str:
         """Return what is chosen, in a few words."""

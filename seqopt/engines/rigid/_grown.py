@@ -1,0 +1,190 @@
+"""The extremes of grip sets of a large structure, straight from what grows with the build.
+
+Where a structure has more nodes than there are grip sets, most of what an operator holds is asked
+of none of them. What the grips of a set move at each other, and what they and the weight do to
+bricks and springs, is then read from `seqopt.engines.rigid._growth` itself, by compiled loops. What
+that means to edges, nodes and ground ends stands by entries: no sparse matrix is cut for every
+brick count.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+from seqopt.engines.interface import Want
+from seqopt.engines.rigid._operator import Doubts, OperatorBuilder
+from seqopt.engines.rigid._response_maps import SceneMaps, inner_edges
+from seqopt.work._threads import cores, in_threads, one_thread
+
+_SETS = 64  # grip sets that a thread takes at least
+
+
+class Grown(NamedTuple):
+    """What unit wrenches on bricks mean, and how inner nodes (B, 6, 6) follow their bricks."""
+
+    twist: Floats
+    wrench: Floats
+    nodes: Floats
+
+
+class Kept(NamedTuple):
+    """What forces at nodes (q,) mean that all grip sets hold: three rows each, and rows of zeros.
+
+    So many that they are a multiple of six: as many as of a brick.
+    """
+
+    node: Ints
+    twist: Floats
+    wrench: Floats
+
+
+class Edges(NamedTuple):
+    """What edges carry of the forces of springs.
+
+    ``first`` (E - B,), ``along`` (3, E - B): of all but inner edges, where the force of its spring
+    is, and how much of it. ``start``, ``at``, ``much``: the entries of rows of inner edges (B,).
+    """
+
+    first: Ints
+    along: Floats
+    start: Ints
+    at: Ints
+    much: Floats
+
+
+class Motion(NamedTuple):
+    """How nodes follow bricks: entries of a matrix, and from which brick count on each holds.
+
+    ``first`` (B + 1,), ``node``: the nodes that follow each brick; ``reach`` (B,): how far from its
+    centroid the last of these is, m.
+    """
+
+    start: Ints
+    at: Ints
+    much: Floats
+    since: Ints
+    first: Ints
+    node: Ints
+    reach: Floats
+
+
+class Ends(NamedTuple):
+    """Where wrenches are of ground ends (G,), and the moments (G, 6, 3) for unit ones."""
+
+    first: Ints
+    moment: Floats
+
+
+class Part(NamedTuple):
+    """A partial structure: counts, and what `inner_edges` says of its bricks."""
+
+    bricks: int
+    wrenches: int  # numbers: six for every spring that acts
+    edges: int
+    nodes: int  # none where nobody asks how far they move
+    at_second: Floats
+    axis: Floats
+
+
+def maps_by_entry(scene: SceneMaps) -> tuple[Edges, Motion, Ends]:
+    """Return what wrenches and twists of a whole scene mean, in space."""
+    spring = scene.network.edge_spring
+    through, outer = scene.edge[spring < 0], scene.edge[spring >= 0].tocoo()
+    along = np.zeros((3, outer.shape[0]))
+    along[outer.col % 6, outer.row] = outer.data
+    rows = through.indptr.astype(np.int64), through.indices.astype(np.int64), through.data
+    edges = Edges(6 * spring[spring >= 0], along, *rows)
+    moment = np.ascontiguousarray(scene.support[:, :, 3:])
+    return edges, _motion_of(scene), Ends(6 * scene.network.springs.support, moment)
+
+
+def _motion_of(scene: SceneMaps) -> Motion:
+    network, entries = scene.network, scene.motion.tocoo()
+    start, at = (part.astype(np.int64) for part in (scene.motion.indptr, scene.motion.indices))
+    pairs = np.unique(np.stack([entries.col // 6, entries.row // 3]), axis=1)
+    brick, node = pairs.astype(np.int64)
+    first = np.searchsorted(brick, np.arange(len(network.inner) + 1))
+    arm = np.linalg.norm(network.node_position[node] - network.centroid[brick], axis=1)
+    reach = np.maximum.reduceat(arm, first[:-1])  # each has its inner nodes at least
+    return Motion(start, at, scene.motion.data, scene.since, first, node, reach)
+
+
+class GrownExtremes:
+    """Answers grip sets of the brick count that a growth has reached.
+
+    ``builder``: in space, of a scene whose grips transmit no moments and whose ground stays.
+    """
+
+    def __init__(self, builder: OperatorBuilder) -> None:
+        self._network, self._growth = builder.network, builder.growth
+        self._grown = Grown(self._growth.twist, self._growth.wrench, builder.nodes)
+        self._maps = maps_by_entry(builder.maps)
+        self._part = Part(0, 0, 0, 0, np.empty(0), np.empty((0, 3)))
+        self._growth.remembers = True
+
+    def reach(self, bricks: int) -> None:
+        """Let a number of bricks stand."""
+        if bricks == self._part.bricks == self._growth.bricks:
+            return
+        with one_thread():
+            self._growth.reach(bricks)
+        network, (twist, _, nodes) = self._network, self._grown
+        acting = int(np.searchsorted(network.springs.since, bricks, side="right"))
+        counts = bricks, 6 * acting, network.count_edges(bricks), network.count_nodes(bricks)
+        _, axis, at_second = inner_edges(network, bricks)
+        self._part = Part(*counts, at_second, axis)
+        own, every = twist[1 : 1 + 6 * bricks, : 6 * bricks], np.arange(bricks)
+        blocks = own.reshape(bricks, 6, bricks, 6)[every, :, every]
+        self.doubts = Doubts(
+            np.einsum("nip,npq,niq->ni", nodes[:bricks], blocks, nodes[:bricks]).ravel(),
+            np.einsum("nip,np->ni", nodes[:bricks], twist[0, : 6 * bricks].reshape(-1, 6)).ravel(),
+            np.repeat(self._growth.loss[:bricks], nodes.shape[1]),
+        )
+
+    def forces(self, columns: Ints) -> tuple[Floats, Floats]:
+        """Return forces (S, k) of rigid grips at nodes (S, r), and their scaled pivots (k, S)."""
+        force = np.empty((len(columns), 3 * columns.shape[1]))
+        pivot = np.empty(force.shape[::-1])
+        _loops().solve_grown(self._grown, self._part.axis, columns, force, pivot)
+        return force, pivot
+
+    def extremes(self, columns: Ints, force: Floats, want: Want) -> Floats:
+        """Return extremes (4, S) as of `Extremes`; two grips on one brick share, in place."""
+        part = self._part if want & Want.DISPLACEMENTS else self._part._replace(nodes=0)
+        grown, maps, loops, kept = self._grown, self._maps, _loops(), self._kept(columns)
+
+        def reduce(own: slice) -> Floats:
+            squares: Floats = loops.reduce_grown(grown, kept, maps, part, columns[own], force[own])
+            return squares
+
+        step = max(_SETS, -(-len(columns) // cores()))
+        parts = [slice(start, start + step) for start in range(0, max(len(columns), 1), step)]
+        found = np.concatenate(in_threads(reduce, parts), axis=1)
+        np.sqrt(found[2:], out=found[2:])
+        return found
+
+    def _kept(self, columns: Ints) -> Kept:
+        """Return what forces mean at the nodes that all sets (S, r) hold."""
+        (twist, wrench, nodes), part = self._grown, self._part
+        held = [n for n in columns[0].tolist() if (columns == n).any(axis=1).all()]
+        found, count = [], -(-len(held) // 2) * 6
+        for answers, width in ((twist, 6 * part.bricks), (wrench, part.wrenches)):
+            rows = np.zeros((count, width))
+            for i, node in enumerate(held):
+                turned = nodes[node // 2, 3 * (node % 2) : 3 * (node % 2) + 3]
+                rows[3 * i : 3 * i + 3] = turned @ answers[1 + 6 * (node // 2) :][:6, :width]
+            found.append(rows)
+        return Kept(np.array(held, dtype=np.int64), *found)
+
+
+@cache
+def _loops() -> ModuleType:
+    """Return the compiled functions; loading them takes half a second."""
+    from seqopt.engines.rigid import _compiled_grown  # noqa: PLC0415  # numba is an extra
+
+    return _compiled_grown
