@@ -113,7 +113,7 @@ def _solve_windows(graph: Layers, formulation: Formulation, run: Run) -> Plan:
 
     seconds: dict[str, float] = {}
     with timed(seconds, "search"):
-        found = search_windows(graph, Watch(run.left))
+        found = search_windows(graph, Watch(run.left), fields=True)
     respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
     with timed(seconds, "verify"):
         steps = _checked(graph.steps(found.choice), graph)

@@ -8,7 +8,7 @@ equations; where two that are nearly rigid share a brick, digits are lost (`near
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import lapack
@@ -16,7 +16,10 @@ from scipy.linalg import lapack
 from seqopt.arrays import Bools, Floats, Ints, frozen
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import _couples
-from seqopt.engines.rigid._operator import ComplianceOperator, Doubts
+from seqopt.engines.rigid._operator import ComplianceOperator
+
+if TYPE_CHECKING:
+    from seqopt.engines.rigid._grown import GrownExtremes
 
 
 class Pairs(NamedTuple):
@@ -194,7 +197,7 @@ def grip_forces(
 
 
 def well_conditioned(
-    operator: ComplianceOperator | Doubts,
+    operator: ComplianceOperator | GrownExtremes,
     index: Ints,
     found: _GripForces,
     most: float,
@@ -202,14 +205,13 @@ def well_conditioned(
 ) -> Bools:
     """Return which sets' forces (S,) rounding changes little enough.
 
-    ``operator``: or, of rigid grips, its doubts alone; ``most``: largest of `_doubts` that is
+    ``operator``: or, of rigid grips, what has grown; ``most``: largest of `_doubts` that is
     accepted; ``compliance``: as of `grip_forces`.
     """
-    doubts = operator.doubts if isinstance(operator, ComplianceOperator) else operator
     lowest, least = found.lowest, np.inf
     if compliance.moved is None:  # else forces may undo what the weight does
         own = 0.0 if compliance.rigid else 2.0  # of what soft grips yield, that forces undo as well
-        least = len(found.pivot) * doubts.worst + own
+        least = len(found.pivot) * operator.doubts.worst + own
     out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
         return out
@@ -222,7 +224,7 @@ def well_conditioned(
 
 
 def _doubts(
-    operator: ComplianceOperator | Doubts,
+    operator: ComplianceOperator | GrownExtremes,
     index: Ints,
     found: _GripForces,
     compliance: GripCompliance = RIGID,
@@ -234,8 +236,7 @@ def _doubts(
     leaves undetermined.
     """
     size = np.abs(found.force.T)
-    doubts = operator.doubts if isinstance(operator, ComplianceOperator) else operator
-    root, own, scale = doubts.shares.take(np.ascontiguousarray(index.T), axis=1)
+    root, own, scale = operator.doubts.shares.take(np.ascontiguousarray(index.T), axis=1)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         own += (root * size).sum(axis=0)
         own *= scale

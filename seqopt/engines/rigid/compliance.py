@@ -186,7 +186,7 @@ def _solve_grown_extremes(
     """Return the same straight from what grows with the build."""
     index = load_rows(columns, 3, 0)
     force, pivot = grown.forces(columns)
-    apart = ~well_conditioned(grown.doubts, index, _GripForces(force, pivot), accuracy / _UNSEEN)
+    apart = ~well_conditioned(grown, index, _GripForces(force, pivot), accuracy / _UNSEEN)
     force[apart] = 0.0
     found = grown.extremes(columns, force, want)
     size = np.sqrt((force.reshape(*columns.shape, 3) ** 2).sum(axis=2))

@@ -60,13 +60,16 @@ class WindowSearch(Terse):
         return np.asarray(aim.join(alone[move], shared[0]))
 
 
-def search_windows(problem: Layers, watch: Watch | None = None) -> WindowSearch:
+def search_windows(
+    problem: Layers, watch: Watch | None = None, *, fields: bool = False
+) -> WindowSearch:
     """Choose every open grip of a build, one move after the other, by ascending brick counts.
 
-    ``problem``: its own responses are not computed. Raises `NothingFoundError` if a move has no
-    candidate left after the choices before it, while others may have led on; `TimeUpError` if time
-    is over before the last move is chosen; `MemoryShortError` if there is not the memory for what
-    it looks at; `KeyboardInterrupt`, with the nodes that were chosen so far as its text.
+    ``problem``: its own responses are not computed; ``fields``: whether those of steps are kept
+    that an engine has at hand, as the plan asks for them next. Raises `NothingFoundError` if a move
+    has no candidate left after the choices before it, while others may have led on; `TimeUpError`
+    if time is over before the last move is chosen; `MemoryShortError` if there is not the memory
+    for what it looks at; `KeyboardInterrupt`, with the nodes that were chosen so far as its text.
     """
     walk = _Walk(problem, watch or Watch())
     try:
@@ -77,9 +80,11 @@ def search_windows(problem: Layers, watch: Watch | None = None) -> WindowSearch:
                 _ = walk.shared[k].sums  # looked at now
                 walk.know((k,))
                 walk.choose(k)
-                walk.note()
+                if fields:
+                    walk.note()
             walk.know(())
-            walk.note()
+            if fields:
+                walk.note()
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(walk.so_far()) from stop
     return WindowSearch(walk.alone, tuple(walk.shared), tuple(walk.choice), walk.fields)
