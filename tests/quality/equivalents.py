@@ -55,7 +55,6 @@ EQUIVALENT = (
         for module, line, why in (
             ("formulations.*", "zip(", LENGTHS),
             (COSTS, "enumerate(zip(", LENGTHS),
-            (COSTS, "zip(self.single[-2::-1]", LENGTHS),
         )
     ),
     Equivalent("formulations.beam", "", "np.zeros(1)", "np.zeros(2)", "two equal ways are one"),
