@@ -80,7 +80,7 @@ EQUIVALENT = (
         Equivalent(TRIAL, "CANCEL", "10.0", size, "where one way of two that agree ends")
         for size in ("9.0", "11.0")
     ),
-    Equivalent(RANKS, "ranks if values.ndim", "==", "<=", "a step has one open move or two"),
+    Equivalent(RANKS, "if values.ndim", "==", "<=", "a step has one open move or two"),
     Equivalent(RANKS, "ordered", "!=", ">", "in order, what is another is larger"),
     *(
         Equivalent(
