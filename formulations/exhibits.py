@@ -85,25 +85,18 @@ def _assigned(graph: Graph, *, apart: bool) -> _Assignment:
     ones = np.ones(graph.states)
     one_each = sparse.csr_array((ones, (level, np.arange(graph.states))))
     rules: list[cp.Constraint] = [cp.Zero(one_each @ picks - np.ones(level.max() + 1))]
-    if apart:
-        never = _pairs_without_arc(graph, level)
+    codes = graph.source.astype(np.int64) * graph.states + graph.target
+    for k in range(int(level.max()) if apart else 0):
+        here, there = np.flatnonzero(level == k), np.flatnonzero(level == k + 1)
+        pairs = np.array(np.meshgrid(here, there, indexing="ij")).reshape(2, -1).T
+        never = pairs[~np.isin(pairs @ [graph.states, 1], codes)]
         if len(never):
             rules.append(cp.NonNeg(np.ones(len(never)) - _adding(never, graph.states) @ picks))
     return _Assignment(picks, level, rules)
 
 
-def _pairs_without_arc(graph: Graph, level: Ints) -> Ints:
-    """Return the pairs of states of neighboring levels that no arc joins, (p, 2)."""
-    codes, out = graph.source.astype(np.int64) * graph.states + graph.target, []
-    for k in range(int(level.max())):
-        here, there = np.flatnonzero(level == k), np.flatnonzero(level == k + 1)
-        pairs = np.array(np.meshgrid(here, there, indexing="ij")).reshape(2, -1).T
-        out.append(pairs[~np.isin(pairs @ [graph.states, 1], codes)])
-    return np.concatenate(out)
-
-
 def _adding(pairs: Ints, count: int) -> sparse.csr_array:
-    """Return what adds up the assignments at both ends of pairs (p, 2), (p, count)."""
+    """Return the incidence matrix (p, count) of pairs (p, 2): it sums both ends of each."""
     rows = np.repeat(np.arange(len(pairs)), 2)
     return sparse.csr_array((np.ones(len(rows)), (rows, pairs.ravel())), (len(pairs), count))
 
@@ -145,7 +138,7 @@ def _loose(graph: Graph) -> WholeProgram:
 
 
 def _split(graph: Graph, level: Ints) -> tuple[Floats, Floats, float]:
-    """Return what states cost alone (n,), what arcs cost beside, from 0, and what was taken out."""
+    """Return costs of states (n,), further costs of arcs (m,) from 0, and the constant term."""
     own = np.zeros(len(graph.source)) if graph.alone is None else graph.alone[:, 0]
     single = np.zeros(graph.states)
     single[graph.target] = own
@@ -182,7 +175,7 @@ def _big_m(graph: Graph) -> WholeProgram:
 
 
 def _below(scale: float) -> Callable[[float], float]:
-    """Return what makes a bound of a program's value, divided by a scale."""
+    """Return the function from a scaled program's value to a lower bound in the unit of costs."""
     return lambda value: scale * (value - ACCURACY * max(abs(value), 1.0))
 
 

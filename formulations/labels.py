@@ -1,4 +1,4 @@
-r"""Paths within budgets: multipliers alone, a bound, or with labels that close what is left open.
+r"""Paths within budgets: a Lagrangian bound alone, or with labels that close the duality gap.
 
 .. math::
 
@@ -44,7 +44,7 @@ from seqopt.problem.problem import Aim
 
 
 def _exact(graph: Graph, watch: Watch, *, most: int = 20_000) -> Choice:
-    """Return the best path within the budgets, or the best one that was met.
+    """Return the optimal path within the budgets, or the incumbent.
 
     ``most``: how many labels are kept at a time, from 1; it has stopped early if more were needed.
     """
@@ -54,7 +54,7 @@ def _exact(graph: Graph, watch: Watch, *, most: int = 20_000) -> Choice:
 
 
 def relaxed(graph: Graph, watch: Watch) -> Choice:
-    """Return the best path that was met, with the bounds of multipliers; exact without budgets."""
+    """Return the incumbent with the Lagrangian bounds; exact without budgets."""
     return _chosen(graph, watch, 0)
 
 

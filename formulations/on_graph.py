@@ -1,4 +1,4 @@
-"""What formulations of paths share: a graph goes in, a path comes out, whatever is built.
+"""What formulations of paths share: a graph goes in, a path and its lower bounds come out.
 
 A formulation is a function from a `seqopt.graph.graph.Graph` to a `formulations.choice.Choice`: a
 path and its lower bounds. The graph is that of the open grips of a schedule, of the states of a
@@ -29,12 +29,12 @@ from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
 from seqopt.graph.paths import path_values, tied
 from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
-from seqopt.problem.problem import WORST_TOTAL, Aim, RobustAim, cvar
+from seqopt.problem.problem import WORST_TOTAL, Aim, cvar
 from seqopt.work.progress import Tell
 
 
 def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> Solution:
-    """Return the path that is chosen, its states the numbers of nodes."""
+    """Return the chosen path of an instance; its states are the numbers of nodes."""
     graph, goal = instance.asked, instance.goals[0]
     if goal.kind == TAIL:
         found = _least_tail(graph, goal, choose, watch)
@@ -65,14 +65,11 @@ def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> Soluti
 
 def _least_tail(graph: Graph, goal: _Target, choose: Choose, watch: Watch) -> Choice:
     """Return the path of least worst or tail total over scenarios, with their weights."""
-    found = least_total(graph, _aim(goal), cheapest_by(choose, watch), watch)
+    aim = WORST_TOTAL  # the tail of which one scenario may have all the weight
+    if goal.most < 1.0:
+        aim = cvar(max(0.0, 1.0 - 1.0 / (goal.most * len(goal.columns))))
+    found = least_total(graph, aim, cheapest_by(choose, watch), watch)
     return Choice(found.path, (found.bound,), watch.over, (tuple(found.weights.tolist()),))
-
-
-def _aim(goal: _Target) -> RobustAim:
-    """Return what is made of totals; one weight of all is that of the worst."""
-    count = len(goal.columns)
-    return WORST_TOTAL if goal.most >= 1.0 else cvar(max(0.0, 1.0 - 1.0 / (goal.most * count)))
 
 
 @dataclass(frozen=True, repr=False)
@@ -105,7 +102,7 @@ class OnGraph(Terse):
         progress: Tell = lambda _: None,
         **options: Any,
     ) -> Solution:
-        """Return the plan of the chosen path; where time or memory ends early, a first plan.
+        """Return the plan of the chosen path, or the incumbent at the limit of time or memory.
 
         Raises a `ProblemError` if there are budgets that it does not take.
         """

@@ -162,7 +162,7 @@ class WholeProgram(NamedTuple):
 
 
 def by_integers(write: Callable[[Graph], WholeProgram]) -> Choose:
-    """Return what chooses the path that an integer program finds, with a bound.
+    """Return the choice of a path by an integer program, with its lower bound.
 
     ``write``: returns the program of a graph. A `SolverError` says that the solver ended without an
     optimum.

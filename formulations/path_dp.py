@@ -7,7 +7,7 @@ For the open grips of a schedule it is
    \min_{o_1, \dots, o_K} \; \sum_{k=1}^{K} c_k(o_k) + \sum_{k=2}^{K} d_k(o_{k-1}, o_k)
 
 with the costs :math:`c` of single candidates and :math:`d` of the step that neighboring moves
-share (``overlap_dp``), or the same with the largest cost in place of the sum (``minimax``); for a
+share (``overlap_dp``), or with the largest cost in place of the sum (``minimax``); for a
 free schedule a path through its states (``path_dp``). With moves :math:`a = (u, v)` that take
 :math:`c_a`,
 

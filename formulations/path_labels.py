@@ -15,9 +15,9 @@ Continued first is the label whose vector :math:`f` is least, goal by goal,
 
 and one that another one of the same state dominates is dropped. The first one at an
 end is the best, since no goal ever gets less on the way. Values up to `seqopt.graph.paths.TIED`
-apart count as one. In ``path_labels`` nothing is known of what is ahead, :math:`h = 0` (Martins, On
-a multicriteria shortest path problem, 1984). In ``best_first`` (A*) what is left of every goal
-alone is: 0 at an end, and
+apart count as one. In ``path_labels`` the lower bound of the rest of a path is :math:`h = 0`
+(Martins, On a multicriteria shortest path problem, 1984). In ``best_first`` (A*) it is the optimum
+of every goal alone: 0 at an end, and
 
 .. math::
 
@@ -87,7 +87,7 @@ def _best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
 
 
 def _and(peaks: Sequence[bool], first: Sequence[float], then: Sequence[float]) -> _Values:
-    """Return what goals take of two parts of a path together."""
+    """Return the values of goals of two parts of a path joined."""
     pairs = zip(peaks, first, then, strict=True)
     return tuple([max(a, b) if peak else a + b for peak, a, b in pairs])
 
@@ -108,7 +108,7 @@ def _is_dominated(bound: _Values, others: list[_Values]) -> bool:
 
 
 def _left(graph: Graph) -> Floats:
-    """Return what every goal takes at least from a state to an end, (n, g); infinite if none is."""
+    """Return lower bounds (n, g) of goals from states to ends; infinite where none is reached."""
     left = np.where(graph.ends[:, None], 0.0, np.inf) * np.ones(len(graph.peaks))
     states, firsts = np.unique(graph.source, return_index=True)
     while True:

@@ -24,7 +24,7 @@ STOPS = ("kTimeLimit", "kInterrupt")
 
 @dataclass(frozen=True)
 class Optimum:
-    """What a solver found: a value, infinite where it was stopped before any, and its own bound.
+    """Result of a solver: value, infinite where it was stopped without an incumbent, and bound.
 
     ``compile_seconds``: what cvxpy took to write the program down for the solver, s; ``nodes``: of
     its search tree; ``stopped``: whether its time was over, or it was interrupted.
@@ -70,10 +70,9 @@ def minimize_by_highs(
 ) -> Optimum:
     """Solve a linear or an integer program by HiGHS; its variables take the best values.
 
-    ``feasible``: whether it is known to have a solution; ``watch``: says when to stop, and is told
-    values and bounds of integer programs as they are found, in the unit that ``told`` turns them
-    into; ``tolerance``: of constraints, by default that of HiGHS. Raises `InfeasibleError`,
-    `SolverError` as `minimize`.
+    ``feasible``: whether it is known to have a solution; ``watch``: deadline, which records
+    incumbents and bounds of integer programs, converted to its unit by ``told``; ``tolerance``: of
+    constraints, by default that of HiGHS. Raises `InfeasibleError`, `SolverError` as `minimize`.
     """
     watch = watch or Watch()
     start = time.perf_counter()
@@ -139,7 +138,7 @@ def _loaded(data: dict[str, Any], *, whole: bool) -> highspy.Highs:
 
 
 def _listen(solver: highspy.Highs, watch: Watch, told: Callable[[float], float]) -> None:
-    """Let HiGHS tell a watch every better solution, and its bounds between them.
+    """Let HiGHS report every incumbent to a watch, and its bounds between them.
 
     It ends when the watch says so, also while it solves linear programs.
     """

@@ -29,7 +29,7 @@ import highspy
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.stability._held_states import Enough, HeldProgram
 from seqopt.stability.limit_analysis import CAP, Answer, Case, Claim, limits
@@ -77,19 +77,6 @@ def _first_directions(corners: int, grips: int) -> _Directions:
     of_corners = _Directions(np.repeat(np.arange(corners), _SIDES), np.tile(flat, (corners, 1)))
     of_grips = corners + np.repeat(np.arange(grips), len(space))
     return of_corners.joined(_Directions(of_grips, np.tile(space, (grips, 1))))
-
-
-def _better_directions(known: _Directions, along: Floats, wanted: Bools) -> _Directions:
-    """Return the best directions of corners and grips where those known are not as good.
-
-    ``along`` (m, 3): what a force of every corner or grip is worth, per component; the normal parts
-    of corners are zero. ``wanted`` (m,): whose directions are asked for.
-    """
-    best = np.zeros(len(along))
-    np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))
-    size = np.linalg.norm(along, axis=1)
-    which = np.flatnonzero(wanted & (size - best > _GAIN))
-    return _Directions(which, along[which] / size[which, None])
 
 
 class _HeldEquilibrium:
@@ -244,13 +231,21 @@ class _HeldEquilibrium:
         return Answer(claim, np.nan, *forces, motion.reshape(-1, 6))
 
     def _better(self, motion: Floats) -> _Directions:
-        size = np.abs(motion).max(initial=0.0) or 1.0
-        along = -(self._map.T @ (motion.ravel() / size)).reshape(-1, 3)
+        """Return the directions of steepest gain, of corners and grips, that the program lacks.
+
+        ``motion``: the duals of equilibrium, (b, 6), which give the reduced cost of a unit force.
+        """
+        largest = np.abs(motion).max(initial=0.0) or 1.0
+        along = -(self._map.T @ (motion.ravel() / largest)).reshape(-1, 3)
         corner = along[: self._corners]
         closing = corner[:, 0] + self._case.friction * np.linalg.norm(corner[:, 1:], axis=1)
         corner[:, 0] = 0.0
         cones = (closing > 0) | bool(self._disc.size)
-        return _better_directions(self._directions, along, np.concatenate([cones, self._held > 0]))
+        wanted, known = np.concatenate([cones, self._held > 0]), self._directions
+        best, size = np.zeros(len(along)), np.linalg.norm(along, axis=1)
+        np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))
+        which = np.flatnonzero(wanted & (size - best > _GAIN))
+        return _Directions(which, along[which] / size[which, None])
 
 
 def compile_held(assembly: Assembly, case: Case) -> HeldProgram:

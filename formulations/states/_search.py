@@ -58,7 +58,7 @@ def shortest(graph: Graph, _: Watch) -> Choice:
 def best_total(
     problem: States, choose: Choose, watch: Watch, tell: Watching, width: int | None = None
 ) -> Solution:
-    """Return the plan of least total over scenarios.
+    """Return the plan of least total over scenarios, with its bound and scenario weights.
 
     ``choose``: paths of least sum; ``width``: how many new states of a brick count are kept; by
     default all, without which no plan is proven to be the least.
@@ -82,7 +82,7 @@ def best_total(
 
 
 def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> Solution:
-    """Return the plan of a choice; where time was over, the better one of it and a first plan."""
+    """Return the plan of a choice; where time was over, the better one of it and the incumbent."""
     first = None
     try:
         first = narrow(problem, WIDTH, tell)
@@ -108,7 +108,10 @@ def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> Sol
 
 
 def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watching:
-    """Return what is told part by part: it says how far it is, and ends the search in time."""
+    """Return a callback of explorers: it reports progress, and enforces time and memory limits.
+
+    ``watch``: whose end raises a `StopError`; ``most``: memory, bytes.
+    """
     asked = 0.0
 
     def tell(found: Explorer) -> None:
@@ -129,7 +132,7 @@ def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watch
 
 
 def plan_by_then(found: Solution | None, stop: StopError | KeyboardInterrupt) -> Solution:
-    """Return a first plan, of which nothing is proven; raise an error if there is none yet."""
+    """Return the incumbent without a bound; raise an error if there is none yet."""
     if found is None:
         raise _too_little(stop) from None
     none = (-np.inf,) * len(found.objective)
@@ -138,7 +141,7 @@ def plan_by_then(found: Solution | None, stop: StopError | KeyboardInterrupt) ->
 
 
 def _too_little(stop: StopError | KeyboardInterrupt) -> SeqoptError | KeyboardInterrupt:
-    """Return what to say where no plan was found before."""
+    """Return the error of a search that was stopped before it had an incumbent."""
     if isinstance(stop, KeyboardInterrupt):
         return stop
     if str(stop) == "memory":
@@ -147,7 +150,7 @@ def _too_little(stop: StopError | KeyboardInterrupt) -> SeqoptError | KeyboardIn
 
 
 def after_margins(problem: States, search: Search, tell: Watching) -> Solution:
-    """Return what is found once margins of stability, which come first, are at their best."""
+    """Return the plan of a search after the margins of stability, which are optimized first."""
     margins = [goal.margins is not None for goal in problem.goals]
     if sorted(margins, reverse=True) != margins:
         named = ", ".join(map(str, problem.goals))
@@ -183,9 +186,9 @@ def narrow(
 ) -> Solution | None:
     """Return the best plan through a few states of every brick count, if there is one.
 
-    Where states must stand it is asked of all of them only if the best paths fall; ``most``: what
-    goals may take of it, whether states stand or not; ``enough``: as of `Explorer`; ``every``:
-    whether all orders that are sought are looked at, not the scene's own alone.
+    Stability is required of the states of the best paths first, and of all states only if these
+    fall; ``most``: upper limits of the goals, above which there is no plan; ``enough``: as of
+    `Explorer`; ``every``: whether all orders are searched, not the scene's own alone.
     """
     for standing in (False, True)[: 1 + bool(problem.demands)]:
         space = build_space(problem, regrips=False, every=every, standing=standing)
@@ -202,7 +205,7 @@ def narrow(
 
 
 def best_standing(found: Explorer, budgets: Sequence[float] = ()) -> Solution:
-    """Return the best path through visited states that pass what is asked of those on it alone."""
+    """Return the best path through visited states that pass the expensive filters."""
     while True:
         visited, best = exact_best(found, budgets)
         if not close_fallen(found, visited, best.path):
@@ -210,9 +213,9 @@ def best_standing(found: Explorer, budgets: Sequence[float] = ()) -> Solution:
 
 
 def close_fallen(found: Explorer, visited: Visited, path: Sequence[int]) -> bool:
-    """Exclude states of a path that do not pass what is expensive; return whether there are any.
+    """Exclude states of a path that fail expensive filters; return whether there are any.
 
-    With each go those of its part that are known to fail: none of these is asked.
+    With each, those of its part that are already proven to fail are excluded.
     """
     fallen, space = False, found.space
     for level, key, state in visited.of(path):
@@ -243,7 +246,7 @@ def exact_best(found: Explorer, budgets: Sequence[float] = ()) -> tuple[Visited,
 
 
 def selected(space: Space, visited: Visited, best: Best | Within) -> Solution:
-    """Return a path as a plan, and with it the states that a better one could pass.
+    """Return a path as a plan, with the states that a better path could pass as a hint.
 
     These are left out where an order was sought: rows of other orders mean other things.
     """
@@ -263,7 +266,7 @@ def selected(space: Space, visited: Visited, best: Best | Within) -> Solution:
 
 @dataclass(frozen=True)
 class Options:
-    """How to search; ``dear``: whether a first plan is worth its time only if it is the best."""
+    """Options of a search; ``dear``: whether a first plan is sought only at the lower bounds."""
 
     width: int
     growth: float
@@ -297,7 +300,7 @@ class ThresholdSearch:
 
     @property
     def is_best(self) -> bool:
-        """Whether no plan is better than the incumbent, since it takes no more than all must."""
+        """Whether the incumbent is optimal, as it attains the lower bounds of all goals."""
         found = self.incumbent
         return bool(found and not self._caps and all(map(le, found.objective, self.floors)))
 
@@ -350,7 +353,7 @@ class ThresholdSearch:
 
     @property
     def _target(self) -> float:
-        """Below which the next plan is sought: halfway to the bound, or better once it is close."""
+        """Upper limit of the next incumbent: halfway to the bound, or any better one near it."""
         middle = (max(self.bound, self._ceiling / FAR_BELOW) * self._ceiling) ** 0.5
         return middle if middle * NARROW < self._ceiling else self._ceiling
 
@@ -402,7 +405,7 @@ def search_states(problem: States, options: Options, tell: Watching) -> Solution
 def _first(
     problem: States, options: Options, floors: Sequence[float], wider: int, tell: Watching
 ) -> Solution | None:
-    """Return a first plan; where that is expensive, only if it takes no more than floors."""
+    """Return a first plan; where that is expensive, only if it attains the lower bounds."""
     width, enough = wider * options.width, floors[0] if wider > 1 else -np.inf
     most = floors if options.dear else None
     if most and problem.each and not problem.demands:
@@ -413,8 +416,19 @@ def _first(
 
 
 def first_threshold(problem: States, options: Options) -> float:
-    """Return from where thresholds rise: over scenarios what the best plan of the first takes."""
-    return _of_one(problem, options) if problem.each and problem.goals[0].is_peak else -np.inf
+    """Return the first threshold of the first goal: over scenarios the best plan of the first.
+
+    Its value is an upper bound if it is feasible in all scenarios; else its value in the first one
+    is a lower bound. Minus infinity without scenarios, or of a sum.
+    """
+    if not (problem.each and problem.goals[0].is_peak):
+        return -np.inf
+    first = replace(problem.each[0], goals=problem.aims, budgets=())  # budgets are of the scene
+    search = threshold_search(first, options, lambda _: None)
+    search.incumbent = narrow(first, WIDTH, lambda _: None)
+    one = search.best()
+    inside = _in_all(problem, one, (np.inf,) * len(problem.goals))
+    return (inside or one).objective[0]
 
 
 def _require_room(problem: States, tell: Watching) -> None:
@@ -425,23 +439,10 @@ def _require_room(problem: States, tell: Watching) -> None:
         raise InfeasibleError("no plan is within all budgets")
 
 
-def _of_one(problem: States, options: Options) -> float:
-    """Return what the plan that is best in the first scenario takes in all; at least in that one.
-
-    What is below the former is enough to be looked at, where that plan is allowed in all.
-    """
-    first = replace(problem.each[0], goals=problem.aims, budgets=())  # budgets are of the scene
-    search = threshold_search(first, options, lambda _: None)
-    search.incumbent = narrow(first, WIDTH, lambda _: None)
-    one = search.best()
-    inside = _in_all(problem, one, (np.inf,) * len(problem.goals))
-    return (inside or one).objective[0]
-
-
 def _in_all(problem: States, one: Solution | None, most: Sequence[float]) -> Solution | None:
-    """Return a plan of one scenario, valued in all; None if in any it is not allowed.
+    """Return a plan of one scenario with its values over all; None if it is infeasible in any.
 
-    Or if goals then take more of it than ``most``.
+    Also None if a goal is then above ``most``.
     """
     worst = np.full(len(problem.goals), -np.inf)
     own = problem.at(one.order if one else ())
@@ -459,7 +460,7 @@ def _in_all(problem: States, one: Solution | None, most: Sequence[float]) -> Sol
 
 
 def unproven(found: Solution, wide: Explorer, proven: float) -> Solution:
-    """Return the first plan, and what thresholds and the levels reached prove of the first goal."""
+    """Return the incumbent with the bound of the first goal from thresholds and reached levels."""
     bound = proven
     if not wide.peaks[0] and wide.level:
         graph, states = wide.graph()

@@ -64,7 +64,11 @@ def least_total(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch)
     best = by_weights(graph, aim, cheapest, watch)
     if watch.over or best.bound >= best.value - CLOSE * abs(best.value):
         return best._replace(bound=min(best.bound, best.value))
-    return _by_labels(graph, aim, best, watch)
+    growth = _Totals(graph, aim, best.weights)  # labels close the gap that weights leave
+    known = LabelSearch(None, best.value, best.bound)
+    found = widening(growth, np.zeros(0), known, watch, LABELS)
+    path = best.path if found.arcs is None else tuple(graph.target[found.arcs].tolist())
+    return LeastTotal(path, found.cost, found.bound, best.weights)
 
 
 def by_weights(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) -> LeastTotal:
@@ -88,14 +92,6 @@ def by_weights(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) 
     start = np.full(count, 1.0 / count)
     weights, bound = highest_bound(met, start, region, ended, rounds=STEPS, closed=CLOSE)
     return best._replace(bound=bound, weights=weights)
-
-
-def _by_labels(graph: Graph, aim: RobustAim, known: LeastTotal, watch: Watch) -> LeastTotal:
-    """Return the best path by labels, vectors of totals that weights bound."""
-    before = LabelSearch(None, known.value, known.bound)
-    found = widening(_Totals(graph, aim, known.weights), np.zeros(0), before, watch, LABELS)
-    path = known.path if found.arcs is None else tuple(graph.target[found.arcs].tolist())
-    return LeastTotal(path, found.cost, found.bound, known.weights)
 
 
 class _Totals(SummedLabels):

@@ -1,8 +1,8 @@
-r"""All plans that no other plan beats in every response: exact, by search zones.
+r"""All nondominated plans, one for each vector of responses: exact, by search zones.
 
-A plan has a vector :math:`z` of numbers that are to be small, say the worst of each response. It
-is dominated by one that is nowhere larger and somewhere less. What is not dominated by any of the
-points found so far lies in one of finitely many *search zones*,
+A plan has a vector :math:`z` of objectives to minimize, say the worst of each response. It is
+dominated by one that is at most as large in all and less in one. A point that none of those found
+so far dominates lies in one of finitely many *search zones*,
 
 .. math::
 

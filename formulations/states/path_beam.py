@@ -49,10 +49,10 @@ def solve(
     """Return a plan through the states of a beam.
 
     ``width``: how many new states of a brick count are kept, from 1; ``seconds``, ``max_memory``:
-    after which, or above how many bytes, it ends without a plan; ``progress``: told as a
-    `seqopt.work.Stage` how far it is. Result: without a bound, but of
-    margins of stability. Raises `InfeasibleError` if no plan is allowed; `ProblemError`,
-    `TimeUpError` if the width is not positive, or memory or time is up.
+    limits, s and bytes, at which it ends without a plan; ``progress``: called with a
+    `seqopt.work.Stage`. Only margins of stability have a bound. Raises `InfeasibleError` if no plan
+    is feasible; `ProblemError`, `TimeUpError` if the width is not positive, or memory or time is
+    up.
     """
     if width < 1:
         raise ProblemError(f"option width={width}: give a whole number from 1 on")

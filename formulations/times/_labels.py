@@ -93,7 +93,7 @@ STEPS = -1  # the column that counts moves
 
 @dataclass(frozen=True, eq=False)
 class Caps:
-    """What paths must keep to.
+    """Upper limits of paths.
 
     ``time``: the end of the build, s; ``sums``: of columns of the graph, most that each may take;
     `STEPS` is the number of moves.
@@ -156,18 +156,18 @@ class TimedLabels:
         return Sweep(self, self._caps.limits, aim=aim, width=width).run(watch, most)
 
     def values(self, taken: Floats, aim: int) -> Floats:
-        """Return when builds end, or what a sum takes."""
+        """Return makespans, s, or the value of a sum, (N,)."""
         return np.asarray(taken[:, 0 if aim == 0 else self._sums + aim - 1])
 
     def bounds(self, state: Ints, taken: Floats) -> Floats:
-        """Return when builds through labels end at least, and what sums they take."""
+        """Return lower bounds (N, 1 + q) of makespan, s, and sums, over completions of labels."""
         end = taken[:, 0]
         since = np.where(self._timed.free[state], taken[:, 1 : self._sums], end[:, None])
         sums = taken[:, self._sums : self._placed] + self._left[state]
         return np.column_stack([self._prices.ends(state, end, since), sums])
 
     def follow(self, labels: Labels, arc: Ints) -> Floats:
-        """Return what labels take after an act each."""
+        """Return the values of labels after an act each, (N, k)."""
         timed, state, taken = self._timed, self.target[arc], labels.taken
         move, column, origin = self._move[arc], self._column[arc], self._origin[arc]
         end, since, placed = taken[:, 0], taken[:, 1 : self._sums], taken[:, self._placed :]

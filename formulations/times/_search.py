@@ -158,7 +158,7 @@ class _InTime(Terse):
         max_memory: float = np.inf,
         progress: Tell = lambda _: None,
     ) -> Solution:
-        """Return the plan of the chosen path; where time or memory ends early, the best so far."""
+        """Return the plan of the chosen path, or the incumbent at the limit of time or memory."""
         watch = Watch(seconds)
         if isinstance(problem, Instance):
             return of_instance(problem, self.choose, watch)
@@ -208,9 +208,9 @@ def _searched(
 
 
 def _ceiling(problem: States, first: Solution | None, waits: Waits) -> float:
-    """Return up to which value of the first goal states are looked at: that of a first plan.
+    """Return the upper bound of the first goal, a peak, from a first plan.
 
-    Unless budgets of time, or mortar, may forbid it.
+    Infinite where budgets of time, or mortar, may make that plan infeasible.
     """
     capped = any(g.in_time for g in problem.goals[len(problem.aims) :])
     forbidden = capped or waits.cuts is not None
@@ -233,7 +233,7 @@ def _staged(
 
 
 def _least_of(plans: Sequence[Solution], bound: tuple[float, ...], stopped: str = "") -> Solution:
-    """Return the best of some plans with bounds that hold for all."""
+    """Return the best of the plans, with lower bounds that hold for all."""
     best = min(plans, key=lambda plan: plan.objective)
     bounds, open_ = list[float](), True
     for value, least in zip(best.objective, bound, strict=True):
@@ -271,7 +271,7 @@ def _plan(
 def _by_then(
     problem: States, first: Solution | None, stop: StopError | KeyboardInterrupt, waits: Waits
 ) -> Solution:
-    """Return a first plan with its makespan; raise an error if there is none that keeps caps."""
+    """Return the incumbent with its makespan; raise an error if none is within the budgets."""
     found = plan_by_then(first, stop)
     soonest = waits.try_soonest(problem, found.states)
     if soonest is None:

@@ -71,7 +71,7 @@ Choose = Callable[[Asked], Chosen]
 
 @dataclass
 class StageFound:
-    """How far goals are: what is still allowed, and what was found of those before."""
+    """Moves and caps that are left after some goals, with the results of these."""
 
     kept: Bools
     caps: Caps
@@ -116,7 +116,7 @@ def beams(
 
 
 class Goals(NamedTuple):
-    """What is asked: goals, of which the last ones are capped by ``budgets`` and no ``aims``."""
+    """Goals, of which the last ones are capped by ``budgets``; the first are the ``aims``."""
 
     goals: tuple[Amount, ...]
     aims: tuple[Amount, ...]
@@ -139,7 +139,7 @@ class Stages:
         self._stage = StageFound(_on_paths(timed.graph), Caps(time, sums), filtered)
 
     def run(self) -> StageFound:
-        """Return what is found; raise an `InfeasibleError` if no path is within all caps."""
+        """Return path and bounds; raise an `InfeasibleError` if no path is within all caps."""
         if not self._stage.kept.any():
             raise InfeasibleError("no plan is allowed")
         for k, goal in enumerate(self._problem.aims):
@@ -264,13 +264,13 @@ class Stages:
         stage.path = swept.path or stage.path
 
     def _taken(self, path: Sequence[int], k: int) -> float:
-        """Return what a goal that is no makespan takes of a path."""
+        """Return the value of a goal, no makespan, of a path."""
         graph = self._timed.graph
         amounts = graph.amounts[moves_along(graph, path), k]
         return float(amounts.max(initial=0.0) if graph.peaks[k] else amounts.sum())
 
     def least(self, path: Sequence[int]) -> float:
-        """Return how long a path takes by all that is known of its waits, s."""
+        """Return the makespan of a path, s, with the waits for mortar that are known."""
         graph = self._timed.graph
         codes = graph.source.astype(np.int64) * graph.states + graph.target
         kept = np.isin(codes, codes[moves_along(graph, path)])
@@ -278,7 +278,7 @@ class Stages:
         return TimedLabels(self._timed, prices, kept, Caps()).sweep(Watch()).best
 
     def values(self, path: Sequence[int]) -> list[float]:
-        """Return what goals take of a path, that of makespans left at zero."""
+        """Return the values of goals of a path, zero for makespans."""
         return [self._taken(path, k) for k in range(len(self._problem.goals))]
 
     def _proof(self, labels: Sequence[Labels], prices: Prices) -> LabelProof:

@@ -1,4 +1,4 @@
-r"""How long a build takes at least, by a whole unit flow that shares the robots' time: a bound.
+r"""A lower bound of the makespan, by an integer unit flow that shares the robots' time: a bound.
 
 The flow of `flow_mip`, :math:`y_a \in \{0, 1\}` for every move, with one more variable: the
 makespan :math:`C` is no less than what all steps take one after the other, nor than the mean time
@@ -31,7 +31,7 @@ from seqopt.graph.formulation import FormulationKind
 
 
 def _bounded(asked: Asked) -> Chosen:
-    """Return the better one of a first plan and that of the flow, with the flow's bound."""
+    """Return the better one of the incumbent and the path of the flow, with the flow's bound."""
     first, watch = asked.first, asked.watch
     most = min(first.value, asked.caps.time)
     kept = useful(asked.timed, asked.prices, asked.kept, most) if np.isfinite(most) else asked.kept

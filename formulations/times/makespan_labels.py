@@ -1,4 +1,4 @@
-r"""How long a build takes, by labels over its states, bounded by multipliers: exact.
+r"""The least makespan, by labels over the states of a build, bounded by multipliers: exact.
 
 A state says which bricks stand and who holds what, a move who takes a grip or lets go. A *label* of
 a state :math:`v` is when the last step ended and since when every robot :math:`r` that is free has

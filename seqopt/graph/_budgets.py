@@ -63,10 +63,10 @@ class _Path(NamedTuple):
 def within_budgets(
     graph: Graph, caps: Sequence[float], watch: Watch | None = None, most: int = 0
 ) -> Within:
-    """Return a path that is good in one goal after the other, its last columns within caps.
+    """Return a path within caps on its last columns, good in goal after goal, with its bounds.
 
-    ``most``: how many labels may close what multipliers leave open of a sum; ``watch``: says when
-    to stop, and is told the values and bounds of the first goal.
+    ``most``: how many labels may be kept to close the duality gap of a sum; ``watch``: deadline,
+    which records incumbents and bounds of the first goal.
 
     Raises `InfeasibleError` if multipliers prove that no path is within all caps;
     `NothingFoundError` if that is open, and none was found.
@@ -109,7 +109,7 @@ def _some_path(graph: Graph, caps: Sequence[float], watch: Watch) -> _Path:
     if found.bound <= _rounding(graph, found.prices, caps):
         most = np.array([tied(cap) for cap in caps])
         growth = CappedSums(graph, nothing, graph.amounts[:, goals:], most, found.prices)
-        until = watch.apart()  # it is told no costs that are none
+        until = watch.apart()  # costs of zero are no incumbent's
         met = widening(growth, most, NONE, until, LABELS, any_path=True)
         path = _path(graph, met.arcs)
         if path is None and until.over:
@@ -131,7 +131,7 @@ def _by_labels(
     watch: Watch,
     most: int,
 ) -> _Found:
-    """Return what labels find beyond what multipliers prove of a sum."""
+    """Return incumbent and bound of a sum after labels that close its duality gap."""
     columns, caps = [c for c, _ in limited], np.array([tied(cap) for _, cap in limited])
     costs = graph.amounts[:, goal]
     growth = CappedSums(graph, costs, graph.amounts[:, columns], caps, found.prices)
@@ -141,7 +141,7 @@ def _by_labels(
 
 
 def _rounding(graph: Graph, prices: Floats, caps: Floats | Sequence[float]) -> float:
-    """Return by how much sums of the longest path may be off, priced."""
+    """Return the rounding error of a Lagrangian value on the longest path."""
     return ROUNDING * graph.states * float(prices @ np.abs(caps))
 
 
@@ -157,7 +157,7 @@ def _taken(graph: Graph, path: _Path) -> tuple[float, ...]:
 
 
 def _better(graph: Graph, goal: int | None, first: _Path | None, other: _Path) -> _Path:
-    """Return the path that takes less of a goal, or moves; the first one of two alike."""
+    """Return the path with less of a goal, or with fewer moves; the first one of ties."""
 
     def taken(path: _Path) -> float:
         return len(path.states) if goal is None else _taken(graph, path)[goal]
@@ -189,7 +189,7 @@ def _least_worst(
 def _least_sum(
     graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]], watch: Watch | None = None
 ) -> _Found:
-    """Return the cheapest path within caps that multipliers lead to, and what they prove.
+    """Return the best path within caps met on the way to the dual optimum, and that bound.
 
     Where no path is within them, a bound above that of any path says so: infinite, or positive
     where costs are zero.

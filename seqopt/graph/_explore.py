@@ -62,7 +62,7 @@ class Part:
         return out
 
     def value(self, rows: Ints, valued: Valued) -> bool:
-        """Evaluate states, new ones or those whose values are floors; return if there are any."""
+        """Evaluate states that are new or known by lower bounds; return if there are any."""
         if len(rows):
             self.values[rows], allowed, most = valued(self.states[rows])
             self.floor[rows] = self.values[rows, 0] > most
@@ -114,18 +114,18 @@ class Explorer:
     tell : callable, optional
         Called after every part of which states were visited; may raise to end the search.
     enough : float, optional
-        Where there is a width, states of no larger value are as good as each other: some of them.
+        With a width, states of no larger value are ties, of which a random sample is kept.
 
     Attributes
     ----------
     space : Space
         What is explored.
     threshold : float
-        What the first goal takes of a visited state is no more, where it is about a peak.
+        Upper limit of the first goal in visited states, if it is a peak.
     reached : int
         The last level on which a state is visited.
     level : int
-        The last level that was looked at.
+        The level that was visited last.
     passes : int
         How often the threshold rose.
     nbytes : int
@@ -233,20 +233,20 @@ class Explorer:
 
     @property
     def excluded(self) -> float:
-        """The least that the first goal takes of a state above the threshold; infinite if none."""
+        """Least value of the first goal in states above the threshold; infinite without any."""
         every = (part for parts in self._parts for part in parts.values())
         least = (p.values[p.mark == PENDING, 0].min(initial=np.inf) for p in every)
         return float(min(least, default=np.inf))
 
     @property
     def complete(self) -> bool:
-        """Whether no state was left out that is allowed and could be reached."""
+        """Whether no feasible state that can be reached was left out."""
         return self._width is None and self.space.complete and self.excluded == np.inf
 
     def without_plan(self, why: str) -> InfeasibleError | NothingFoundError:
-        """Return the error that says that the visited states have no plan, and why.
+        """Return the error of visited states without a plan: infeasible only if they are complete.
 
-        Only of a complete search it is that none is allowed.
+        ``why``: the message.
         """
         if self.complete:
             return InfeasibleError(why)
@@ -256,7 +256,7 @@ class Explorer:
         return self._parts[level].setdefault(key, Part(*self._shape))
 
     def _visit(self, level: int, key: Key, part: Part) -> Ints:
-        """Visit states below the threshold and what they lead to within a part; return which."""
+        """Visit states below the threshold and their successors in a part; return their rows."""
         visited = [np.zeros(0, dtype=np.int64)]
         while True:
             fresh = self._eligible(key, part)
@@ -273,7 +273,7 @@ class Explorer:
             visited.append(fresh)
 
     def _open(self, level: int, key: Key, part: Part, fresh: Ints) -> None:
-        """Visit states, and add what they lead to within their part."""
+        """Visit states, and add their successors within their part."""
         part.mark[fresh] = OPEN
         self.reached = max(self.reached, level)
         if level:
@@ -333,14 +333,14 @@ class Explorer:
 
     @property
     def _most(self) -> float:
-        """What the first goal may take of a visited state, up to the error of six digits."""
+        """Upper limit of the first goal in visited states, with the error of single precision."""
         if not self.space.peaks[0]:
             return np.inf
         most = min(self.threshold, self.below)
         return most + (BAND * abs(most) if np.isfinite(most) else 0.0)
 
     def _go_on(self, level: int, key: Key, part: Part, fresh: Ints) -> None:
-        """Add what visited states lead to on the next level."""
+        """Add the successors of visited states on the next level."""
         if level == self.space.levels or not len(fresh):
             return
         for following, moves in self.space.onward(key, part.states[fresh]):

@@ -1,24 +1,24 @@
 r"""Best paths within limits by setting labels: exact, or a bound on what is left.
 
-A label is a beginning of a path, with a vector :math:`z` of what it takes: costs, capped sums,
-totals of scenarios, when robots are free. Labels are continued by all arcs from their states, level
-by level, and dropped
+A label is a partial path from the start with a vector :math:`z` of values: costs, capped sums,
+totals of scenarios, when robots are free. Labels are extended by all arcs from their states, level
+by level, and pruned
 
-- if another label of the same state takes no more of anything: it is dominated,
-- if a lower bound of what paths through it take is beyond a limit; of what is minimized, that is
-  the best path known.
+- if they are dominated: another label of the same state is no larger in any value,
+- if a lower bound of all their completions exceeds a limit; for the objective the limit is the
+  incumbent.
 
-What bounds a label is known by what is minimized. Of a sum within budgets :math:`B`, with
-multipliers :math:`\lambda`, the cost :math:`C`, the capped sums :math:`S`, and :math:`V_\lambda(v)`
-and :math:`D_b(v)`, the least priced cost and the least of a sum from a state :math:`v` to an end,
+The bounds depend on the objective. For a sum within budgets :math:`B`, with multipliers
+:math:`\lambda`, the cost :math:`C`, the capped sums :math:`S`, and :math:`V_\lambda(v)` and
+:math:`D_b(v)`, the least Lagrangian cost and the least sum from a state :math:`v` to an end,
 
 .. math::
 
    C + \lambda^T (S - B) + V_\lambda(v) \qquad\text{and}\qquad S_b + D_b(v) \le B_b .
 
-First few labels of a level are kept, those with the least bounds; that gives a good path. Then
-more, until none is left out that could lead to a better one. If there are too many, or time is
-over, the least bound of those left out bounds all paths.
+At first a beam of few labels a level is kept, those with the least bounds, which gives an
+incumbent. The beam is widened until no pruned label could lead to a better path. If there are too
+many labels, or time is over, the least bound of the pruned ones bounds all paths.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ class LateError(Exception):
 
 
 class Labels(NamedTuple):
-    """Labels: the state of each (N,), what it takes (N, k), its last arc, and which it continues.
+    """Labels: state (N,), values (N, k), last arc (N,) and number of the predecessor (N,).
 
-    Of the start's label arc and ``back`` are -1.
+    Of the start's label the last two are -1.
     """
 
     state: Ints
@@ -69,31 +69,31 @@ def _joined(parts: Sequence[Labels]) -> Labels:
 
 
 class _Growth(Protocol):
-    """What labels take, and how arcs continue them."""
+    """Extension of labels by arcs, and lower bounds of their completions."""
 
     ends: Bools  # (n,)
     levels: Ints  # (n,): no arc leads to a lower one
     starts: Ints  # (n + 1,): the first arc from every state
     target: Ints  # (a,)
-    first: Floats  # (1, k): what the start takes
+    first: Floats  # (1, k): values of the start
     look_back: int  # with how many labels of its state one is compared
 
     def follow(self, labels: Labels, arc: Ints) -> Floats:
-        """Return what labels take after an arc each, (N, k); infinite where it cannot be taken."""
+        """Return the values of labels after an arc each, (N, k); infinite if infeasible."""
 
     def bounds(self, state: Ints, taken: Floats) -> Floats:
-        """Return what paths through labels take at least of everything that is limited, (N, b)."""
+        """Return lower bounds (N, b), over all completions of labels, of all limited values."""
 
     def values(self, taken: Floats, aim: int) -> Floats:
-        """Return what paths that end with labels take of what is minimized, (N,)."""
+        """Return the objective (N,) of paths that end with labels."""
 
 
 @dataclass
 class Swept:
-    """What labels found: the best path, all labels that were kept, and what was left out.
+    """Result of a sweep: the best path, all labels that were kept, and the bound of the others.
 
-    ``best``: infinite without a path; ``arcs``: of the path; ``left_out``: least bound of labels
-    that were pruned, of what is minimized; ``narrow``: whether some could have been better.
+    ``best``: infinite without a path; ``arcs``: of the path; ``left_out``: least bound of the
+    objective in pruned labels; ``narrow``: whether the width pruned any.
     """
 
     best: float = np.inf
@@ -107,8 +107,8 @@ class Swept:
 class Sweep:
     """Labels within limits (b,), level by level.
 
-    ``aim``: which of what is limited is minimized; ``width``: how many labels of a level are
-    continued at a time, all by default.
+    ``aim``: column of the limited values that is the objective; ``width``: how many labels of a
+    level are extended, all by default.
     """
 
     def __init__(
@@ -118,7 +118,10 @@ class Sweep:
         self._aim, self._width, self._found = aim, width, Swept()
 
     def run(self, watch: Watch, most: int = 0) -> Swept:
-        """Return what is found; ``most``: labels that may be kept, 0 for any number."""
+        """Return the best path and labels; ``most``: labels that may be kept, 0 for any number.
+
+        Raises `LateError` if there are more, or time is over.
+        """
         growth, found, count, best = self._growth, self._found, 0, -1
         zero = np.zeros(1, dtype=np.int64)
         start = self._within(Labels(zero, growth.first, zero - 1, zero - 1))
@@ -130,9 +133,11 @@ class Sweep:
                 fresh = self._narrowed(_undominated(met, here, growth), 1)
                 here.append(fresh)
                 found.kept.append(fresh)
-                value, at = self._at_end(fresh)
+                values = growth.values(fresh.taken, self._aim)
+                values = np.where(growth.ends[fresh.state], values, np.inf)
+                value = float(values.min(initial=np.inf))
                 if value < found.best:
-                    found.best, best = value, count + at
+                    found.best, best = value, count + int(np.argmin(values))
                     self._limits[self._aim] = min(self._limits[self._aim], value * (1 - MARGIN))
                 if watch.over or 0 < most < count + fresh.size:
                     raise LateError
@@ -165,17 +170,8 @@ class Sweep:
         self._found.left_out = min(self._found.left_out, float(late.min(initial=np.inf)))
         return labels.only(np.flatnonzero(fits.all(axis=1)))
 
-    def _at_end(self, labels: Labels) -> tuple[float, int]:
-        """Return the least value of labels at ends, and which it is."""
-        if not labels.size:
-            return np.inf, 0
-        values = self._growth.values(labels.taken, self._aim)
-        values = np.where(self._growth.ends[labels.state], values, np.inf)
-        at = int(np.argmin(values))
-        return float(values[at]), at
-
     def _continued(self, labels: Labels, first: int) -> Iterator[Labels]:
-        """Yield what follows from labels, numbered from ``first``, by one arc each."""
+        """Yield the successors of labels, numbered from ``first``, by one arc each, in chunks."""
         starts = self._growth.starts
         counts = np.diff(starts)[labels.state]
         cuts = np.searchsorted(np.cumsum(counts), np.arange(0, counts.sum() + CHUNK, CHUNK)[1:])
@@ -204,7 +200,7 @@ class Sweep:
 
 
 def _undominated(fresh: Labels, known: Sequence[Labels], growth: _Growth) -> Labels:
-    """Return the labels that no known one, and no other, is found to dominate."""
+    """Return the new labels that no known or new one is found to dominate."""
     states = np.zeros(len(growth.ends), dtype=bool)
     states[fresh.state] = True
     old = [labels.only(states[labels.state]) for labels in known]
@@ -226,7 +222,7 @@ def _undominated(fresh: Labels, known: Sequence[Labels], growth: _Growth) -> Lab
 
 
 def _above_another(state: Ints, taken: Floats) -> Bools:
-    """Return where an earlier label of the same state takes no more."""
+    """Return where an earlier label of the same state has no larger value, (N,)."""
     new = np.ones(len(state), dtype=bool)
     new[1:] = state[1:] != state[:-1]
     apart = (taken.max(initial=0.0) - taken.min(initial=0.0) + 1.0) * (np.cumsum(new) - 1)
@@ -237,7 +233,7 @@ def _above_another(state: Ints, taken: Floats) -> Bools:
 
 
 class LabelSearch(NamedTuple):
-    """The arcs of the best path that was met, none if there is none, and a bound on all paths."""
+    """The incumbent by its arcs, None without one, its cost, and a lower bound of all paths."""
 
     arcs: Ints | None
     cost: float
@@ -253,10 +249,10 @@ def widening(
     *,
     any_path: bool = False,
 ) -> LabelSearch:
-    """Return the best path within caps on what is limited after the first, by ever more labels.
+    """Return the best path within caps by labels, in beams of growing width.
 
-    ``best``: what is known before; ``most``: how many labels of a level are kept at most;
-    ``any_path``: whether it ends with the first path that is found.
+    ``caps``: of the limited values after the objective; ``best``: incumbent and bound before;
+    ``most``: the largest width; ``any_path``: whether the first path that is found is enough.
     """
     width = min(NARROW, most)
     while not watch.over and best.bound < best.cost:
@@ -277,7 +273,7 @@ def widening(
 
 
 class SummedLabels:
-    """Labels of what moves add to sums, (m, k)."""
+    """Labels of sums of the amounts of moves, (m, k)."""
 
     look_back = 32
 
@@ -293,9 +289,9 @@ class SummedLabels:
 
 
 class CappedSums(SummedLabels):
-    """Labels of what moves cost (m,), and of amounts (m, B) that are capped.
+    """Labels of the costs (m,) and capped amounts (m, B) of moves, with Lagrangian bounds.
 
-    ``multipliers`` (B,) of the caps, from 0, lead the search and prove bounds.
+    ``multipliers`` (B,): of the caps, from 0.
     """
 
     def __init__(
@@ -307,10 +303,10 @@ class CappedSums(SummedLabels):
         self._least = np.column_stack([distances(graph, own, back=True) for own in amounts.T])
 
     def bounds(self, state: Ints, taken: Floats) -> Floats:
-        """Return what paths cost at least by the multipliers, and take of capped sums."""
+        """Return Lagrangian bounds of costs, and lower bounds of capped sums, (N, 1 + B)."""
         priced = taken[:, 0] + taken[:, 1:] @ self._multipliers - self._paid_back
         return np.column_stack([priced + self._rest[state], taken[:, 1:] + self._least[state]])
 
     def values(self, taken: Floats, aim: int) -> Floats:
-        """Return what paths cost."""
+        """Return the costs of paths, (N,)."""
         return np.asarray(taken[:, aim])

@@ -55,7 +55,7 @@ def potentials(graph: Graph, goal: int, value: float) -> tuple[float, Bools]:
 
 
 def _sum_bound(graph: Graph, costs: Floats, before: Floats) -> float:
-    """Return what a sum of costs (m,) is at least on any path, by potentials of states (n,).
+    """Return a lower bound of a sum of costs (m,) on all paths, by potentials of states (n,).
 
     Minus infinity where a move takes less than the difference of its states' potentials.
     """
@@ -65,7 +65,7 @@ def _sum_bound(graph: Graph, costs: Floats, before: Floats) -> float:
 
 
 def least_sum(graph: Graph, costs: Floats) -> float:
-    """Return what a sum of costs (m,) from 0 is at least on any path, by potentials.
+    """Return a lower bound of a sum of costs (m,), from 0, on all paths, by potentials.
 
     Infinite where no path leads to an end, minus infinity where an inequality does not hold.
     """
@@ -73,7 +73,7 @@ def least_sum(graph: Graph, costs: Floats) -> float:
 
 
 def _to_go(graph: Graph, costs: Floats) -> Floats:
-    """Return what a sum of costs (m,) from 0 takes at least from states to an end, (n,).
+    """Return lower bounds (n,) of a sum of costs (m,), from 0, from states to ends.
 
     Infinite where no path leads to an end; zero where an inequality does not hold.
     """
@@ -84,7 +84,7 @@ def _to_go(graph: Graph, costs: Floats) -> Floats:
 
 
 def _hold(least: Floats, costs: Floats, graph: Graph, *, back: bool = False) -> bool:
-    """Return whether no move leads from a state to another by less than their difference."""
+    """Return whether potentials (n,) are dual feasible: no move costs less than their rise."""
     ends = (graph.target, graph.source) if back else (graph.source, graph.target)
     first, second = least[ends[0]], least[ends[1]]
     ways = np.isfinite(first)

@@ -20,12 +20,12 @@ from seqopt.work._clock import Clock
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """How long a formulation may take, who is told what it finds, and which models it is given.
+    """Settings of one solve: time limits, callback of progress, proof and options.
 
-    ``time_limit``: of choosing alone, s; ``proof``: whether the answer is proven; ``lazy``: whether
-    only models that the proof needs are solved; ``options``: of the formulation; ``explains``:
-    whether it is said what helps where there is no plan; ``clock``: of all there is to do,
-    responses and proof too.
+    ``time_limit``: of the formulation alone, s; ``proof``: whether the answer is proven; ``lazy``:
+    whether only models that the proof needs are solved; ``options``: of the formulation;
+    ``explains``: whether an infeasible problem is answered with remedies; ``clock``: of responses,
+    formulation and proof together.
     """
 
     time_limit: float = math.inf
@@ -38,7 +38,7 @@ class Run:
 
     @property
     def left(self) -> float:
-        """How much time is left to choose, s."""
+        """Time that the formulation has left, s."""
         return min(self.time_limit, self.clock.left)
 
 
@@ -52,10 +52,10 @@ def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a formulation knew at a time.
+    """Incumbent and lower bound of a formulation at a time.
 
-    ``seconds``: since it began; ``objective``: of the best choice so far; infinite where there was
-    none; ``bound``: the highest proven; minus infinity where there was none.
+    ``seconds``: since it began; ``objective``: of the incumbent; infinite without one; ``bound``:
+    the highest lower bound; minus infinity without one.
     """
 
     seconds: float
@@ -76,9 +76,10 @@ class Finding:
 
 
 class Watch:
-    """A watch on one call of a formulation, which asks it for the time and tells it what it finds.
+    """Clock and log of one solve: the deadline, and the incumbents and bounds so far.
 
-    ``time_limit``: after which the formulation is to stop, s; ``progress``: told every finding.
+    ``time_limit``: after which the formulation has to stop, s; ``progress``: called with every
+    `Finding`.
 
     >>> watch = Watch(time_limit=60.0)
     >>> watch.tell(objective=12.0)
@@ -113,7 +114,7 @@ class Watch:
         return ended or self.interrupted or self.seconds >= self._limit
 
     def apart(self) -> Watch:
-        """Return a watch that takes note of other findings, and is over where this one is."""
+        """Return a watch with a log of its own, which is over when this one is."""
         other = Watch(self.left)
         other._within = self
         return other
@@ -124,21 +125,21 @@ class Watch:
 
     @property
     def trace(self) -> tuple[Finding, ...]:
-        """What was found, in order."""
+        """Incumbents and bounds, in order."""
         return tuple(self._trace)
 
     @property
     def objective(self) -> float:
-        """Of the best choice that was told."""
+        """Objective of the incumbent; infinite without one."""
         return self._trace[-1].objective if self._trace else math.inf
 
     @property
     def bound(self) -> float:
-        """The highest that was told."""
+        """Highest lower bound; minus infinity without one."""
         return self._trace[-1].bound if self._trace else -math.inf
 
     def tell(self, objective: float = math.inf, bound: float = -math.inf) -> None:
-        """Take note of a choice or a bound; what is no better than before is passed over.
+        """Record an incumbent or a lower bound, unless it is no better than those before.
 
         ``objective``, ``bound``: in the unit of the criterion.
         """

@@ -87,7 +87,7 @@ def tied(value: float) -> float:
 
 
 def strictly_below(value: float) -> float:
-    """Return below what a value is better than this one, by more than an error of rounding."""
+    """Return the threshold below which a value is better by more than an error of rounding."""
     return value - TIED * abs(value)
 
 
@@ -167,7 +167,7 @@ def moves_along(graph: Graph, path: Sequence[int]) -> Ints:
 
 
 def path_values(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
-    """Return what every column takes of a path: its sum, or its largest amount.
+    """Return the value of every column of a path: its sum, or its largest amount.
 
     Of moves side by side those count that are best together.
     """
@@ -226,15 +226,19 @@ def _lazy_path(
 ) -> tuple[int, ...] | None:
     """Return a path of states that pass, the start left out; None if there is none.
 
-    ``parts`` (n,): of every state, from 0; those of one are asked together; ``known`` (n,): 1 where
-    a state passes, -1 where it does not, else 0; what is found is added; ``ask``: says which do,
-    and what it does not know does not; ``recall``: what can be said without asking; ``tell``:
-    called before every path.
+    ``parts`` (n,): of every state, from 0; those of one are tested together; ``known`` (n,): 1
+    where a state passes, -1 where it does not, else 0; updated in place; ``ask``: tests states;
+    what stays open counts as failed; ``recall``: verdicts that need no test; ``tell``: called
+    before every path.
     """
     failed = Counter[int]()
     while True:
         tell()
-        path, after = _fewest_open(graph, known)
+        left = graph.only((known[graph.target] != FAILS) & (known[graph.source] != FAILS))
+        costs = np.where(known[left.target] == PASSES, 1.0, 1.0 + OPEN)  # few open states first
+        after = distances(left, costs, back=True)
+        first = _first_path(left, costs, after) if np.isfinite(after[0]) else ()
+        path = np.array(first, dtype=np.int64)
         open_ = path[known[path] == 0]
         if not len(path):
             return None
@@ -252,20 +256,7 @@ def _lazy_path(
 
 
 def _all_pass(part: int, rows: Ints, known: Ints, ask: Ask) -> bool:
-    """Ask states of a part, and say whether all pass."""
+    """Test states of a part; return whether all pass."""
     if len(rows):
         known[rows] = np.where(ask(part, rows) == PASSES, PASSES, FAILS)
     return bool((known[rows] == PASSES).all())
-
-
-def _fewest_open(graph: Graph, known: Ints) -> tuple[Ints, Floats]:
-    """Return the path on which the fewest states are open, of these one of the fewest moves.
-
-    A state that is open counts as much as `OPEN` moves. Empty if there is none. Beside it, what is
-    left from every state to an end, (n,).
-    """
-    part = graph.only((known[graph.target] != FAILS) & (known[graph.source] != FAILS))
-    costs = np.where(known[part.target] == PASSES, 1.0, 1.0 + OPEN)
-    after = distances(part, costs, back=True)
-    path = _first_path(part, costs, after) if np.isfinite(after[0]) else ()
-    return np.array(path, dtype=np.int64), after

@@ -109,13 +109,13 @@ class Source:
         return f"{values}, {status}{within}{among}"
 
     def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
-        """Return what was asked, for a summary; ``limits``: as they are said."""
+        """Return the settings of the problem for a summary; ``limits``: bounds by name."""
         raise NotImplementedError
 
     def spent(
         self, objective: Mapping[str, float], found: Solution
     ) -> dict[str, dict[str, float | None]]:
-        """Return what there is of every budget, what is spent, and its price if one is known."""
+        """Return cap, use and multiplier, if one is known, of every budget."""
         return {}
 
     def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:

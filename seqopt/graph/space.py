@@ -111,7 +111,7 @@ class Space(Protocol):
         """
 
     def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
-        """Return what goals take of states, and which states are allowed.
+        """Return the values of goals in states, and which states are feasible.
 
         Parameters
         ----------
@@ -120,10 +120,10 @@ class Space(Protocol):
         states : (n, c) int
             A state a row.
         rough : bool
-            Whether six digits are enough.
+            Whether single precision is enough.
         most : float
-            Where there are floors, a state of which the first goal takes more need not have values
-            that are larger than this.
+            Where there are floors, values of a state in which the first goal is larger may be
+            lower bounds above this.
 
         Returns
         -------
@@ -147,12 +147,12 @@ class Space(Protocol):
         """
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
-        """Return what goals take of moves.
+        """Return the values of goals of moves.
 
         Parameters
         ----------
         values : (m, g) float
-            What they take of the states that the moves lead to.
+            Of the states that the moves lead to.
         taken : (m, k) float
             As of `Moves`.
 
@@ -164,16 +164,16 @@ class Space(Protocol):
 
     @property
     def complete(self) -> bool:
-        """Whether these are all moves that are allowed."""
+        """Whether these are all feasible moves."""
         return True
 
     @property
     def floors(self) -> bool:
-        """Whether values above those that count may be less than they are."""
+        """Whether values above the limit may be lower bounds, not exact."""
         return False
 
     def stand(self, part: Key, states: Ints) -> Bools:
-        """Return which states pass what is too expensive to be asked of all.
+        """Return which states pass the tests that are too expensive for all states.
 
         Parameters
         ----------
@@ -189,7 +189,7 @@ class Space(Protocol):
         return np.ones(len(states), dtype=bool)
 
     def known(self, part: Key, states: Ints) -> Ints:
-        """Return the same where it is known before it is asked.
+        """Return the cached verdicts of `stand`.
 
         Parameters
         ----------
@@ -207,7 +207,7 @@ class Space(Protocol):
 
     @property
     def effort(self) -> tuple[int, int]:
-        """Of orders that are sought, how many sets of bricks were looked at; grip sets solved."""
+        """In a search of orders, numbers of sets of bricks visited and of grip sets solved."""
         return 0, 0
 
     def path(self, found: Found) -> tuple[tuple[int, ...], tuple[tuple[int, ...], ...]]:

@@ -121,7 +121,7 @@ def _value(instance: Instance, goal: _Target, path: _Walk) -> float:
 
 
 def _spent(instance: Instance, path: _Walk) -> dict[str, float]:
-    """Return what a path takes of caps; a `SolverError` names one that it exceeds."""
+    """Return the use of caps by a path; a `SolverError` names one that it exceeds."""
     out = {}
     for cap in instance.caps:
         own = path.ends
@@ -136,7 +136,7 @@ def _spent(instance: Instance, path: _Walk) -> dict[str, float]:
 def _bounds(
     instance: Instance, values: Sequence[float], claims: Sequence[Claim]
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return what is proven of every goal, and what is claimed."""
+    """Return the proven and the claimed lower bounds of all goals."""
     if len(claims) > len(values):
         raise SolverError(f"there are {len(claims)} bounds for {len(values)} goals")
     stage, out, said = first_stage(instance), list[float](), list[float]()
@@ -156,7 +156,7 @@ def _bounds(
 
 
 def _require_modest(goal: _Target, claim: Claim, found: tuple[float, float], *, bare: bool) -> None:
-    """Raise an error if a bound is above the value of a path, or above what is to prove it."""
+    """Raise an error if a claimed bound is above the value of a path, or above the proven one."""
     value, bound = found
     if bound > value + ABOVE * abs(value):
         raise SolverError(f"{goal.name}: the bound {bound:.9g} is above the path's {value:.9g}")

@@ -1,4 +1,4 @@
-r"""How little any path within caps on sums can cost: the certificate's own proof.
+r"""Lower bounds of paths within caps on sums: the certificate's own proof.
 
 It shares nothing with the formulations that it judges. Every multiplier :math:`\lambda \ge 0` of
 the caps proves a bound, the least priced cost of any path. The best ones are duals of the cheapest
@@ -42,7 +42,7 @@ NEIGHBORS = (1, 2, 3, 5, 8, 13, 21, 34)  # with which a partial path is compared
 
 @dataclass(frozen=True, eq=False)
 class _Case:
-    """What is judged: what moves cost (m,) and take of caps (m, B), over the ``sizes`` of these.
+    """A scaled problem: costs (m,) and uses (m, B) of caps by moves, over their ``sizes``.
 
     ``value``: of a path within the caps; no higher bound is looked for.
     """
@@ -56,12 +56,12 @@ class _Case:
 
     @property
     def slack(self) -> float:
-        """By how much costs may be off."""
+        """Rounding error of costs."""
         return SLACK * max(abs(self.value), TINY)
 
 
 class _Parts(NamedTuple):
-    """Ends of paths: first state, priced and plain cost, what they take, and a bound."""
+    """Labels of path ends: first state, Lagrangian and plain cost, uses of caps, and a bound."""
 
     at: Ints
     behind: Floats
@@ -161,7 +161,7 @@ def _mixed(case: _Case, paths: Sequence[tuple[float, Floats]]) -> tuple[Floats, 
 
 
 def _least(case: _Case, prices: Floats) -> tuple[float, float, Floats]:
-    """Return the least priced cost of any path, what that path costs, and its excess of caps."""
+    """Return the least Lagrangian cost of any path, that path's cost, and its excess of caps."""
     graph, costs = case.graph, case.costs + case.takes @ prices
     matrix: Any = graph.matrix(costs)
     (reached,), (before,) = dijkstra(matrix, indices=[0], return_predecessors=True)
@@ -210,7 +210,7 @@ def _laid_down(case: _Case, prices: Floats) -> tuple[float, bool]:
 
 
 def _undominated(at: Ints, cost: Floats, taken: Floats) -> Bools:
-    """Return which partial paths none is found to dominate in cost and in all caps."""
+    """Return which labels none is found to dominate in cost and in all caps."""
     order = np.lexsort((taken.sum(axis=1), cost, at))
     at, cost, taken = at[order], cost[order], taken[order]
     good = np.ones(len(at), dtype=bool)

@@ -32,10 +32,10 @@ ABOVE = 1e-6  # over a value: how far a claim may be above what is proven
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Claim(FrozenValue):
-    """A bound, and what is to prove it; of no value, what follows from the rest.
+    """A claimed lower bound and its proof; without a value, the bound that the proof gives.
 
-    ``potentials`` (n,): infinite where nothing is said of a node; ``cut``: nodes, the start among
-    them; ``prices``: by name of a cap or of a sum before; ``weights``: of columns of a tail;
+    ``potentials`` (n,): infinite where a node has none; ``cut``: nodes, the start among them;
+    ``prices``: multipliers, by name of a cap or of a sum before; ``weights``: of columns of a tail;
     ``shares`` (L, 1 + k): of the time of all, then of a robot of every kind; ``labels``: nodes
     (N,), and (N, 1 + c + q) when the last act ended, since when robots are free, zero where they
     hold, and sums that are limited.
@@ -51,7 +51,7 @@ class Claim(FrozenValue):
 
 
 class Stage(NamedTuple):
-    """How far goals are: arcs that are left, and what sums of columns may be at most."""
+    """State between goals: the arcs that are left, and caps on sums of columns."""
 
     graph: Graph
     limited: tuple[tuple[str, int, float], ...]
@@ -75,11 +75,11 @@ def next_stage(stage: Stage, goal: _Target, value: float) -> Stage:
 
 
 def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value: float) -> float:
-    """Return what a claim proves of a goal, or the judge itself where it gives no proof.
+    """Return the lower bound of a goal by the proof of a claim, or by the judge's own without one.
 
-    ``value``: of a path; no higher bound is looked for.
+    ``value``: of a path; no higher bound is sought.
 
-    Raises `SolverError` where a potential, a weight or a share breaks what it has to keep.
+    Raises `SolverError` where a potential, a weight or a share is dual infeasible.
     """
     limited = _priced(stage, claim)
     if goal.kind == PEAK:
@@ -97,7 +97,7 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value:
 
 
 def _priced(stage: Stage, claim: Claim) -> list[tuple[float, int, float]]:
-    """Return prices with their columns and what may be taken of them."""
+    """Return multipliers with their columns and caps."""
     known = {name: (column, most) for name, column, most in stage.limited}
     for name, price in claim.prices.items():
         if name not in known:
@@ -111,7 +111,7 @@ def _priced(stage: Stage, claim: Claim) -> list[tuple[float, int, float]]:
 def _sum(
     stage: Stage, costs: Floats, claim: Claim, limited: Sequence[tuple[float, int, float]]
 ) -> float:
-    """Return what a sum is at least, by potentials that are given or the judge's own."""
+    """Return the Lagrangian bound of a sum, by the given potentials or the judge's own."""
     back = 0.0
     for price, column, most in limited:
         costs = costs + price * stage.graph.amounts[:, column]
@@ -225,7 +225,7 @@ def _worst_within(
 
 
 def _left(graph: Graph, column: int, inside: Ints) -> float:
-    """Return the least amount of what leaves a cut; a `SolverError` says if it is none."""
+    """Return the least amount of the arcs that leave a cut; a `SolverError` says if it is none."""
     if len(inside) and not (inside.min() >= 0 and inside.max() < graph.states):
         raise SolverError(f"cut: it names a node outside 0 to {graph.states - 1}")
     within = np.zeros(graph.states, dtype=bool)

@@ -59,7 +59,7 @@ class Rebuilt:
                 self._add(part, coming)
 
     def _go_on(self, part: Any, level: int, found: Reachable, count: int) -> None:
-        """Note what leads on from states, whose numbers begin at a count, and within a start."""
+        """Add the successors of states, whose numbers begin at a count, and within a start."""
         within = [(part, move) for move in found.onward if move.level == level and not count]
         within = [(p, m._replace(states=self._space.from_part(p, m.states))) for p, m in within]
         for to, move in [*within, *self._space.onward(part, found)]:
@@ -127,7 +127,7 @@ class Proof:
         return Rebuilt(self._space, asked, self._hint if hinted else None)
 
     def bounds(self, values: Sequence[float]) -> tuple[float, ...]:
-        """Return lower bounds, goal by goal, those before it being at their values.
+        """Return lexicographic lower bounds of the goals.
 
         ``values``: of every goal; bounds of margins mean nothing. Infinite where there is no plan.
         """

@@ -124,7 +124,7 @@ class RuleTables(_Tables):
         return [[self._place[n] for n in book.newest_nodes[r, bricks]] for r in self.team]
 
     def _places(self, bricks: int) -> tuple[list[list[int]], Bools, list[Bools]]:
-        """Return what counts with so many bricks, looked up once.
+        """Return cached tables of so many bricks.
 
         The places that robots may take; by robot and place whether it holds the newest brick;
         places of bricks that nothing ties to the ground.
@@ -172,7 +172,7 @@ class RuleTables(_Tables):
             yield from (self._removed if self._top else self._placed)(level, states, keeps)
 
     def _regripped(self, level: int, states: Ints, keeps: Ints) -> Iterator[Transitions]:
-        """Yield what follows where a free robot takes hold of a brick that stands."""
+        """Yield successors in which a free robot takes hold of a brick that stands."""
         bricks, begin = self.bricks_at(level), self._rules.begin
         begins = begin is not None and level == self.first and not self._is_let_go(level)
         able = np.arange(len(states)) if begins else keeps
@@ -187,7 +187,7 @@ class RuleTables(_Tables):
             yield Transitions(level, source[ok], held, regrip=True, distance=distance[ok])
 
     def _released(self, level: int, states: Ints) -> Iterator[Transitions]:
-        """Yield what follows where one robot lets go, or at the end all."""
+        """Yield successors in which one robot lets go, or at the end all."""
         for robot in range(self.robots):
             source = np.flatnonzero(states[:, robot] > 0)
             after = self._let_go(states[source], robot)
@@ -202,7 +202,7 @@ class RuleTables(_Tables):
             yield self._without_way(level, source, after)
 
     def _placed(self, level: int, states: Ints, keeps: Ints) -> Iterator[Transitions]:
-        """Yield what follows where a free robot places the next brick."""
+        """Yield successors in which a free robot places the next brick."""
         bricks = self.bricks_at(level) + 1
         for robot in self._takers():
             if self._book.places(self.team[robot], bricks):
@@ -214,7 +214,7 @@ class RuleTables(_Tables):
                 yield Transitions(level + 1, source[ok], held, regrip=False, distance=distance[ok])
 
     def _removed(self, level: int, states: Ints, keeps: Ints) -> Iterator[Transitions]:
-        """Yield what follows where a robot takes the newest brick away that it alone holds."""
+        """Yield successors in which a robot takes the newest brick away that it alone holds."""
         bricks = self.bricks_at(level)
         brick = (2 * bricks - 1, 2 * bricks)  # places of its nodes
         rows = keeps[np.isin(states[keeps, : self.robots], brick).sum(axis=1) == 1]
@@ -236,7 +236,7 @@ class RuleTables(_Tables):
     def _taken(
         self, states: Ints, rows: Ints, robot: int, wanted: Sequence[int]
     ) -> tuple[Ints, Ints, Floats]:
-        """Return what follows where a robot that is free takes a place that nobody holds."""
+        """Return successors in which a robot that is free takes a place that nobody holds."""
         free = rows[states[rows, robot] <= 0]
         return self._take(states, free, robot, wanted, states[free, : self.robots])
 
@@ -246,7 +246,7 @@ class RuleTables(_Tables):
         yield from (robot for robot in range(self.robots) if robot not in first)
 
     def _is_let_go(self, level: int) -> bool:
-        """Return whether robots let go one by one there, whatever else the rules say, and only so.
+        """Return whether robots let go one by one there, and only so, under all rules.
 
         Who stands there against the rules has begun to let go.
         """
@@ -369,7 +369,7 @@ class ScheduleTables(_Tables):
         return max((step.bricks for step in self._schedule.steps[:level]), default=begin)
 
     def successors(self, level: int, states: Ints) -> Iterator[Transitions]:
-        """Yield what follows from states (n, robots) by the next step, if there is one."""
+        """Yield the successors of states (n, robots) by the next step, if there is one."""
         number = self._before + level + 1
         if level == self.last or number in self._heavy:
             return
@@ -388,7 +388,7 @@ class ScheduleTables(_Tables):
         yield Transitions(level + 1, source[ok], after[ok], regrip, distance[ok])
 
     def _held_by_others(self, states: Ints, robot: int, number: int) -> Ints:
-        """Return what others hold in a step already: those before it, and who goes on holding."""
+        """Return places that others already hold in a step: robots before, and those that go on."""
         out = np.delete(states, robot, axis=1)
         for column, other in enumerate(r for r in range(self.robots) if r != robot):
             hold = self._holds.get((other, number))

@@ -95,7 +95,7 @@ class AllOrders(OneSchedule):
         return frozenset(stands), stands[-1] if stands else 0
 
     def least(self) -> tuple[float, ...]:
-        """Return the same, the whole structure among it, in which every order ends."""
+        """Return lower bounds of goals, also from the whole structure, the end of all orders."""
         first, *others = self.evaluator.least()
         goal = self._problem.goals[0]
         peak = goal.is_peak and not goal.margins

@@ -100,7 +100,7 @@ def state_values(goal: Amount, states: StateArrays) -> Floats:
 
 
 class Filter(NamedTuple):
-    """What states must keep to.
+    """Upper limits of states.
 
     ``values``: of goals; the first that is about no margin bounds states, if it is about a worst
     step; ``margins``: of first goals, with which states must stand, as demanded; None does not
@@ -128,7 +128,7 @@ class Reachable(NamedTuple):
 
 
 class StateEvaluator:
-    """The states of one schedule: which may be passed, and what goals take of them.
+    """The states of one schedule: which are feasible, and the values of goals in them.
 
     ``tables``: what rules allow; ``margins``: how many goals are about margins; they come first.
     """
@@ -167,7 +167,7 @@ class StateEvaluator:
         return tuple(out.tolist())
 
     def bars(self, margins: Sequence[float]) -> bool:
-        """Return whether a state that every plan passes is not allowed, or lacks such margins."""
+        """Return whether a state that every plan passes is infeasible, or lacks such margins."""
         asked = Filter((), margins, exact=True)
         return any(not self.valued(*state, asked)[1].all() for state in self.tables.certain())
 
@@ -206,7 +206,7 @@ class StateEvaluator:
         return values, ok
 
     def demands(self, margins: Sequence[float]) -> tuple[Standing, ...]:
-        """Return what is demanded of states where the first goals, margins, have values."""
+        """Return the stability requirements of states, with values of the first goals, margins."""
         base = self.problem.standing or Standing()
         pairs = zip(self.problem.goals, margins, strict=False)
         own = (base.demanding(goal.name, max(value, 0.0)) for goal, value in pairs)
@@ -221,7 +221,7 @@ class StateEvaluator:
         return out
 
     def known_to_stand(self, level: int, states: Ints, margins: Sequence[float]) -> Ints:
-        """Return 1 for states that are known to stand, -1 for those that fall, 0 for others."""
+        """Return cached verdicts (n,): 1 stands, -1 falls, 0 open."""
         (held, payload), bricks = self.held_to_stand(states), self.tables.bricks_at(level)
         if not bricks:
             return np.ones(len(held), dtype=np.int64)
@@ -294,7 +294,7 @@ class StateEvaluator:
         return found
 
     def amounts(self, values: Floats, found: Transitions) -> Floats:
-        """Return what goals take of moves to states with such values, (m, g)."""
+        """Return the values (m, g) of goals of moves to states with such values."""
         out = values.copy()
         moves = MoveArrays(np.full(len(found.distance), float(found.regrip)), found.distance)
         for k, goal in enumerate(self.problem.goals):
@@ -340,7 +340,7 @@ def interchangeable(
 
 
 def _six_digits_do(problem: States) -> bool:
-    """Return whether six digits of responses say nearly as much of what goals take of states."""
+    """Return whether single-precision responses suffice for the goals of states."""
     ratios = isinstance(problem.criterion, WorstRatio)
     of_states = [goal for goal in problem.goals if goal.states is not None]
     peaks = all(goal.has_few_digits and (ratios or not goal.of_criterion) for goal in of_states)
@@ -348,6 +348,6 @@ def _six_digits_do(problem: States) -> bool:
 
 
 def _near(values: Floats, bounds: Floats) -> Bools:
-    """Return the rows (n,) of which a value (n, k) is so close to a bound that digits decide."""
+    """Return the rows (n,) with a value (n, k) too close to a bound for single precision."""
     finite = bounds[np.isfinite(bounds)]
     return np.asarray((np.abs(values[:, :, None] - finite) <= BAND * np.abs(finite)).any((1, 2)))

@@ -1,4 +1,4 @@
-"""Whether the steps of a plan stand, bear on props and keep the linear range, seen anew.
+"""Whether the steps of a plan stand, bear on props and keep the linear range, recomputed.
 
 It shares the engine and the cone program alone with the search: of the linear range the length and
 the motions of nodes are found again from how bricks move as rigid bodies.

@@ -63,7 +63,7 @@ def _met(
 
 
 def _sizes(network: Network, steps: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return what each response is compared with: rounding of forces is no response of its own."""
+    """Return the scale of each response: its largest value, of forces at least the whole weight."""
     force = float(np.linalg.norm(network.weight, axis=1).sum())
     floors = {"N": force, "Nm": force * float(np.ptp(network.node_position, axis=0).max())}
     sizes: dict[str, float] = {}
@@ -77,7 +77,7 @@ TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be fro
 
 
 def _known_gap(gap: float) -> float:
-    """Return a gap as people read it: below the tolerance of proofs there is none."""
+    """Return a gap, or zero if it is within the tolerance of proofs."""
     return 0.0 if gap <= TOLERANCE else gap
 
 
@@ -90,18 +90,18 @@ class Certificate(FrozenValue):
     values : tuple of float
         The value of every goal, recomputed; of candidates one, in the unit of the criterion.
     bounds : tuple of float
-        Lower bound of every goal, those before it being at their values, computed again from the
-        data; minus infinity where nothing is proven.
+        Lexicographic lower bounds of the goals, recomputed from the data; minus infinity where
+        nothing is proven.
     gap : float
-        What is left between them, over the size of the values: of the costs that a choice of
-        candidates meets, their sum or the largest. It has no unit; infinite where nothing is
-        proven. Margins of stability leave what `seqopt.problem.standing.NARROW` says.
+        Largest difference of value and bound, relative to the size of the values: of the costs
+        that a choice of candidates meets, their sum or the largest. Infinite where nothing is
+        proven; margins of stability are proven to `seqopt.problem.standing.NARROW`.
     claimed_gap : float
-        The same with the formulation's own bound if that is higher; it is not proven.
+        Gap to the formulation's own bound, if that is higher; it is not proven.
     spent : mapping of str to float
         The amount that the plan uses of each budget.
     states : int
-        How many states the proof looked at, where it is about states.
+        Number of states in the proof, where it is about states.
 
     Examples
     --------

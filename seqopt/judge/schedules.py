@@ -54,10 +54,10 @@ def judge_schedule(
 
     ``selection``: what a formulation claims; ``steps``: of the selection, checked in the scene;
     ``hint`` (mapping of int to (n, c) int): states that a search visited, by brick count; only the
-    time that the proof takes depends on them; ``exact``: whether values are promised as the least;
-    else only bounds that were claimed are. Raises `SolverError` if a value is not what was claimed,
-    a limit or a budget is exceeded, or a plan is better than promised; `StepError` if a step breaks
-    a rule.
+    time that the proof takes depends on them; ``exact``: whether values are claimed to be optimal;
+    else only the claimed bounds are checked. Raises `SolverError` if a value is not what was
+    claimed, a limit or a budget is exceeded, or a plan is better than promised; `StepError` if a
+    step breaks a rule.
     """
     own, aims = ordered(problem, selection.order), len(problem.aims)
     values = _as_claimed(own, selection, steps)
@@ -83,9 +83,9 @@ def judge_schedule(
 
 
 def ordered(problem: States, order: Order) -> States:
-    """Return the problem of an order that is claimed, which must be one of those that are sought.
+    """Return the problem of a claimed order; a `SolverError` if the order is infeasible.
 
-    Raises `SolverError` if it is none.
+    ``order``: names of all bricks; empty where it is given.
     """
     if problem.orders is None:
         if order:
@@ -99,7 +99,7 @@ def ordered(problem: States, order: Order) -> States:
 
 
 def _first_bound(problem: States, selection: Solution, bounds: Bounds) -> Bounds:
-    """Return bounds with the one that is claimed of the first goal, where it can be proven.
+    """Return bounds with the claimed bound of the first goal, where it can be proven.
 
     Raises `SolverError` if a plan is better.
     """
@@ -117,7 +117,7 @@ def _first_bound(problem: States, selection: Solution, bounds: Bounds) -> Bounds
 def _proven(
     problem: States, selection: Solution, values: Bounds, hint: Hint | None, *, exact: bool
 ) -> Certificate:
-    """Return the certificate of values by bounds that are proven."""
+    """Return the certificate of values with proven bounds."""
     aims = len(problem.aims)
     twin = next((goal.twin for goal in problem.goals if goal.in_time), None)
     proof, claimed = Proof(_weighed(problem, selection), hint), selection.bound
@@ -140,19 +140,19 @@ def _proven(
 
 
 def _closed(values: Sequence[float], bounds: Sequence[float]) -> Bounds:
-    """Return bounds that are no higher than values; those that leave no room are the values."""
+    """Return bounds capped by values; those within rounding of a value are set to it."""
     pairs = zip(values, bounds, strict=False)
     return tuple(v if b >= v - BELOW * abs(v) else b for v, b in pairs)
 
 
 def _has_twins(problem: States) -> bool:
-    """Return whether all that is asked of states and moves was written a second time."""
+    """Return whether all goals of states and moves, and all filters, have twins."""
     goals = (twin_of(goal) is not None or goal.in_time for goal in problem.goals)
     return all(goals) and all(each.twin is not None for each in problem.filters)
 
 
 def _gap(goals: Sequence[Amount], values: Sequence[float], bounds: Sequence[float]) -> float:
-    """Return the most that bounds of the first goals leave open, over the size of their values."""
+    """Return the largest gap of the first goals, relative to the size of their values."""
     return max(
         (value - bound) / (_size(goal.name, value) or 1.0)
         for goal, value, bound in zip(goals, values, bounds, strict=False)
@@ -160,7 +160,7 @@ def _gap(goals: Sequence[Amount], values: Sequence[float], bounds: Sequence[floa
 
 
 def _weighed(problem: States, selection: Solution) -> States:
-    """Return a problem over totals of scenarios with the weights that are claimed, made valid."""
+    """Return a problem over scenario totals with the claimed weights, projected to valid ones."""
     if not problem.totals:
         return problem
     if [*map(len, selection.prices)] != [len(problem.each)]:
@@ -182,7 +182,7 @@ def _margin_bounds(problem: States, proof: Proof, values: Bounds) -> Bounds:
 
 
 def _multipliers(problem: States, selection: Solution) -> Sequence[Sequence[float]]:
-    """Return the multipliers that are claimed of budgets, goal by goal."""
+    """Return the claimed multipliers of budgets, goal by goal."""
     found, budgets = selection.prices, len(problem.budgets)
     if len(found) < len(problem.aims) or any(len(each) < budgets for each in found):
         raise SolverError("there is no price for every budget and goal")
@@ -190,7 +190,7 @@ def _multipliers(problem: States, selection: Solution) -> Sequence[Sequence[floa
 
 
 def _require_promised(problem: States, bounds: Bounds, promised: Sequence[float]) -> None:
-    """Raise a `SolverError` if a bound, not of a margin, is below what is promised."""
+    """Raise a `SolverError` if a proven bound, margins aside, is below the claimed one."""
     for goal, bound, least in zip(problem.aims, bounds, promised, strict=False):
         if not goal.margins and not bound >= least - BELOW * abs(least):
             if not problem.budgets:
@@ -200,7 +200,7 @@ def _require_promised(problem: States, bounds: Bounds, promised: Sequence[float]
 
 
 def _with_counts(problem: States, twin: PathTwin | None, values: Bounds, bounds: Bounds) -> Bounds:
-    """Return bounds of first goals, those of makespans no lower than the combinatorial one."""
+    """Return bounds of the first goals, raised to the combinatorial bound of makespans."""
     if twin is None:
         return bounds
     least = twin.least(problem.network, problem.rules)
@@ -211,7 +211,7 @@ def _with_counts(problem: States, twin: PathTwin | None, values: Bounds, bounds:
 
 
 def _as_claimed(problem: States, selection: Solution, steps: Sequence[Step]) -> Bounds:
-    """Return the values of steps that keep the rules, if they are those that are claimed."""
+    """Return the recomputed values of feasible steps; a `SolverError` if others were claimed."""
     if isinstance(problem.rules, Schedule):
         _check_scheduled(problem.rules, steps)
         check_carried(problem.network.scene, problem.rules, steps, problem.worlds)
@@ -249,11 +249,11 @@ def plan_values(
     claimed: Sequence[float] = (),
     starts: Sequence[float] = (),
 ) -> tuple[float, ...]:
-    """Return what goals take of a sequence, from the responses of its steps.
+    """Return the values of goals of a sequence, from the responses of its steps.
 
     ``claimed``: the value of every goal; margins of stability are compared with these, and taken
     from them; ``starts``: where mortar cures, when steps start, s. Result: SI units. Over scenarios
-    the largest, but ways, which are those of the scene itself. Raises `SolverError` if a step
+    the largest, but distances, which are those of the scene itself. Raises `SolverError` if a step
     exceeds a limit, is not proven to stand, or has less of a margin.
     """
     if problem.each:
@@ -313,7 +313,7 @@ def _check_filters(problem: States, levels: Levels, steps: Sequence[Step]) -> No
 
 
 def _value(goal: Amount, levels: Levels, moves: MoveArrays) -> float:
-    """Return what an amount of states or moves takes of a plan, by its twin if it has one."""
+    """Return the value of an amount of states or moves of a plan, by its twin if it has one."""
     values = own_values(goal)
     assert values is not None  # it is of no whole path
     every = [values(moves)] if goal.moves else [values(states) for _, states in levels]

@@ -5,9 +5,8 @@ state, or of every move, and counts on a path
 
 .. math:: \max_k a(s_k) \quad \text{or} \quad \sum_k a(s_{k-1}, s_k).
 
-Aims and budgets are amounts by their names: whoever adds one writes a function on arrays of states
-or moves, and registers it (`seqopt.register`) with its twin, the same written a second time for
-the judge.
+Aims and budgets are amounts by their names: a further one is a function on arrays of states or
+moves, registered (`seqopt.register`) with its twin, an independent implementation for the judge.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from seqopt.scene.scene import Scene
 
 LARGEST = "F_largest"
 STATE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", LARGEST, TOLERANCE)
-"""Responses of a state, whoever moved last: those that goals, criteria and limits may name."""
+"""Responses of a state, independent of the last move, for goals, criteria and limits."""
 NONE = -1  # in place of a node, of a robot that holds none
 
 
@@ -55,7 +54,7 @@ class StateArrays(NamedTuple):
     rows: Ints
 
     def only(self, kept: Ints) -> StateArrays:
-        """Return some of the states, by their indices."""
+        """Select states by their indices, (k,)."""
         responses = {name: values[kept] for name, values in self.responses.items()}
         names = ("nodes", "forces", "most", "possible", "rows")
         parts = {name: getattr(self, name)[kept] for name in names}
@@ -74,7 +73,7 @@ class MoveArrays(NamedTuple):
 
 
 def call(what: str, function: Any, arrays: StateArrays | MoveArrays) -> np.ndarray:
-    """Return what a function of somebody else makes of n states or moves, (n,)."""
+    """Return a user's function of states or moves, (n,); a `ProblemError` if it fails."""
     count = len(arrays.possible if isinstance(arrays, StateArrays) else arrays.regrips)
     try:
         found = np.asarray(function(arrays))
@@ -89,7 +88,7 @@ def call(what: str, function: Any, arrays: StateArrays | MoveArrays) -> np.ndarr
 
 @dataclass(frozen=True, repr=False)
 class Amount:
-    """What a build takes: an aim makes it small, a budget keeps it within a cap.
+    """An amount of a build: an aim minimizes it, a budget caps it.
 
     Parameters
     ----------
@@ -102,17 +101,17 @@ class Amount:
     responses : tuple of str
         Of states, those that it needs.
     twin : callable, optional
-        The same function, written a second time: with it the judge proves what plans take; without
-        one the certificate says "claimed".
+        An independent implementation, with which the judge recomputes values and proves bounds;
+        without one the certificate says "claimed".
     unit : str
         Of a budget in words, as ``m`` of ``travel=3.5m``.
     least : callable, optional
         Takes the space of states and moves, returns a lower bound that is known before anything is
         searched.
     show : callable, optional
-        Makes of a value, SI units, what people read.
+        Converts a value from SI to display units.
     margins : callable, optional
-        Of a margin of stability: takes what is known of grip sets, and these; returns (n, 2).
+        Of a margin of stability: takes `StandingSets`, and grip sets; returns brackets, (n, 2).
     of_criterion : bool
         Whether it is the criterion's.
     needs_stays : bool or callable
@@ -157,15 +156,15 @@ class Amount:
 
     @property
     def has_few_digits(self) -> bool:
-        """Whether six digits of responses are enough to choose by."""
+        """Whether single-precision responses are enough to search by."""
         return self.is_peak and (self.of_criterion or isinstance(self.states, _Response))
 
     def value(self, arrays: StateArrays | MoveArrays) -> Floats:
-        """Return what it takes of states or moves, (n,), by its own function."""
+        """Return its values of states or moves, (n,), by its own function."""
         return self.checked(self.states or self.moves, arrays)
 
     def checked(self, function: Any, arrays: StateArrays | MoveArrays) -> Floats:
-        """Return what its function, or its twin, says; a `ProblemError` if those are no values."""
+        """Return the values (n,) of its function or twin; a `ProblemError` if they are invalid."""
         if self.name in BUILT_IN or isinstance(self.states, _Response):
             found: Floats = function(arrays)
             return found
@@ -181,7 +180,7 @@ class Amount:
         return self.needs_stays(scene) if callable(self.needs_stays) else self.needs_stays
 
     def shown(self, value: float) -> float:
-        """Return a value, SI units, as people read it."""
+        """Return a value in display units."""
         return value if self.show is None else self.show(value)
 
 
@@ -197,7 +196,7 @@ class _Response:
 
 @dataclass(frozen=True)
 class _Margin:
-    """Between which values a margin of stability lies, (n, 2)."""
+    """Brackets of a margin of stability, (n, 2)."""
 
     name: str
 
@@ -237,7 +236,7 @@ def _fewest_steps(space: Any) -> float:
 
 
 def _tilt_survived(value: float) -> float:
-    """Return the tilt that is survived, in degrees."""
+    """Return the critical tilt, degrees, from its distance to a right angle, rad."""
     return degrees(pi / 2 - value)
 
 

@@ -6,9 +6,9 @@ A filter answers twice, since what it asks may stay open. A plan passes states :
 .. math:: P = \{s : f(s) \text{ is proven}\}, \qquad R = \{s : \neg f(s) \text{ is proven}\}, \qquad
    P \cap R = \emptyset .
 
-Limits, payloads, rules, standing and arms are filters of one kind. Each says how it can be
-loosened, so that whoever explains that nothing is feasible needs no list of names. Whoever adds
-one registers it (`seqopt.register`) and asks for it by its name, as for a limit.
+Limits, payloads, rules, standing and arms are filters of one kind. Each knows how it can be
+loosened, from which remedies of an infeasible problem are found. A further one is registered
+(`seqopt.register`) and named as a limit.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ class Filter:
     expensive : bool
         Whether it is asked only of states that pass all other filters.
     twin : callable, optional
-        What ``refuses`` says, written a second time: with it the judge proves that no plan is
-        better; without one the certificate says "claimed".
+        An independent implementation of ``refuses``, with which the judge proves bounds; without
+        one the certificate says "claimed".
     loosened : callable, optional
-        Takes a problem; yields how it can be loosened, in words, and the problem with that. By
-        default it can be left out.
+        Takes a problem; yields a relaxation in words, and the relaxed problem. By default the
+        filter is left out.
 
     Examples
     --------
@@ -88,13 +88,13 @@ class Filter:
         return call(f"filter {self.name}", self.refuses, states).astype(bool)
 
     def refuted_again(self, states: StateArrays) -> Bools:
-        """Return the same as its twin says; none where there is no twin."""
+        """Return which states its twin proves not to pass, (n,); none without a twin."""
         if self.twin is None:
             return np.zeros(len(states.rows), dtype=bool)
         return call(f"twin of filter {self.name}", self.twin, states).astype(bool)
 
     def ways(self, problem: Any) -> Iterator[tuple[str, Any]]:
-        """Yield how it can be loosened in a problem, in words, and the problem with that."""
+        """Yield relaxations of a problem in this filter: in words, and the relaxed problem."""
         if self.loosened is not None:
             yield from self.loosened(problem)
         else:
@@ -140,7 +140,7 @@ def _rules_filter() -> Filter:
 
 
 def _standing_filter(problem: Any) -> Filter:
-    """Return the filter of the demand to stand, of which it may be open whether it is met."""
+    """Return the filter of the stability requirement, which may stay open for a state."""
 
     def passes(states: StateArrays) -> Bools:
         held = problem.held_to_stand(states.rows)
@@ -200,7 +200,7 @@ def filters_of(problem: Any) -> tuple[Filter, ...]:
 def register(*parts: Amount | Filter) -> None:
     """Add amounts and filters of your own, which aims, budgets and limits then ask for by name.
 
-    A package does the same by entry points of the group ``seqopt.parts``.
+    Packages register theirs by entry points of the group ``seqopt.parts``.
 
     Parameters
     ----------

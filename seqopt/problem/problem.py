@@ -137,9 +137,9 @@ class RobustAim:
         return np.asarray(weights / weights.sum())
 
     def allowed(self, weights: Floats) -> Floats:
-        """Return weights of scenarios, (S,), that prove a bound on totals from 0, near some.
+        """Return scenario weights (S,), projected to those that prove a bound on totals from 0.
 
-        Any do from zero to the largest that add up to one or less.
+        They are from zero to the largest weight of one scenario, and add up to one or less.
         """
         within = np.clip(weights, 0.0, self.most(len(weights)))
         return np.asarray(within / max(1.0, float(within.sum())))
@@ -195,7 +195,7 @@ FORMS = "travel=0.8, travel=3.5m, steps_over:F_largest=250:10 or robot_use:rob1=
 
 @dataclass(frozen=True)
 class AskedBudget:
-    """A budget as it is asked for."""
+    """A budget, parsed."""
 
     words: str
     name: str  # of what is capped
@@ -368,7 +368,7 @@ class Problem(Shown):
 
     @property
     def is_timed(self) -> bool:
-        """Whether it is asked how long the build takes."""
+        """Whether the makespan is a goal or has a budget."""
         capped = any(str(words).startswith("makespan=") for words in self.budgets)
         return capped or any(goal.in_time for goal in self.goals)
 
@@ -383,16 +383,16 @@ class Problem(Shown):
     def asked(
         cls, engine: Engine, moves: Schedule | FreeRules, criterion: Criterion, **words: Any
     ) -> Problem:
-        """Return a problem of what is asked, in values or in words, as of `seqopt.pose`."""
+        """Return the problem of keywords, values or words, as `seqopt.pose` takes them."""
         return cls(engine, moves, criterion, **_in_values(words, engine))
 
     def but(self, **words: Any) -> Problem:
-        """Return the same problem with something else asked, in values or in words."""
+        """Return the problem with other values of keywords, values or words."""
         return replace(self, **_in_values(words, self.engine))
 
     @property
     def says_range(self) -> bool:
-        """Whether the limit of the linear range is asked for, or lifted."""
+        """Whether the limit of the linear range is given, or lifted."""
         return any(limit.response == LINEAR_RANGE for limit in self.limits)
 
     @property
@@ -408,12 +408,12 @@ class Problem(Shown):
 
     @cached_property
     def graphs(self) -> dict[str, Any]:
-        """The graphs of choices that were made for it, which keep what was computed."""
+        """Cached graphs of choices, with the responses that they computed."""
         return {}
 
 
 def _in_values(words: Mapping[str, Any], engine: Engine) -> dict[str, Any]:
-    """Return values in the place of words, by what they are about."""
+    """Return keywords with all words parsed into values."""
     network = getattr(engine, "network", None)
     if "limits" in words and isinstance(network, Network):  # else it is refused later
         found = parse_limits(words["limits"], network.scene)

@@ -83,7 +83,7 @@ def crown(scene: Scene) -> float:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SceneFacts:
-    """What criteria may ask of a scene, each computed when it is first asked for."""
+    """Numbers of a scene that criteria use, each computed when it is first needed."""
 
     engine: Engine
 
@@ -230,8 +230,8 @@ class Limit:
     response : str
         A name as in `seqopt.problem.criteria`, ``tolerance`` or ``linear_range``.
     bound : float
-        SI units; of a tolerance, which no step may stay below, m; of the linear range a share of
-        it. By default plans keep within 1 wherever any does; infinite lifts that.
+        SI units; of a tolerance a lower bound, m; of the linear range a share of it: by default
+        plans keep within 1 wherever any does, and infinite lifts that.
 
     Raises
     ------
@@ -263,16 +263,16 @@ class Limit:
 
     @property
     def label(self) -> str:
-        """What people call it."""
+        """Name of the limit in messages and summaries."""
         return self.response
 
     def shown(self, value: float) -> float:
-        """Return a value of the response as people read it."""
+        """Return a value of the response in display units."""
         return value
 
     @property
     def counted(self) -> float:
-        """The bound as values are counted: of a tolerance, which is a least one, one over it."""
+        """Upper bound of the computed values: of a tolerance its reciprocal, 1/m."""
         return 1 / self.bound if is_tolerance(self.response) else self.bound
 
     def exceeded(self, values: Floats) -> Bools:
@@ -309,7 +309,7 @@ def _step_limits(given: Sequence[Limit] | Limit, scene: Scene) -> tuple[Limit, .
 
 
 def _said_limits(limits: Sequence[Limit]) -> dict[str, object]:
-    """Return bounds by the names of limits, as words and JSON have them."""
+    """Return bounds by the names of limits, in display units, ready for JSON."""
     return {
         limit.label: limit.shown(limit.bound) if math.isfinite(limit.bound) else LIFTED
         for limit in limits
@@ -354,7 +354,7 @@ def _prop_limits(scene: Scene) -> tuple[Limit, ...]:
 
 @dataclass(frozen=True, repr=False)
 class ResponsesAsked(Terse):
-    """The responses that criterion, limits and further wishes ask for."""
+    """The responses that criterion, limits and ``also`` need."""
 
     criterion: Criterion
     limits: tuple[Limit, ...]

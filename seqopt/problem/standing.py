@@ -1,4 +1,4 @@
-"""That the states of a free schedule stand: the demand, and what is known of grip sets."""
+"""Stability of the states of a free schedule: the requirement, and verdicts of grip sets."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from seqopt.stability._margins import Margins
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Proofs, Screen
 
 MARGINS = ("bond", "friction", "tilt")
-"""What goals may ask of the stability of states, each of them to be small: the least bond (Pa, in
-tension, with that times 1 + friction as cohesion), the least coefficient of friction, and how far
-the tilt that is survived is from a right angle (rad)."""
+"""Margins of stability that goals minimize: the least bond (Pa, in tension, with that times
+1 + friction as cohesion), the least coefficient of friction, and the difference of a right angle
+and the critical tilt (rad)."""
 TILTS = 2048  # steps of a right angle, to which the tilt of a state is found
 STEP = pi / 2 / TILTS  # rad
 NARROW = 0.02
-"""Within which share of itself a margin is proven: a bond, a friction, the tilt survived."""
+"""Relative width within which a margin is proven: of a bond, a friction, the critical tilt."""
 _LEAST = {"bond": 0.0, "friction": 1e-4, "tilt": 1e-4}  # within which one is that is hardly any
 
 
@@ -59,7 +59,7 @@ class Standing:
             raise ProblemError(f"tilt {short(self.tilt)}: give an angle from 0 to below pi/2, rad")
 
     def demanding(self, name: str, value: float) -> Standing:
-        """Return the demand that a margin, as goals count it, is no worse than a value alone."""
+        """Return the requirement of one margin alone, no worse than a value as goals count it."""
         if name == "tilt":
             return Standing(self.mortar, max(0.0, pi / 2 - value))
         if name == "friction":
@@ -67,13 +67,13 @@ class Standing:
         return Standing(bond_mortar(value, self.mortar.friction))
 
     def _implies(self, other: Standing) -> bool:
-        """Return whether what meets this demand meets another one."""
+        """Return whether this requirement implies another one."""
         stronger = map(le, astuple(self.mortar), astuple(other.mortar))
         return all(stronger) and self.tilt >= other.tilt
 
     @property
     def said(self) -> str:
-        """How it is demanded to stand, in words.
+        """The requirement in words.
 
         >>> Standing("dry").said, Standing("epoxy", tilt=0.05).said
         ('dry', 'with epoxy, tilted by 2.86°')
@@ -82,7 +82,7 @@ class Standing:
         return f"{_with_mortar(_mortar_name(self.mortar))}{tilted}"
 
     def described(self) -> dict[str, float | str]:
-        """Return the demand, ready for JSON: strengths in Pa, tilt in degrees."""
+        """Return the requirement, ready for JSON: strengths in Pa, tilt in degrees."""
         return {
             "friction": self.mortar.friction,
             "tensile_strength_Pa": self.mortar.tensile_strength,
@@ -98,11 +98,11 @@ def _without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
 
 
 class StandingSets:
-    """Which grip sets of a scene stand, and by what margins; each is looked at once.
+    """Cached verdicts and margins of the grip sets of a scene.
 
-    ``standing``: margins are those of its mortar; ``payloads`` (k,): all that robots may have, N;
-    ``demands``: all of which what stands has to meet; by default the one; ``undecided``: how many
-    grip sets were neither proven to stand nor to fall.
+    ``standing``: whose mortar the margins are of; ``payloads`` (k,): all that robots may have, N;
+    ``demands``: all requirements that a grip set has to meet; by default the one; ``undecided``:
+    how many grip sets were neither proven to stand nor to fall.
     """
 
     def __init__(
@@ -136,7 +136,7 @@ class StandingSets:
         ]
 
     def share(self, other: StandingSets) -> None:
-        """Share what is proven with others of the same scene, with other demands, from now on.
+        """Share proofs with other sets of the same scene, under other requirements, from now on.
 
         What stands with more stands with less; forces and motions of one are tried for all.
         """
@@ -147,12 +147,12 @@ class StandingSets:
 
     @property
     def looked_at(self) -> int:
-        """Of how many grip sets it was asked whether they stand."""
+        """Number of grip sets with a verdict."""
         return self._known[""].count
 
     @property
     def programs(self) -> int:
-        """How many linear programs were solved."""
+        """Number of linear programs solved."""
         return self._screens[0].solved + self._margins.solved
 
     def stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
@@ -168,7 +168,7 @@ class StandingSets:
         return np.asarray(self._verdicts(bricks, held, payload) != FALLS)
 
     def recalled(self, bricks: int, held: Ints, payload: Floats) -> Ints:
-        """Return which are known to stand, 1, or to fall, -1, by what others prove; see `stand`."""
+        """Return verdicts that known proofs imply, (S,): 1 stands, -1 falls, 0 open."""
         if not bricks:
             return np.full(len(held), STANDS)
         found = [screen.recalled(bricks, held, payload) for screen in self._screens]
@@ -190,7 +190,7 @@ class StandingSets:
         return self._known[""].of(bricks, codes, verdicts)[:, 0]
 
     def _by_others(self, bricks: int, codes: Ints) -> Floats:
-        """Return the verdicts (n,) that what is known with other demands decides; else NaN."""
+        """Return the verdicts (n,) that those under other requirements imply; else NaN."""
         out = np.full(len(codes), np.nan)
         for other in self._others:
             found = other._known[""].known(bricks, codes)
@@ -200,7 +200,7 @@ class StandingSets:
         return out
 
     def margins(self, name: str, bricks: int, held: Ints, payload: Floats) -> Floats:
-        """Return (S, 2) between which values, as goals count them, margins of grip sets lie."""
+        """Return brackets (S, 2) of the margins of grip sets, as goals count them."""
 
         def brackets(rows: Ints) -> Floats:
             margin = self._tilts if name == "tilt" else getattr(self._margins, name)
@@ -209,7 +209,7 @@ class StandingSets:
         return self._known[name].of(bricks, self._codes(held, payload), brackets)
 
     def _tilts(self, bricks: int, held: Ints, payload: Floats) -> Floats:
-        """Return between which angles from a right one tilts lie, by halving intervals."""
+        """Return brackets (S, 2), rad, of a right angle less the critical tilt, by bisection."""
         low, fallen = np.full(len(held), -1), np.full(len(held), TILTS)
         ends = []
         for least in (STANDS, OPEN):  # what is proven to stand, then what may
@@ -239,10 +239,10 @@ class StandingSets:
 
 
 def _size(name: str, value: float) -> float:
-    """Return what one of `MARGINS` is, of a tilt what is survived: what shares are shares of."""
+    """Return the size of one of `MARGINS`, for relative gaps: of a tilt the critical tilt."""
     return abs(pi / 2 - value if name == "tilt" else value)
 
 
 def slack(name: str, value: float) -> float:
-    """Return within what one of `MARGINS` is proven."""
+    """Return the width within which one of `MARGINS` is proven."""
     return max(NARROW * _size(name, value), _LEAST[name])

@@ -95,6 +95,8 @@ def times_table(
     rows, end = [], 0.0
     for step, time in zip(steps, step_times(scene, steps, waits, begin), strict=True):
         taken = [step.grips[r] for r in time.robots if step.grips[r] is not None]
+        ready = end if time.ready is None else max(end, time.ready)
+        cures = {"cures_s": max(0.0, time.start - ready), "joint": time.joint}  # wait for mortar
         rows.append(
             {
                 "step": step.number,
@@ -107,17 +109,11 @@ def times_table(
                 "start_s": time.start,
                 "end_s": time.end,
                 "waits_s": time.start - end,
-                **({} if waits is None else _cured(time, end)),
+                **({} if waits is None else cures),
             }
         )
         end = time.end
     return pd.DataFrame(rows).astype({"node": "Int64", "prepares_s": float, "ready_s": float})
-
-
-def _cured(time: StepTime, before: float) -> dict[str, object]:
-    """Return how long a step waits for mortar alone, s, and of which joint."""
-    ready = before if time.ready is None else max(before, time.ready)
-    return {"cures_s": max(0.0, time.start - ready), "joint": time.joint}
 
 
 def busy_table(scene: Scene, steps: Sequence[Step], waits: Waits | None = None) -> pd.DataFrame:

@@ -112,12 +112,12 @@ def _values(costs: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Budget(FrozenValue):
-    """A bound on a total over the build.
+    """A cap on a total over the build.
 
-    ``name``: what is capped, with its unit; ``single`` (tuple of (C_k,) float): what each choice
-    takes of the budget: finite; ``shared`` (tuple of (C_{k-1}, C_k) float): what each pair takes of
-    it: finite; ``bound``: infinite if there is no cap. Raises `ProblemError` if a shape is wrong,
-    an amount is not finite, or the bound is NaN or -inf.
+    ``name``: what is capped, with its unit; ``single`` (tuple of (C_k,) float): use of each choice,
+    finite; ``shared`` (tuple of (C_{k-1}, C_k) float): use of each pair, finite; ``bound``:
+    infinite if there is no cap. Raises `ProblemError` if a shape is wrong, an amount is not finite,
+    or the bound is NaN or -inf.
     """
 
     name: str
@@ -142,7 +142,7 @@ class Budget(FrozenValue):
         return LayeredCosts(self.single, self.shared)
 
     def spent(self, choice: Sequence[int]) -> float:
-        """Return what a choice takes of the budget, in its unit."""
+        """Return the use of the budget by a choice, in its unit."""
         return self.amounts.cost(choice)
 
 
@@ -195,7 +195,7 @@ class Joined:
         self._found[moves] = self._join(before, costs)
 
     def add_anyway(self, cost: float) -> None:
-        """Join what a build costs whatever is chosen, to the costs of the first move."""
+        """Join the cost that all choices share, to the costs of the first move."""
         self.add((-1, 0), np.full((1, self._sizes[0]), cost))
 
     def single(self, move: int) -> Floats:
@@ -212,7 +212,7 @@ class Joined:
         return LayeredCosts(tuple(map(self.single, range(len(self._sizes)))), shared)
 
     def budget(self, name: str, bound: float) -> Budget:
-        """Return a bound on the total of what is joined."""
+        """Return the budget that caps the joined total."""
         amounts = self.layered()
         return Budget(name, amounts.single, amounts.shared, bound)
 

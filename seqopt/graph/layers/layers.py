@@ -89,15 +89,6 @@ def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
     return np.asarray(candidates != schedule.moves[move - 1].candidates[before])
 
 
-def _window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:
-    """Return the steps that a move decides after a candidate of the one before, solved anew."""
-    schedule = evaluation.schedule
-    own, alone = windows(schedule, [(move, before)], alone=True), evaluation.resources.alone()
-    found = replace(evaluation, schedule=own, resources=alone).steps
-    moves = {step.number: step.moves for step in schedule.steps}
-    return tuple(replace(each, moves=moves[each.step.number]) for each in found)
-
-
 @dataclass(frozen=True, repr=False)
 class Layers(Source, Shown):
     """Support placement over a whole build; responses, sums and peaks are computed on first use.
@@ -194,7 +185,7 @@ class Layers(Source, Shown):
         return f"objective {value:.6g}, {proven}"
 
     def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
-        """Return what was asked, for a summary; ``limits``: as they are said."""
+        """Return the settings of the problem for a summary; ``limits``: bounds by name."""
         return {
             "aims": [*self.names_of(aim)],
             "criterion": self.criterion.name,
@@ -208,7 +199,7 @@ class Layers(Source, Shown):
     def spent(
         self, objective: Mapping[str, float], found: Solution
     ) -> dict[str, dict[str, float | None]]:
-        """Return what there is of every budget, what is spent, and its price."""
+        """Return cap, use and multiplier of every budget."""
         known = [budget.name for budget in self.budgets if math.isfinite(budget.bound)]
         prices = dict(zip(known, found.prices[0] if found.prices else (), strict=False))
         return {
@@ -371,7 +362,11 @@ class Layers(Source, Shown):
         Computed again if the responses of all choices are not kept.
         """
         if self.evaluation.streams:
-            return _window_anew(self.evaluation, move, before)
+            own = windows(self.schedule, [(move, before)], alone=True)
+            alone = self.evaluation.resources.alone()
+            solved = replace(self.evaluation, schedule=own, resources=alone).steps
+            moves = {step.number: step.moves for step in self.schedule.steps}
+            return tuple(replace(each, moves=moves[each.step.number]) for each in solved)
         found = []
         for choices in self._decided.get(move, ()):  # of two open moves the row of the first
             row = before if len(choices.moves) == 2 else slice(None)
@@ -510,7 +505,7 @@ def candidate_layers(
 ) -> Layers:
     """Return the problem of choosing the open grips of a schedule; nothing is computed yet.
 
-    ``limits``: what no step may exceed, whether or not a grip is open in it. ``also``: responses to
+    ``limits``: bounds of all steps, whether or not a grip is open in them. ``also``: responses to
     compute besides those that criterion and limits use. Raises `ProblemError` if there is no such
     response, or no grip is open.
     """
@@ -552,12 +547,12 @@ def steps_over(problem: Layers, response: str, level: float, bound: float) -> Bu
 
 
 def travel(problem: Layers, bound: float) -> Budget:
-    """Return a bound on how far robots go straight from one grip to the next, over the whole build.
+    """Return a cap on the straight distances of robots from grip to grip over the whole build.
 
-    ``problem``: whose choices the budget is for; ``bound``: m. Result: each choice takes the ways
-    between its node and given ones before and after it, each pair that between its two nodes; the
-    first move those between given nodes too; m. Raises `ProblemError` if a robot goes from the grip
-    of a move to that of another one that is not the next.
+    ``problem``: whose choices the budget is for; ``bound``: m. Result: each choice takes the
+    distances between its node and given ones before and after it, each pair that between its two
+    nodes; the first move those between given nodes too; m. Raises `ProblemError` if a robot goes
+    from the grip of a move to that of another one that is not the next.
     """
     joined, at = (
         Joined([*map(len, problem.candidates)], np.add),
@@ -589,7 +584,7 @@ _Grip = int | OpenGrip
 
 
 def _ways(schedule: Schedule) -> Iterator[tuple[str, tuple[_Grip, _Grip]]]:
-    """Yield who goes from which grip to which other one, also from where the build begins."""
+    """Yield robot and both ends of every change of grip, also from where the build begins."""
     scene, site = schedule.scene, schedule.begin
     before = () if site is None else (site.stays or site.holds(scene), site.holds(scene))
     every = zip(*before, *(step.grips for step in schedule.steps), strict=True)

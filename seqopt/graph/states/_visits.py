@@ -68,9 +68,10 @@ def steps_in_hands(
     states: Sequence[Sequence[int]],
     grips: Sequence[Sequence[int]],
 ) -> tuple[Step, ...]:
-    """Return the same by the robots that grips say, places (one per robot), if they say any.
+    """Return the checked steps with the robot assignment given by ``grips``, if any.
 
-    Raises `SolverError` if they are not those of the states.
+    ``grips``: of every step, the place that each robot holds, 0 for none. Raises `SolverError` if
+    they are not those of the states.
     """
     steps = steps_of(space, states)
     if not grips:
@@ -108,7 +109,7 @@ def _follow(
     stays: dict[int, int],
     numbers: Sequence[int | None],
 ) -> bool:
-    """Let robots of a kind hold what their entries say; return whether one took a grip."""
+    """Assign robots of a kind to the nodes of their entries; return whether one took a grip."""
     wanted = {numbers[n]: n for n in entries if n > 0}
     left = [-n for n in entries if n <= 0]
     for robot in robots:
@@ -222,7 +223,7 @@ class StateSpace(Space):
         return self.problem.values(part, states, rough=rough, most=most)
 
     def _totals(self, level: int, states: Ints) -> tuple[Floats, Bools]:
-        """Return what the goal takes of states in every scenario, and which are allowed in all."""
+        """Return values of the goal by scenario, (n, S), and which states are feasible in all."""
         out = np.full((len(states), len(self.peaks)), np.inf)
         rows = np.arange(len(states))
         for k, problem in enumerate(self.problem.each):
@@ -272,7 +273,7 @@ def scenario_peaks(problem: States) -> tuple[bool, ...]:
 
 
 def move_amounts(problem: States, values: Floats, taken: Floats) -> Floats:
-    """Return what goals take of moves, (m, g).
+    """Return the values of goals of moves, (m, g).
 
     ``values`` (m, g): what they take of the states that the moves lead to; ``taken`` (m, 2):
     whether the moves are regrips, and how far robots go, m. Result (m, g).

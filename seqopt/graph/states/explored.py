@@ -36,7 +36,7 @@ def build_space(
 
 
 def floors_of_goals(problem: States) -> tuple[float, ...]:
-    """Return what every plan takes at least of each goal, known before anything is searched.
+    """Return lower bounds of goals that are known before the search.
 
     No worst step is better than the end that all builds have in common, no build shorter than its
     bricks and robots allow. Minus infinity where nothing is known.
@@ -56,7 +56,7 @@ def floors_of_goals(problem: States) -> tuple[float, ...]:
 
 
 def barred(problem: States) -> tuple[int, Ints] | None:
-    """Return a state that every plan passes and that is not allowed; None if there is none.
+    """Return a state that every plan passes and that is infeasible; None if there is none.
 
     Of a free schedule that is the finished structure that nobody holds, of others every step in
     which no grip is open. Result: its level, and the state (1, c). Without limits and demands
@@ -76,12 +76,11 @@ def explore(
     width: int | None = None,
     tell: Callable[[Explorer], object] = lambda _: None,
 ) -> Explorer:
-    """Return the states of a problem below a ceiling that stand as is demanded.
+    """Return the visited states of a problem below a ceiling, its stability requirement included.
 
-    ``ceiling``: the first goal must not take more of a state, where it is about a peak; ``width``:
-    from how many new states of a brick count the search goes on, and without regrips; ``tell``:
-    called after every level; may raise to end the search. Nothing is visited where a state that
-    every plan passes is not allowed.
+    ``ceiling``: upper bound of the first goal, if it is a peak; ``width``: how many new states of a
+    brick count are kept, and without regrips; ``tell``: called after every level; may raise to end
+    the search. Nothing is visited where a state that every plan passes is infeasible.
     """
     asked = bool(problem.demands) or any(goal.margins for goal in problem.goals)
     few = width is not None

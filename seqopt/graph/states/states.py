@@ -52,17 +52,16 @@ class States(Source, Shown):
     ``engine``: what computes responses; ``rules``: which moves are possible: those that rules
     allow, or those that choose the open grips of a schedule, however many are open in a step;
     ``criterion``: what a step costs, for the goals that name no response; ``goals``: what to
-    minimize, the most important first; ``limits``: what no step may exceed; ``standing``: that
-    every state must stand, if it is demanded; ``settled``: margins that every state must have as
-    well; ``budgets``: caps on the sums of as many last goals, which are not to be made small but
-    kept within; ``scenarios``: of the same scene in other states of the world: what is largest in
-    any of them counts, and limits and standing hold in all. By default that of ``engine`` alone.
-    ``over``: what is made of their totals, if the goal is a sum; ``weights``: by scenario, of its
-    sum in that goal, in place of the largest.
-    ``resources``: who solves grip sets, and where answers are kept; the proof believes none of
-    these; ``spares``: whether the whole that nobody holds costs nothing; ``filters``: what states
-    must pass beside limits; ``orders``: among which orders of the bricks the best is sought, by
-    default the scene's own alone: values keep its scales.
+    minimize, the most important first; ``limits``: bounds of all steps; ``standing``: stability
+    requirement of all states, if any; ``settled``: margins that are required as well; ``budgets``:
+    caps on the sums of as many last goals, which are constraints, not objectives; ``scenarios``:
+    engines of the same scene in other states of the world: the largest value over them counts, and
+    limits and stability hold in all; by default that of ``engine`` alone. ``over``: aggregation of
+    their totals, if the goal is a sum; ``weights``: of the scenarios in it, in place of the
+    largest. ``resources``: workers of grip sets and the cache of responses, which the proof does
+    not use; ``spares``: whether the finished structure without grips costs nothing; ``filters``:
+    further requirements of states; ``orders``: which orders of the bricks are searched, by default
+    the scene's own alone: values keep its scales.
     """
 
     engine: Engine
@@ -202,7 +201,7 @@ class States(Source, Shown):
         return exact and not (self.budgets or self.totals or self.is_timed)
 
     def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
-        """Return what was asked, for a summary; ``limits``: as they are said."""
+        """Return the settings of the problem for a summary; ``limits``: bounds by name."""
         stands = None
         if self.standing is not None:
             sets = {name: getattr(self.stability, name) for name in COUNTED}
@@ -220,7 +219,7 @@ class States(Source, Shown):
     def spent(
         self, objective: Mapping[str, float], found: Solution
     ) -> dict[str, dict[str, float | None]]:
-        """Return what there is of every budget, and what is spent."""
+        """Return cap and use of every budget; multipliers are not known."""
         capped = zip(self.names[len(self.aims) :], self.budgets, strict=True)
         return {n: {"bound": cap, "spent": objective[n], "price": None} for n, cap in capped}
 
@@ -246,7 +245,7 @@ class States(Source, Shown):
 
     @property
     def is_timed(self) -> bool:
-        """Whether it is asked how long the build takes."""
+        """Whether the makespan is a goal or has a budget."""
         return any(goal.in_time for goal in self.goals)
 
     @property
@@ -289,7 +288,7 @@ class States(Source, Shown):
 
     @cached_property
     def screened(self) -> GripSets:
-        """The same with six digits, to choose by: enough where only worst values count."""
+        """Responses in single precision, to search by: enough where only worst values count."""
         if self.filters or any(goal.states and not goal.has_few_digits for goal in self.goals):
             return self.sets
         return GripSets(self.engine, self.sets.names, self.resources, screen=True)
@@ -313,8 +312,8 @@ class States(Source, Shown):
     ) -> tuple[StateArrays, Bools]:
         """Return states as amounts and filters see them, and which pass the filters.
 
-        ``states`` (n, c): as in `seqopt.sequence._rule_space`; ``rough``: whether six digits are
-        enough, except for what is close to a limit. What stands is asked later.
+        ``states`` (n, c): as in `seqopt.sequence._rule_space`; ``rough``: whether single precision
+        is enough, except close to a limit. Stability is evaluated later.
         """
         (held, most), bricks = self._grips(states), self.space.bricks_at(level)
         answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
@@ -326,8 +325,9 @@ class States(Source, Shown):
         found, places = self._by_name(answers, forces), states[:, : self.space.robots].clip(min=0)
         nodes = self._node_numbers[places]
         seen = StateArrays(bricks, nodes, found, forces, most, fits, self.criterion, states)
-        for each in self._asked_first:
-            fits &= each.proven(seen)
+        for each in self.every_filter:
+            if each.passes and not each.expensive:  # a filter without a test is kept by all moves
+                fits &= each.proven(seen)
         for each in self.filters if fits.any() else ():
             if each.expensive:
                 rows = np.flatnonzero(fits)
@@ -343,18 +343,13 @@ class States(Source, Shown):
         """All that states must pass: rules, standing, payloads, arms, limits, and others."""
         return filters_of(self)
 
-    @property
-    def _asked_first(self) -> tuple[Filter, ...]:
-        """Filters that no move keeps by itself, and that cost little."""
-        return tuple(f for f in self.every_filter if f.passes and not f.expensive)
-
     def _by_name(self, answers: Floats, forces: Floats) -> dict[str, Floats]:
         found = dict(zip(self.sets.names, answers.T, strict=True))
         found[LARGEST] = forces.max(axis=1, initial=0.0)
         return found
 
     def _close(self, answers: Floats, forces: Floats, most: Floats) -> Bools:
-        """Return which states are so close to a limit that more digits decide."""
+        """Return which states are too close to a limit for single precision, (n,)."""
         close = _near(forces, np.where(np.isfinite(most), most, np.nan)).any(axis=1)
         found = self._by_name(answers, forces)
         for limit in self.limits:
@@ -365,12 +360,12 @@ class States(Source, Shown):
     def values(
         self, level: int, states: Ints, *, rough: bool = False, most: float = np.inf
     ) -> tuple[Floats, Bools]:
-        """Return what goals take of states, and which states are within all limits.
+        """Return the values of goals in states, and which states are within all limits.
 
-        ``states`` (n, c); ``rough``: whether six digits are enough; ``most``: over scenarios, a
-        state of which the first goal takes more is not asked further: its values are then those of
-        some scenarios. Results: ``values`` (n, g): a column for every goal; zero for one that is
-        about moves, or about margins; ``within`` (n,).
+        ``states`` (n, c); ``rough``: whether single precision is enough; ``most``: over scenarios,
+        a state in which the first goal is larger is not evaluated further: its values are then
+        lower bounds, from some scenarios. Results: ``values`` (n, g): a column for every goal; zero
+        for one that is about moves, or about margins; ``within`` (n,).
         """
         if self.each:
             asked = [partial(p.values, level, rough=rough) for p in self.each]
@@ -393,9 +388,9 @@ class States(Source, Shown):
     def standing_values(
         self, level: int, states: Ints, *, most: float = np.inf
     ) -> tuple[Floats, Bools]:
-        """Return the same where states must also stand as is demanded, margins among the goals.
+        """Return values, margins among them, and feasibility with the stability requirement.
 
-        What stands, and by what margin, is asked only of states that nothing else rules out.
+        Stability and margins are evaluated last, of states that are otherwise feasible.
 
         ``states`` (n, c); ``most``: as of `values`. Results: ``values`` (n, g); ``within`` (n,).
         """
@@ -416,14 +411,14 @@ class States(Source, Shown):
         return out, within
 
     def stand(self, level: int, states: Ints) -> Bools:
-        """Return which states (n, c) are proven to stand as is demanded, (n,)."""
+        """Return which states (n, c) are proven to meet the stability requirement, (n,)."""
         if self.each:
             return np.asarray(np.all([p.stand(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)
         return np.asarray(self.stability.stand(bricks, *self.held_to_stand(states)))
 
     def recalled(self, level: int, states: Ints) -> Ints:
-        """Return which states are known to stand as is demanded, 1, which to fall, -1, else 0."""
+        """Return verdicts that known proofs imply, (n,): 1 stands, -1 falls, 0 open."""
         if self.each:
             return np.asarray(np.min([p.recalled(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)
@@ -432,7 +427,7 @@ class States(Source, Shown):
     def _worst(
         self, valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]], states: Ints, most: float
     ) -> tuple[Floats, Bools]:
-        """Return the largest values in all scenarios; what one rules out the next is not asked."""
+        """Return values (n, g) over scenarios; infeasible in one is left out of the next."""
         out = np.zeros((len(states), len(self.goals)))
         within = np.ones(len(states), dtype=bool)
         for number, values in enumerate(valued):
@@ -443,30 +438,30 @@ class States(Source, Shown):
         return out, within
 
     def joined(self, before: Floats, values: Floats, number: int) -> Floats:
-        """Return values over the scenarios before one, that of a number, and with it, (n, g)."""
+        """Return values (n, g) over scenarios with those of one more, the scenario of a number."""
         if self.weights:
             return before + self.weights[number] * values
         return np.maximum(before, values)
 
     @cached_property
     def stability(self) -> StandingSets:
-        """What is known of how grip sets stand."""
+        """Cached verdicts and margins of grip sets."""
         mortar = self.standing or Standing()
         return StandingSets(self.network, mortar, self._payloads, self.demands)
 
     def share_proofs(self, other: States) -> None:
-        """Share what is proven of how states stand with a problem of the same scenes."""
+        """Share proofs of stability with a problem of the same scenes."""
         for one, shared in zip(self.each or (self,), other.each or (other,), strict=True):
             one.stability.share(shared.stability)
 
     @property
     def demands(self) -> tuple[Standing, ...]:
-        """All that is demanded of the stability of states."""
+        """All stability requirements of states."""
         return self.settled if self.standing is None else (self.standing, *self.settled)
 
     @cached_property
     def certified(self) -> dict[tuple[int, Grips], Stability]:
-        """What the cone program says of states, as far as it was asked."""
+        """Cached verdicts of the cone program, by brick count and grips."""
         return {}
 
     @cached_property
@@ -498,7 +493,7 @@ class States(Source, Shown):
         return _ascending(held, self._caps)
 
     def held_to_stand(self, states: Ints) -> tuple[Ints, Floats]:
-        """Return the same where stability is asked, for which kinds of grips do not count."""
+        """Return nodes held, ascending, and payloads, (n, r), for stability: no kinds of grips."""
         return _ascending(states[:, : len(self._caps)].clip(min=0), self._payloads)
 
     def in_scene(self, scene: Scene) -> States:
