@@ -427,7 +427,7 @@ class States(Source, Shown):
     def _worst(
         self, valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]], states: Ints, most: float
     ) -> tuple[Floats, Bools]:
-        """Return values (n, g) over scenarios; infeasible in one is left out of the next."""
+        """Return values (n, g) over scenarios; what one excludes is not evaluated in the next."""
         out = np.zeros((len(states), len(self.goals)))
         within = np.ones(len(states), dtype=bool)
         for number, values in enumerate(valued):
