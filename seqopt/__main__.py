@@ -25,7 +25,7 @@ AGAIN = 0.05  # s after which an interrupt that was lost is raised again
 
 
 def run() -> int:
-    """Run the command of the shell and return its exit status; its start may be interrupted."""
+    """Run the shell's command and return its exit status, also if interrupted while loading."""
     try:
         _open_streams()
         _answer_signals(_leave)  # libraries that are being loaded may lose what is raised in them
@@ -60,7 +60,7 @@ def run() -> int:
 
 
 def _crashed(error: Exception) -> int:
-    """Say on standard error where seqopt itself failed, last in a line; return that status."""
+    """Print the traceback of an internal error, its last line a summary; return its status."""
     with contextlib.suppress(OSError, AttributeError, ValueError):
         said = " ".join(f"{type(error).__name__}: {error}".split())[:500]
         lines = "".join(traceback.format_exception(error))
@@ -71,7 +71,7 @@ def _crashed(error: Exception) -> int:
 
 
 def _answer_signals(answer: Callable[[int, FrameType | None], object]) -> None:
-    """Let all signals that ask for an end ask as ctrl-C does, so that files are cleaned up."""
+    """Handle all termination signals like ctrl-C, so that temporary files are deleted."""
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) not in (signal.SIG_IGN, None):
@@ -79,14 +79,14 @@ def _answer_signals(answer: Callable[[int, FrameType | None], object]) -> None:
 
 
 def _leave(*_: object) -> None:
-    """End the program at once: nothing is written before it has started."""
+    """Exit at once: before the start there are no files to clean up."""
     with contextlib.suppress(OSError):
         os.write(2, b"seqopt: interrupted\n")
     os._exit(INTERRUPTED)
 
 
 def _raise_again(lost: sys.UnraisableHookArgs) -> None:
-    """Ask once more where an interrupt met what cannot raise, as the end of an object."""
+    """Repeat an interrupt that was raised where exceptions are ignored, as in a finalizer."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
         threading.Timer(AGAIN, interrupt_main).start()  # at once it would meet this hook
     else:
@@ -94,7 +94,7 @@ def _raise_again(lost: sys.UnraisableHookArgs) -> None:
 
 
 def _require_room() -> None:
-    """Refuse a limit of memory under which libraries wait without end for what they do not get."""
+    """Raise a `MemoryError` for a memory limit under which libraries hang."""
     if os.name == "posix":
         import resource  # noqa: PLC0415  # POSIX has it alone
 
@@ -104,7 +104,7 @@ def _require_room() -> None:
 
 
 def _open_streams() -> None:
-    """Keep files of ours from taking the places of closed streams; print any name anywhere."""
+    """Occupy the descriptors of closed streams; escape characters that a stream cannot encode."""
     for place in range(3):
         try:
             os.fstat(place)

@@ -1,7 +1,7 @@
-"""Archives of arrays (npz), of which every size is known before anything is unpacked.
+"""Archives of arrays (npz), all of whose sizes are checked before unpacking.
 
-A directory may lie, so no more is unpacked of a part than it announces; and what an array announces
-is compared with how much there is of it.
+A directory may be forged, so unpacking is limited to the announced size of a part, and the
+announced shape of an array is compared with its size.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ _HEADER = re.compile(
 
 
 class Archive:
-    """An archive, of which nothing is unpacked yet.
+    """An archive, unpacked lazily.
 
-    ``content``: its bytes; ``where``: what messages call it. Raises `FileError` if it is none, has
-    too many parts, or would be too large.
+    ``content``: its bytes; ``where``: its name in messages. Raises `FileError` if it is invalid,
+    has too many parts, or is too large.
     """
 
     def __init__(self, content: bytes, where: str) -> None:
@@ -63,7 +63,7 @@ class Archive:
         return tuple(self._parts)
 
     def require(self, names: Iterable[str]) -> None:
-        """Raise a `FileError` unless the archive has parts of some names, and no others."""
+        """Raise a `FileError` unless the archive has exactly the named parts."""
         wanted, there = {*names}, {*self._parts}
         for name in sorted(wanted - there):
             raise FileError(f"{self._where}: it has no {name}; write it again")
@@ -71,7 +71,7 @@ class Archive:
             raise FileError(f"{self._where}: nothing says what {name[:60]!r} is; leave it out")
 
     def read(self, name: str) -> bytes:
-        """Return the content of a part; a `FileError` says that it is not there, or broken."""
+        """Return the content of a part; raise a `FileError` if it is missing or damaged."""
         if name not in self._parts:
             raise FileError(f"{self._where}: it has no {name}; write it again")
         part = self._parts[name]
@@ -84,7 +84,7 @@ class Archive:
             raise FileError(f"{self._where}: {name} cannot be unpacked: {error}") from error
 
     def text(self, name: str) -> str:
-        """Return a part as text; a `FileError` says that it is not UTF-8, or as `read`."""
+        """Return a part as text; raise a `FileError` if it is not UTF-8, or as `read`."""
         try:
             return self.read(name).decode()
         except UnicodeDecodeError as error:
@@ -93,8 +93,8 @@ class Archive:
     def array(self, name: str, kinds: str, shape: tuple[int | None, ...]) -> np.ndarray:
         """Return an array.
 
-        ``kinds``: letters of the kinds of numbers that it may have, as of NumPy; ``shape``: that it
-        must have, None where any number will do. Raises `FileError` if it is none, or another.
+        ``kinds``: accepted kinds of its type, as letters of NumPy; ``shape``: required one, None for
+        any size. Raises `FileError` for other content.
         """
         found = _array(self.read(f"{name}.npy"))
         if found is None:
@@ -111,7 +111,7 @@ class Archive:
 
 
 def _array(content: bytes) -> np.ndarray | None:
-    """Return the array of what ``numpy.save`` wrote; None if it is none."""
+    """Return the array written by ``numpy.save``; None for other content."""
     start = 10 + int.from_bytes(content[8:10], "little")
     said = _HEADER.fullmatch(content[10:start].decode("latin-1"))
     if content[:8] != b"\x93NUMPY\x01\x00" or said is None:

@@ -1,4 +1,4 @@
-"""Reading and writing files so that nothing is left half-written."""
+"""Reading files, and writing them atomically."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MARK = "'"
 
 
 def harmless(text: str) -> str:
-    """Return a cell that spreadsheets show as it is, after an apostrophe if need be.
+    """Return a cell that spreadsheets take for no formula, with an apostrophe if needed.
 
     >>> harmless("=cmd_node"), harmless("rob1_node"), plain(harmless("'=x"))
     ("'=cmd_node", 'rob1_node', "'=x")
@@ -34,12 +34,12 @@ def harmless(text: str) -> str:
 
 
 def plain(text: str) -> str:
-    """Return what a cell said before `harmless`."""
+    """Invert `harmless`."""
     return text[1:] if text.startswith(_MARK) and harmless(text) != text else text
 
 
 def _harmless_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table whose columns and texts are `harmless`; numbers stay as they are."""
+    """Return a table with `harmless` names of columns and strings; numbers are unchanged."""
 
     def safe(value: object) -> object:
         return harmless(value) if isinstance(value, str) else value
@@ -82,9 +82,9 @@ _MOST_VALUES = 10_000_000  # an empty list has two bytes in a file, and sixty in
 
 
 def parse_json(text: str, where: str, error: type[SeqoptError] = FileError, **how: Any) -> Any:
-    """Return a JSON document; an ``error`` says in a line what is wrong with it.
+    """Parse a JSON document; raise an ``error`` with one line for an invalid one.
 
-    ``where``: what messages call it; ``how``: of `json.loads`, to read entries strictly.
+    ``where``: its name in messages; ``how``: options of `json.loads`.
     """
     if sum(map(text.count, ",[{")) > _MOST_VALUES:
         raise error(f"{where}: it has more than {_MOST_VALUES:,} values; give fewer")
@@ -117,8 +117,8 @@ def read_table(
 ) -> tuple[list[str], list[tuple[int, Row]]]:
     """Return the columns of a CSV table, and its rows: the number of the line, cells by column.
 
-    A cell that is missing is empty; what is beyond the columns stands under None. ``error``: raised
-    if it is no such table.
+    A missing cell is empty; cells beyond the columns are under None. ``error``: raised for other
+    content.
     """
     reader = csv.DictReader(io.StringIO(text), restval="")
     try:
@@ -137,13 +137,13 @@ def write_text(path: Path, text: str) -> None:
 
 
 def csv_text(table: pd.DataFrame, digits: int = 6) -> str:
-    """Return a table as CSV, without its index, to some digits; no text begins a formula."""
+    """Return a table as CSV, without its index, rounded to ``digits``; no cell begins a formula."""
     safe = _harmless_table(table)
     return str(safe.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 
 
 def rows_text(rows: Sequence[Mapping[str, object]], digits: int = 6) -> str:
-    """Return rows with the same columns as `csv_text` does a table: without pandas, which is slow.
+    """Return rows of equal columns as CSV, as `csv_text`, but without loading pandas.
 
     >>> rows_text([{"step": 1, "brick": "=a", "tilt": 2 / 3}]).splitlines()
     ['step,brick,tilt', "1,'=a,0.666667"]
@@ -162,20 +162,20 @@ def _cell(value: object, digits: int) -> object:
 
 
 def write_bytes(path: Path, content: bytes | str) -> None:
-    """Write a file whole: it appears under its name only once complete.
+    """Write a file atomically: it appears under its name only once complete.
 
-    A link is followed to its target; a file that is there keeps its mode. Raises `FileError` if it
-    cannot be written, or what is there is no regular file: a device, say.
+    A link is followed to its target; an existing file keeps its mode. Raises `FileError` if it
+    cannot be written, or the target is no regular file, as a device.
     """
     with _told("write", path):
         _put_all([(path, content)])
 
 
 def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
-    """Write files by name into a folder, which is made, all of them or none.
+    """Write files by name into a folder, created if missing, all of them or none.
 
-    A new folder appears under its name with all of its files at once. In one that is there all
-    files are complete beside their places before the first is put in its place. Raises `FileError`.
+    A new folder appears under its name with all of its files at once. In an existing one all files
+    are written under temporary names before the first is renamed. Raises `FileError`.
     """
     target = Path(os.path.realpath(folder))
     with _told("write", folder):
@@ -191,7 +191,7 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
 
 
 def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
-    """Raise an error if two outputs are one file, or one is an input."""
+    """Raise a `FileError` if two outputs are the same file, or one is an input."""
     seen: list[Path] = []
     for path in outputs:
         if any(_is_same(path, other) for other in inputs):
@@ -202,7 +202,7 @@ def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
 
 
 def require_folder(path: Path) -> None:
-    """Raise `FileError`, before anything is computed, if a folder cannot be made or written."""
+    """Raise `FileError`, before anything is computed, if a folder cannot be created or written."""
     there = Path(os.path.realpath(path))
     while not os.path.lexists(there) and there != there.parent:
         there = there.parent
@@ -212,7 +212,7 @@ def require_folder(path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder, and those above it, unless it is there. Raises `FileError`."""
+    """Create a folder and its parents, unless they exist. Raises `FileError`."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -221,7 +221,7 @@ def make_folder(path: Path) -> None:
 
 @contextmanager
 def _told(verb: str, path: Path) -> Iterator[None]:
-    """Say in a `FileError` why a file cannot be read or written. ``verb``: read or write."""
+    """Turn errors of reading or writing into a `FileError`. ``verb``: read or write."""
     try:
         yield
     except FileError:
@@ -239,7 +239,7 @@ def _told(verb: str, path: Path) -> Iterator[None]:
 
 
 def _stage(path: Path, content: bytes | str) -> tuple[Path, Path]:
-    """Write content beside its place; return the file that has it, and the place."""
+    """Write content to a temporary file in the target's folder; return it and the target."""
     content = content.encode() if isinstance(content, str) else content
     target = Path(os.path.realpath(path))
     mask = os.umask(0)  # a new file gets it; a temporary one is private
@@ -262,7 +262,7 @@ def _stage(path: Path, content: bytes | str) -> tuple[Path, Path]:
 
 
 def _put_all(files: Sequence[tuple[Path, bytes | str]]) -> None:
-    """Write files; then put them in their places, one right after the other."""
+    """Write temporary files; then rename all to their targets."""
     staged: list[tuple[Path, Path]] = []
     with undisturbed():
         try:
@@ -276,7 +276,7 @@ def _put_all(files: Sequence[tuple[Path, bytes | str]]) -> None:
 
 
 def _is_same(path: Path, other: Path) -> bool:
-    """Return whether two paths lead to one file, whether or not it is there."""
+    """Return whether two paths lead to the same file, which may not exist."""
     try:
         return path.samefile(other)
     except OSError:  # one of them is not there

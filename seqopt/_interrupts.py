@@ -1,4 +1,4 @@
-"""Interrupts that wait for critical work, that call a function, or that end work in time."""
+"""Interrupts: deferred in critical sections, answered by callbacks, and raised by time limits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ENDS = tuple(
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Hold back the signals that end a program; one that came meanwhile is answered after."""
+    """Defer termination signals until the end of the block."""
     if threading.current_thread() is not threading.main_thread():  # signals are not answered here
         yield
         return
@@ -44,10 +44,10 @@ def undisturbed() -> Iterator[None]:
 
 @contextmanager
 def answered(told: Callable[[], object]) -> Iterator[None]:
-    """Answer the first of the signals that end a program by a call; a second one ends as before.
+    """Answer the first termination signal by a call; a second one is handled as before.
 
-    Signals that somebody else answers are left to him. The call comes between two instructions of
-    the main thread, and only takes note.
+    Signals with foreign handlers are left to these. The call runs between two instructions of the
+    main thread, and should only set a flag.
     """
     mine = threading.current_thread() is threading.main_thread()
     numbers = [n for n in _ENDS if mine and signal.getsignal(n) is signal.default_int_handler]
@@ -69,7 +69,7 @@ def answered(told: Callable[[], object]) -> Iterator[None]:
 
 
 def interrupt_main() -> None:
-    """Interrupt the main thread as ctrl-C does, from any other: where it waits that ends too."""
+    """Interrupt the main thread like ctrl-C, from any other thread, also while it waits."""
     main = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main:
         signal.pthread_kill(main, signal.SIGINT)
@@ -79,7 +79,7 @@ def interrupt_main() -> None:
 
 @contextmanager
 def _heard(over: threading.Event) -> Iterator[None]:
-    """Let an end be heard where interrupts are ignored, as they are in a background job."""
+    """Handle termination signals where interrupts are ignored, as in a background job."""
     before = signal.getsignal(signal.SIGINT)
 
     def end_only(*_: object) -> None:
@@ -98,9 +98,9 @@ def _heard(over: threading.Event) -> Iterator[None]:
 
 @contextmanager
 def ending(seconds: float) -> Iterator[None]:
-    """Raise `TimeoutError` between two instructions of a block that takes longer than it may.
+    """Raise `TimeoutError` between two instructions of a block that exceeds its time limit.
 
-    In the main thread alone; elsewhere a block takes as long as it takes.
+    In the main thread only; in others there is no limit.
     """
     if seconds <= 0:
         raise TimeoutError

@@ -1,4 +1,4 @@
-"""Names of a room's page that wait until somebody asks for them."""
+"""Lazily loaded names of a package."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from importlib import import_module
 def later(
     page: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return the ``__getattr__`` and ``__dir__`` of a page that loads little at first (PEP 562).
+    """Return ``__getattr__`` and ``__dir__`` of a package with lazy names (PEP 562).
 
-    ``homes``: what few commands need, by name the module of its own room that has it.
+    ``homes``: the module of the package that defines each name.
     """
     own = vars(sys.modules[page])
 

@@ -1,8 +1,8 @@
-"""What outer rooms offer to the core, which imports none of them: found by name, loaded when asked.
+"""Extension points of the core: offers of outer rooms, found by name and loaded on demand.
 
-A room that knows another amount, filter or picture adds a line here. What is not offered is missing
-and nothing else breaks. Packages of others add amounts and filters by entry points of the group
-``seqopt.parts``, users by `seqopt.register`.
+A room with another amount, filter or picture adds a line here. The core works without any of them.
+Plug-ins add amounts and filters by entry points of the group ``seqopt.parts``, users by
+`seqopt.register`.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ ADDED: dict[str, Any] = {}
 
 
 def offered(name: str) -> Any:
-    """Return what an outer room offers under a name; None where none does, or it is taken away."""
+    """Return the offer of an outer room by name; None if there is none, or the room is missing."""
     home = OFFERS.get(name, "")
     try:
         return getattr(import_module(home), name) if home else None
@@ -54,7 +54,7 @@ def offered(name: str) -> Any:
 
 
 def registered(kind: type) -> dict[str, Any]:
-    """Return what rooms, packages and users added of a kind, by name: amounts or filters."""
+    """Return the amounts or filters that rooms, plug-ins and users registered, by name."""
     points = entry_points(group="seqopt.parts")
     every = {name: offered(name) for name in PARTS} | {p.name: p.load() for p in points} | ADDED
     return {name: part for name, part in every.items() if isinstance(part, kind)}

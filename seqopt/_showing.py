@@ -1,7 +1,7 @@
-"""How values find the functions that draw them, although they may not import these.
+"""Renderers of values, found by name, since values may not import them.
 
-Pictures are made in `seqopt.report`, which imports scenes and plans, so these cannot import it in
-turn: they call `display`, which loads the function when a picture is needed.
+Pictures are drawn by `seqopt.report`, which imports scenes and plans. To avoid an import cycle
+these call `display`, which loads the function on demand.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PAGE = "report.html"  # the page in a folder that a command writes
 
 
 def display(name: str) -> Callable[..., Any]:
-    """Return the function that draws something, loaded when it is first asked for.
+    """Return the drawing function of a name, loaded on first use.
 
     Raises `ExtraError` if it needs matplotlib and that is not installed.
     """
@@ -36,7 +36,7 @@ def display(name: str) -> Callable[..., Any]:
 
 
 class Shown:
-    """Base class of values that a notebook shows as a small table with a small picture."""
+    """Base class of values that notebooks show as a small table with a picture."""
 
     __slots__ = ()
 
@@ -57,7 +57,7 @@ class Page:
         return f"<Page of {size:.1f} MB: save('report.html') writes it, open() shows it>"
 
     def _repr_html_(self) -> str:
-        """Return a frame that holds the page."""
+        """Return an ``iframe`` with the page."""
         from html import escape  # noqa: PLC0415  # for notebooks only
 
         return (

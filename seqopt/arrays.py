@@ -35,7 +35,7 @@ def skew(vectors: Floats) -> Floats:
 
 
 class Terse:
-    """Base of dataclasses that stay short at the prompt, whatever they hold.
+    """Base of dataclasses with a short representation.
 
     Arrays are shown by shape and type, long tuples by length, numbers with six digits; fields at
     their defaults are left out, and what would go beyond `_LONGEST` letters is counted. Subclasses
@@ -87,7 +87,7 @@ class FrozenValue(Terse):
 
 
 def frozen(content: _Content) -> _Content:
-    """Return the same content, arrays and sparse ones also within tuples and mappings read-only."""
+    """Return the content with arrays read-only, also sparse ones and within tuples and mappings."""
     if isinstance(content, np.ndarray):
         content.setflags(write=False)
     elif isinstance(content, _COMPRESSED):
@@ -103,7 +103,7 @@ def frozen(content: _Content) -> _Content:
 
 
 def _parts(value: FrozenValue) -> list[object]:
-    """Return the contents of the fields that count when values are compared."""
+    """Return the values of the fields that comparisons use."""
     return [getattr(value, field.name) for field in fields(value) if field.compare]  # type: ignore[arg-type]
 
 
@@ -133,7 +133,7 @@ def _is_nan(content: object) -> bool:
 
 
 def _hashable(content: object) -> object:
-    """Return something with a hash that equal contents share."""
+    """Return a hashable value, equal for equal contents."""
     if isinstance(content, np.ndarray):
         if content.dtype.kind == "f":  # -0.0 equals 0.0, and one NaN another
             content = np.where(np.isnan(content), np.nan, content + 0.0)
@@ -148,7 +148,7 @@ def _hashable(content: object) -> object:
 
 
 def _is_default(content: object, default: object) -> bool:
-    """Return whether a field is what it is where nothing is given."""
+    """Return whether a field has its default value."""
     plain = (str, int, float, tuple, type(None), Enum)
     return default is not MISSING and isinstance(content, plain) and bool(content == default)
 

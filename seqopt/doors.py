@@ -3,11 +3,11 @@
 A scene is given as such, by its name or words, by its file, or as a plan or the folder of one.
 Where a parameter says nothing else, words of the command line stand for its value:
 ``criterion="worst-ratio"``, ``limits=["payload", "F_largest=300"]``, ``grips=1e6``. With ``out``
-the same is written as by the command. Progress is shown in a notebook and at a terminal, or told to
-``progress``. A `SeqoptError` says in one line what to change.
+the files of the command are written. Progress is shown in a notebook and at a terminal, or passed
+to ``progress``. A `SeqoptError` names in one line what to change.
 
-Parameters, their types and defaults are the fields of what a command is asked, and their
-descriptions its help: these are written once.
+Parameters, types and defaults are the fields of a command's options, and descriptions their help:
+both are written once.
 """
 
 from __future__ import annotations
@@ -68,9 +68,9 @@ _T = TypeVar("_T")
 def _function(
     asked: Callable[_P, Asked], returns: type[_T], about: str, example: str
 ) -> Callable[_P, _T]:
-    """Return the function of Python that a command is; ``asked``: what it takes, as a class.
+    """Return a command as a Python function; ``asked``: the class of its options.
 
-    ``about``: what it returns, in words.
+    ``about``: description of its result.
     """
     name = asked.__name__.lower()
     command = COMMANDS[name]
@@ -104,7 +104,7 @@ def _function(
 
 
 def _value(command: Any, asked: Any) -> Any:
-    """Return what a command finds; where it is asked to write that, it does."""
+    """Return the result of a command, and write its output if requested."""
     if not hasattr(command, "find"):
         answer = command.run(asked)
         found = answer.value

@@ -70,7 +70,7 @@ class GripError(SeqoptError, ValueError):
 
 
 class ProblemError(SeqoptError, ValueError):
-    """A placement problem is malformed, or a formulation cannot solve problems of its kind."""
+    """A problem is malformed, or a formulation cannot solve problems of its kind."""
 
 
 class InfeasibleError(ProblemError):
@@ -121,7 +121,7 @@ class PluginWarning(UserWarning):
 
 
 def did_you_mean(given: object, known: Iterable[str]) -> str:
-    """Return a hint at the word that was probably meant, or nothing where none or two are near.
+    """Return a suggestion for a mistyped word, or an empty string if none or two are near.
 
     >>> did_you_mean("overlap_pd", ["cascade", "overlap_dp"])
     ' (did you mean overlap_dp?)'

@@ -1,4 +1,4 @@
-"""The shortest way: from a scene to a plan in one call."""
+"""From a scene to a plan in one call."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ SEARCH = "search"  # the order that is sought
 
 @dataclass(frozen=True)
 class Defaults:
-    """What is taken where nothing is asked for, in Python and on the command line alike."""
+    """Defaults of criterion, aims and engine, in Python and on the command line."""
 
     criterion: Criterion
     aim: str = ""
@@ -54,7 +54,7 @@ DEFAULTS = {FREE: Defaults(WORST_OVER_METHODS, "minmax"), "any other": Defaults(
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """How a plan is searched for, and what that may use.
+    """Settings of a search, and its resources.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
 def _with_defaults(
     criterion: Criterion | str | None, aim: str | None, over: RobustAim | str, *, states: bool
 ) -> tuple[Criterion, str | tuple[()]]:
-    """Return criterion and aims of a problem, or their defaults."""
+    """Return the given criterion and aims, or their defaults."""
     usual = DEFAULTS[FREE if states else "any other"]
     of_totals = str(over) != str(WORST_PEAK)  # they are of sums
     return find_criterion(criterion or usual.criterion), aim or (not of_totals and usual.aim) or ()
@@ -212,7 +212,7 @@ def _with_defaults(
 def _chooses_states(
     moves: Schedule | FreeRules, formulation: str | None, others: Sequence[object] = ()
 ) -> bool:
-    """Return whether states are chosen, and not candidates; ``others``: what also asks for it."""
+    """Return whether states are chosen, not candidates; ``others``: options that need states."""
     if any(others) or not in_layers(moves):
         return True
     named = None if formulation is None else find_formulation(formulation)
@@ -227,7 +227,7 @@ def _find_moves(
     rules: FreeRules | Sequence[str] | str | None,
     where: str = "rules",
 ) -> Schedule | FreeRules:
-    """Return the open grips of a schedule, or the rules of the free one, in words or as values.
+    """Return a schedule with open grips, or the rules of the free one, from words or values.
 
     ``where``: rules, for messages.
     """

@@ -28,7 +28,7 @@ TIMED = ("free", "alike", "kinds", "move", "column", "origin", "prepares", "acts
 
 
 def stored(instance: Instance) -> bytes:
-    """Return the archive of an instance; the same instance gives the same bytes."""
+    """Return the archive of an instance, bitwise reproducible."""
     arrays: dict[str, np.ndarray] = {
         "source": instance.source,
         "target": instance.target,
@@ -64,7 +64,7 @@ def stored(instance: Instance) -> bytes:
 
 
 def _narrow(values: np.ndarray) -> np.ndarray:
-    """Return whole numbers in as few bytes as hold them."""
+    """Return integers in the smallest type that holds them."""
     if values.dtype.kind not in "iu":
         return values
     low, high = values.min(initial=0), values.max(initial=0)
@@ -92,7 +92,7 @@ def _named(name: str) -> zipfile.ZipInfo:
 
 
 def read(path: Path) -> Instance:
-    """Return the instance of a file; a `FileError` says what is wrong with it."""
+    """Read the instance of a file; raise a `FileError` that names the fault."""
     if path.suffix in WRITERS and path.suffix != ".npz":
         raise FileError(f"{path}: {path.suffix} is written for solvers, not read; give the .npz")
     content = read_bytes(path)
@@ -115,7 +115,7 @@ def read(path: Path) -> Instance:
 
 
 def _arrays(document: dict[str, Any], archive: Archive) -> dict[str, np.ndarray]:
-    """Return the arrays that a document declares, each of the shape and kind that it should be."""
+    """Return the arrays that a document declares, after checks of shape and type."""
     nodes, arcs, timed = document["nodes"], document["arcs"], document["timed"]
     names = [f"amount_{k}" for k in range(len(document["columns"]))]
     more = [f"timed_{name}" for name in (*TIMED, "longest")] if timed else []
@@ -137,7 +137,7 @@ def _arrays(document: dict[str, Any], archive: Archive) -> dict[str, np.ndarray]
 
 
 def _timed_arrays(archive: Archive, nodes: int, arcs: int) -> dict[str, np.ndarray]:
-    """Return the arrays of acts; numbers in them stand for columns, arcs and kinds that exist."""
+    """Return the arrays of acts, after checks of their indices of columns, arcs and kinds."""
     kinds = archive.array("timed_kinds", "iu", (None,))
     c, k = len(kinds), int(kinds.max(initial=-1)) + 1
     move = archive.array("timed_move", "iu", (None,))
@@ -160,7 +160,7 @@ def _timed_arrays(archive: Archive, nodes: int, arcs: int) -> dict[str, np.ndarr
 
 
 def _require_between(name: str, numbers: np.ndarray, least: int, end: int) -> None:
-    """Raise an error unless whole numbers are from one on and below another."""
+    """Raise a `ValueError` unless integers are from one bound on and below another."""
     if numbers.size and not least <= int(numbers.min()) <= int(numbers.max()) < end:
         worst = int(numbers.min() if int(numbers.min()) < least else numbers.max())
         raise ValueError(f"{name}: {worst} is not from {least} to {end - 1}")
@@ -179,7 +179,7 @@ def _check(document: object, path: Path) -> None:
 
 
 def _instance(document: dict[str, Any], arrays: dict[str, np.ndarray]) -> Instance:
-    """Return the instance of a document that obeys the schema, and its arrays."""
+    """Return the instance of a valid document and its arrays."""
     count, names = document["nodes"], tuple(column["name"] for column in document["columns"])
     for name in ("source", "target", "ends"):
         _require_between(name, arrays[name], 0, count)
@@ -222,7 +222,7 @@ def _instance(document: dict[str, Any], arrays: dict[str, np.ndarray]) -> Instan
 
 
 def _require_columns(goals: Sequence[_Target], caps: Sequence[_Cap], count: int) -> None:
-    """Raise an error unless goals and caps name columns that exist, as many as they need."""
+    """Raise a `ValueError` unless goals and caps refer to existing columns, in their number."""
     for which in [c for g in goals for c in g.columns] + [cap.column or 0 for cap in caps]:
         if which and which >= count:
             raise ValueError(f"column {which} is named, and there are {count}")
@@ -320,7 +320,7 @@ def save_instance(instance: Instance, path: Path | str) -> None:
 
 
 def _all(instance: Instance) -> dict[str, bytes | str]:
-    """Return an instance in all formats by file name; CP-SAT's where times are asked."""
+    """Return an instance in all formats by file name; that of CP-SAT only with times."""
     names = {f"instance{end}": write for end, write in WRITERS.items()}
     if not instance.asks_time:
         del names["instance.pbtxt"]

@@ -1,12 +1,12 @@
-r"""An instance as one mixed-integer program, for whatever solver: what its files write down.
+r"""An instance as a mixed-integer program, the content of its files for solvers.
 
 With :math:`x_a \in \{0, 1\}` for every arc (of times: for every act), one unit flows from node 0 to
 an end. A sum is :math:`\sum c_a x_a`. A peak is :math:`t` with :math:`t \ge \sum c_a x_a` over the
 arcs of every level where all paths have one arc on each, else over the arcs to every node. A tail
 is :math:`\eta + m \sum_s u_s` with :math:`u_s \ge \sum_a c_{s a} x_a - \eta`, where :math:`m` is
-the largest weight. Of times, :math:`T_v` is when the act that leads to a node ends, and
-:math:`\rho_{v r}` since when robot :math:`r` is free there; what an act demands of these is said
-where it is taken.
+the largest weight. Of times, :math:`T_v` is the end of the act that leads to a node, and
+:math:`\rho_{v r}` the time from which robot :math:`r` is free there; the constraints of an act on
+these are active if it is taken.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ NEVER = -1  # of a row: it holds whatever is taken
 
 
 class Program(NamedTuple):
-    """Minimize ``cost @ x`` with rows between limits, some only where a 0-1 variable is 1.
+    """Minimize ``cost @ x`` with rows between limits, some active only if a 0-1 variable is 1.
 
     ``names`` (v), ``cost`` (v,), ``upper`` (v,), from 0; ``whole`` (v,) bool; ``matrix`` (r, v),
-    ``low``, ``high`` (r,); ``where`` (r,): the variable that switches a row on, or `NEVER`;
-    ``slack`` (r,): by how much it may be off where it is not; ``later`` (k, v): further goals;
+    ``low``, ``high`` (r,); ``where`` (r,): the indicator variable of a row, or `NEVER`;
+    ``slack`` (r,): its big-M, if inactive; ``later`` (k, v): further goals;
     ``rows`` (r): names.
     """
 
@@ -49,7 +49,7 @@ class Program(NamedTuple):
 
 @dataclass
 class _Draft:
-    """Rows as they are written."""
+    """Rows of the program under construction."""
 
     count: int
     at: list[tuple[Ints, Ints, Floats]] = field(default_factory=list)
@@ -67,7 +67,7 @@ class _Draft:
         limits: tuple[Floats, Floats],
         switch: tuple[Ints, float] | None = None,
     ) -> None:
-        """Add rows: places of entries, their limits, and what switches them on."""
+        """Add rows: entries, limits, and indicator variables."""
         count = len(limits[0])
         rows, columns, values = parts
         self.at.append((rows + self.total, columns, values))
@@ -81,7 +81,7 @@ class _Draft:
 
 
 def program(instance: Instance) -> Program:
-    """Return the program of the first goal; further goals are rows that nothing limits."""
+    """Return the program of the first goal; further goals are unbounded rows."""
     timed = instance.timed if instance.asks_time else None
     arc = np.arange(instance.arcs) if timed is None else timed.move
     letter, count = ("x" if timed is None else "y"), len(arc)
@@ -109,7 +109,7 @@ def program(instance: Instance) -> Program:
 
 
 class _More(NamedTuple):
-    """Variables beside arcs: where they begin, by what they are for."""
+    """Variables besides arcs: first index by purpose."""
 
     names: list[str]
     at: dict[str, int]
@@ -138,14 +138,14 @@ def _more(instance: Instance, timed: TimedGraph | None) -> _More:
 
 
 def horizon(timed: TimedGraph) -> float:
-    """Return a time by which some build has ended, s: one of least time, all in a row."""
+    """Return an upper bound of the makespan, s: the shortest path with all work in sequence."""
     graph = timed.graph
     longest = timed.prepares + timed.acts
     return float(distances(graph, longest)[graph.ends].min())
 
 
 def _flow(draft: _Draft, instance: Instance, arc: Ints) -> None:
-    """Say that one unit leaves node 0, leaves all nodes but ends, and comes to an end."""
+    """Add flow conservation of one unit from node 0 to an end."""
     source, target = instance.source[arc], instance.target[arc]
     column, ones = np.arange(len(arc)), np.ones(len(arc))
     inner = ~instance.ends
@@ -165,7 +165,7 @@ def _flow(draft: _Draft, instance: Instance, arc: Ints) -> None:
 
 
 def _goal(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, more: _More) -> Floats:
-    """Write down what a goal needs, and return its costs of variables."""
+    """Add the rows of a goal, and return its cost vector."""
     k = instance.goals.index(goal)
     if goal.kind == SUM:
         return np.asarray(instance.amounts[arc, goal.columns[0]])
@@ -187,7 +187,7 @@ def _goal(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, more: _Mo
 
 
 def _peak(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, variable: int) -> None:
-    """Say that the peak is no less than what is taken on a level, or to a node."""
+    """Add rows that bound the peak below by the amounts of each level, or of each node."""
     to = instance.target[arc]
     groups = instance.levels[to] if instance.is_layered else to
     own, rows = np.unique(groups, return_inverse=True)
@@ -210,7 +210,7 @@ def _caps(draft: _Draft, instance: Instance, arc: Ints, more: _More) -> None:
 
 
 def _times(draft: _Draft, instance: Instance, timed: TimedGraph, more: _More) -> None:
-    """Say when acts end, since when robots are free, and that nobody does two at once."""
+    """Add rows of end times of acts, and of the availability of robots."""
     move, column, big = timed.move, timed.column, more.most
     node, since, robots = more.at["node"], more.at["since"], len(timed.kinds)
     before, after = instance.source[move].astype(int), instance.target[move].astype(int)
@@ -247,7 +247,7 @@ def _after(
     least: Floats,
     switch: tuple[Ints, float],
 ) -> None:
-    """Say that one variable is no less than another and some more, row by row."""
+    """Add precedence rows: one variable is at least another plus a duration."""
     first, second = variables
     count = len(first)
     rows = np.tile(np.arange(count), 2)

@@ -28,7 +28,7 @@ def as_lp(instance: Instance) -> str:
 
 
 def _switched(found: Program) -> Program:
-    """Return a program whose rows hold always: what is not switched on may be off by a slack."""
+    """Return a program without indicators: inactive rows are relaxed by their slack (big-M)."""
     rows = np.flatnonzero(found.where != NEVER)
     slack = (found.slack + np.where(np.isfinite(found.low), found.low, 0.0))[rows]
     shape = found.matrix.shape
@@ -118,7 +118,7 @@ def _lp(instance: Instance, found: Program) -> Iterator[str]:
 
 
 def _terms(start: str, columns: np.ndarray, values: np.ndarray, names: list[str]) -> Iterator[str]:
-    """Yield lines of a sum; one of nothing has a term that is nothing."""
+    """Yield lines of a sum; an empty one has a zero term."""
     terms = [
         f"{'-' if v < 0 else '+'} {abs(float(v))!r} {names[c]}"
         for c, v in zip(columns.tolist(), values.tolist(), strict=True)
@@ -128,9 +128,9 @@ def _terms(start: str, columns: np.ndarray, values: np.ndarray, names: list[str]
 
 
 def as_cp_sat(instance: Instance) -> str:
-    """Return the text of CP-SAT's model (``CpModelProto``), with times in whole parts of a second.
+    """Return the text of CP-SAT's model (``CpModelProto``), with integer times.
 
-    Amounts become whole numbers of 1/parts, rounded down; the model's objective has the scale.
+    Amounts become integer multiples of 1/parts, rounded down; the model's objective has the scale.
     """
     found = program(instance)
     numbers = np.concatenate([found.cost, found.matrix.data, found.low[np.isfinite(found.low)]])
@@ -169,7 +169,7 @@ def _cp_sat(instance: Instance, found: Program, parts: float) -> Iterator[str]:
 def _linear(
     row: str, terms: tuple[np.ndarray, Floats], of: tuple[Program, int], scale: float
 ) -> str:
-    """Return a row, its amounts rounded so that no path is shut out."""
+    """Return a row, its amounts rounded such that all paths stay feasible."""
     found, i = of
     at, own = terms
     low, high = found.low[i] * scale, found.high[i] * scale

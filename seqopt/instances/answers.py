@@ -1,4 +1,4 @@
-"""Bare solutions of instances, from anywhere: read, and judged by arithmetic alone."""
+"""Solutions of instances from any source: read, and checked by arithmetic alone."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certi
 
 
 def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
-    """Return a solution with its bounds; a `ProblemError` names an entry that cannot be read."""
+    """Parse a solution with its bounds; raise a `ProblemError` that names an invalid entry."""
     found, where = _loaded(solution)
     if isinstance(found, Mapping):
         if unknown := {*found} - {*WHAT, "values", "bounds", "instance"}:
@@ -94,7 +94,7 @@ def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
 
 
 def _loaded(given: Any) -> tuple[Any, str]:
-    """Return what a file or a text holds, or what is given; and what to call it."""
+    """Return the content of a file or a text, or a given value; and its name in messages."""
     if isinstance(given, Path):
         return _parsed(read_text(given), str(given)), str(given)
     if isinstance(given, str):
@@ -103,7 +103,7 @@ def _loaded(given: Any) -> tuple[Any, str]:
 
 
 def _parsed(text: str, where: str) -> Any:
-    """Return what a text holds: JSON, or numbers after a word that says of what."""
+    """Parse a text: JSON, or numbers after a word that names their kind."""
     if text.lstrip()[:1] in ("{", "["):
         return parse_json(text, where, ProblemError)
     words = re.split(r"[\s,;]+", text.strip())
@@ -116,7 +116,7 @@ def _parsed(text: str, where: str) -> Any:
 
 
 def _whole(given: Any, where: str) -> Ints:
-    """Return whole numbers from 0."""
+    """Return an integer array (n,), not empty; raise a `ProblemError` for other values."""
     found = _array(given)
     if found is None or found.ndim != 1 or not len(found) or (found % 1).any():
         raise ProblemError(f"{where}: give a list of whole numbers")
@@ -124,9 +124,9 @@ def _whole(given: Any, where: str) -> Ints:
 
 
 def _array(given: Any) -> np.ndarray | None:
-    """Return numbers as an array, none of them beyond what whole numbers hold; None if not all are.
+    """Return an array of numbers below 2**63 in size; None for other values.
 
-    Nothing but numbers counts as one, nor does a list whose rows differ in length.
+    Booleans, strings and ragged lists are no numbers.
     """
     try:
         found = np.asarray(given)
@@ -138,7 +138,7 @@ def _array(given: Any) -> np.ndarray | None:
 
 
 def _values(instance: Instance, given: Any, where: str) -> tuple[float | None, ...]:
-    """Return claimed values in the order of goals, None where none is claimed."""
+    """Return claimed values by goal, None without a claim."""
     names = [goal.name for goal in instance.goals]
     if isinstance(given, Mapping):
         if unknown := {*given} - {*names}:
@@ -155,7 +155,7 @@ def _values(instance: Instance, given: Any, where: str) -> tuple[float | None, .
 
 
 def _floats(given: Any, where: str) -> Floats:
-    """Return numbers (n,), infinite where there is none."""
+    """Return numbers (n,), infinite for missing ones."""
     if isinstance(given, str | bytes | Mapping) or not isinstance(given, Iterable):
         raise ProblemError(f"{where}: give a list of numbers")
     found = np.array([np.inf if v is None else as_float(v) for v in given], dtype=float)
@@ -165,7 +165,7 @@ def _floats(given: Any, where: str) -> Floats:
 
 
 def _claim(given: Any, where: str) -> Claim:
-    """Return a claim of a mapping, or of a number alone."""
+    """Parse a claim from a mapping or a number."""
     if isinstance(given, Real):
         given = {"value": given}
     if isinstance(given, Claim):
@@ -190,7 +190,7 @@ def _claim(given: Any, where: str) -> Claim:
 
 
 def _table(given: Any, where: str) -> Floats:
-    """Return rows of numbers; one row may be given alone."""
+    """Return rows of numbers (m, n); a single row may be one-dimensional."""
     found = _array(given)
     if found is None or not 1 <= found.ndim <= 2:
         raise ProblemError(f"{where}: give rows of as many numbers each")
@@ -198,7 +198,7 @@ def _table(given: Any, where: str) -> Floats:
 
 
 def _labels(given: Any, where: str) -> tuple[Ints, Floats]:
-    """Return labels: nodes and a row of numbers for each."""
+    """Return labels: their nodes (n,) and values (n, k)."""
     if not isinstance(given, Mapping) or {*given} != {"nodes", "values"}:
         raise ProblemError(f"{where}: give nodes and values")
     return _whole(given["nodes"], f"{where}, nodes"), _table(given["values"], f"{where}, values")

@@ -1,4 +1,4 @@
-"""The instance of a problem: its whole graph, computed, and what is asked of paths through it."""
+"""Compile a problem to an instance: its complete graph, goals and caps."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def compile_instance(
 
 
 def _of_states(name: str, states: States, below: float) -> Instance:
-    """Return the instance of states: bricks that stand, and nodes that robots hold."""
+    """Return the instance of a graph of states."""
     if below < np.inf and (states.totals or not states.goals[0].is_peak):
         raise ProblemError("below: the first aim is no worst step; leave it out")
     demanded = bool(states.demands) or any(goal.margins for goal in states.goals)
@@ -124,7 +124,7 @@ def _of_states(name: str, states: States, below: float) -> Instance:
 
 
 def _targets(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap, ...]]:
-    """Return names of columns, goals and caps."""
+    """Return the names of columns, goals and caps of a problem of states."""
     names, goals, caps = list[str](), list[_Target](), list[_Cap]()
     bounds = (*[None] * len(states.aims), *states.budgets)
     for goal, bound in zip(states.goals, bounds, strict=True):
@@ -141,7 +141,7 @@ def _targets(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap
 
 
 def _cut(timed: TimedGraph, whole: Graph, kept: Ints, graph: Graph) -> TimedGraph:
-    """Return a graph in time of those nodes that are kept; what it is without time is given."""
+    """Restrict a timed graph to the kept nodes; ``graph``: the restricted one without times."""
     on = np.isin(np.arange(whole.states), kept)
     arcs = on[whole.source] & on[whole.target]
     acts = arcs[timed.move]

@@ -100,7 +100,7 @@ def _of_bricks(scene: Scene) -> tuple[list[_Node], list[_Edge]]:
 
 
 def network_of(given: Network | Scene) -> Network:
-    """Return a network, or that of a scene."""
+    """Return a network unchanged, or the network of a scene."""
     if isinstance(given, Network | Scene):
         return given if isinstance(given, Network) else build_network(given)
     kind = type(given).__name__
@@ -176,7 +176,7 @@ def _arrays(
 
 
 def _movement(spring: Joint | Ground) -> Floats:
-    """Return how the ground moves at a spring, (6,)."""
+    """Return the movement of the ground at a spring, (6,), m and rad."""
     if isinstance(spring, Joint) or spring.movement is None:
         return np.zeros(6)
     out = np.array(spring.movement)
@@ -185,7 +185,7 @@ def _movement(spring: Joint | Ground) -> Floats:
 
 
 def _axes(springs: _Springs, index_of: dict[int, int]) -> Floats:
-    """Return the axes (S, 3, 3) of springs; of one with a face the first is into its last body."""
+    """Return the axes (S, 3, 3) of springs; with a face, the first points into the second body."""
     along = np.array([spring.along for spring, _ in springs])
     across = np.array([spring.across for spring, _ in springs])
     for i, (spring, _) in enumerate(springs):

@@ -47,7 +47,7 @@ GROUND = -1  # stands for the ground where a brick's index in build order is exp
 
 
 class PartKind(IntEnum):
-    """What a node or an edge of the network is.
+    """Kind of a node or an edge of the network.
 
     Arrays are compared with its values: of a member NumPy asks the class for more, and an interrupt
     that comes just then is lost.
@@ -112,7 +112,7 @@ class Springs(FrozenValue):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Compliances(FrozenValue):
-    """The compliance of every grip, one value for each of M kinds: of hands, or arms behind them.
+    """The compliance of every grip by M kinds: of grippers, and of arms behind them.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class Compliances(FrozenValue):
     nodes: Ints
 
     def at(self, node: Ints, kind: Ints) -> Ints:
-        """Return the kinds (S, r) of grips by robots of some kind on nodes; (1, 1) if all are one.
+        """Return the kinds (S, r) of grips of robots by kind on nodes; (1, 1) if all are equal.
 
         -1 of grips whose compliance is not known.
         """
@@ -217,7 +217,7 @@ class Network(Shown, FrozenValue):
 
     @cached_property
     def inner_weight(self) -> Floats:
-        """What of its brick's weight every inner node bears, (2B, 3), N; order of ``inner``."""
+        """Share of its brick's weight at every inner node, (2B, 3), N; order of ``inner``."""
         half = np.repeat(0.5 * self.weight, 2, axis=0)
         for i, brick in enumerate(self.scene.placed):
             if brick.node_offsets is not None:
@@ -226,7 +226,7 @@ class Network(Shown, FrozenValue):
 
     @cached_property
     def loads(self) -> tuple[Ints, Ints, Floats]:
-        """Bricks (L,) that loads and wind pull at, from which counts on (L,), wrenches (L, 6)."""
+        """Loads and wind: bricks (L,), brick counts from which they act (L,), wrenches (L, 6)."""
         scene, index = self.scene, {name: since - 1 for name, since in self.scene.since.items()}
         brick = np.array([index[load.brick] for load in scene.loads], dtype=np.int64)
         last = np.array([index[load.starts_with] for load in scene.loads], dtype=np.int64)
@@ -245,10 +245,10 @@ class Network(Shown, FrozenValue):
         return frozen((brick, 1 + np.maximum(brick, last), wrench))
 
     def applied(self, bricks: int, before: int = 0) -> Floats:
-        """Return what loads and wind apply to the bricks of a partial structure.
+        """Return the wrenches of loads and wind on the bricks of a partial structure.
 
-        ``before``: only what did not act yet on as many bricks. Result (b, 6): force and moment
-        about the centroid, N and N m.
+        ``before``: only those that do not act yet at this brick count. Result (b, 6): force and
+        moment about the centroid, N and N m.
         """
         brick, since, wrench = self.loads
         now, out = (since > before) & (since <= bricks), np.zeros((bricks, 6))
@@ -256,17 +256,17 @@ class Network(Shown, FrozenValue):
         return out
 
     def inner_load(self, bricks: int) -> Floats:
-        """Return what of weight and loads every inner node bears, (2b, 3), N.
+        """Return the share of weight and loads at every inner node, (2b, 3), N.
 
-        Of a load half each, as of a weight; its moments send nothing along the inner edges.
+        Half of a load each, as of a weight; its moments cause no force along the inner edges.
         """
         half = 0.5 * self.applied(bricks)[:, :3]
         return np.asarray(self.inner_weight[: 2 * bricks] + np.repeat(half, 2, axis=0))
 
     def ground_motion(self, bricks: int) -> Floats:
-        """Return how nodes move with the ground while no brick does, (n, 3), m.
+        """Return the displacements (n, 3) of nodes by the ground with fixed bricks, m.
 
-        A base node moves with the ground, the joint node before it half as far as the ground there.
+        A base node moves with the ground, its joint node half as far.
         """
         out, springs = np.zeros((self.count_nodes(bricks), 3)), self.springs
         for s in np.flatnonzero((springs.since <= bricks) & springs.movement.any(axis=1)):
@@ -289,12 +289,12 @@ class Network(Shown, FrozenValue):
 
     @cached_property
     def derived(self) -> dict[str, Any]:
-        """What later rooms derive from the network alone and keep with it, by name."""
+        """Values that outer rooms derive from the network alone and cache with it, by name."""
         return {}
 
     @cached_property
     def lever(self) -> float:
-        """The length of the longest inner edge, by which moments are measured, m."""
+        """The length of the longest inner edge, which scales moments, m."""
         ends = self.node_position[self.inner]
         return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
 
@@ -319,7 +319,7 @@ class Network(Shown, FrozenValue):
     def index_of_grip(self) -> tuple[Ints, Ints]:
         """Numbers of inner nodes, (2B,) ascending, and their indices in ``inner.ravel()``.
 
-        A node that must not be held has an index after all others.
+        A node that cannot be held has an index after all others.
         """
         numbers = np.array([self.node_name[i] for i in self.inner.ravel()], dtype=np.int64)
         order = np.argsort(numbers)
@@ -328,10 +328,10 @@ class Network(Shown, FrozenValue):
 
     @cached_property
     def index_from_first(self) -> tuple[int, Ints]:
-        """Number before the first of inner nodes, and what numbers from it on have for an index.
+        """Offset of the numbers of inner nodes, and a table of their indices.
 
-        As `index_of_grip`; of numbers that it does not know, and beyond some gaps, it comes after
-        all others.
+        As `index_of_grip`; unknown numbers, and those beyond large gaps, have an index after all
+        others.
         """
         known, index = self.index_of_grip
         near = known - known[0] < 2 * len(known)
@@ -340,11 +340,11 @@ class Network(Shown, FrozenValue):
         return int(known[0]) - 1, frozen(out)
 
     def count_nodes(self, bricks: int) -> int:
-        """Return how many nodes a partial structure has."""
+        """Return the number of nodes of a partial structure."""
         return int(np.searchsorted(self.node_since, bricks, side="right"))
 
     def count_edges(self, bricks: int) -> int:
-        """Return how many edges a partial structure has."""
+        """Return the number of edges of a partial structure."""
         return int(np.searchsorted(self.edge_since, bricks, side="right"))
 
     def plot(self, bricks: int | None = None) -> Figure:
@@ -389,10 +389,10 @@ class Network(Shown, FrozenValue):
         return view
 
     def bodies(self, bricks: int) -> nx.Graph[int]:
-        """Return the bricks of a partial structure and the ground, as springs tie them.
+        """Return the graph of bricks and ground of a partial structure, connected by springs.
 
-        Bricks by place in build order, the ground as `GROUND`. A spring without any stiffness ties
-        nothing.
+        Bricks are indices in build order, the ground is `GROUND`. A spring without stiffness is no
+        edge.
         """
         from networkx import Graph  # noqa: PLC0415  # as for the whole graph
 

@@ -1,16 +1,14 @@
-"""Blocks of states, and what an engine answers for one: the unit that is computed, sent, stored.
+"""Blocks of states, and their responses: the unit of computing, of messages, and of caching.
 
-A state is a brick count and the nodes held. How many states make a block depends on nothing but
-the schedule, so that answers are the same to the last bit wherever and by whomever a block is
-answered.
+A state is a brick count and the nodes held. The size of blocks depends on the schedule alone, so
+that responses are bitwise equal in any process.
 
-For other processes the scene is sent, and the engine made where it is needed.
+Other processes receive the scene, and build the engine themselves.
 
-In a folder of answers every block is a file of its own, written whole: a checksum of all that
-follows, the numbers, then what the engine counted. No more is read than an answer to the block can
-be, and a file is believed only if it is whole and its block's own: whatever is damaged is computed
-again. Against somebody who writes false numbers with their checksum there is
-`seqopt.judge.certificate`.
+In a cache folder every block is a file, written atomically: a checksum of the rest, the numbers,
+then the counts of the engine. Reading is limited to the size of the block's answers, and a file is
+used only if it is complete and belongs to the block: damaged ones are computed again. Against
+forged files with valid checksums there is `seqopt.judge.certificate`.
 """
 
 from __future__ import annotations
@@ -59,7 +57,7 @@ _Tally = tuple[tuple[object, int], ...]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Block(FrozenValue):
-    """States with one brick count, and what is to be known of them."""
+    """States with one brick count, and the requested responses."""
 
     bricks: int  # how many bricks stand
     grips: Ints  # (S, r); numbers of grips, as `seqopt.Scene.grip_numbers` has them
@@ -70,7 +68,7 @@ class Block(FrozenValue):
 
     @cached_property
     def key(self) -> str:
-        """Its content, condensed."""
+        """Hash of its content."""
         exact = (*(() if self.screen else ("exact",)), *self.props)
         exact += ("compiled",) if self.compiled else ()
         mark = hashlib.sha256(repr((self.bricks, self.names, self.grips.shape, *exact)).encode())
@@ -79,7 +77,7 @@ class Block(FrozenValue):
 
     @property
     def work(self) -> float:
-        """About how long it takes, in no unit: what an engine does grows with the bricks."""
+        """Estimated work, without unit: it grows with the bricks."""
         return work(len(self.grips), self.bricks)
 
 
@@ -87,13 +85,13 @@ COMPILED = 2e7  # work from which on compiled loops save more than loading them 
 
 
 def work(states: int, bricks: int) -> float:
-    """Return about how long states take, in no unit."""
+    """Return the estimated work of states, without unit."""
     return float(states * (bricks + 20))  # 20: what every state costs, however small it is
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Answers(FrozenValue):
-    """What an engine answers for a block.
+    """The responses of a block.
 
     ``values`` (S,): the responses asked for, SI units; ``forces`` (S, r): sizes of the forces of
     the grips, N; ``tally`` (object, int): what the engine counted meanwhile, if it counts:
@@ -106,7 +104,7 @@ class Answers(FrozenValue):
 
 
 def join_answers(parts: Sequence[Answers]) -> Answers:
-    """Return the answers to blocks one after the other, one at least."""
+    """Concatenate the answers to blocks, at least one."""
     values = {name: np.concatenate([a.values[name] for a in parts]) for name in parts[0].values}
     tally = sum((Counter(dict(part.tally)) for part in parts), Counter[object]())
     return Answers(values, np.concatenate([part.forces for part in parts]), tuple(tally.items()))
@@ -138,15 +136,15 @@ def answer(engine: Engine, block: Block) -> Answers:
 
 
 def tally_of(engine: Engine) -> dict[object, int]:
-    """Return what an engine counts, empty if it does not. Result: its own: adding to it counts."""
+    """Return the counts of an engine, to update in place; an empty mapping if it has none."""
     found = getattr(engine, "tally", None)
     return found if isinstance(found, dict) else {}
 
 
 def packed(engine: Engine) -> bytes:
-    """Return an engine as it is sent: how to make it, or itself where nobody knows.
+    """Pickle the recipe of an engine, or the engine itself if it has none.
 
-    Raises `SceneError` if it is one's own and cannot be sent.
+    Raises `SceneError` if a user's engine cannot be pickled.
     """
     recipe = _known_recipe(engine)
     try:
@@ -159,22 +157,22 @@ def packed(engine: Engine) -> bytes:
 
 
 def _known_recipe(engine: Engine) -> Recipe | None:
-    """Return how to make an engine again; None if not by name, or not of its scene's network."""
+    """Return the recipe of an engine; None if it has none, or one for another network."""
     recipe = recipe_of(engine)
     return recipe if recipe is not None and recipe.network == engine.network else None
 
 
 def remade(content: bytes) -> Engine:
-    """Return an engine that was `packed`, newly made."""
+    """Build an engine from its `packed` form."""
     found: Recipe | Engine = pickle.loads(content)  # our own, of `packed`
     return found.make() if isinstance(found, Recipe) else found
 
 
 class _Made(threading.local):
-    """The engines that each thread of a worker makes, the last two: of one run and the next.
+    """The last two engines of each thread of a worker: of consecutive runs.
 
-    An executor of others offers no place for what its workers keep between tasks; without one
-    each task would make its engine, and grow it, anew.
+    Executors of users have no storage for workers' data between tasks; without this cache each
+    task would build its engine again.
     """
 
     def __init__(self) -> None:
@@ -185,7 +183,7 @@ _OF_THREAD = _Made()
 
 
 def unpacked(engine: Engine | bytes) -> Engine:
-    """Return an engine, or what was `packed` made by this worker."""
+    """Return an engine unchanged, or the cached one of a `packed` form."""
     return _OF_THREAD.engine(engine) if isinstance(engine, bytes) else engine
 
 
@@ -195,10 +193,10 @@ _WORDS = 2**16  # bytes that what an engine counted takes at most
 
 
 class Store:
-    """The answers of one engine in a folder.
+    """The cached answers of one engine in a folder.
 
-    ``folder``: made if it is not there; ``engine``: made by name. Raises `FileError` if the folder
-    cannot be written; `SceneError` if nobody can say what the engine's answers depend on.
+    ``folder``: created if missing; ``engine``: made by name. Raises `FileError` if the folder
+    cannot be written; `SceneError` if the engine has no recipe to form keys from.
     """
 
     def __init__(self, folder: Path, engine: Engine) -> None:
@@ -226,7 +224,7 @@ class Store:
         return hashlib.sha256(f"{block.key} {payloads}".encode()).hexdigest()
 
     def find(self, block: Block) -> Answers | None:
-        """Return the answers to a block, if they are there and whole."""
+        """Return the cached answers to a block; None if they are missing or damaged."""
         sets, columns = len(block.grips), len(block.names) + block.grips.shape[1]
         words = _DIGEST + 8 * sets * columns
         try:
@@ -263,12 +261,12 @@ class Store:
 
 
 def open_store(folder: Path | str | None, engine: Engine) -> Store | None:
-    """Return the store of an engine's answers in a folder. ``folder``: None for none."""
+    """Return the store of an engine's answers; None without a folder."""
     return None if folder is None else Store(Path(folder), engine)
 
 
 def _tidy(folder: Path) -> None:
-    """Take away what runs that were killed left half-written."""
+    """Delete temporary files of killed runs."""
     for path in folder.glob(f"{HIDDEN}*"):
         try:
             if time.time() - path.stat().st_mtime > _LEFT:
@@ -285,7 +283,7 @@ BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in t
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StepChoices(FrozenValue):
-    """One open step of a schedule and what every choice in it leads to.
+    """One open step of a schedule, and the responses of every choice.
 
     Attributes
     ----------
@@ -345,7 +343,7 @@ class Batch(FrozenValue):
 
     @property
     def count(self) -> int:
-        """How many blocks there are."""
+        """Number of blocks."""
         return max(-(-len(self.states) // BLOCK), 1)
 
     def choices(self, answers: Sequence[Answers]) -> list[StepChoices]:
@@ -389,17 +387,17 @@ def steps_of_batches(schedule: Schedule) -> list[list[list[OpenStep]]]:
 
 
 def _shape(schedule: Schedule, step: OpenStep) -> tuple[int, ...]:
-    """Return how many candidates each open move of a step has."""
+    """Return the number of candidates of each open move of a step."""
     return tuple(len(schedule.moves[m].candidates) for m in step.moves)
 
 
 def choices_of(schedule: Schedule, step: OpenStep) -> int:
-    """Return how many choices a step has, impossible ones among them."""
+    """Return the number of choices of a step, including infeasible ones."""
     return math.prod(_shape(schedule, step))
 
 
 def batch_of(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> Batch:
-    """Return what open steps with as many bricks and as many grips have in common."""
+    """Group open steps of equal numbers of bricks and grips, with their distinct states."""
     names = tuple(frozenset(wanted(schedule.moves[step.moves[-1]].bricks)) for step in steps)
     choices = [combinations(schedule, step) for step in steps]
     possible = tuple(
@@ -413,7 +411,7 @@ def batch_of(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> B
 
 
 def for_arms(scene: Scene, step: OpenStep, rows: Ints) -> Bools:
-    """Return which choices (P,) of a step arms can be in.
+    """Return which choices (P,) of a step are feasible for arms.
 
     ``rows`` (P, r): nodes held, by the robots that hold any, in their order.
     """
@@ -428,7 +426,7 @@ def for_arms(scene: Scene, step: OpenStep, rows: Ints) -> Bools:
 
 
 def distinct(rows: Ints) -> tuple[Ints, Ints]:
-    """Return the distinct rows, ascending, and which of them each row is.
+    """Return the distinct rows, ascending, and the index of each row among them.
 
     Four times as fast as ``numpy.unique``, which sorts rows as if they were text.
 
@@ -444,7 +442,7 @@ def distinct(rows: Ints) -> tuple[Ints, Ints]:
 
 
 def _robots_holding(step: OpenStep) -> list[int]:
-    """Return which of the scene's robots grip."""
+    """Return the indices of the scene's robots that grip in a step."""
     return [i for i, grip in enumerate(step.grips) if grip is not None]
 
 
@@ -478,7 +476,7 @@ _SHARE = 0.8  # of the free memory that responses and costs may take
 
 
 def _bytes_of_choices(schedule: Schedule, wanted: Wanted) -> int:
-    """Return about how many bytes the responses of all choices of a schedule take."""
+    """Estimate the memory of the responses of all choices of a schedule, bytes."""
     return sum(
         _NUMBER * (len(wanted(schedule.moves[step.moves[-1]].bricks)) + _BESIDE) * choices
         for step, choices in _open_steps(schedule)
@@ -486,7 +484,7 @@ def _bytes_of_choices(schedule: Schedule, wanted: Wanted) -> int:
 
 
 def _bytes_of_costs(schedule: Schedule) -> int:
-    """Return about how many bytes all costs take while responses come step by step."""
+    """Estimate the memory of all costs if responses are computed step by step, bytes."""
     of_moves: dict[tuple[int, ...], int] = {}
     of_bricks = Counter[int]()
     for step, choices in _open_steps(schedule):
@@ -497,15 +495,15 @@ def _bytes_of_costs(schedule: Schedule) -> int:
 
 
 def _open_steps(schedule: Schedule) -> Iterator[tuple[OpenStep, int]]:
-    """Yield the open steps and how many choices each has."""
+    """Yield the open steps and their numbers of choices."""
     return ((step, choices_of(schedule, step)) for step in schedule.steps if step.moves)
 
 
 def require_memory(schedule: Schedule, wanted: Wanted, most: float | None = None) -> bool:
-    """Return whether the responses of all choices can be kept, and not only their costs.
+    """Return whether memory suffices for the responses of all choices, not only for costs.
 
     ``most``: bytes that may be used; by default `_SHARE` of the free memory. Raises
-    `MemoryShortError` if not even the costs can be kept.
+    `MemoryShortError` if it does not suffice for the costs.
     """
     most = _SHARE * free_memory() if most is None else most
     if _bytes_of_choices(schedule, wanted) <= most:

@@ -1,4 +1,4 @@
-r"""Joint stiffnesses from load tests of one's own: what the tests fix, and what they leave open.
+r"""Calibration of joint stiffness by load tests: identifiable factors, and their intervals.
 
 A test is a force on a brick of a scene and how far the loaded point moved along it. All joints and
 ground ends of all scenes are made stiffer by two factors, one in translation and one in rotation,
@@ -64,7 +64,7 @@ class StiffnessFit(Terse):
 
 
 def calibrate(tests: pd.DataFrame) -> StiffnessFit:
-    """Return the joint stiffnesses that load tests speak for, and what they leave open.
+    """Fit factors on joint stiffness to load tests, with intervals of what is not identified.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def calibrate(tests: pd.DataFrame) -> StiffnessFit:
 
 
 def _loaded(number: int, row: Mapping[Any, Any]) -> Network:
-    """Return the network of a test with its load and nothing else."""
+    """Return the network of a test with its load as the only one."""
     where, moved = f"test {number}", row["displacement_mm"]
     if not isinstance(moved, int | float) or not 0 < moved < np.inf:
         raise SceneError(f"{where}: displacement_mm is {moved}; give mm along the force")

@@ -4,8 +4,8 @@ Beside the responses of `seqopt.responses.quantities` there are those that belon
 force of each (``F_`` and its name, as `robot_response` writes it), of the one that takes its grip
 (``F_move``) and the largest (``F_largest``), sizes without sign.
 
-Where the responses of all choices are more than the memory that may be used, they come one brick
-count after the other, so that costs alone can be kept.
+If the responses of all choices exceed the memory limit, they are computed by brick count, and only
+costs are kept.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Evaluation(Terse):
         return analyze(self.engine, self.given)
 
     def table_of_given(self, names: Iterable[str]) -> pd.DataFrame:
-        """Return the table of `seqopt.analyze` of given steps, with tolerances among responses."""
+        """Return the table of `seqopt.analyze` of given steps, with the tolerances in ``names``."""
         table = self._given_table
         for name in {*filter(is_tolerance, names)}:
             table = with_tolerances(self.engine, self.given, table, name)
@@ -97,15 +97,15 @@ class Evaluation(Terse):
 
     @property
     def work(self) -> float:
-        """About how much work it is."""
+        """Estimated work, without unit."""
         steps = (step for step in self.schedule.steps if step.moves)
         return sum(work(choices_of(self.schedule, step), step.bricks) for step in steps)
 
     @cached_property
     def streams(self) -> bool:
-        """Whether there is memory for costs alone: responses then come, and go, step by step.
+        """Whether memory suffices for costs alone: responses are then computed step by step.
 
-        Raises `MemoryShortError` if there is not even that.
+        Raises `MemoryShortError` if it does not suffice for costs either.
         """
         return not require_memory(self.schedule, self.wanted, self.resources.max_memory)
 
@@ -113,7 +113,7 @@ class Evaluation(Terse):
     def steps(self) -> tuple[StepChoices, ...]:
         """All open steps, in order.
 
-        Raises `MemoryShortError` if there is not the memory to keep them.
+        Raises `MemoryShortError` if memory does not suffice for them.
         """
         if self.streams:
             raise MemoryShortError(
@@ -125,10 +125,10 @@ class Evaluation(Terse):
     def levels(self) -> Generator[Sequence[StepChoices], None, None]:
         """Return all open steps, in order, those of one brick count after the other.
 
-        They are computed as they are taken, and kept for the next time where there is memory.
+        They are computed lazily, and cached if memory suffices.
 
         Raises `MechanismError`, `SolverError`, `WorkerError` as the engine does, and the workers;
-        `MemoryShortError` if there is not the memory.
+        `MemoryShortError` if memory does not suffice.
         """
         keep = not self.streams
         if self._kept and keep:
@@ -147,7 +147,7 @@ class Evaluation(Terse):
 
     @cached_property
     def _kept(self) -> list[_Found]:
-        """What was found, once all levels were computed."""
+        """The evaluation, after computing all levels."""
         return []
 
     @property
@@ -158,18 +158,18 @@ class Evaluation(Terse):
 
     @property
     def models(self) -> int:
-        """How many different models there are: a model is a brick count and the nodes held."""
+        """Number of distinct models: a model is a brick count and the nodes held."""
         return self._found.models
 
     @property
     def seconds(self) -> float:
-        """How long solving them took, s."""
+        """Run time of solving them, s."""
         return self._found.seconds
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Found(Terse):
-    """What is kept of an evaluation; no steps where there is not the memory."""
+    """Cached results of an evaluation; without steps if memory does not suffice."""
 
     steps: tuple[StepChoices, ...]
     models: int
@@ -177,7 +177,7 @@ class _Found(Terse):
 
 
 def _by_level(evaluation: Evaluation) -> Generator[tuple[list[StepChoices], int], None, None]:
-    """Yield the steps with one brick count after the other, and how many models they have."""
+    """Yield the steps by brick count, with their number of models."""
     schedule = evaluation.schedule
     levels = steps_of_batches(schedule)
     under_way: deque[list[Batch]] = deque()
@@ -205,10 +205,10 @@ def _by_level(evaluation: Evaluation) -> Generator[tuple[list[StepChoices], int]
 
 
 def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
-    """Return how many distinct models a search of one move after the other looks at.
+    """Return the number of distinct models of a search move by move.
 
-    A step that two moves share is then solved for the later one's candidates only, the earlier
-    choice being made.
+    A step shared by two moves is then solved for candidates of the later one only, given the
+    earlier choice.
 
     ``choice``: the chosen candidate of every move.
     """
@@ -219,7 +219,7 @@ def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
 
 
 def _window_states(schedule: Schedule, step: OpenStep, choice: Sequence[int]) -> np.ndarray:
-    """Return the nodes held (S, r), ascending, for what is open once the earlier move is made."""
+    """Return the nodes held (S, r), ascending, of open choices given the earlier move."""
     if len(step.moves) == 2:
         first = step.moves[0]
         node = schedule.moves[first].candidates[choice[first]]

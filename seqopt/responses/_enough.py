@@ -1,4 +1,4 @@
-"""Which model was enough, what a more detailed one would have changed, and what was left out."""
+"""Model sufficiency: whether a more detailed model would change results, and neglected effects."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _KNOWN = AutoEngine, PlanarEngine, ComplianceEngine, OpeningEngine
 
 @dataclass(frozen=True, repr=False)
 class Enough(Terse):
-    """What computed the steps of builds, and what is known of models that were not taken.
+    """The model of the steps of builds, and the estimated effect of other models.
 
     ``engine``: its name; ``others``: what more detailed ones would change here, in words;
     ``joint``, ``step``: which joint comes closest to its elastic limits, and where; empty where
@@ -41,23 +41,23 @@ class Enough(Terse):
     left_out: tuple[str, ...]
 
     def facts(self) -> dict[str, object]:
-        """Return it as numbers and words, for scripts."""
+        """Return the fields, ready for JSON."""
         said = asdict(self)
         return said | {"below_limit_Pa": said.pop("below_limit")}
 
     @property
     def lines(self) -> tuple[str, str]:
-        """The same in two lines, for people."""
+        """The sufficient model and its neglected effects, a line each."""
         return f"enough: {self.engine}; {self.others}", f"left out: {'; '.join(self.left_out)}"
 
 
 def what_was_enough(
     within: LinearRange, builds: Mapping[str, _Columns], *, staged: bool = False
 ) -> Enough:
-    """Return which model was enough for builds, by their tables of responses.
+    """Return the sufficient model of builds, given their tables of responses.
 
-    ``within``: what says where they leave the linear range; ``staged``: whether steps carry what
-    earlier ones lock in; how close joints come to their limits is then not known.
+    ``within``: the linear range of their engine; ``staged``: whether steps include locked-in forces
+    of earlier ones; the margins of joints to their limits are then not known.
     """
     engine, recipe = within.engine, recipe_of(within.engine)
     each = [(*within.closest(table), name) for name, table in builds.items()]
@@ -75,7 +75,7 @@ def what_was_enough(
 
 
 def _others(within: LinearRange, below: float, where: str) -> str:
-    """Return what more detailed engines would change, in words; ``below``: the limits, Pa."""
+    """Describe what more detailed engines would change; ``below``: margin to the limits, Pa."""
     engine = within.engine
     if isinstance(engine, OpeningEngine):
         return "none is more detailed"
@@ -101,7 +101,7 @@ def _others(within: LinearRange, below: float, where: str) -> str:
 def _left_out(
     within: LinearRange, builds: Mapping[str, _Columns], *, staged: bool
 ) -> Iterator[str]:
-    """Yield what the model has not, as far as it could matter in these builds."""
+    """Yield effects that the model neglects and that may matter in these builds."""
     every, moved = within.engine.network.scene.robots, RESPONSES["D_max"]
     kinds = within.engine.network.scene.grip_kinds
     rigid = ~kinds.gives[kinds.of_robot[: len(every)]]  # props come after robots
@@ -124,9 +124,9 @@ def _left_out(
 
 
 def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
-    """Return by how much grips may be off, in brackets.
+    """Describe the tolerance of grips, in parentheses.
 
-    Nothing where that is not linear, takes long, or a payload is exceeded wherever they are.
+    Empty if the engine is not linear, there are many bricks, or a payload is exceeded anyway.
     """
     scene = within.engine.network.scene
     if not is_linear(within.engine) or len(scene.bricks) > _FEW:

@@ -1,7 +1,6 @@
-"""Responses of grip sets, computed when they are first needed, and kept.
+"""Responses of grip sets, computed on demand and cached.
 
-For searches among more sets than need to be solved: all sets that are asked for at once are
-solved in batches, each of them once.
+For searches that need few of many sets: the sets of a request are solved in batches, each once.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ from seqopt.work.progress import Progress
 
 
 class KnownRows:
-    """Rows of values by a key and a code, each computed once; ``count``: how many were.
+    """Cached rows of values by a key and a code; ``count``: the number computed.
 
     >>> rows = KnownRows()
     >>> codes = np.array([3, 1, 3])
@@ -56,11 +55,11 @@ class KnownRows:
 
     @property
     def nbytes(self) -> int:
-        """How much memory the rows take."""
+        """Memory of the rows, bytes."""
         return sum(codes.nbytes + values.nbytes for codes, values in self._known.values())
 
     def known(self, key: object, codes: Ints) -> Floats:
-        """Return the first values (n,) of rows that are known already; NaN of others."""
+        """Return the first values (n,) of cached rows; NaN of others."""
         known, values = self._known.get(key, (codes[:0], None))
         if values is None or not len(known):
             return np.full(len(codes), np.nan)
@@ -68,7 +67,7 @@ class KnownRows:
         return np.where(known[at] == codes, values[at, 0], np.nan)
 
     def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
-        """Return the rows of codes, those that are new computed now, all together.
+        """Return the rows of codes; those not cached are computed as one batch.
 
         ``key``: codes of other keys are others; ``codes`` (n,); ``compute``: returns the rows (m,
         k) of distinct codes, given the places (m,) where they first stand among those asked for.
@@ -128,12 +127,12 @@ class GripSets:
 
     @property
     def solved(self) -> int:
-        """How many different grip sets were solved."""
+        """Number of distinct grip sets solved."""
         return self._known.count
 
     @property
     def nbytes(self) -> int:
-        """How much memory their responses take."""
+        """Memory of the responses, bytes."""
         return self._known.nbytes
 
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats]:
@@ -156,7 +155,7 @@ class GripSets:
         return responses, forces
 
     def _found(self, bricks: int, nodes: Ints) -> Floats:
-        """Return responses and forces of sets (S, r), those that are new solved now: (S, R + r)."""
+        """Return responses and forces (S, R + r) of sets (S, r); those not cached are solved."""
 
         def solve(new: Ints) -> Floats:
             grips = self._number[nodes[new]]
@@ -175,9 +174,9 @@ class GripSets:
 def solve_sets(
     engine: Engine, sets: Block, resources: Resources = HERE, store: Store | None = None
 ) -> Floats:
-    """Return the responses of grip sets, then the forces of grips; infinite where a part is loose.
+    """Return responses and grip forces of grip sets; infinite for mechanisms.
 
-    ``sets``: with one brick count; ``resources``: who solves them; ``store``: what is known. Result
+    ``sets``: of one brick count; ``resources``: workers; ``store``: cached answers. Result
     (S, R + r): SI units. Raises `SolverError`, `WorkerError`.
     """
     grips, alone = sets.grips, resources.executor is None and resources.workers == 1
@@ -199,14 +198,14 @@ _CHUNKS = 32  # tasks for every worker: one that is slow, or dies, leaves little
 
 
 class _Chunk(NamedTuple):
-    """Blocks that are answered together, and their answers if they are stored."""
+    """Blocks of one task, with their answers if they are cached."""
 
     blocks: tuple[Block, ...]
     stored: list[Answers] | None = None
 
     @property
     def work(self) -> float:
-        """About how much work they are, stored or not."""
+        """Estimated work, cached or not."""
         return sum(block.work for block in self.blocks)
 
 
@@ -221,9 +220,9 @@ def answer_blocks(
 ) -> Generator[Answers, None, None]:
     """Return the answers to blocks of states, in their order.
 
-    ``blocks``: taken as they are needed; ``total``: about how much work they are; ``store``: what
-    is known; ``loose``: whether states that leave something loose have infinite answers, which are
-    not stored; else a `MechanismError` is raised.
+    ``blocks``: consumed lazily; ``total``: their estimated work; ``store``: cached answers;
+    ``loose``: whether mechanisms have infinite answers, which are not cached, instead of raising a
+    `MechanismError`.
     """
     tally = tally_of(engine)
     progress = Progress("responses", total, resources.progress)
@@ -262,7 +261,7 @@ def _answer_all(engine: Engine | bytes, portion: _Chunk, *, loose: bool) -> list
 
 
 def _answer_loose(engine: Engine, block: Block) -> Answers:
-    """Return answers, infinite of sets that leave something loose: these are found by halving."""
+    """Return answers, infinite for mechanisms, which are isolated by bisecting the block."""
     count = len(block.grips)
     try:
         return answer(engine, block)
@@ -277,13 +276,13 @@ def _answer_loose(engine: Engine, block: Block) -> Answers:
 def _split_work(
     blocks: Iterable[Block], store: Store | None, enough: float | None
 ) -> Iterator[_Chunk]:
-    """Return portions of about equal work, each of neighboring blocks; stored ones apart.
+    """Split blocks into chunks of consecutive ones, of about equal work; cached blocks apart.
 
-    Engines that grow with the structure serve ascending brick counts best, and what all states of
-    one share they prepare once: portions keep the order of the blocks, and end between brick counts
-    unless one has several portions' work.
+    Engines that grow with the structure are fastest for ascending brick counts, and factorize once
+    for all states of one: chunks keep the order of blocks, and end between brick counts unless one
+    has the work of several chunks.
 
-    ``enough``: work of a portion; None where each block is one.
+    ``enough``: work of a chunk; None for a chunk per block.
     """
     mine: list[Block] = []
     for block in blocks:
@@ -309,10 +308,10 @@ class Moved(NamedTuple):
 
 
 def most_moved(engines: Iterable[Engine], steps: Sequence[Step]) -> Moved:
-    """Return how far any node moves in any step, in the worst of some engines of alike scenes.
+    """Return the largest displacement of any node in any step, over engines of several scenes.
 
-    Displacements alone are computed, to six digits: all states with as many bricks and grips at
-    once.
+    Only displacements are computed, in single precision, in batches of equal numbers of bricks and
+    grips.
     """
     return max((_most_moved(engine, steps) for engine in engines), key=lambda moved: moved.share)
 
@@ -337,6 +336,6 @@ BAND = 1e-5  # share of a value within which six digits do not decide
 
 
 def _near(values: Floats, bound: Floats | float) -> Bools:
-    """Return which values are so close to a bound, NaN if there is none, that digits decide."""
+    """Return which values agree with a bound (NaN for none) to within single precision."""
     finite = np.where(np.isfinite(values), values, np.nan)
     return np.asarray(np.abs(finite - bound) <= BAND * np.abs(bound))

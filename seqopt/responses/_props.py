@@ -1,4 +1,4 @@
-"""What props bear, and whether that is more than they may."""
+"""Forces of props, and violations of their capacities."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def with_props(grips: Ints, props: Sequence[int]) -> Ints:
 
 
 def excess_of(props: Sequence[Prop], force: Floats) -> Floats:
-    """Return by how much the forces (S, p, 3) of props are more than they may be at most, (S,), N.
+    """Return the largest violation (S,) of capacities by forces (S, p, 3) of props, N.
 
-    That is beyond a capacity, or a pull of one that only pushes; zero where none is.
+    Force above the capacity, or tension in a prop that only pushes; zero if there is none.
     """
     out = np.zeros(len(force))
     for prop, own in zip(props, force.transpose(1, 0, 2), strict=True):
@@ -37,7 +37,7 @@ def excess_of(props: Sequence[Prop], force: Floats) -> Floats:
 
 
 def prop_cells(scene: Scene, step: Step, force: Floats) -> dict[str, object]:
-    """Return what a table of steps says of props, from their forces (p, 3); nothing without any."""
+    """Return the cells of props in a table of steps, from their forces (p, 3)."""
     if not scene.props:
         return {}
     props = scene.standing_props(step.bricks, held=bool(step.held))
@@ -52,7 +52,7 @@ def prop_cells(scene: Scene, step: Step, force: Floats) -> dict[str, object]:
 
 
 def props_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
-    """Return a row for every prop of a build: from when to when it holds, and what it bears.
+    """Return a row per prop of a build: the steps in which it holds, and its forces.
 
     Columns: ``node``, ``brick``, ``from_step``, ``to_step``, ``largest_force_N``, ``at_step``, and
     of one that only pushes ``least_push_N``, negative if it would have to pull.

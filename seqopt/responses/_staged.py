@@ -35,7 +35,7 @@ from seqopt.sequence.steps import Step, StepKind, check_sequence, require_steps
 
 
 class Placing(Enum):
-    """Where a brick is set down; forces are the same either way, displacements are not."""
+    """Where a brick is placed, which affects displacements but not forces."""
 
     FITTED = "fitted"  # onto the deformed structure, so that its joints are as planned
     PLANNED = "planned"  # where the plan has it; its joints take up what the structure moved
@@ -43,7 +43,7 @@ class Placing(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StagedState(FrozenValue):
-    """What a partial structure has come to.
+    """Accumulated displacements and forces of a partial structure.
 
     ``twist`` (6b,): of the bricks from where the plan has them, m and rad; ``wrench`` (J, 6): of
     every spring of the network on its second body, N and N m; ``carried`` (E,): by the edges,
@@ -61,7 +61,7 @@ class StagedState(FrozenValue):
 def analyze_staged(
     network: Network | Scene, steps: Sequence[Step], placing: Placing | str = Placing.FITTED
 ) -> pd.DataFrame:
-    """Return the responses of every step with everything that earlier steps lock in.
+    """Return the responses of every step, including forces that earlier steps lock in.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def staged_fields(
 
 
 def next_state(parts: Ungripped, before: StagedState, step: Step, placing: Placing) -> StagedState:
-    """Return the state that a step leads to, its grips in the order of the robots.
+    """Return the state after a step, its grips in the order of the robots.
 
     ``parts``: of the structure after the step; ``step``: that places one brick at most.
     """
@@ -176,8 +176,8 @@ def _loaded(
 ) -> StagedState:
     """Return a state with further forces (2b, 3) at inner nodes and moments (b, 3) on bricks.
 
-    Nodes that are held stay, or go as far as the ``compliance`` of their grips lets them. What
-    loads it, and which ground end moves, since there were ``before`` bricks, is added.
+    Held nodes are fixed, or supported by the ``compliance`` of their grips. Loads and movements of
+    the ground that begin after ``before`` bricks are added.
     """
     load, turn = pulls
     network, applied = parts.network, parts.network.applied(state.bricks, before)
@@ -206,8 +206,8 @@ def _loaded(
 def _fitted(network: Network, state: StagedState) -> Floats:
     """Return the twist (6,) with which the next brick fits the structure.
 
-    Its springs are as planned then; where several bricks or the ground disagree, the least energy
-    counts, and what is left over is filled without stress.
+    Its springs are then undeformed; if several bricks or the ground are incompatible, the twist of
+    least energy, with the remaining gaps filled without stress.
     """
     bricks = state.bricks + 1
     acting, gap, stiffness = spring_maps(network, bricks)

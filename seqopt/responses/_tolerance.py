@@ -1,7 +1,7 @@
-"""How far grips may be from where they should be before something is more than it may be.
+"""Tolerances: the largest misplacement of grips within all limits.
 
-Every grip may be off by as much, in any direction, each in another one. Forces and displacements
-are linear in that: one solution for every grip and direction tells the worst of all.
+All grips may be misplaced by the same distance, each in any direction. Forces and displacements are
+linear in the misplacement: one solution per grip and direction gives the worst case.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ def is_tolerance(name: str) -> bool:
 
 
 def value_text(name: str, value: float) -> str:
-    """Return what an aim or a response is worth: a length in its unit, else six digits."""
+    """Format the value of an aim or a response: a length with its unit, else six digits."""
     length = is_tolerance(name) or name == "D_max"
     return length_text(value) if length else f"{value:.6g}"
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """What must hold wherever grips are, besides the payloads of robots.
+    """Limits of a tolerance besides the payloads of robots.
 
     ``tension`` of any edge, N; ``shift`` of any node, m.
     """
@@ -54,13 +54,13 @@ class Allowed:
 
     @property
     def wanted(self) -> Want:
-        """The fields that it is about."""
+        """The fields that the limits need."""
         edges = Want.EDGES if np.isfinite(self.tension) else Want(0)
         return edges | (Want.DISPLACEMENTS if np.isfinite(self.shift) else Want(0))
 
     @property
     def name(self) -> str:
-        """The response that it is asked by: as ``tolerance[T_max=900,D_max=1e-05]``."""
+        """Its name as a response: ``tolerance[T_max=900,D_max=1e-05]``."""
         said = (("T_max", self.tension), ("D_max", self.shift))
         words = [f"{name}={most!r}" for name, most in said if np.isfinite(most)]
         return f"{TOLERANCE}[{','.join(words)}]" if words else TOLERANCE
@@ -70,7 +70,7 @@ ROBOTS_ALONE = Allowed()
 
 
 def allowed_by(name: str) -> Allowed:
-    """Return what a response allows, by its name."""
+    """Parse the limits in the name of a tolerance."""
     words = name[len(TOLERANCE) + 1 : -1].split(",") if name != TOLERANCE else []
     said = dict(word.split("=") for word in words)
     return Allowed(float(said.get("T_max", "inf")), float(said.get("D_max", "inf")))
@@ -78,7 +78,7 @@ def allowed_by(name: str) -> Allowed:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far the grips of a step may be off, and what stops them from being farther off.
+    """The tolerance of the grips of a step, and the limit that is reached first.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Tolerance:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Group:
-    """Values of one kind, n for each of S grip sets, that misplacements change."""
+    """Responses of one kind, n for each of S grip sets, that are linear in misplacements."""
 
     what: str
     own: Floats  # (S, n, 3)
@@ -124,7 +124,7 @@ class _Group:
 
 
 class _Tensions(_Group):
-    """Axial forces, the first component of the three, which may be as low as they will."""
+    """Axial forces, the first of three components, without lower limit."""
 
     def rates(self) -> tuple[Floats, Floats]:
         room = self.most - self.own[..., 0]
@@ -137,7 +137,7 @@ class _Tensions(_Group):
 
 
 def _linear(engine: Engine) -> Engine:
-    """Return the engine whose answers are linear in misplacements: of joints that never fail."""
+    """Return the engine of joints that never fail, which is linear in misplacements."""
     if isinstance(engine, OpeningEngine):
         raise ProblemError(
             f"tolerance: a {type(engine).__name__} is not linear in where grips are; take the "
@@ -151,7 +151,7 @@ def _linear(engine: Engine) -> Engine:
 def _groups(
     engine: Engine, bricks: int, grips: Ints, payload: Floats, allowed: Allowed
 ) -> Iterator[_Group]:
-    """Yield what grip sets (S, r) may make too large."""
+    """Yield the limited responses of grip sets (S, r)."""
     engine, (sets, held) = _linear(engine), grips.shape
     fields = engine.solve(bricks, grips, allowed.wanted)
     moved = np.zeros((sets, 3 * held, held, 3))
@@ -179,10 +179,10 @@ def _groups(
 
 
 def misfits(engine: Engine, bricks: int, grips: Ints, allowed: Allowed = ROBOTS_ALONE) -> Floats:
-    """Return one over how far the grips of sets may be off, (S,), 1/m.
+    """Return the reciprocals (S,) of the tolerances of grip sets, 1/m.
 
-    `NO_TOLERANCE` where something is too large with all grips in their places, and where two rigid
-    grips hold one brick: they fit in one place alone.
+    `NO_TOLERANCE` if a limit is violated without misplacement, and if two rigid grips hold one
+    brick, which any misplacement makes incompatible.
 
     ``grips`` (S, r): numbers, as of `seqopt.Scene.grip_numbers`.
     """
@@ -206,7 +206,7 @@ def _payloads(network: Network, grips: Ints) -> Floats:
 
 
 def _tied(engine: Engine, bricks: int, grips: Ints) -> Bools:
-    """Return which sets (S,) hold one brick with two rigid grips."""
+    """Return which sets (S,) have two rigid grips on one brick."""
     kinds = engine.network.scene.grip_kinds
     brick = grip_columns(engine.network, bricks, grips) // 2
     apart = -1 - np.arange(grips.shape[1])  # soft grips are on no brick together
@@ -215,7 +215,7 @@ def _tied(engine: Engine, bricks: int, grips: Ints) -> Bools:
 
 
 def step_tolerance(engine: Engine, step: Step, allowed: Allowed = ROBOTS_ALONE) -> Tolerance:
-    """Return how far the grips of a step may be off, with its proof."""
+    """Return the tolerance of the grips of a step, with its proven lower bound."""
     scene = engine.network.scene
     pairs = zip(scene.robots, step.grips, strict=True)
     holding = [robot.name for robot, node in pairs if node is not None]
@@ -241,18 +241,18 @@ def step_tolerance(engine: Engine, step: Step, allowed: Allowed = ROBOTS_ALONE) 
 
 
 def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
-    """Return what is held in every step."""
+    """Return the bricks and grips of every step."""
     return [(s.number, s.bricks, scene.grip_numbers(s.grips, s.bricks)) for s in steps]
 
 
 def is_linear(engine: Engine) -> bool:
-    """Return whether an engine is known to be linear in where grips are, in all directions."""
+    """Return whether an engine is linear in misplacements of grips in all directions."""
     known = isinstance(engine, AutoEngine | PlanarEngine)
     return known or type(engine) is ComplianceEngine
 
 
 def is_tied(engine: Engine, steps: Sequence[_Held]) -> bool:
-    """Return whether a step holds one brick with two rigid grips: these fit in one place alone."""
+    """Return whether a step has two rigid grips on one brick, and so no tolerance."""
     several = {(bricks, held) for _, bricks, held in steps if len(held) > 1}
     return any(bool(_tied(engine, bricks, np.array([held]))[0]) for bricks, held in several)
 
@@ -260,10 +260,10 @@ def is_tied(engine: Engine, steps: Sequence[_Held]) -> bool:
 def each_tolerance(
     engine: Engine, steps: Sequence[_Held], known: dict[_Key, float] | None = None
 ) -> Floats:
-    """Return how far grips may be off in every step, m.
+    """Return the tolerance of grips of every step, m.
 
-    All steps with as many grips are asked at once, equal ones once. ``known``: by bricks and what
-    is held; what is found is added.
+    Steps of equal numbers of grips are solved as one batch, equal states once. ``known``: cache by
+    bricks and grips, updated in place.
     """
     known = {} if known is None else known
     new = {(len(held), bricks, held) for _, bricks, held in steps if (bricks, held) not in known}
@@ -277,7 +277,7 @@ def each_tolerance(
 
 
 def _misfits_of(engine: Engine, keys: Sequence[tuple[int, int, tuple[int, ...]]]) -> Floats:
-    """Return what `misfits` does of grip sets of all brick counts, with as many grips each."""
+    """Return the `misfits` of grip sets of all brick counts, with equal numbers of grips."""
     out, rows = np.zeros(len(keys)), [np.arange(0)]
     groups: list[_Group] = []
     for bricks, same in groupby(range(len(keys)), key=lambda i: keys[i][1]):
@@ -302,10 +302,10 @@ _CLOSE = 1.01  # ratio of stiffnesses that are told apart
 
 
 def stiffness_for(engine: Engine, steps: Sequence[Step], distance: float) -> float | None:
-    """Return the largest stiffness of all grips, N/m, with which they may be so far off, m.
+    """Return the largest stiffness of all grips, N/m, at which the tolerance is met.
 
-    It is found by bisection: stiffer grips are not all tried. Infinite where rigid ones may be,
-    None where no stiffness from `_SOFTEST` on may.
+    Found by bisection, so that not all stiffer grips are checked. Infinite if rigid grips meet it,
+    None if no stiffness from `_SOFTEST` on does.
     """
     recipe, scene = recipe_of(engine) or Recipe(USUAL, engine.network.scene), engine.network.scene
 
@@ -329,19 +329,19 @@ COLUMN = "tolerance_mm"
 
 
 def tolerances_along(engine: Engine, steps: Sequence[Step], name: str = TOLERANCE) -> list[float]:
-    """Return how far the grips of steps may be off, mm, by a tolerance's name."""
+    """Return the tolerances of steps, mm, for a tolerance's name."""
     return [1e3 * step_tolerance(engine, step, allowed_by(name)).distance for step in steps]
 
 
 def with_tolerances(
     engine: Engine, steps: Sequence[Step], table: pd.DataFrame, name: str = TOLERANCE
 ) -> pd.DataFrame:
-    """Return a table of steps with that beside their responses."""
+    """Return a table of steps with a column of tolerances, mm."""
     return table.assign(**{COLUMN: tolerances_along(engine, steps, name)})
 
 
 def tolerance_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
-    """Return how far grips may be off in every step: a row each, mm, and what stops them."""
+    """Return a row per step with the tolerance of its grips, mm, and the limit reached first."""
     found = [step_tolerance(engine, step) for step in steps]
     return pd.DataFrame(
         {
@@ -354,6 +354,6 @@ def tolerance_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
 
 
 def misfits_along(table: _Columns) -> Floats:
-    """Return one over the tolerances of a table of steps, 1/m."""
+    """Return the reciprocals of the tolerances in a table of steps, 1/m."""
     with np.errstate(divide="ignore"):
         return np.asarray(np.minimum(1e3 / np.asarray(table[COLUMN], dtype=float), NO_TOLERANCE))

@@ -36,7 +36,7 @@ _TINY = np.finfo(float).tiny
 
 
 def worst_rates(own: Floats, influence: Floats, most: Floats) -> tuple[Floats, Floats]:
-    """Return which share of what vectors may be a misplacement of one meter uses up at most.
+    """Return the worst rate of a misplacement of one meter, as a share of the limit of vectors.
 
     ``own`` (n, 3): the vectors where nothing is misplaced; ``influence`` (n, r, 3, 3): by what
     they change, by component, for one meter of each grip, by direction; ``most`` (n,): how long
@@ -55,9 +55,9 @@ def worst_rates(own: Floats, influence: Floats, most: Floats) -> tuple[Floats, F
 def proven_rates(
     own: Floats, influence: Floats, most: Floats, direction: Floats
 ) -> tuple[Floats, Floats]:
-    """Return between which values the rates of vectors are proven to lie, (n,) each, 1/m.
+    """Return proven lower and upper bounds of the rates of vectors, (n,) each, 1/m.
 
-    ``direction`` (n, 3): in which the largest are thought to be; the others as of `worst_rates`.
+    ``direction`` (n, 3): estimates of the worst ones; else as `worst_rates`.
     """
     low, high = np.full((2, len(own)), np.inf)
     for i in np.flatnonzero(np.linalg.norm(own, axis=1) < most):
@@ -83,7 +83,7 @@ class _Vectors(NamedTuple):
         return _Vectors(*(each[rows] for each in self))
 
     def pulls(self, u: Floats) -> Floats:
-        """Return what every grip adds to them in directions (n, d, 3): (n, d, r, 3)."""
+        """Return the influence (n, d, r, 3) of every grip in directions (n, d, 3)."""
         found = u @ self.influence
         return np.asarray(found.reshape(*found.shape[:2], found.shape[2] // 3, 3))
 
@@ -99,9 +99,9 @@ def _side_by_side(influence: Floats) -> Floats:
 
 
 def _search(vectors: _Vectors) -> tuple[Floats, Floats]:
-    """Return rates (n,) and directions (n, 3): from one start where a proof says that it will do.
+    """Return rates (n,) and directions (n, 3): from one start where it is proven optimal.
 
-    Elsewhere from several, and where no proof is close yet, by triangles.
+    Elsewhere from several, and if no bound is tight, by spherical triangles.
     """
     sphere = _sphere()
     every = np.broadcast_to(sphere, (len(vectors.own), *sphere.shape))
@@ -118,7 +118,7 @@ def _search(vectors: _Vectors) -> tuple[Floats, Floats]:
 
 
 def _climb(vectors: _Vectors, start: Floats) -> tuple[Floats, Floats]:
-    """Return rates (n,) and directions (n, 3) that small turns make no larger.
+    """Return locally maximal rates (n,) and their directions (n, 3).
 
     Along its own slope a convex function of degree one is at least as large as where that was
     taken; a step of Newton's is tried beside it.
@@ -140,7 +140,7 @@ def _climb(vectors: _Vectors, start: Floats) -> tuple[Floats, Floats]:
 
 
 def _steps(vectors: _Vectors, rate: Floats, u: Floats) -> Floats:
-    """Return where the slope points, and where it would vanish along the sphere, (n, 2, 3)."""
+    """Return the directions (n, 2, 3) of the gradient and of a Newton step on the sphere."""
     pulls = vectors.pulls(u[:, None])[:, 0]
     size = _floored(np.sqrt(np.square(pulls).sum(axis=2)))[:, :, None]
     ahead = vectors.influence @ (pulls / size).reshape(len(u), 3 * pulls.shape[1], 1)
@@ -172,7 +172,7 @@ def _unit(vectors: Floats, otherwise: Floats) -> Floats:
 
 
 def _bracket(one: _Vectors, u: Floats) -> tuple[float, float, Floats]:
-    """Return between which values the rate of one vector lies, by the closest proof there is.
+    """Return lower and upper bound of the rate of one vector, by the tightest proof.
 
     Last is the direction (1, 3) of the first: triangles may meet one that is worse than ``u``.
     """
@@ -193,7 +193,7 @@ def _bracket(one: _Vectors, u: Floats) -> tuple[float, float, Floats]:
 
 
 def _floored(size: Floats) -> Floats:
-    """Return lengths (n, r) that can be divided by: any weights prove something."""
+    """Return lengths (n, r) bounded away from zero: any weights give a valid bound."""
     total = size.sum(axis=1, keepdims=True)
     return np.asarray(np.maximum(size, np.where(total > 0, 1e-9 * total, 1.0)))
 
@@ -212,7 +212,7 @@ def _below_quadratic(vectors: _Vectors, u: Floats, rate: Floats) -> Bools:
 
 
 def _by_triangles(one: _Vectors, rate: float) -> bool | Floats:
-    """Return whether no direction has a larger rate, or one (1, 3) that has."""
+    """Prove by triangles that no direction has a larger rate, or return one (1, 3) that has."""
     left, seen = _triangles(1), 0
     while len(left):
         seen += len(left)

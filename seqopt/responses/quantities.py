@@ -43,7 +43,7 @@ def length_text(length: float) -> str:
 
 
 def _payload_text(force: float) -> str:
-    """Return a payload that is enough for a force: whole newtons, three digits at most, rounded up.
+    """Format a sufficient payload for a force: whole newtons, at most three digits, rounded up.
 
     >>> _payload_text(211.9), _payload_text(12_345.0), _payload_text(212.0)
     ('212', '12400', '212')
@@ -132,7 +132,7 @@ _MARKS = set("[]=,;")  # of the language of criteria, limits and tables
 
 
 def robot_response(robot: str) -> str:
-    """Return the name of the force of a robot's grip, which nothing else has.
+    """Return the unique name of the force of a robot's grip.
 
     It is ``F_`` and the robot's name; where that means something else already, or cannot be read
     back from a list, the name stands in brackets.

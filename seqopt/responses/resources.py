@@ -60,7 +60,7 @@ class Resources:
             raise ProblemError(f"max_memory is {most!r}; give a number of bytes above zero")
 
     def alone(self) -> Resources:
-        """Return them for little work: one process, and no reports of progress."""
+        """Return resources for little work: one process, without progress."""
         return replace(self, workers=1, executor=None, progress=None)
 
 

@@ -1,6 +1,6 @@
 """Responses of steps as a table: the columns of Tables A.1 and A.2 of Bruun et al.
 
-Also its grips: who holds what, from when to when, and with which force.
+Also its grips: robot, node, first and last step, and force.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ REMEDY = (
 
 @dataclass(frozen=True)
 class Departure:
-    """A limit of the linear range that some steps leave."""
+    """A limit of the linear range that some steps exceed."""
 
     what: str  # what is too large, in a word or two
     said: str  # the largest value, the limit, and why it is one
@@ -81,11 +81,11 @@ class Departure:
 
 
 class LinearRange:
-    """Finds the steps of builds in which an engine's results leave the linear range.
+    """Checks the steps of builds against the linear range of an engine.
 
-    ``engine``: which one; ``mortar``: whose elastic limits count; ``unchecked``: why stresses in
-    joints are not checked, if they should be: in a line, or none; ``offs``: how far grips may be
-    off, m, of states of which that was asked.
+    ``engine``: its engine; ``mortar``: with the elastic limits of joints; ``unchecked``: one line
+    that says why stresses in joints are not checked, or empty; ``offs``: cached tolerances of
+    grips, m.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -114,7 +114,7 @@ class LinearRange:
     def departures(
         self, table: _Columns, fields: Iterable[Fields] | None = None
     ) -> tuple[Departure, ...]:
-        """Return the limits that the steps of a build leave.
+        """Return the limits that the steps of a build exceed.
 
         ``table``: of `seqopt.analyze`; ``fields``: of every step; by default the engine's.
 
@@ -153,7 +153,7 @@ class LinearRange:
         )
 
     def keeps_limits(self, steps: Sequence[Step]) -> bool:
-        """Return whether joints stay within their elastic limits in all steps, where these are."""
+        """Return whether joints stay within their elastic limits, if any, in all steps."""
         if self._limits is None or isinstance(self._engine, OpeningEngine):
             return True
         scene = self._network.scene
@@ -163,7 +163,7 @@ class LinearRange:
         return all(self._known[key][2] <= margin for key in keys)
 
     def seen(self, step: Step, fields: Fields) -> Fields:
-        """Return the fields of a step, all of them, and remember what it is asked of them."""
+        """Return all fields of a step, and cache its measures."""
         (found,) = self._of(fields)
         if not (self._breaks and found[2] > 0):  # else others than those of rigid bricks
             numbers = self._network.scene.grip_numbers(step.grips, step.bricks)
@@ -171,12 +171,12 @@ class LinearRange:
         return fields
 
     def of_builds(self, tables: Mapping[str, _Columns]) -> dict[str, tuple[Departure, ...]]:
-        """Return the limits that builds leave, for those that leave any, by name."""
+        """Return the limits that builds exceed, for those that exceed any, by name."""
         self._ask(key for table in tables.values() for key in self._keys(table))
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
     def of_steps(self, builds: Mapping[str, Sequence[Step]]) -> dict[str, tuple[Departure, ...]]:
-        """Return the limits that builds leave, by their steps: each state is computed once."""
+        """Return the limits that builds exceed, from their steps: each state is computed once."""
         states, shift = _distinct(builds.values()), RESPONSES["D_max"]
         fields = _each_fields(self.engine, states.values(), Want.DISPLACEMENTS)
         moved = {
@@ -195,9 +195,9 @@ class LinearRange:
         return self.of_builds(tables)
 
     def closest(self, table: _Columns) -> tuple[float, str, int]:
-        """Return which joint comes closest to its elastic limits: Pa below them, name and step.
+        """Return the joint closest to its elastic limits: margin, Pa, name and step.
 
-        Negative beyond them; NaN, without a joint, where that is not known.
+        The margin is negative beyond them; NaN, without a joint, if it is not known.
         """
         excess, joint = self._measured(table, None)[:, 2:].T
         at = int(excess.argmax())
@@ -217,11 +217,11 @@ class LinearRange:
         return np.array([self._known[key] for key in keys])
 
     def _keys(self, table: _Columns) -> list[_Key]:
-        """Return the bricks and what is held of every step."""
+        """Return the bricks and grips of every step."""
         return [(b, held) for _, b, held in held_in_table(self._network.scene, table)]
 
     def _ask(self, keys: Iterable[_Key]) -> None:
-        """Measure what is not known."""
+        """Compute the measures of states that are not cached."""
         if isinstance(self._engine, OpeningEngine):
             return
         asked, found = list[_Key](), list[Fields]()
@@ -236,15 +236,15 @@ class LinearRange:
 
     @cached_property
     def _lever(self) -> Floats:
-        """How far every corner is from the center of its joint, (K,), m."""
+        """Distance of every corner from the center of its joint, (K,), m."""
         assert self._limits is not None
         assembly = self._limits.assembly
         return lengths(assembly.corner - self._network.springs.position[assembly.contact])
 
     def _of(self, *parts: Fields) -> Floats:
-        """Return rotation, rad, strain, stress beyond elastic limits, Pa, and in which joint.
+        """Return rotation, rad, strain, excess over elastic limits, Pa, and joint index, (S, 4).
 
-        A row for every grip set of some fields, the last with the most bricks, (S, 4).
+        A row per grip set of all ``parts``, the last of which has the most bricks.
         """
         springs, bricks = self._network.springs, parts[-1].brick_twist.shape[1]
         acting = max(1, int(np.searchsorted(springs.since, bricks, side="right")))
@@ -280,7 +280,7 @@ def _stacked(parts: Sequence[Floats]) -> Floats:
 
 
 def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:
-    """Return which builds leave the linear range, and by what: one line, or none.
+    """Describe the builds that exceed the linear range, and their limits: one line, or none.
 
     Examples
     --------
@@ -358,7 +358,7 @@ def _analyze_builds(engine: Engine, builds: Sequence[Sequence[Step]]) -> list[pd
 
 
 def _distinct(builds: Iterable[Sequence[Step]]) -> dict[tuple[int, Grips], Step]:
-    """Return a step for every state of builds, by ascending bricks: engines grow with them."""
+    """Return a step for every distinct state of builds, by ascending bricks, as engines grow."""
     states = {(step.bricks, step.grips): step for steps in builds for step in steps}
     return {state: states[state] for state in sorted(states, key=itemgetter(0))}
 
@@ -386,7 +386,7 @@ def _table_of(columns: _Columns) -> pd.DataFrame:
 
 
 def held_in_table(scene: Scene, table: _Columns) -> list[_Held]:
-    """Return what is held in every step of a table of `analyze`."""
+    """Return the bricks and grips of every step of a table of `analyze`."""
     nodes = zip(*(table[f"{robot.name}_node"] for robot in scene.robots), strict=True)
     bricks = [int(count) for count in table["bricks"]]
     held = (
@@ -439,7 +439,7 @@ def _each_fields(
 ) -> Iterator[Fields]:
     """Yield the full fields of every step, as `step_fields`.
 
-    Steps that follow each other with as many bricks are solved together, equal ones once.
+    Consecutive steps with equal bricks are solved as one batch, equal states once.
     """
     scene = engine.network.scene
     for bricks, same in groupby(steps, attrgetter("bricks")):
@@ -457,10 +457,10 @@ def _each_fields(
 def _solved_alike(
     engine: Engine, keys: Iterable[_Key], want: Want
 ) -> Iterator[tuple[list[_Key], Fields]]:
-    """Yield states with as many bricks and grips, each once, and their fields, solved at once.
+    """Yield distinct states and their fields, solved in batches of equal bricks and grips.
 
-    By ascending brick counts, as engines grow with the build, and those with most grips first, as
-    these hold bricks that the others hold. Where nothing stands, nothing is solved.
+    By ascending brick counts, as engines grow with the build, and by descending numbers of grips,
+    as more grips include the bricks of fewer. The empty site is not solved.
     """
     same = defaultdict[tuple[int, int], dict[_Key, None]](dict)
     for key in keys:
@@ -519,11 +519,11 @@ def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
 def _with_faults(
     scene: Scene, table: pd.DataFrame, steps: Sequence[Step], faults: Mapping[int, SeqoptError]
 ) -> pd.DataFrame:
-    """Return a table with the steps that an engine did not solve, and a column that says why.
+    """Return a table with added rows of steps that were not solved, and a column of reasons.
 
-    ``table``: of the others; ``faults``: by number of the step. In the column ``finding`` a step is
-    a ``mechanism``, of the brick that moves most, or ``not solved``, which says nothing of it; the
-    cells of its responses are empty.
+    ``table``: of the others; ``faults``: errors by step number. The column ``finding`` is
+    ``mechanism``, with the brick that moves most, or ``not solved``, which leaves the step
+    undecided; the cells of their responses are empty.
     """
     rows: dict[int, dict[str, object]] = {}
     for row in table.assign(finding="").to_dict("records"):
@@ -543,7 +543,7 @@ def _with_faults(
 
 
 def _held_cells(scene: Scene, step: Step) -> dict[str, object]:
-    """Return the cells of a step that are known before anything is computed."""
+    """Return the cells of a step that need no responses."""
     row: dict[str, object] = {"step": step.number, "type": step.kind.value, "bricks": step.bricks}
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[f"{robot.name}_brick"] = None if node is None else scene.brick_of_node[node].name

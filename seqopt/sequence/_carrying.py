@@ -1,7 +1,7 @@
-"""What a robot carries by itself: the brick that it places or takes away.
+"""Loads that a robot carries alone: the brick that it places or removes.
 
-A grip on a brick that stands shares its weight with joints and other grips. On the way there the
-robot alone has all of it, and its tool.
+Joints and other grips share the weight of a placed brick. During transport the robot carries all
+of it, and its tool.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _ROUNDING = 1e-9  # over a payload, by which a load may exceed it
 
 
 class Carried(NamedTuple):
-    """A brick that a robot places, or takes away."""
+    """A brick that a robot places or removes."""
 
     step: int  # its number
     robot: int  # index among the scene's robots
@@ -29,9 +29,9 @@ class Carried(NamedTuple):
 
 
 def carried(scene: Scene, steps: Sequence[AnyStep]) -> Iterator[Carried]:
-    """Yield who carries which brick in steps, some of whose grips may be open.
+    """Yield robot and brick of every transport in steps, whose grips may be open.
 
-    Who takes a brick away held it until then: of a first step that does, that is not known.
+    The robot that removes a brick held it before: unknown if the first step removes one.
     """
     removals = {step.number - 1: step for step in steps if step.kind is StepKind.REMOVE}
     for hold in holds(scene, steps):
@@ -42,14 +42,14 @@ def carried(scene: Scene, steps: Sequence[AnyStep]) -> Iterator[Carried]:
 
 
 def loads(scene: Scene, robot: Robot) -> Floats:
-    """Return what a robot carries with every brick in build order, its tool included, (B,), N."""
+    """Return the load of a robot with every brick in build order, its tool included, (B,), N."""
     tool = 0.0 if robot.arm is None else robot.arm.tool_mass
     gravity = scene.weight_factor * float(np.linalg.norm(scene.gravity))
     return gravity * (np.array([brick.mass for brick in scene.placed]) + tool)
 
 
 def can_carry(scenes: Sequence[Scene], robot: int) -> Bools:
-    """Return which bricks in build order a robot carries within its payload in all scenes, (B,)."""
+    """Return whether a robot can carry each brick in build order in all scenes, (B,)."""
     pairs = [(scene, scene.robots[robot]) for scene in scenes]
     within = [loads(scene, own) <= own.payload * (1 + _ROUNDING) for scene, own in pairs]
     return np.asarray(np.all(within, axis=0))

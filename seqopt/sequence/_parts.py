@@ -1,4 +1,4 @@
-"""Parts of builds: the state of a site from a file, and what is left of a schedule."""
+"""Parts of builds: the state of a site from a file, and the rest of a schedule."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
 
 
 def _measured(scene: Scene, told: object, where: str) -> Scene:
-    """Return a scene whose bricks are where they were measured."""
+    """Return a scene with bricks at measured positions, m."""
     points: Mapping[str, Any] = told if isinstance(told, Mapping) else {"": told}
     for name, point in points.items():
         right = isinstance(point, list) and len(point) == 3 and _are_near(point)
@@ -60,12 +60,12 @@ def _measured(scene: Scene, told: object, where: str) -> Scene:
 
 
 def _are_near(values: Sequence[object]) -> bool:
-    """Return whether numbers can be places of a scene: beyond, products of them lose all digits."""
+    """Return whether coordinates are within `LARGEST_NUMBER`: larger products lose precision."""
     return all(abs(as_float(value)) <= LARGEST_NUMBER for value in values)
 
 
 def _standing(scene: Scene, told: object, where: str) -> tuple[Scene, int]:
-    """Return a scene in an order that begins with bricks that stand, and how many these are."""
+    """Return a scene in an order that begins with the standing bricks, and their number."""
     if isinstance(told, int) and not isinstance(told, bool):
         return scene, told
     known = scene.build_order
@@ -79,7 +79,7 @@ def _standing(scene: Scene, told: object, where: str) -> tuple[Scene, int]:
 
 
 def _by_robot(scene: Scene, told: object, where: str) -> tuple[int | None, ...] | None:
-    """Return nodes by robot; None where none are given."""
+    """Return the node of each robot; None if none are given."""
     if told is None:
         return None
     names = [robot.name for robot in scene.robots]
@@ -89,10 +89,10 @@ def _by_robot(scene: Scene, told: object, where: str) -> tuple[int | None, ...] 
 
 
 def what_is_left(schedule: Schedule, done: Sequence[Step], to: Site | None = None) -> Schedule:
-    """Return what is left of a schedule after steps that were done; their grips stay chosen.
+    """Return the rest of a schedule after completed steps, whose grips are fixed.
 
-    ``to``: where it ends before its last step; grips that last until then are its own. Raises
-    `StepError` if what was done is not the schedule, or nothing is left.
+    ``to``: an end before its last step; grips held there are fixed. Raises `StepError` if the
+    completed steps do not follow the schedule, or nothing is left.
     """
     last = len(schedule.steps) if to is None else to.step
     if not len(done) < last <= len(schedule.steps):
@@ -126,7 +126,7 @@ def what_is_left(schedule: Schedule, done: Sequence[Step], to: Site | None = Non
 
 
 def _held(schedule: Schedule, count: int, grips: Sequence[int | None]) -> dict[int, int | None]:
-    """Return the nodes of moves that are held after so many steps."""
+    """Return the nodes of moves that are held after a number of steps."""
     planned = schedule.steps[count - 1].grips
     pairs = zip(planned, grips, strict=True)
     return {grip.move: node for grip, node in pairs if isinstance(grip, OpenGrip)}

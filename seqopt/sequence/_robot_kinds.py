@@ -1,4 +1,4 @@
-"""Robots of a free schedule by kind: those that could change places."""
+"""Robots of a free schedule by kind: those that are interchangeable."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from seqopt.sequence.two_robots import placing_node
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotKind(FrozenValue):
-    """Robots that reach the same nodes, may carry as much, and may place the same bricks."""
+    """Robots of equal reach, force limit, and bricks that they may place."""
 
     robots: tuple[int, ...]  # indices of the scene's robots
     reach: Bools  # (2B,); nodes that they may hold, as in ``network.inner.ravel()``
@@ -39,10 +39,10 @@ def sort_robots(
     timed: bool = False,
     worlds: Sequence[Scene] = (),
 ) -> tuple[RobotKind, ...]:
-    """Return the robots that take part, by kind, in the order of their first robots.
+    """Return the participating robots by kind, in the order of their first robots.
 
-    ``caps``: largest force of a robot's grip beside its payload, by its name, N; ``timed``: whether
-    those of a kind must take as long; ``worlds``: scenes of scenarios, in which bricks weigh more.
+    ``caps``: force limits of grips besides payloads, by robot, N; ``timed``: whether robots of a
+    kind must have equal durations; ``worlds``: scenes of scenarios, with other weights.
     """
     scene, kept = network.scene, rules.payload is Payload.KEPT
     alike: dict[tuple[object, ...], RobotKind] = {}
@@ -68,7 +68,7 @@ def node_numbers(network: Network) -> list[int]:
 
 
 def _placing(network: Network, robot: Robot, reach: Bools) -> Bools:
-    """Return at which node a robot places every brick."""
+    """Return the mask (2B,) of the nodes at which a robot places bricks."""
     out = np.zeros_like(reach)
     for k, brick in enumerate(network.scene.placed):
         with suppress(StepError):  # it reaches none

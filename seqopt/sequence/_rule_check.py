@@ -1,7 +1,7 @@
-"""The second book of rules: who may hold, place and bear what, looked up apart from the search.
+"""A second implementation of the rules: what robots may hold, place and carry, for the judge.
 
-It shares nothing with `seqopt.sequence._rule_space`, and judges what was found there: steps follow
-from it in `seqopt.judge._rule_moves`.
+It is independent of `seqopt.sequence._rule_space`, whose results it checks: the moves of
+`seqopt.judge._rule_moves` follow from it.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from seqopt.sequence.two_robots import placing_node
 
 
 def too_heavy(scenes: Sequence[Scene], place: int, robots: Sequence[int]) -> str:
-    """Return which robots cannot bear a brick and their tool by themselves in a scene; or nothing.
+    """Describe the robots that cannot carry a brick and their tool in a scene; or empty.
 
-    ``place``: of the brick in build order, from 0, or from the end.
+    ``place``: index of the brick in build order, may be negative.
     """
     for scene in scenes:
         brick, pull = scene.placed[place], hypot(*scene.gravity) * scene.weight_factor
@@ -44,9 +44,9 @@ def too_heavy(scenes: Sequence[Scene], place: int, robots: Sequence[int]) -> str
 def unbearable(
     scenes: Sequence[Scene], steps: Sequence[AnyStep], begin: Site | None
 ) -> dict[int, str]:
-    """Return in which steps who carries a brick cannot bear it in some scene: why, by number.
+    """Return the steps whose robot cannot carry its brick in some scene: reasons by number.
 
-    ``steps``: checked, some of their grips perhaps open; ``begin``: where they begin.
+    ``steps``: checked, may have open grips; ``begin``: where they begin.
     """
     out: dict[int, str] = {}
     before: tuple[object, ...] = (None,) * len(scenes[0].robots)
@@ -67,7 +67,7 @@ def unbearable(
 def check_carried(
     scene: Scene, schedule: Schedule, steps: Sequence[Step], worlds: tuple[Scene, ...] = ()
 ) -> None:
-    """Require that robots bear the bricks that they place or take away, in scenarios as well."""
+    """Require that robots can carry the bricks that they place or remove, also in scenarios."""
     for number, why in unbearable((scene, *worlds), steps, schedule.begin).items():
         raise StepError(f"step {number}: {why}")
 
@@ -76,7 +76,7 @@ def check_carried(
 class RuleBook:
     """The rules of a free schedule in a scene.
 
-    ``worlds``: the scenes of scenarios, in which bricks weigh more.
+    ``worlds``: the scenes of scenarios, with other weights.
     """
 
     network: Network
@@ -85,17 +85,17 @@ class RuleBook:
 
     @cached_property
     def team(self) -> tuple[int, ...]:
-        """Indices of the robots that take part."""
+        """Indices of the participating robots."""
         return self.rules.team(self.network.scene)
 
     @cached_property
     def span(self) -> tuple[int, int]:
-        """How many bricks stand where the build begins, and where it ends."""
+        """Brick counts at the beginning and at the end of the build."""
         return self.rules.span(self.network.scene)
 
     @property
     def start(self) -> tuple[int, Grips, int]:
-        """Bricks, grips, and regrips since the last brick, where the build begins."""
+        """Bricks, grips, and regrips since the last brick, at the beginning of the build."""
         site = self.rules.begun(self.network.scene).begin
         if site is None:
             return 0, (None,) * len(self.network.scene.robots), 0
@@ -110,14 +110,14 @@ class RuleBook:
 
     @cached_property
     def takes(self) -> dict[tuple[int, int], tuple[int, ...]]:
-        """By robot and brick count, the nodes of bricks that stand that it may take hold of."""
+        """By robot and brick count, the nodes of placed bricks that it may grip."""
         scene = self.network.scene
         near = [self.rules.near(scene, b) for b in range(len(scene.placed) + 1)]
         return {at: tuple(n for n in own if n in near[at[1]]) for at, own in self.reached.items()}
 
     @cached_property
     def newest_nodes(self) -> dict[tuple[int, int], tuple[int, ...]]:
-        """By robot and brick count, at which nodes it holds the newest brick."""
+        """By robot and brick count, the nodes at which it may hold the newest brick."""
         scene, out = self.network.scene, {}
         for r in self.team:
             for b, brick in enumerate(scene.placed, start=1):
@@ -128,15 +128,15 @@ class RuleBook:
         return out
 
     def named(self, robot: int) -> bool:
-        """Return whether a robot is one of those that may place or take away bricks."""
+        """Return whether a robot is among those that may place or remove bricks."""
         return not self.rules.placers or self.network.scene.robots[robot].name in self.rules.placers
 
     def too_heavy(self, bricks: int, robots: Sequence[int]) -> str:
-        """Return which robots cannot bear the newest brick in a scenario, in words; or nothing."""
+        """Describe the robots that cannot carry the newest brick in a scenario; or empty."""
         if self.rules.payload is Payload.IGNORED:
             return ""
         return too_heavy((self.network.scene, *self.worlds), bricks - 1, robots)
 
     def places(self, robot: int, bricks: int) -> bool:
-        """Return whether a robot may place the newest brick, or take it away."""
+        """Return whether a robot may place or remove the newest brick."""
         return self.named(robot) and not self.too_heavy(bricks, (robot,))

@@ -1,11 +1,11 @@
-"""States of a free schedule, and the moves between them, many at a time.
+"""States of a free schedule and the moves between them, in batches.
 
-A state is how many bricks stand and which node every robot holds. States of one brick count are
-rows of integers, a column per robot, those of one kind side by side: 0 for a robot that is free, n
-for one that holds the n-th node (from 1, brick by brick in build order). Robots of one kind could
-change places, so their entries are sorted, largest first. A further column counts the grips
-taken since the last brick where a rule limits these. Where travel counts, a free robot stays at
-the node that it held last, -n.
+A state is a brick count and the node that every robot holds. States of one brick count are rows of
+integers, a column per robot, those of one kind adjacent: 0 for a free robot, n for one that holds
+the n-th node (from 1, brick by brick in build order). Robots of one kind are interchangeable, so
+their entries are sorted, largest first, which removes symmetric states. If a rule limits regrips, a
+further column counts those since the last brick. If travel counts, a free robot stays at the node
+that it held last, -n.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def sort_entries(states: Ints, first: int, end: int) -> None:
 
 
 def _join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
-    """Return several moves as one, from states (n, c)."""
+    """Concatenate moves from states (n, c)."""
     none = Moves(np.zeros(0, dtype=np.int64), states[:0], np.zeros(0))
     return Moves(*map(np.concatenate, zip(none, *parts, strict=True)))
 
@@ -53,7 +53,7 @@ _PAIRS = 4_000_000  # of states and nodes that are looked at together
 
 
 class StateRows(Terse):
-    """What spaces of states have in common: rows with a column for every robot."""
+    """Base class of spaces of states: rows with a column per robot."""
 
     network: Network
     kinds: tuple[RobotKind, ...]
@@ -61,7 +61,7 @@ class StateRows(Terse):
 
     @property
     def robots(self) -> int:
-        """How many robots take part."""
+        """Number of participating robots."""
         return sum(len(kind.robots) for kind in self.kinds)
 
     @cached_property
@@ -75,7 +75,7 @@ class StateRows(Terse):
         return {node: i for i, node in enumerate(node_numbers(self.network), start=1)}
 
     def require_codes(self, regrips: int = 0) -> None:
-        """Raise a `StepError` if states of a level are more than can be numbered."""
+        """Raise a `StepError` if the codes of a level exceed int64."""
         base = 1 + (2 if self.parks else 1) * 2 * len(self.network.inner)
         if base**self.robots * (1 + regrips) >= 2**62:
             raise StepError(
@@ -85,7 +85,7 @@ class StateRows(Terse):
             )
 
     def for_arms(self, bricks: int, states: Ints) -> Bools:
-        """Return which states (n, c) arms can be in while so many bricks stand, (n,)."""
+        """Return which states (n, c) are feasible for arms at a brick count, (n,)."""
         scene = self.network.scene
         if not scene.has_arms:  # nothing is copied for nobody: this is asked of all states
             return np.ones(len(states), dtype=bool)
@@ -94,7 +94,7 @@ class StateRows(Terse):
         return go_together(scene, bricks, held)
 
     def codes(self, states: Ints) -> Ints:
-        """Return a number (n,) for every state (n, c) that no other one of its level has."""
+        """Return a code (n,) per state (n, c), unique in its level."""
         last = 2 * len(self.network.inner)
         least = -last if self.parks else 0
         out = states[:, self.robots :].sum(axis=1, dtype=np.int64)  # grips since the last brick
@@ -105,11 +105,11 @@ class StateRows(Terse):
         return np.asarray(out)
 
     def held(self, states: Ints) -> Ints:
-        """Return which nodes are held (n, robots), sorted, zeros for robots that are free first."""
+        """Return the nodes held (n, robots), ascending, zeros of free robots first."""
         return np.sort(states[:, : self.robots].clip(min=0), axis=1)
 
     def grips(self, states: Ints) -> Ints:
-        """Return how many grips are held, (n,)."""
+        """Return the number of grips, (n,)."""
         return np.asarray((states[:, : self.robots] > 0).sum(axis=1))
 
 
@@ -124,12 +124,12 @@ class FreeSpace(StateRows):
 
     @property
     def first(self) -> int:
-        """With how many bricks the build begins."""
+        """Brick count at the beginning of the build."""
         return self._span[0]
 
     @property
     def levels(self) -> int:
-        """With how many bricks the build ends: states of one brick count are a level."""
+        """Brick count at the end of the build: states of one brick count are a level."""
         return self._span[1]
 
     @cached_property
@@ -138,7 +138,7 @@ class FreeSpace(StateRows):
 
     @property
     def held_first(self) -> int:
-        """How many grips are held where the build begins."""
+        """Number of grips at the beginning of the build."""
         return self.rules.begin.held if self.rules.begin else 0
 
     def bricks_at(self, level: int) -> int:
@@ -147,17 +147,17 @@ class FreeSpace(StateRows):
 
     @property
     def ends_bare(self) -> bool:
-        """Whether every build ends in the finished structure that nobody holds."""
+        """Whether every build ends in the finished structure without grips."""
         return self.rules.how_it_ends is not Ending.HELD
 
     def without_choice(self) -> Iterator[tuple[int, Ints]]:
-        """Yield the level and the state (1, c) in which every build ends, if it is one."""
+        """Yield the level and the state (1, c) in which every build ends, if it is unique."""
         if self.ends_bare:
             yield self.levels, np.zeros_like(self.start())
 
     @property
     def fewest_steps(self) -> int:
-        """How many steps a build has at least: all but a grip per robot are let go one by one."""
+        """Lower bound of the number of steps: all but one grip per robot are released singly."""
         placed = self.levels - self.first
         if self.rules.how_it_ends is Ending.ONE_BY_ONE:
             return 2 * placed + self.held_first
@@ -183,9 +183,9 @@ class FreeSpace(StateRows):
         return frozen(out)
 
     def start(self) -> Ints:
-        """Return the one state in which the build begins, (1, c).
+        """Return the initial state, (1, c).
 
-        It is of the smallest type that holds every node: there may be tens of millions of states.
+        Its type is the smallest that holds every node: there may be tens of millions of states.
         """
         most = max(2 * len(self.network.inner), self.rules.regrips or 0)
         columns = self.robots + (self.rules.regrips is not None)
@@ -197,7 +197,7 @@ class FreeSpace(StateRows):
         return out
 
     def _row(self, site: Site) -> Ints:
-        """Return the entries (robots,) of robots in a site."""
+        """Return the entries (robots,) of a site."""
         held, out = site.holds(self.network.scene), np.zeros((1, self.robots), dtype=np.int64)
         for kind, (first, end) in zip(self.kinds, self.slots, strict=True):
             for column, robot in enumerate(kind.robots, start=first):
@@ -210,7 +210,7 @@ class FreeSpace(StateRows):
         return np.asarray(out[0])
 
     def may_place(self, bricks: int, states: Ints) -> Bools:
-        """Return in which states (n, c) a brick may be placed: the first may break rules, (n,)."""
+        """Return which states (n, c) allow a placement, (n,); the initial one may break rules."""
         if self.rules.begin is None or bricks != self._span[0] or not bricks:
             return np.ones(len(states), dtype=bool)
         return self.lawful(bricks, states)
@@ -223,7 +223,7 @@ class FreeSpace(StateRows):
         return self._lawful_only(bricks + 1, moves)
 
     def holds(self, bricks: int, states: Ints) -> Moves:
-        """Return the moves in which a free robot takes a grip on a brick that stands."""
+        """Return the moves in which a free robot grips a placed brick."""
         begins = self.rules.begin is not None and bricks == self._span[0]
         begins &= not self.rules.lets_go_one_by_one(bricks, self._span)
         able = np.ones(len(states), dtype=bool) if begins else self.lawful(bricks, states)
@@ -236,7 +236,7 @@ class FreeSpace(StateRows):
         return Moves(rows[moves.source[ok]], moves.states[ok], moves.way[ok])
 
     def releases(self, bricks: int, states: Ints) -> Moves:
-        """Return the moves in which one robot lets go, or at the end all do, as rules allow."""
+        """Return the feasible moves in which one robot releases, or at the end all do."""
         moves = self._lets_go(states, states[:, : self.robots] > 0)
         if not self.rules.lets_go_one_by_one(bricks, self._span):
             moves = self._lawful_only(bricks, moves)
@@ -250,7 +250,7 @@ class FreeSpace(StateRows):
         return moves
 
     def _lets_go(self, states: Ints, may: Bools) -> Moves:
-        """Return the moves in which one robot lets go that may, (n, robots) by column."""
+        """Return the moves in which one robot releases; ``may`` (n, robots): the feasible ones."""
         parts = []
         for first, end in self.slots:
             for slot in range(first, end):
@@ -262,7 +262,7 @@ class FreeSpace(StateRows):
         return _join_moves(parts, states)
 
     def lawful(self, bricks: int, states: Ints) -> Bools:
-        """Return which states (n, c) keep the rules as long as the build goes on, (n,)."""
+        """Return which states (n, c) satisfy the rules before the end of the build, (n,)."""
         scene = self.network.scene
         props = scene.standing_props(bricks, held=True) if bricks else ()
         propped = [scene.since[scene.brick_of_node[prop.node].name] - 1 for prop in props]
@@ -273,7 +273,7 @@ class FreeSpace(StateRows):
         return ok
 
     def _lawful(self, bricks: int, states: Ints, propped: Sequence[int]) -> Bools:
-        """Return which states keep the rules with props at bricks, places in build order from 0."""
+        """Return which states satisfy the rules; ``propped``: bricks as indices in build order."""
         held = states[:, : self.robots]
         least = self.rules.fewest_grips(self.network.scene) - len(propped) if bricks > 1 else 0
         ok = np.asarray(self.grips(states) >= least)
@@ -290,7 +290,7 @@ class FreeSpace(StateRows):
         return ok
 
     def ended(self, states: Ints) -> Bools:
-        """Return which states with all bricks end the build, (n,)."""
+        """Return which states of the last level end the build, (n,)."""
         if self.rules.how_it_ends is not Ending.HELD:
             return np.asarray(self.grips(states) == 0)
         if self.rules.finish is None or self.rules.finish.grips is None:
@@ -301,7 +301,7 @@ class FreeSpace(StateRows):
         return np.asarray((held == self._row(self.rules.finish).clip(min=0)).all(axis=1))
 
     def _near(self, bricks: int) -> Ints:
-        """Return the nodes of bricks that stand that may be taken hold of, from 0."""
+        """Return the nodes of placed bricks that may be gripped, from 0."""
         if not self.rules.candidates:
             return np.arange(2 * bricks)
         if bricks not in self._near_of:
@@ -316,13 +316,13 @@ class FreeSpace(StateRows):
 
     @cached_property
     def _loose(self) -> tuple[list[list[int]], ...]:
-        """By brick count the parts that no joint ties to the ground: places in build order."""
+        """By brick count the parts without joints to the ground: indices in build order."""
         at = {brick.name: i for i, brick in enumerate(self.network.scene.placed)}
         parts = ((), *(islands(self.network, count + 1) for count in range(max(self._span))))
         return tuple([[at[name] for name in part] for part in level] for level in parts)
 
     def _takes(self, states: Ints, nodes_of: Sequence[Ints]) -> Moves:
-        """Return the moves in which a free robot takes one of some nodes, by kind."""
+        """Return the moves in which a free robot grips one of the given nodes of its kind."""
         parts = []
         for (first, end), nodes in zip(self.slots, nodes_of, strict=True):
             slots = range(first, end) if self.parks else [end - 1]  # entries are sorted
@@ -340,7 +340,7 @@ class FreeSpace(StateRows):
         return _join_moves(parts, states)
 
     def _grip_pairs(self, states: Ints, slot: int, nodes: Ints) -> Moves:
-        """Return the moves in which a column's robot, free in all states, takes a free node."""
+        """Return the moves in which the robot of a column, free in all states, grips a node."""
         held = states[:, : self.robots].clip(min=0)
         taken = np.zeros((len(states), int(max(nodes.max() + 1, held.max())) + 1), dtype=bool)
         for nodes_held in held.T:
@@ -359,13 +359,13 @@ class FreeSpace(StateRows):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _TakeDownSpace(FreeSpace):
-    """The states of a take-down: those of building, and moves that take bricks away."""
+    """The states of a take-down: those of building, with moves that remove bricks."""
 
     first = 1  # level 0 is the empty site of builds, before which there is nothing to do
 
     @property
     def levels(self) -> int:
-        """The level on which it ends: every brick that is removed leads to the next."""
+        """The last level: each removed brick leads to the next level."""
         return 1 + self._span[0] - self._span[1]
 
     def bricks_at(self, level: int) -> int:
@@ -374,14 +374,14 @@ class _TakeDownSpace(FreeSpace):
 
     @property
     def fewest_steps(self) -> int:
-        """How many steps it has at least: who removes a brick took hold of it, or did at first."""
+        """Lower bound of the number of steps: bricks are gripped before removal, or initially."""
         removed = self.levels - 1
         return removed + max(0, removed - self.held_first)
 
     def within(
         self, level: int, states: Ints, *, regrips: bool = True
     ) -> tuple[tuple[Moves, bool], ...]:
-        """Return the moves that remove no brick: robots must take grips to remove any."""
+        """Return the moves that remove no brick: grips, which precede removals, and releases."""
         bricks = self.bricks_at(level)
         return super().within(bricks, states) if bricks else ()
 
@@ -390,11 +390,11 @@ class _TakeDownSpace(FreeSpace):
         return ((self.removes(self.bricks_at(level), states), False),)
 
     def may_place(self, level: int, states: Ints) -> Bools:
-        """Return in which states (n, c) a brick may be removed: the first may break rules, (n,)."""
+        """Return which states (n, c) allow a removal, (n,); the initial one may break rules."""
         return super().may_place(self.bricks_at(level), states)
 
     def removes(self, bricks: int, states: Ints) -> Moves:
-        """Return the moves in which the one robot that holds the newest brick takes it away."""
+        """Return the moves in which the only robot that holds the newest brick removes it."""
         held = states[:, : self.robots].astype(np.int64)
         may = (held + 1) // 2 == bricks
         may[may.sum(axis=1) != 1] = False
@@ -415,11 +415,11 @@ def free_space(
     timed: bool = False,
     worlds: Sequence[Scene] = (),
 ) -> FreeSpace:
-    """Return the states of a free schedule in a scene.
+    """Return the state space of a free schedule in a scene.
 
-    ``caps``: largest force of a robot's grip beside its payload, by its name, N; ``parks``: whether
-    free robots stay where they were, for their travel; ``timed``: whether it counts how long robots
-    take; ``worlds``: scenes of scenarios, in which robots must carry their bricks as well.
+    ``caps``: force limits of grips besides payloads, by robot, N; ``parks``: whether states track
+    the positions of free robots, for their travel; ``timed``: whether durations of robots matter;
+    ``worlds``: scenes of scenarios, in which robots must carry their bricks as well.
 
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))

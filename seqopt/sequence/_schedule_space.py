@@ -1,8 +1,8 @@
-"""States of a schedule with open grips, and the moves between them, many at a time.
+"""States of a schedule with open grips and the moves between them, in batches.
 
-A state is a step and which node every robot holds in it: rows of integers as in
-`seqopt.sequence._rule_space`, a column per robot of the scene. However many grips are open in a
-step, each move goes from one step to the next.
+A state is a step and the node that every robot holds in it: rows of integers as in
+`seqopt.sequence._rule_space`, a column per robot of the scene. Each move leads from one step to the
+next, for any number of open grips.
 """
 
 from __future__ import annotations
@@ -42,21 +42,21 @@ class ScheduleSpace(StateRows):
 
     @property
     def levels(self) -> int:
-        """How many steps there are."""
+        """Number of steps."""
         return len(self.schedule.steps)
 
     @property
     def ends_bare(self) -> bool:
-        """Whether nobody holds anything in the last step."""
+        """Whether the last step has no grips."""
         return all(grip is None for grip in self.schedule.steps[-1].grips)
 
     @property
     def fewest_steps(self) -> int:
-        """How many steps a build has: all have as many."""
+        """Number of steps, equal for all builds."""
         return self.levels
 
     def bricks_at(self, level: int) -> int:
-        """Return how many bricks stand after so many steps."""
+        """Return the brick count after a number of steps."""
         return self.schedule.steps[level - 1].bricks if level else self._begin.bricks
 
     @cached_property
@@ -64,12 +64,12 @@ class ScheduleSpace(StateRows):
         return _begin_step(self.network.scene, self.schedule.begin)
 
     def may_place(self, level: int, states: Ints) -> Bools:
-        """Return from which states the next step may be taken: from all, (n,)."""
+        """Return from which states the next step is feasible: all, (n,)."""
         return np.ones(len(states), dtype=bool)
 
     @cached_property
     def kinds(self) -> tuple[RobotKind, ...]:  # type: ignore[override]  # no field here
-        """Every robot by itself: of a schedule none could change places."""
+        """A kind per robot: robots of a schedule are not interchangeable."""
         every = np.ones(2 * len(self.network.inner), dtype=bool)
         carries = every[: len(self.network.inner)]  # each step says by itself who carries which
         return tuple(
@@ -79,14 +79,14 @@ class ScheduleSpace(StateRows):
 
     @cached_property
     def _too_heavy(self) -> frozenset[int]:
-        """Numbers of the steps in which a robot carries a brick that its payload does not allow."""
+        """Numbers of the steps in which a brick exceeds the payload of its robot."""
         scene = self.network.scene
         able = [can_carry((scene, *self.worlds), robot) for robot in range(self.robots)]
         every = carried(scene, (self._begin, *self.schedule.steps))
         return frozenset(c.step for c in every if not able[c.robot][scene.since[c.brick] - 1])
 
     def start(self) -> Ints:
-        """Return the one state before the first step, (1, robots) int."""
+        """Return the initial state, (1, robots) int."""
         held, site = self._begin.grips, self.schedule.begin
         stays = site.stays if site and site.stays and self.parks else (None,) * self.robots
         out = [self._place.get(n, -self._place.get(s, 0)) for n, s in zip(held, stays, strict=True)]
@@ -129,7 +129,7 @@ class ScheduleSpace(StateRows):
 
     @cached_property
     def _at(self) -> Floats:
-        """Positions of places (2B + 1, 3), m; distances of all pairs would take much memory."""
+        """Positions of nodes (2B + 1, 3), m, instead of the much larger matrix of distances."""
         return np.pad(self.network.node_position[self.network.inner.ravel()], ((1, 0), (0, 0)))
 
     def without_choice(self) -> Iterator[tuple[int, Ints]]:
@@ -141,11 +141,11 @@ class ScheduleSpace(StateRows):
                 yield level, np.array([places], dtype=np.int32)
 
     def ended(self, states: Ints) -> Bools:
-        """Return which states of the last step end the build: all, (n,) bool."""
+        """Return which states of the last step end the build: all, (n,)."""
         return np.ones(len(states), dtype=bool)
 
     def steps(self, rows: Ints) -> tuple[Step, ...]:
-        """Return the checked steps of states (levels, robots), one after the other."""
+        """Return the checked steps of a sequence of states (levels, robots)."""
         numbers = np.array([None, *node_numbers(self.network)])
         grips = numbers[rows.clip(min=0)].tolist()
         steps = [

@@ -20,7 +20,7 @@ MOST_ROBOTS = 5
 
 
 class Newest(Enum):
-    """Where the newest brick is held until the next one is placed."""
+    """At which nodes the newest brick is held until the next one is placed."""
 
     EITHER = "either"  # at either of its free nodes
     PLACING = "placing"  # at the node at which its holder would place it
@@ -35,7 +35,7 @@ class Payload(Enum):
 
 
 class Direction(Enum):
-    """Whether bricks are placed, or taken away, the newest first."""
+    """Whether bricks are placed, or removed, the newest first."""
 
     BUILD = "build"
     TAKE_DOWN = "take-down"
@@ -134,7 +134,7 @@ class FreeRules:
             settle(self, candidates=Near(self.candidates).rule)
 
     def span(self, scene: Scene) -> tuple[int, int]:
-        """Return how many bricks stand where the build begins, and where it ends."""
+        """Return the brick counts at the beginning and at the end of the build."""
         first, last = 0, len(scene.placed)
         if self.takes_down:
             first, last = last, first
@@ -157,11 +157,11 @@ class FreeRules:
 
     @property
     def takes_down(self) -> bool:
-        """Whether bricks are taken away."""
+        """Whether bricks are removed."""
         return self.direction is Direction.TAKE_DOWN
 
     def begun(self, scene: Scene) -> FreeRules:
-        """Return the rules with where a take-down begins: at least with who holds nothing there."""
+        """Return the rules with the beginning of a take-down, by default without grips."""
         if not self.takes_down or self.begin is not None:
             return self
         bare = Site(len(scene.placed), (None,) * len(scene.robots), step=0)
@@ -169,7 +169,7 @@ class FreeRules:
 
     @property
     def how_it_ends(self) -> Ending:
-        """How the build ends, where grips at its end are given too."""
+        """How the build ends, also if grips at its end are given."""
         if self.takes_down and (self.finish is None or not self.finish.bricks):
             return Ending.ONE_BY_ONE  # who removes the last brick lets go by that
         if self.finish is None or self.finish.grips is None:
@@ -178,21 +178,21 @@ class FreeRules:
         return Ending.HELD if self.finish.held else bare
 
     def lets_go_one_by_one(self, bricks: int, span: tuple[int, int]) -> bool:
-        """Return whether robots may let go against the rules, and then only let go, at a count.
+        """Return whether at a brick count robots may only release, even against the rules.
 
-        ``span``: of brick counts, as of `span`.
+        ``span``: brick counts, as of `span`.
         """
         return bricks == span[1] and self.how_it_ends is Ending.ONE_BY_ONE
 
     def near(self, scene: Scene, bricks: int) -> frozenset[int]:
-        """Return the nodes of bricks that stand, of so many, that may be taken hold of."""
+        """Return the nodes of the placed bricks that may be gripped."""
         nodes = [node for brick in scene.placed[:bricks] for node in brick.nodes]
         if not self.candidates:
             return frozenset(nodes)
         return frozenset(Near(self.candidates).nodes(scene, bricks, nodes))
 
     def team(self, scene: Scene) -> tuple[int, ...]:
-        """Return which of a scene's robots take part: their indices, ascending."""
+        """Return the indices of the participating robots of a scene, ascending."""
         known = [robot.name for robot in scene.robots]
         for name in (*self.robots, *self.placers):
             if name not in known:
@@ -220,7 +220,7 @@ class FreeRules:
         return tuple(team.values())
 
     def fewest_grips(self, scene: Scene) -> int:
-        """Return the least number of nodes held, from the second brick on."""
+        """Return the least number of grips, from the second brick on."""
         if self.least_grips is not None:
             return self.least_grips
         return _usual_grips(len(self.team(scene)))
@@ -246,11 +246,11 @@ class FreeRules:
 
     @property
     def left_out(self) -> str:
-        """How candidates are left out, in words; empty if all are open."""
+        """How candidates are restricted, in words; empty if they are not."""
         return self.candidates
 
     def letting_go(self, scene: Scene, steps: Sequence[Step]) -> int:
-        """Return how many steps at the end only let go, with fewer grips than rules ask for."""
+        """Return the number of last steps that release, with fewer grips than rules require."""
         if self.how_it_ends is Ending.HELD:
             return 0
         count = 0
@@ -262,11 +262,11 @@ class FreeRules:
         return count
 
     def in_scene(self, scene: Scene) -> FreeRules:
-        """Return the rules in another scene: they name no scene."""
+        """Return the rules in another scene: unchanged, as they refer to none."""
         return self
 
     def loosened(self, scene: Scene) -> Iterator[tuple[str, FreeRules]]:
-        """Yield the rules with one of them loosened, and how a user says so."""
+        """Yield the rules with one of them relaxed, and its command-line words."""
         for least in range(self.fewest_grips(scene) - 1, -1, -1):
             yield f"least_grips={least}", replace(self, least_grips=least)
         if self.newest is Newest.PLACING:
@@ -297,7 +297,7 @@ _LOOSEST = (
 
 
 def _usual_grips(robots: int) -> int:
-    """Return how many nodes are held at least by default: two, while one robot is free to place."""
+    """Return the default least number of grips: two, but one robot stays free to place."""
     return max(0, min(2, robots - 1))
 
 
@@ -312,7 +312,7 @@ def parse_rules(
     robots: tuple[str, ...] = (),
     where: str = "rules",
 ) -> FreeRules:
-    """Return rules that are given as such, or in words, ``least_grips=1``, for robots by name.
+    """Parse rules from words, ``least_grips=1``, or return given ones, for robots by name.
 
     ``where``: for messages.
     """
@@ -338,8 +338,8 @@ def parse_rules(
 def with_robots(scene: Scene, count: int) -> Scene:
     """Return a scene with one to five robots: its own first, then mobile ones.
 
-    Further robots reach every node, have the largest payload of the scene's own, and give way as
-    the first of them does, and take as long.
+    Further robots reach every node, have the largest payload of the scene's own, and the compliance
+    and durations of the first of them.
 
     >>> import seqopt
     >>> [robot.name for robot in with_robots(seqopt.load_scene("arch25"), 4).robots]

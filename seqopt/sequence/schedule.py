@@ -1,8 +1,7 @@
 """Schedules: sequences in which some grips are still to be chosen.
 
-Candidates may be thinned to those near the working end, where the two bricks are that were placed
-last. What is left out is not looked at, so that whatever is found among the rest is a heuristic for
-the whole, however it is found.
+Candidates may be restricted to those near the working end, the two bricks placed last. Optima of
+the restricted problem are heuristic for the whole, also if they are proven.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ _NEWEST = 2  # bricks that make the working end: a build from both ends has two 
 
 @dataclass(frozen=True)
 class Near:
-    """A rule that keeps nodes near the working end of a build.
+    """A restriction of candidates to nodes near the working end of a build.
 
     ``rule``: ``near:12`` keeps the nodes of bricks that at most 12 joints part from the bricks
     placed last, ``within:1.5`` the nodes at most 1.5 m from these bricks' centroids.
@@ -55,7 +54,7 @@ class Near:
         object.__setattr__(self, "rule", text)
 
     def nodes(self, scene: Scene, bricks: int, nodes: Sequence[int]) -> tuple[int, ...]:
-        """Return those of some nodes that are near with so many bricks, or the nearest of them."""
+        """Select the nodes that are near at a brick count, or else the nearest ones."""
         if not nodes:
             return ()
         name, _, most = self.rule.partition(":")
@@ -79,7 +78,7 @@ class Near:
 
 @dataclass(frozen=True)
 class Hold:
-    """One grip, for as long as it lasts."""
+    """One grip, from its first to its last step."""
 
     robot: int  # index among the scene's robots
     first: int  # number of the first step in which it is held
@@ -90,7 +89,7 @@ class Hold:
 
 
 def holds(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Hold, ...]:
-    """Return every grip of a sequence or schedule for as long as it lasts, by robot, then by step.
+    """Return every grip of a sequence or schedule with its steps, by robot, then by step.
 
     >>> import seqopt
     >>> scene = seqopt.load_scene("arch25")
@@ -203,7 +202,7 @@ class Schedule(Shown):
         return {}
 
     def letting_go(self, scene: Scene, steps: Sequence[Step]) -> int:
-        """Return how many steps at the end only let go, whatever rules say: there are no rules."""
+        """Return the number of last steps that only release against rules: zero, without rules."""
         return 0
 
     def in_scene(self, scene: Scene) -> Schedule:
@@ -211,17 +210,17 @@ class Schedule(Shown):
         return replace(self, scene=scene)
 
     def loosened(self, scene: Scene) -> Iterator[tuple[str, Schedule]]:
-        """Yield what can be loosened: of given steps nothing."""
+        """Yield relaxations: given steps have none."""
         yield from ()
 
     @property
     def has_pairs(self) -> bool:
-        """Whether at most two moves, neighboring ones, share a step: moves form layers then."""
+        """Whether at most two moves, consecutive ones, share a step, so that moves form layers."""
         return self._crowded is None
 
     @property
     def _crowded(self) -> OpenStep | None:
-        """The first step that moves share which are more than two, or do not follow each other."""
+        """The first step shared by more than two moves, or by moves that are not consecutive."""
         return next((s for s in self.steps if s.moves and s.moves[-1] - s.moves[0] > 1), None)
 
     def __repr__(self) -> str:
@@ -231,7 +230,7 @@ class Schedule(Shown):
         return f"<Schedule {self.method} of {self.scene.name}: {what}>"
 
     def table(self) -> pd.DataFrame:
-        """Return what is to be chosen, a row per open grip.
+        """Return the open grips, a row each.
 
         Columns: ``move`` (from 1), ``robot``, ``step`` in which it takes the grip, ``to_step``, the
         last before it lets go, ``bricks`` that stand, ``newest``, the brick placed last,
@@ -304,7 +303,7 @@ def thin(schedule: Schedule, rule: str) -> Schedule:
 
 
 def islands(network: Network, bricks: int) -> tuple[frozenset[int], ...]:
-    """Return the bricks of every part of a partial structure that no joint ties to a ground end.
+    """Return the bricks of every part of a partial structure without joints to a ground end.
 
     >>> from dataclasses import replace
     >>> import seqopt
@@ -347,7 +346,7 @@ def check_support(
 
 
 def _always_tied(network: Network) -> bool:
-    """Return whether every brick is tied to the ground or one before it as soon as it is placed."""
+    """Return whether every placed brick has a joint to the ground or an earlier brick."""
     springs = network.springs
     at_once = springs.stiffness.any(axis=1) & (springs.since == springs.bodies[:, 1] + 1)
     return len(np.unique(springs.bodies[at_once, 1])) == len(network.scene.placed)

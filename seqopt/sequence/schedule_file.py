@@ -108,7 +108,7 @@ def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
 
 
 def _read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
-    """Return what a row says beside its grips."""
+    """Return step number, kind and brick count of a row."""
     kinds = {kind.value: kind for kind in StepKind}
     if row["type"] not in kinds:
         raise StepError(f"{where}: type is {short(row['type'])}; give one of {', '.join(kinds)}")
@@ -117,7 +117,7 @@ def _read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
 
 
 def _read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
-    """Return the node a robot holds; its brick, if named, must be the node's."""
+    """Return the node that a robot holds; a brick named with it must be the node's."""
     if not row[f"{robot.name}_node"].strip():
         return None
     node = _integer(row, f"{robot.name}_node", where)
@@ -132,7 +132,7 @@ def _read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
 
 
 def _integer(row: Row, column: str, where: str) -> int:
-    """Return a whole number; 48.0, as tables with empty cells are often written, is one too."""
+    """Parse an integer; also 48.0, as tables with empty cells are often written."""
     text = row[column].strip()
     try:
         return whole(column, int(text.removesuffix(".0")))
@@ -235,7 +235,7 @@ def schedule_text(schedule: Schedule) -> str:
 def find_schedule(
     network: Network, schedule: Schedule | Path | str | None = None, robots: Sequence[str] = ()
 ) -> Schedule:
-    """Return a schedule by name, from a file, or itself; the usual loop where none is given."""
+    """Return a schedule by name, from a file, or unchanged; by default the loop of all robots."""
     if schedule is None:
         return robot_loop(network, robots or min(len(network.scene.robots), MOST))
     if isinstance(schedule, str) and schedule in SCHEDULES:
@@ -265,7 +265,7 @@ def find_schedule(
 
 
 def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> OpenStep:
-    """Return the step of a row, which must be possible after those before."""
+    """Return the step of a row, which must be feasible after the previous ones."""
     number, kind, bricks = _read_cells(row, where)
     if number != len(before) + 1:
         raise StepError(f"{where}: step {number} should be {len(before) + 1}; number steps from 1")
@@ -280,7 +280,7 @@ def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> Ope
 
 
 def _grips(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> ScheduledGrips:
-    """Return what the robots hold in a row: a mark goes on, or is a new move."""
+    """Return the grips of a row: a mark continues an open grip, or is a new move."""
     last = before[-1].grips if before else (None,) * len(scene.robots)
     count = len({move for step in before for move in step.moves})
     grips: list[int | OpenGrip | None] = []

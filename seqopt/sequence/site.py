@@ -1,4 +1,4 @@
-"""Where a build stands: which bricks, and who holds what; builds may begin and end anywhere."""
+"""State of a site: placed bricks and grips, at which builds may begin and end."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from seqopt.sequence.steps import Grips, Step, StepKind, _check_state
 
 @dataclass(frozen=True)
 class Site:
-    """Where a build stands.
+    """State of a site.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Site:
 
     @classmethod
     def after(cls, steps: Sequence[Step], count: int) -> Site:
-        """Return where a build stands after so many of its steps, from 0 for the empty site."""
+        """Return the site after a number of steps of a build, 0 for the empty site."""
         first, last = (steps[0].number - 1, steps[-1].number) if steps else (0, 0)
         if not isinstance(count, Integral) or not (first or 0) <= count <= last:
             raise StepError(f"step {short(count)}: the plan has {first} to {last}")
@@ -79,16 +79,16 @@ class Site:
 
     @property
     def placed(self) -> list[float]:
-        """When the bricks that stand were in their places, s: nobody has waited yet."""
+        """When the placed bricks were in position, s, from their ages."""
         return [-age for age in self.ages] + [0.0] * (self.bricks - len(self.ages))
 
     @property
     def held(self) -> int:
-        """How many grips are held."""
+        """Number of grips."""
         return sum(node is not None for node in self.grips or ())
 
     def holds(self, scene: Scene) -> Grips:
-        """Return the node that each robot holds, if the site is possible in a scene."""
+        """Return the node that each robot holds; raise an error if the scene does not allow it."""
         grips, most = self.grips, len(scene.placed)
         if not isinstance(self.bricks, Integral) or not 0 <= self.bricks <= most:
             raise StepError(
@@ -106,7 +106,7 @@ class Site:
         return grips
 
     def described(self, scene: Scene) -> dict[str, object]:
-        """Return what stands and who holds what by names, ready for JSON."""
+        """Return bricks and grips by names, ready for JSON."""
         pairs = zip(scene.robots, self.holds(scene), strict=True)
         held = {robot.name: node for robot, node in pairs if node is not None}
         return {

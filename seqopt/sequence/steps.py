@@ -16,7 +16,7 @@ Grips = tuple[int | None, ...]
 
 
 class StepKind(Enum):
-    """What a step does."""
+    """Kind of a step."""
 
     PLACE = "place"  # one more brick, held by the robot that places it
     RELEASE = "release"  # one grip fewer, or several; same bricks
@@ -89,7 +89,7 @@ def _idle_note(scene: Scene, name: str, steps: Iterable[AnyStep]) -> list[str]:
 
 
 def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
-    """Return steps if that is what they are; a schedule whose grips are open is not."""
+    """Return steps unchanged; raise an error for other objects, as a schedule with open grips."""
     if not isinstance(steps, Sequence) or not all(isinstance(step, Step) for step in steps):
         raise StepError(
             f"a {type(steps).__name__} is not a sequence of steps; "
@@ -101,9 +101,9 @@ def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
 def check_sequence(
     scene: Scene, steps: Sequence[Step], begin: AnyStep | None = None
 ) -> tuple[Step, ...]:
-    """Return the steps if each is possible after the one before, the first one after ``begin``.
+    """Return the steps, checked to be feasible one after the other, the first after ``begin``.
 
-    By default they go on from the empty site.
+    By default they begin at the empty site.
     """
     if not steps:
         raise StepError("the sequence has no steps; give at least one")
@@ -113,7 +113,7 @@ def check_sequence(
 
 
 def _check_part(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Return the steps of a build or of a part of one, whatever stands before the first of them."""
+    """Return the checked steps of a build or of a part of one, which may begin in any state."""
     if require_steps(steps):
         _check_state(scene, steps[0], f"step {steps[0].number}")
     if len(steps) != 1:
@@ -122,13 +122,13 @@ def _check_part(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
 
 
 def check_step(scene: Scene, before: AnyStep | None, step: AnyStep) -> None:
-    """Require that a step is possible after the one before, whatever its open grips become."""
+    """Require that a step is feasible after the previous one, for any choice of open grips."""
     _check_state(scene, step, f"step {step.number}")
     _check_change(scene, before or Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), step)
 
 
 def _check_state(scene: Scene, step: AnyStep, where: str) -> None:
-    """Require grips that are possible whatever came before; ``where``: what a message names."""
+    """Require feasible grips, regardless of previous steps; ``where``: named in messages."""
     if len(step.grips) != len(scene.robots):
         raise StepError(
             f"{where}: {len(step.grips)} grips for {len(scene.robots)} robots; give one each"
@@ -169,7 +169,7 @@ def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int, where: str
 
 
 def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
-    """Require that a step does what its kind says, and nothing else."""
+    """Require that a step makes exactly the change of its kind."""
     where = f"step {step.number} ({step.kind.value})"
     removes = step.kind is StepKind.REMOVE
     expected = before.bricks + (step.kind is StepKind.PLACE) - removes
@@ -209,7 +209,7 @@ def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
 def _turned_round(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
     """Return the take-down that passes the states of a build in reverse, from 1.
 
-    It begins where the build ends; robots that let go together take hold one after the other.
+    It begins at the end of the build; simultaneous releases become successive grips.
 
     >>> import seqopt
     >>> scene = seqopt.load_scene("arch25")

@@ -1,4 +1,4 @@
-"""Methods with open grips for two robots or more, all of which an optimization chooses."""
+"""Methods with open grips for two robots or more, whose grips are optimized."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
 class _Turn(NamedTuple):
     """The roles of one turn of the loop, each named by the first brick that it places.
 
-    Who has held longest moves in the next turn, and places in the one after.
+    The robot with the longest grip moves in the next turn, and places in the one after.
     """
 
     mover: int
@@ -259,7 +259,7 @@ def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) ->
 
 
 def _free(scene: Scene, window: Sequence[Step], helpers: Sequence[int]) -> int:
-    """Return the first helper that holds nothing in some steps and reaches a node held by none."""
+    """Return the first helper free in the given steps that reaches a free node."""
     held = {node for step in window for node in step.held}
     for robot in helpers:
         idle = all(step.grips[robot] is None for step in window)

@@ -35,9 +35,9 @@ _MM = 1000.0
 
 
 def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str]:
-    """Yield the least reach of one robot with which something exists, else of all; in words.
+    """Yield the least sufficient reach of a single robot, else of all robots, in words.
 
-    ``exists``: whether it does in a scene, which is the same save for what robots reach.
+    ``exists``: whether the problem is feasible in a scene with other reaches.
     """
     limited = {
         robot.name: robot.reach
@@ -60,9 +60,9 @@ def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str
 def _least(
     scene: Scene, reaches: Mapping[str, Side | Sphere], exists: Callable[[Scene], bool]
 ) -> float:
-    """Return how much longer some reaches have to be at least, in whole mm; zero if it is vain.
+    """Return the least sufficient extension of reaches, in whole mm; zero if none suffices.
 
-    Only lengths at which one more node is reached make a difference. ``reaches``: by robot.
+    Only lengths at which a further node is reached are tried. ``reaches``: by robot.
     """
     points = [brick.node_position(node) for brick in scene.placed for node in brick.nodes]
     lacks = (reach.lack(point) for reach in reaches.values() for point in points)
@@ -83,7 +83,7 @@ def _least(
 
 
 def _says_reach(make: _Make) -> _Make:
-    """Return a method whose error that asks for a longer reach says which one is enough."""
+    """Decorate a method so that errors about reach name the least sufficient one."""
 
     @wraps(make)
     def made(network: Network | Scene, robots: int | Sequence[str] = ()) -> object:
@@ -114,7 +114,7 @@ _Way = tuple[int, tuple[_Pair, ...]]  # changes so far, pairs so far
 def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> list[int]:
     """Return the indices of the robots that a method may use, in the order of its roles.
 
-    Without names these are all robots of the scene, which must be as many as roles at least.
+    By default all robots of the scene, which must be at least as many as roles.
     """
     known = [robot.name for robot in scene.robots]
     if not names:
@@ -138,13 +138,12 @@ def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> 
 def _take_turns(
     network: Network, swap_after: Set[int], robots: Sequence[int], starts: Sequence[_Pair] = ()
 ) -> list[_Pair]:
-    """Return who places every brick and who holds meanwhile, two robots at a time.
+    """Return the placing and the holding robot of every brick, two robots at a time.
 
-    After some bricks (``swap_after``: their names) the one that placed stays and holds, after the
-    others the one that held. The two are the same all along where their reach allows it; otherwise
-    a third of the robots takes the place of the one that is free, as seldom as possible. Ties go to
-    the order of the robots. ``starts`` has who may place the first brick, and who is its partner;
-    by default any two.
+    After bricks in ``swap_after``, names, the placing robot holds on, after others the holding one.
+    The pair stays the same if its reach allows; otherwise a third robot replaces the free one, with
+    the fewest replacements. Ties go to the order of robots. ``starts``: pairs of the robot that
+    places the first brick and its partner; by default any two.
     """
     scene = network.scene
     rank = {robot: i for i, robot in enumerate(robots)}
@@ -169,7 +168,7 @@ def _take_turns(
 
 
 def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepError:
-    """Return the error that nobody is left to place a brick."""
+    """Return the error that no robot can place a brick."""
     brick = scene.placed[k]
     nodes = [node for node in brick.nodes if node not in scene.blocked_nodes]
     names = " and ".join(scene.robots[robot].name for robot in sorted({*free}))
@@ -181,9 +180,9 @@ def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepEr
 
 
 def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list[int]:
-    """Return a different robot for every role that reaches all bricks which the role places.
+    """Assign a robot to every role that reaches all bricks which the role places.
 
-    Bricks are places in build order; of all ways the first is taken, role by role.
+    Bricks are indices in build order; of all assignments the lexicographically first, by role.
     """
     reach = {r: within_reach(scene, scene.robots[r]) for r in robots}
     fits = [[r for r in robots if all(reach[r][b] for b in role)] for role in roles]
@@ -201,7 +200,7 @@ def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list
 
 
 def _first_match(fits: Sequence[Sequence[int]]) -> list[int]:
-    """Return the first way to give every role a robot of its own; none if there is no way."""
+    """Return the lexicographically first assignment of robots to roles; None if there is none."""
     for robot in fits[0] if fits else ():
         rest = [[other for other in fit if other != robot] for fit in fits[1:]]
         if not all(rest):
@@ -226,7 +225,7 @@ def lies_along(network: Network) -> frozenset[int]:
 
 
 def _along(network: Network, bricks: slice) -> Bools:
-    """Return which of some bricks lie along the structure."""
+    """Return which of the given bricks lie along the structure."""
     half = network.edge_kind == PartKind.JOINT.value
     return np.asarray(np.isin(network.inner[bricks], network.edge_nodes[half, 0]).all(axis=1))
 
@@ -250,7 +249,7 @@ def _begins_elsewhere(network: Network) -> frozenset[int]:
 
 
 def degeneration(network: Network, method: str) -> str:
-    """Return why a method of `METHODS` becomes another one on a structure; empty if it does not.
+    """Return why a method of `METHODS` degenerates to another one on a structure; else empty.
 
     Examples
     --------
@@ -387,7 +386,7 @@ def alternate(
     robots: Sequence[str],
     grip: Callable[[int, int], _Grip],
 ) -> Iterator[tuple[StepKind, int, tuple[_Grip | None, ...]]]:
-    """Yield the steps in which two robots, that may be named, place and hold by turns.
+    """Yield the steps in which two robots place and hold by turns.
 
     After each brick one of the two releases, if it holds anything; after the last one both do.
     ``grip`` says what a robot, by its index, holds of the brick that it places, by the brick count.
