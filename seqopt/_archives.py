@@ -93,7 +93,7 @@ class Archive:
     def array(self, name: str, kinds: str, shape: tuple[int | None, ...]) -> np.ndarray:
         """Return an array.
 
-        ``kinds``: accepted kinds of its type, as letters of NumPy; ``shape``: required one, None for
+        ``kinds``: accepted type kinds, as letters of NumPy; ``shape``: required one, None for
         any size. Raises `FileError` for other content.
         """
         found = _array(self.read(f"{name}.npy"))

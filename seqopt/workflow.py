@@ -120,7 +120,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     engine : str
         A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest level (`pose`).
     aim : str, optional
-        What is to be small, the most important first: ``"minmax,steps"``.
+        Minimized goals, the most important first: ``"minmax,steps"``.
     limits : sequence of Limit, Filter or str
         Bounds that no step may exceed: ``"payload"``, ``"F_largest=300"``, ``"linear_range=any"``;
         and filters, by the names by which they were registered.
@@ -139,7 +139,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     search : Search, optional
         How it is searched, and what that may use.
     progress : callable, optional
-        Told how far it is.
+        Called with the progress.
 
     Returns
     -------

@@ -48,8 +48,8 @@ def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certi
     FileError, ProblemError
         If a file or an entry cannot be read.
     SolverError
-        If the path does not lead from node 0 to an end, exceeds a cap or is worth something else
-        than is claimed; or if a bound is higher than what is to prove it.
+        If the path does not lead from node 0 to an end, exceeds a cap or has other values
+        than claimed; or if a bound exceeds the one that its multipliers prove.
 
     Examples
     --------

@@ -42,7 +42,7 @@ def compile_instance(
     name : str, optional
         What it is called; by default as its scene.
     aim : Aim, optional
-        Of candidates of moves: whether the sum of their costs is to be small or the largest; by
+        Of candidates of moves: whether to minimize the sum of their costs or the largest; by
         default as of the formulation that usually solves the problem.
     below : float, optional
         Where states are chosen: those of which the first aim takes more are left out. A path that

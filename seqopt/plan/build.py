@@ -121,7 +121,7 @@ class ShownBuild(Shown):
     def tolerances(self) -> pd.DataFrame:
         """Return the tolerance of grip positions of every step, in the worst direction.
 
-        Result: a row per step: ``tolerance_mm`` (infinite where nobody holds), ``proven_mm``, up to
+        Result: a row per step: ``tolerance_mm`` (infinite without grips), ``proven_mm``, up to
         which no robot exceeds its payload, and what ``stops`` grips from being farther off. Raises
         `ProblemError` for discrete elements, which are not linear in that.
         """
@@ -131,7 +131,7 @@ class ShownBuild(Shown):
         """Return the earliest start and end times of all actions, in the order of the steps.
 
         Result: a row per step: ``step``, ``type``, ``bricks``, ``robots`` who act, ``node`` that is
-        taken, from when the robot ``prepares_s`` and is ``ready_s`` (none where robots let go),
+        taken, from when the robot ``prepares_s`` and is ``ready_s`` (none for a release),
         ``start_s`` and ``end_s`` of what changes the structure, and how long it ``waits_s`` for the
         robot; where mortar cures, also for the mortar, which alone it ``cures_s``, and the
         ``joint`` that was the last to hold. Raises `StepError` if it is not known how long a robot
@@ -295,7 +295,7 @@ class GivenSequence(ShownBuild):
 
     @property
     def result(self) -> str:
-        """What it is worth, in words."""
+        """Its values, in words."""
         return "given, not optimized"
 
     def table(self) -> pd.DataFrame:

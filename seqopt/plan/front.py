@@ -216,13 +216,13 @@ def _require_memory(found: Explorer) -> None:
 class Front(Terse):
     """A Pareto set whose points are checked.
 
-    ``table``: a row per point, by the first number: the numbers that are to be small, SI units,
-    then ``steps`` and ``regrips`` of its plan where they are none of these; ``steps``: the plan of
-    every row; ``engines``: what computes its responses, of the scene in its build order;
-    ``complete``: whether it was proven that no further point exists; ``seconds``: by stage, s:
-    solve, verify; ``moved``: how far plans move nodes, over the limit of the linear range, where
-    that was asked; ``beyond``: why some leave it, in a few words; ``stopped``: why it ended early:
-    ``time`` or ``interrupt``; empty if it did not.
+    ``table``: a row per point, sorted by the first column: values of the goals, SI units, then
+    ``steps`` and ``regrips`` of its plan if these are no goals; ``steps``: the plan of every row;
+    ``engines``: its engine, for the scene in its build order; ``complete``: whether it is proven
+    that no point is missing; ``seconds``: run times of solve and verify, s; ``moved``: largest
+    displacements of plans, over the limit of the linear range, if computed; ``beyond``: why some
+    exceed it, in words; ``stopped``: ``time`` or ``interrupt`` if the search ended early, else
+    empty.
     """
 
     table: pd.DataFrame

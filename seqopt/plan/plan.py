@@ -53,7 +53,7 @@ class Plan(ShownBuild):
     Attributes
     ----------
     problem : Problem
-        What was asked; or the graph of choices, where that was given.
+        The problem; or the graph of choices, if that was given.
     graph : Layers, States or Instance
         What was chosen from.
     formulation : Formulation
@@ -291,7 +291,7 @@ class Plan(ShownBuild):
 
     @cached_property
     def overloads(self) -> tuple[Excess, ...]:
-        """The payloads that steps exceed, whether or not a limit was asked for."""
+        """The payloads that steps exceed, also without a limit on payloads."""
         return overloads(self.engine.network.scene, self._columns)
 
     def responses(self) -> pd.DataFrame:

@@ -25,9 +25,9 @@ def without(
 ) -> tuple[Scene, Site]:
     """Return scene and site without robots that are lost, and without bricks that are missing.
 
-    Who is lost lets go and takes no further part. A brick that stood is placed again next; one
-    that was still to come waits until all are placed that do not hang on it. Nobody holds what is
-    missing.
+    A lost robot releases its node and is not used again. A missing brick that stood is placed
+    again next; a later one waits for all bricks that are not connected through it. Grips on
+    missing bricks are released.
     """
     names = [robot.name for robot in scene.robots]
     for name in lost:

@@ -76,7 +76,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     Raises
     ------
     ProblemError
-        If there is no such response, no grip is open, or questions do not go together.
+        If there is no such response, no grip is open, or parts of the question are incompatible.
 
     Examples
     --------

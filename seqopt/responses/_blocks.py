@@ -93,7 +93,7 @@ def work(states: int, bricks: int) -> float:
 class Answers(FrozenValue):
     """The responses of a block.
 
-    ``values`` (S,): the responses asked for, SI units; ``forces`` (S, r): sizes of the forces of
+    ``values`` (S,): the requested responses, SI units; ``forces`` (S, r): sizes of the forces of
     the grips, N; ``tally`` (object, int): what the engine counted meanwhile, if it counts:
     `seqopt.engines._auto.AutoEngine`.
     """
@@ -320,7 +320,7 @@ class Wanted(Protocol):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Batch(FrozenValue):
-    """Open steps with as many bricks and as many grips."""
+    """Open steps of equal numbers of bricks and grips."""
 
     schedule: Schedule
     steps: tuple[OpenStep, ...]

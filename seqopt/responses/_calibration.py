@@ -3,7 +3,7 @@ r"""Calibration of joint stiffness by load tests: identifiable factors, and thei
 A test is a force on a brick of a scene and how far the loaded point moved along it. All joints and
 ground ends of all scenes are made stiffer by two factors, one in translation and one in rotation,
 until computed displacements come closest to measured ones: least squares of logarithms, so that
-tests count alike whatever their size.
+tests of any size have equal weight.
 
 Displacements are in proportion to :math:`1/k`. So the share :math:`s` of a displacement that is due
 to joints that turn says all of what a test tells: it fixes :math:`k_t^{1-s} k_r^s`. Two factors are
@@ -64,7 +64,7 @@ class StiffnessFit(Terse):
 
 
 def calibrate(tests: pd.DataFrame) -> StiffnessFit:
-    """Fit factors on joint stiffness to load tests, with intervals of what is not identified.
+    """Fit factors on joint stiffness to load tests, with confidence intervals.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ __all__ = ["CHOICE_RESPONSES", "Evaluation", "StepChoices", "Wanted"]
 
 @dataclass(frozen=True, repr=False)
 class Evaluation(Terse):
-    """The responses of all choices of a schedule, computed when they are first asked for.
+    """The responses of all choices of a schedule, computed on first use.
 
     Parameters
     ----------

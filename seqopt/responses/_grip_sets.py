@@ -70,7 +70,7 @@ class KnownRows:
         """Return the rows of codes; those not cached are computed as one batch.
 
         ``key``: codes of other keys are others; ``codes`` (n,); ``compute``: returns the rows (m,
-        k) of distinct codes, given the places (m,) where they first stand among those asked for.
+        k) of distinct codes, given the places (m,) of their first occurrence in the request.
         Result (n, k).
         """
         distinct, first = np.unique(codes, return_index=True)

@@ -26,7 +26,7 @@ class Resources:
     max_memory : float, optional
         Bytes that responses and costs may take; by default four fifths of the free memory.
     progress : callable, optional
-        Told in a few words how far a computation is that takes more than a second.
+        Called with the progress, in a few words, of computations longer than a second.
 
     Raises
     ------

@@ -70,22 +70,22 @@ class FreeRules:
     regrips : int or None
         Most grips taken between two bricks, besides those that place; by default any number.
     ending : Ending or str
-        How the build ends. One by one: with all bricks robots may let go whatever the rules say,
-        and once a state breaks them, robots only let go; so also where a build begins in it.
+        How the build ends. One by one: with all bricks robots may release against the rules,
+        and once a state violates them, only release; also if a build begins in such a state.
     candidates : str
-        Where bricks that stand may be taken hold of: ``near:6`` or ``within:1.5``, as of
+        At which nodes placed bricks may be gripped: ``near:6`` or ``within:1.5``, as of
         `seqopt.sequence.schedule.Near`; by default wherever robots reach.
     begin : Site or None
         Where the build begins; by default with the empty site. This state need not keep rules or
         limits; until rules are kept for the first time, robots may only take grips, except where
-        they have begun to let go one by one (see ``ending``).
+        releases one by one have begun (see ``ending``).
     finish : Site or None
         Where it ends: with so many bricks, and grips, or as ``ending`` says; by default with all
         bricks. Robots of one kind may have changed places.
     direction : Direction or str
-        Whether bricks are placed, or taken away, the newest first, each by the one robot that holds
-        it, at a node of the rule ``newest``. A take-down begins by default with all bricks, which
-        nobody holds, and ends with the empty site; states keep the same rules.
+        Whether bricks are placed, or removed, the newest first, each by the only robot that holds
+        it, at a node of the rule ``newest``. A take-down begins by default with all bricks and no
+        grips, and ends with the empty site; states keep the same rules.
 
     Raises
     ------

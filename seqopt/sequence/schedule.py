@@ -324,7 +324,7 @@ def islands(network: Network, bricks: int) -> tuple[frozenset[int], ...]:
 def check_support(
     network: Network, steps: Sequence[Step] | Sequence[OpenStep], moves: Sequence[Move] = ()
 ) -> None:
-    """Require that every island is held at every step, whatever is chosen for open grips."""
+    """Require that every island is held at every step, for any choice of open grips."""
     if _always_tied(network):
         return
     on = network.scene.brick_of_node
