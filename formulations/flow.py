@@ -79,7 +79,7 @@ def _least_sum(graph: Graph, goal: int, watch: Watch) -> tuple[Graph, float, boo
 
 
 def _least_peak(graph: Graph, goal: int, watch: Watch) -> tuple[Graph, float, bool]:
-    """Return the moves that take no more than the least peak, that peak, and the same."""
+    """Return the moves within the least peak, that peak, and whether time was over before."""
     amounts = graph.amounts[:, goal]
     levels = np.unique(amounts)
     low, high = 0, len(levels) - 1

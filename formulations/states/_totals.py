@@ -31,7 +31,7 @@ LABELS = 16_384  # of a level that are continued at most
 
 
 class StopError(Exception):
-    """Time or memory that was given is used up; says which."""
+    """The limit of time or of memory, as its text says, is reached."""
 
 
 def cheapest_by(choose: Choose, watch: Watch) -> _Cheapest:
@@ -72,7 +72,7 @@ def least_total(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch)
 
 
 def by_weights(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) -> LeastTotal:
-    """Return the best path that is met on the way to the weights with the highest bound."""
+    """Return the best path met on the way to the weights of the highest lower bound."""
     count, best = len(graph.peaks), LeastTotal((), np.inf, -np.inf, np.zeros(0))
 
     def met(weights: Floats) -> Plane:

@@ -30,7 +30,7 @@ KEPT = 3  # prices that bound labels, those with the highest bounds
 
 @dataclass(frozen=True, eq=False)
 class Prices:
-    """Prices, and what they say.
+    """Multipliers of the robots' time, and bounds by them.
 
     ``each`` (L, 1 + k): of the time of all, and of a robot of every kind; ``left`` (L, n): priced
     time from states to ends at least; ``kinds`` (c,): of columns; ``bound``: of any build, s.

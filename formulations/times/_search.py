@@ -73,7 +73,7 @@ class Waits:
             self.cuts = FallCuts(network, mortar, self._builds.joints)
 
     def learn(self) -> bool:
-        """Keep the motions of all states that were looked at; return whether some are new."""
+        """Add the failure motions of all evaluated states; return whether some are new."""
         if self._builds is None or self.cuts is None:
             return False
         return sum(map(self.cuts.add, self._builds.motions)) > 0
@@ -99,7 +99,7 @@ class Waits:
         return Soonest(grips, times[-1].end, starts)
 
     def try_soonest(self, problem: States, states: Sequence[Sequence[int]]) -> Soonest | None:
-        """Return the same; None where no wait is enough."""
+        """Return the assignment of least makespan; None if no wait is enough."""
         try:
             return self.soonest(problem, states)
         except StepError:

@@ -30,7 +30,7 @@ ALMOST = 1e-9  # over a value: a path must be better by more than this to be bet
 
 
 class Chosen(NamedTuple):
-    """A path through states, its start left out, and what is known of its makespan.
+    """A path through states, its start left out, with its makespan and lower bound, s.
 
     ``value``, ``bound``: s; ``labels``: that prove the bound, if there are any; ``late``: whether
     time was over.
@@ -45,7 +45,7 @@ class Chosen(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """A build in time of which the least makespan is sought.
+    """The problem of the least makespan of a build in time.
 
     ``timed``: states, moves and acts; ``kept`` (m,): the moves that may be taken; ``caps``: what
     paths must keep to; ``prices``: bound builds; ``first``: a first path, of no states if none was

@@ -176,7 +176,7 @@ class Explorer:
         return self.whole
 
     def dive(self, threshold: float = np.inf, below: float = np.inf) -> bool:
-        """Visit the same states, the highest level first, until a build may end in one of them.
+        """Visit states up to a threshold, the highest level first, until one may end a build.
 
         Few are visited at a time while that leads on, more and more where it does not; after some
         turns it gives up, since whole levels are visited in larger batches.

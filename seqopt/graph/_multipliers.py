@@ -39,7 +39,7 @@ from seqopt.arrays import Floats
 
 
 class Plane(NamedTuple):
-    """A path at the multipliers that were asked for: its plane, and a lower bound of the dual."""
+    """The plane of the best path at given multipliers, and a lower bound of the dual there."""
 
     constant: float
     slope: Floats
@@ -47,7 +47,7 @@ class Plane(NamedTuple):
 
 
 class Highest(NamedTuple):
-    """The best multipliers that were met, and the bound that they prove: infinite of no path."""
+    """The best multipliers so far, and their Lagrangian bound: infinite if there is no path."""
 
     multipliers: Floats
     bound: float

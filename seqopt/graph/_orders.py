@@ -33,7 +33,7 @@ MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 
 
 def among_orders(problem: States, among: Orders | str) -> States:
-    """Return the problem whose build order is sought too; values keep the scales of the scene's.
+    """Return the problem over feasible build orders too; values keep the scales of the scene's.
 
     Raises `ProblemError` if there are no such orders, what is asked depends on the scene's own, or
     its engine was not made by name.
@@ -81,7 +81,7 @@ def upward(problem: States) -> States:
 
 @dataclass(frozen=True)
 class OrderRules:
-    """Which orders of a scene's bricks are sought.
+    """Which orders of a scene's bricks are feasible.
 
     ``stands``: names of the bricks with which all builds begin.
     """
@@ -111,7 +111,7 @@ class OrderRules:
         return tuple(b for b in left if self.ties[b] & placed or b in founded)
 
     def allows(self, order: Sequence[int]) -> bool:
-        """Return whether an order of all bricks' names is one of those that are sought."""
+        """Return whether an order, names of all bricks, is feasible."""
         first = len(self.stands)
         pairs = [*enumerate(order)][first:]
         follow = all(b in self.next_bricks(frozenset(order[:k])) for k, b in pairs)
@@ -119,7 +119,7 @@ class OrderRules:
 
 
 def order_rules(problem: States) -> OrderRules:
-    """Return which orders are sought of a problem."""
+    """Return the rules of feasible orders of a problem."""
     scene = problem.network.scene
     first = upward(problem).free_rules.span(scene)[0]
     return OrderRules(scene, Orders.of(problem.orders or Orders.TIED), scene.build_order[:first])
@@ -174,7 +174,7 @@ def _sets(places: list[int], fewest: int, robots: int, nodes: int) -> Ints:
 
 
 def _values(free: States, held: Ints) -> Floats:
-    """Return what the goal takes of grip sets of the whole; infinite where something is loose."""
+    """Return the goal of grip sets of the whole, (n,); infinite where something is loose."""
     if free.each:
         return np.asarray(np.max([_values(each, held) for each in free.each], axis=0))
     bricks, goal = len(free.network.inner), free.goals[0]
@@ -191,7 +191,7 @@ def _values(free: States, held: Ints) -> Floats:
 
 
 class TooManySetsError(ProblemError):
-    """There are more sets of bricks than may be looked at."""
+    """There are more sets of bricks than the search may visit."""
 
 
 Part = tuple[frozenset[int], int]  # bricks that stand, and the newest

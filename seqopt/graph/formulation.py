@@ -44,7 +44,7 @@ class Run:
 
 @contextmanager
 def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Note how long something takes under the name of a stage."""
+    """Record the run time of a stage, s, under its name."""
     start = time.perf_counter()
     yield
     seconds[stage] = time.perf_counter() - start
@@ -109,7 +109,7 @@ class Watch:
 
     @property
     def over(self) -> bool:
-        """Whether the time limit is reached, or somebody asked for an end."""
+        """Whether the time limit is reached, or an interrupt has come."""
         ended = self._within is not None and self._within.over
         return ended or self.interrupted or self.seconds >= self._limit
 
@@ -257,7 +257,7 @@ class Formulation:
 
     @property
     def window_options(self) -> dict[str, int | str] | None:
-        """Options with which it looks at one window after the other; None if it never does."""
+        """Options for solving window by window; None if it cannot."""
         return None if self.windowed is None else dict(self.windowed)
 
     @property

@@ -45,7 +45,7 @@ class _Cap(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Instance(Source, FrozenValue, Shown):
-    """A graph, what its arcs take, and which path through it is sought; no scene is needed.
+    """A graph with amounts of its arcs, goals and caps of paths through it; no scene is needed.
 
     A path leads from node 0 to one of the ends. Goals are made small one after the other: of the
     paths that are best in the first, the best in the second, and so on.
@@ -145,14 +145,14 @@ class Instance(Source, FrozenValue, Shown):
 
     @cached_property
     def graph(self) -> Graph:
-        """The same as a graph, all columns its amounts."""
+        """Its graph, with all columns as amounts."""
         peaks = {c for goal in self.goals if goal.kind == PEAK for c in goal.columns}
         kinds = tuple(c in peaks for c in range(len(self.columns)))
         return Graph(self.source, self.target, self.amounts, kinds, self.ends)
 
     @cached_property
     def asked(self) -> Graph:
-        """The same with the columns of goals, one after the other, and then those with caps."""
+        """Its graph with the columns of goals, then those with caps, in order."""
         graph, goals = self.graph, [c for goal in self.goals for c in goal.columns]
         columns = [*goals, *(cap.column for cap in self.caps if cap.column is not None)]
         caps = tuple(cap.most for cap in self.caps if cap.column is not None)

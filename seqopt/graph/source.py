@@ -32,7 +32,7 @@ class Source:
 
     @property
     def among(self) -> str:
-        """Which candidates alone are looked at, in words; empty for all."""
+        """The candidates that are kept, in words; empty for all."""
         return ""
 
     @property
@@ -102,7 +102,7 @@ class Source:
         return False
 
     def said(self, objective: Mapping[str, float], gap: float | None, status: str) -> str:
-        """Return the values of a plan, and what is proven about it, in words."""
+        """Return objective, gap and status of a plan in words."""
         values = ", ".join(f"{name} {value_text(name, v)}" for name, v in objective.items())
         within = f" within {gap:.2g}" if gap and gap < inf else ""
         among = f" among candidates {self.among}" if self.among else ""

@@ -53,7 +53,7 @@ def judge_path(instance: Instance, answer: Answer) -> Certificate:
 
 
 class _Walk(NamedTuple):
-    """A path: its arcs, and where times are asked when its last act ends."""
+    """Arcs of a path, and its makespan in an instance in time."""
 
     arcs: Ints
     ends: float

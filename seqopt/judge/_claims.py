@@ -64,7 +64,7 @@ def first_stage(instance: Instance) -> Stage:
 
 
 def next_stage(stage: Stage, goal: _Target, value: float) -> Stage:
-    """Return what is left for the goals after one that is at its value."""
+    """Return arcs and caps that are left once a goal is at its value."""
     if goal.kind == PEAK:
         kept = stage.graph.amounts[:, goal.columns[0]] <= tied(value)
         return stage._replace(graph=stage.graph.only(kept))

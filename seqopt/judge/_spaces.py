@@ -33,7 +33,7 @@ MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 
 
 class TooManyPartsError(ProblemError):
-    """There are more sets of bricks than a proof looks at."""
+    """There are more sets of bricks than a proof may visit."""
 
 
 class OneSchedule:
@@ -74,7 +74,7 @@ class OneSchedule:
 
 
 class AllOrders(OneSchedule):
-    """The states of all orders that are sought, of a take-down those of the build it reverses.
+    """The states of all feasible orders; of a take-down those of the build that it reverses.
 
     ``evaluator``: of the scene's own order: what all orders have in common.
     """

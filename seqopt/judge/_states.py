@@ -229,7 +229,7 @@ class StateEvaluator:
         return np.asarray(np.min(known, axis=0))
 
     def _stability(self, margins: Sequence[float]) -> Iterator[StandingSets]:
-        """Yield what is known of every demand in every scenario."""
+        """Yield the verdicts of every stability requirement, scenario by scenario."""
         for demand in self.demands(margins):
             if demand not in self._standing:
                 networks = [p.network for p in self.problem.each or (self.problem,)]

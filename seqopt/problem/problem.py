@@ -261,7 +261,7 @@ def _positive(text: str, words: str) -> float:
 
 
 class Orders(Enum):
-    """Among which orders the best is sought."""
+    """Which orders are feasible."""
 
     TIED = "tied"  # a joint or ground end ties every brick to what stands when it is placed
     ANY = "any"
@@ -403,7 +403,7 @@ class Problem(Shown):
         )
 
     def within_range(self, share: float) -> Problem:
-        """Return the same problem whose steps keep within a share of the linear range."""
+        """Return the problem with a limit on the linear range, a share of it."""
         return replace(self, limits=(*self.limits, Limit(LINEAR_RANGE, share)))
 
     @cached_property
@@ -457,7 +457,7 @@ READ: dict[str, Callable[[Any], Any]] = {
 
 
 def _require_for_curing(problem: Any) -> None:
-    """Raise a `ProblemError` where mortar cures and what is asked beside it is not modeled."""
+    """Raise a `ProblemError` if mortar cures beside a requirement that is not modeled then."""
     if problem.standing is None or problem.standing.curing is None:
         return
     wrong = [str(goal) for goal in problem.goals if goal.margins]

@@ -92,7 +92,7 @@ some times, and for which joint it waits; empty if for none."""
 
 
 class CuringBuilds:
-    """Says from when on states of a build stand with what their joints have then; proven.
+    """Proven earliest times at which states stand with the bonds that their joints then have.
 
     ``asked``: how many states were looked at, each with bonds.
     """
@@ -164,7 +164,7 @@ class CuringBuilds:
 
 
 def mortar_waits(network: Network, standing: Standing | None) -> Waits | None:
-    """Return what says how long steps wait for mortar; None where none cures."""
+    """Return the waits of steps for mortar, as a function; None where none cures."""
     if standing is None or standing.curing is None:
         return None
     return CuringBuilds(network, standing.mortar, standing.curing).waits

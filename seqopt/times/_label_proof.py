@@ -37,7 +37,7 @@ class Limits:
 
 
 class Closed:
-    """Labels that are looked at as a proof.
+    """Labels to be checked as a proof: all successors are dominated, or pruned by bounds.
 
     ``acts``: all that may be taken; ``amounts`` (m, q): what moves take of sums; ``multipliers``
     (L, 1 + c): of the time of all and of robots, made valid; ``limits``: beyond which nothing is

@@ -178,7 +178,7 @@ def reassigned_steps(
     waits: Waits | None = None,
     begin: Site | None = None,
 ) -> tuple[Step, ...]:
-    """Return the same grips in the same order by those robots with which the build takes least.
+    """Return the steps with the robot assignment of least makespan.
 
     ``may``: whether a robot, by its index, may have a grip; ``team``: the robots that take part, by
     default all; ``waits``, ``begin``: as of `step_times`; who holds there goes on. A `StepError`

@@ -194,7 +194,7 @@ def reassign(
 
 
 def _who_carries(scene: Scene, steps: Sequence[Step]) -> Callable[[int, Hold], bool]:
-    """Return what says whether a robot bears the bricks that are placed or removed in a hold."""
+    """Return the test of whether a robot bears the bricks placed or removed in a hold."""
     bricks = {(each.robot, each.step): each.brick for each in carried(scene, steps)}
     able = [can_carry((scene,), robot) for robot in range(len(scene.robots))]
 

@@ -138,7 +138,7 @@ class Budget(FrozenValue):
 
     @property
     def amounts(self) -> LayeredCosts:
-        """What choices take, in place of costs; made anew each time, as judges need it."""
+        """Uses of the budget as costs of choices; made anew each time, as judges need it."""
         return LayeredCosts(self.single, self.shared)
 
     def spent(self, choice: Sequence[int]) -> float:

@@ -134,7 +134,7 @@ class Layers(Source, Shown):
 
     @property
     def among(self) -> str:
-        """Which candidates alone are looked at, in words; empty for all."""
+        """The candidates that are kept, in words; empty for all."""
         return self.schedule.left_out
 
     @property
@@ -176,7 +176,7 @@ class Layers(Source, Shown):
         return tuple(candidates.index(node) for candidates, node in pairs)
 
     def said(self, objective: Mapping[str, float], gap: float | None, status: str) -> str:
-        """Return the value of a plan, and what is proven about it, in words."""
+        """Return objective and gap, or status, of a plan in words."""
         if gap is None:
             values = ", ".join(f"{name} {value:.6g}" for name, value in objective.items())
             return f"{values} (claimed), {status}" if values else "not compared with the optimum"
@@ -284,7 +284,7 @@ class Layers(Source, Shown):
 
     @property
     def _in_all(self) -> _Asked:
-        """What is asked in every scenario, by a criterion with the numbers of the nominal scene."""
+        """Responses needed in all scenarios; the criterion has the nominal scene's numbers."""
         evaluation = self.evaluation
         also = getattr(evaluation.wanted, "also", ())
         wanted = ResponsesAsked(self.criterion, self.limits, also)

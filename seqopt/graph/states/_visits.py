@@ -210,7 +210,7 @@ class StateSpace(Space):
 
     @property
     def floors(self) -> bool:
-        """Whether a state that one scenario rules out is not asked of the next."""
+        """Whether values may be lower bounds, from some of the scenarios."""
         return bool(self.problem.each) and not self.problem.totals
 
     def values(
@@ -247,7 +247,7 @@ class StateSpace(Space):
         return self.problem.recalled(part, states)
 
     def schedule(self, part: int, asked: States) -> tuple[int, States]:
-        """Return the level of a part, and the problem whose states it has, by what is asked."""
+        """Return the level of a part, and the given problem, of which its states are."""
         return part, asked
 
     def path(self, found: Found) -> tuple[Order, tuple[tuple[int, ...], ...]]:

@@ -95,7 +95,7 @@ class States(Source, Shown):
 
     @cached_property
     def each(self) -> tuple[States, ...]:
-        """The same problem in every scenario by itself; none where there are no scenarios."""
+        """The problem of every single scenario; empty without scenarios."""
         alone = replace(self, scenarios=(), over=WORST_PEAK, weights=())
         return tuple(replace(alone, engine=engine) for engine in self.scenarios)
 
@@ -112,7 +112,7 @@ class States(Source, Shown):
 
     @property
     def alone_in_scene(self) -> States:
-        """The same: its own engine is that of the scene itself."""
+        """Itself: its engine is that of the nominal scene."""
         return self
 
     def names_of(self, _: Aim | None) -> tuple[str, ...]:
@@ -147,7 +147,7 @@ class States(Source, Shown):
 
     @property
     def among(self) -> str:
-        """Which candidates alone are looked at, in words; empty for all."""
+        """The candidates that are kept, in words; empty for all."""
         return self.rules.left_out
 
     @property
@@ -197,7 +197,7 @@ class States(Source, Shown):
         return self.chosen_candidates(states)
 
     def settles(self, *, exact: bool) -> bool:
-        """Return whether an exact search is optimal if judged: margins within what is proven."""
+        """Return whether a judged exact search is optimal, up to the proven width of margins."""
         return exact and not (self.budgets or self.totals or self.is_timed)
 
     def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
@@ -472,7 +472,7 @@ class States(Source, Shown):
 
     @cached_property
     def _beyond(self) -> Ints:
-        """How far the places of grips of the robot of every column are after those of nodes."""
+        """Offset of the places of grips from those of nodes, of the robot of every column, (r,)."""
         of_robot = self.network.scene.grip_kinds.of_robot
         robots = [robot for kind in self.space.kinds for robot in kind.robots]
         return np.asarray(2 * len(self.network.inner) * of_robot[robots])
@@ -497,12 +497,12 @@ class States(Source, Shown):
         return _ascending(states[:, : len(self._caps)].clip(min=0), self._payloads)
 
     def in_scene(self, scene: Scene) -> States:
-        """Return the same problem of another scene, as of one with other robots."""
+        """Return the problem in another scene, as of other robots."""
         engine = engine_for(self.engine, scene)
         return replace(self, engine=engine, rules=self.rules.in_scene(engine.network.scene))
 
     def carrying(self, payload: float) -> States:
-        """Return the same problem in which every robot may carry so much, N."""
+        """Return the problem with one payload, N, of every robot."""
 
         def strong(scene: Scene) -> Scene:
             return scene.with_robots(*(replace(r, payload=payload) for r in scene.robots))
@@ -601,7 +601,7 @@ def over_scenarios(
 
 
 def _asked(problem: States) -> States:
-    """Return a problem whose stability can be asked, where it will be."""
+    """Return the problem after checks of goals, stability and curing; raises `ProblemError`."""
     if problem.standing is not None or any(goal.margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
     check_parts(problem.goals)
