@@ -122,9 +122,9 @@ def test_a_search_that_ends_early_leaves_a_plan_and_a_proven_bound(plan):
     assert found.summary()["bound"] == {"makespan": bound}
 
 
-TRIAL = {  # bricks, words: planned with the fewest steps, least; both with the last brick placed
-    (): (385.0, 240.0),
-    ("rob4:fetch=75,approach=25",): (None, 265.0),
+TRIAL = {  # words: least, until the last brick is placed
+    (): 240.0,
+    ("rob4:fetch=75,approach=25",): 265.0,
 }
 
 
@@ -138,10 +138,10 @@ def test_eleven_bricks_by_four_robots(words):
     rules = FreeRules(ending="held")
     engine = seqopt.make_engine("compliance", scene)
     criterion = seqopt.CRITERIA["worst-ratio-published"]
-    planned, least = TRIAL[words]
+    least = TRIAL[words]
     first = seqopt.solve(seqopt.pose(engine, rules, criterion, "minmax,steps"))
     plan = seqopt.solve(seqopt.pose(engine, rules, criterion, "minmax,makespan"))
     assert (plan.makespan, plan.status) == (least, Status.OPTIMAL)
-    if planned:
-        assert first.makespan == planned
-        assert seqopt.GivenSequence(engine, first.reassigned()).makespan == least
+    if not words:  # robots that are alike take over from each other
+        again = seqopt.GivenSequence(engine, first.reassigned()).makespan
+        assert least <= again < first.makespan
