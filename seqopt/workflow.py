@@ -17,7 +17,8 @@ from seqopt.graph.formulation import find_formulation
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import in_layers, pose, solve
+from seqopt.plan.pose import in_layers, pose
+from seqopt.plan.solve import solve
 from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.filters import Filter

@@ -35,7 +35,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import TimeUpError
 from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation, formulations
 from seqopt.graph.layers.compiled import compile_layers
-from seqopt.plan.solving import CANDIDATES, STATES, graph_of
+from seqopt.graph.source import CANDIDATES, STATES
+from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import Aim
 
 SIZES = ("chain7", "chain11", "chain15", "arch25", "chain49", "chain97", "chain145")

@@ -25,8 +25,8 @@ import seqopt
 from experiments.harness.claim import Claim, Finding, Options, Times, told
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.judge._rule_moves import check_free
+from seqopt.plan.pose import states_of
 from seqopt.plan.replan import goes_on, without
-from seqopt.plan.solving import states_of
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, idle_robots

@@ -11,7 +11,7 @@ from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.graph.formulation import find_formulation
 from seqopt.network.build import build_network
-from seqopt.plan.solving import pose
+from seqopt.plan.pose import pose
 from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.filters import Filter
 from seqopt.problem.problem import (

@@ -12,14 +12,16 @@ import numpy as np
 from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import ProblemError
+from seqopt.graph.formulation import Formulation, as_formulation, formulations
 from seqopt.graph.graph import Graph, Rows
-from seqopt.graph.source import Source
+from seqopt.graph.source import ARCS, Source
 from seqopt.problem.problem import Aim
 
 if TYPE_CHECKING:
     from seqopt.graph._timed import TimedGraph
 
 SUM, PEAK, TAIL, TIME = "sum", "peak", "tail", "time"
+AIMS = {SUM: Aim.SUM, PEAK: Aim.PEAK}
 
 
 class _Target(NamedTuple):
@@ -80,6 +82,8 @@ class Instance(Source, FrozenValue, Shown):
     <Instance 'arch25': 493 nodes, 12453 arcs, least sum>
     """
 
+    kind = ARCS
+
     name: str
     source: Rows
     target: Rows
@@ -123,6 +127,31 @@ class Instance(Source, FrozenValue, Shown):
     def as_layers(self) -> Any:
         """Nothing, as `alone_in_scene`."""
         return self.alone_in_scene
+
+    @property
+    def fitting(self) -> tuple[str, ...]:
+        """The names of formulations that fit, the default first."""
+        every = formulations()
+        asked = ("time" if self.asks_time else "goals", "instance")
+        found = [n for n, f in every.items() if f.fits(*asked) and not f.aim]
+        if len(self.goals) == 1 and self.goals[0].kind in AIMS and not self.asks_time:
+            aim = AIMS[self.goals[0].kind]
+            found += [n for n, f in every.items() if f.aim is aim]
+        if self.caps:
+            found = [name for name in found if every[name].takes_budgets]
+        usual = ("makespan_labels", "labels" if self.caps else "path_dp", "schedule_search")
+        first = next(name for name in usual if name in found)
+        return (first, *(name for name in found if name != first))
+
+    def formulation(self, named: Formulation | str | None) -> Formulation:
+        """Return the formulation that chooses from it; a `ProblemError` if it does not fit."""
+        names = self.fitting
+        found = as_formulation(named or names[0])
+        if found.name not in names and found.name in formulations():
+            raise ProblemError(
+                f"{found.name}: instance {self.name} does not fit; use {' or '.join(names)}"
+            )
+        return found
 
     def names_of(self, aim: Aim | None) -> tuple[str, ...]:
         """Return what every goal is called."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from seqopt.errors import ProblemError
+from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.problem.problem import Aim
 from seqopt.responses._tolerance import value_text
 from seqopt.sequence.steps import Step
@@ -14,11 +15,17 @@ from seqopt.sequence.steps import Step
 if TYPE_CHECKING:
     from seqopt.graph.solution import Solution
     from seqopt.problem.standing import Standing
+    from seqopt.scene.scene import Order
     from seqopt.sequence.site import Site
+
+
+CANDIDATES, STATES, ARCS = "candidates", "states", "arcs"  # of what a path is chosen
 
 
 class Source:
     """Base class of what plans are chosen from, with what most of these have in common."""
+
+    kind: ClassVar[str]  # `CANDIDATES`, `STATES` or `ARCS`
 
     @property
     def candidates(self) -> tuple[tuple[int, ...], ...]:
@@ -64,6 +71,14 @@ class Source:
     def default_formulation(self) -> str:
         """The name of the formulation that chooses from it if none is named."""
         raise NotImplementedError
+
+    def formulation(self, named: Formulation | str | None) -> Formulation:
+        """Return the formulation that chooses from it; a `ProblemError` if it does not fit."""
+        return as_formulation(named or self.default_formulation, *self.questions)
+
+    def at(self, order: Order) -> Any:
+        """Return it in the chosen order of the bricks, by name; itself where one was given: ()."""
+        return self
 
     @property
     def as_layers(self) -> Any:

@@ -21,7 +21,7 @@ from seqopt.graph.layers.compiled import compile_layers, on_paths
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
-from seqopt.plan.solving import graph_of, usual
+from seqopt.plan.pose import graph_of, usual
 from seqopt.problem.problem import Aim, Problem
 
 

@@ -17,6 +17,7 @@ value and a lower bound, both computed again from the problem's data.
 """
 
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import pose, solve
+from seqopt.plan.pose import pose
+from seqopt.plan.solve import solve
 
 __all__ = ["Plan", "pose", "solve"]

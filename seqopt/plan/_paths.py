@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,22 +20,42 @@ from seqopt.judge._arithmetic import Answer, OverCapError, judge_path
 from seqopt.judge._claims import Claim
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan._guard import called, with_numbers
+from seqopt.sequence.steps import Step
 from seqopt.work._clock import INTERRUPT
+
+if TYPE_CHECKING:
+    from seqopt.plan.search._window_search import WindowSearch
 
 PROOF = "the proof"  # what it is called where there was no time for it
 
 
-class FoundPath(NamedTuple):
-    """A path through an instance: claimed solution, certificate, and run times by stage, s."""
+class Found(NamedTuple):
+    """What was chosen: claimed solution, certificate, checked steps, run times by stage, s.
+
+    ``search``, ``looked_at``: as of `Plan`.
+    """
 
     selection: Solution
     certificate: Certificate | None
+    steps: tuple[Step, ...]
     seconds: dict[str, float]
+    search: WindowSearch | None = None
+    looked_at: int | None = None
 
 
-def find_path(
-    instance: Instance, formulation: Formulation, run: Run, offset: float = 0.0
-) -> FoundPath:
+def proven(
+    selection: Solution, judge: Callable[[], Certificate], run: Run
+) -> tuple[Solution, Certificate | None]:
+    """Return a solution with its certificate, if one is requested and there is time for it."""
+    if not run.proof:
+        return selection, None
+    certificate = run.clock.spare(PROOF, judge, None)
+    if certificate is None:
+        selection = replace(selection, stopped=run.clock.left_out[PROOF])
+    return selection, certificate
+
+
+def find_path(instance: Instance, formulation: Formulation, run: Run, offset: float = 0.0) -> Found:
     """Find a path by a formulation, certified if a proof is requested.
 
     ``offset``: constant added to the first objective of every path. On an interrupt the formulation
@@ -51,16 +72,12 @@ def find_path(
         selection = _selected(instance, formulation, run, watch, offset)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
-    certificate = None
     with timed(seconds, "verify"):
-        if run.proof:
-            proof = partial(judged, instance, formulation, selection)
-            certificate = run.clock.spare(PROOF, proof, None)
-            if certificate is None:
-                selection = replace(selection, stopped=run.clock.left_out[PROOF])
+        judge = partial(judged, instance, formulation, selection)
+        selection, certificate = proven(selection, judge, run)
     if offset:
         selection, certificate = _raised(selection, certificate, offset)
-    return FoundPath(selection, certificate, seconds)
+    return Found(selection, certificate, (), seconds)
 
 
 def _selected(

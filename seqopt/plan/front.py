@@ -27,7 +27,7 @@ from seqopt.plan._guard import called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
 from seqopt.plan._paths import PROOF
 from seqopt.plan._range import INTERRUPTED, RANGE, keeping, leaves
-from seqopt.plan.solving import states_of
+from seqopt.plan.pose import states_of
 from seqopt.problem.amounts import REGRIPS, STEPS, Amount
 from seqopt.problem.problem import Problem
 from seqopt.responses._grip_sets import Moved, most_moved

@@ -18,10 +18,10 @@ from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
 from seqopt.graph.formulation import Formulation, find_formulation, formulations
 from seqopt.graph.layers.costs import TINY
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.plan._layers import on_the_way
 from seqopt.plan._range import keeping
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import pose, solve
+from seqopt.plan.pose import pose
+from seqopt.plan.solve import on_the_way, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum, WorstRatio
 from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import LINEAR_RANGE, Criterion, Limit, _prop_faults, overloads

@@ -20,7 +20,7 @@ from seqopt.graph.formulation import FormulationKind, exhibits, formulations
 from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.instances.compiled import compile_instance
 from seqopt.judge.schedules import plan_values
-from seqopt.plan.solving import layers_of, states_of
+from seqopt.plan.pose import layers_of, states_of
 from seqopt.problem import Amount, Filter
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim

@@ -25,7 +25,7 @@ from seqopt.network.build import build_network
 from seqopt.plan._paths import judged
 from seqopt.plan.search._pair_search import KnownCosts
 from seqopt.plan.search._window_search import search_windows
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, StepCost
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit

@@ -16,7 +16,7 @@ from seqopt.graph._orders import order_rules
 from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
-from seqopt.plan.solving import graph_of
+from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import Orders
 from seqopt.problem.requirements import Limit
 from seqopt.scene.parts import Robot

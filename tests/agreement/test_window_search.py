@@ -14,7 +14,7 @@ from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.search._window_search import search_windows
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
 from seqopt.responses._choices import window_models
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop

@@ -17,7 +17,7 @@ from seqopt.arms._model import ArmModel
 from seqopt.arms._permits import permits
 from seqopt.engines.registry import make_engine
 from seqopt.errors import GripError, StepError
-from seqopt.plan.solving import layers_of
+from seqopt.plan.pose import layers_of
 from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.table import force_column
 from seqopt.scene.arm import Arm

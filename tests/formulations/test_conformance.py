@@ -27,7 +27,7 @@ from seqopt.graph.formulation import (
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers, steps_over, travel
 from seqopt.network.build import build_network
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop

@@ -22,7 +22,7 @@ from seqopt.graph.paths import _on_paths, fewest_moves, lexicographic
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.problem import WORST_TOTAL, cvar
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.rules import FreeRules, with_robots

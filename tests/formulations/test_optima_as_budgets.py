@@ -19,7 +19,7 @@ from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.layers.layers import travel
 from seqopt.graph.states._visits import StateSpace
 from seqopt.graph.states.states import build_states, within
-from seqopt.plan.solving import layers_of, states_of
+from seqopt.plan.pose import layers_of, states_of
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.builders import small_arch

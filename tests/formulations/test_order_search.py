@@ -21,7 +21,7 @@ from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.states.states import build_states, over_scenarios, within
 from seqopt.judge._proof import Proof
 from seqopt.plan._status import Status, order_bound_said
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.criteria import StepCost, WorstRatio
 from seqopt.problem.problem import WORST_TOTAL, Orders, cvar
 from seqopt.problem.standing import Standing, slack

@@ -10,7 +10,7 @@ from scipy.stats import rankdata
 
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.plan._tables import choice_table
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.criteria import _mean_ranks, _ranks_of
 from seqopt.problem.requirements import SceneFacts, payload_limits
 from seqopt.sequence.three_robots import modified_sequential

@@ -17,7 +17,7 @@ from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.layers.ranking import _least_among_least, move_costs, objectives, split_gap
 from seqopt.network.build import build_network
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, _ranks_of
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop

@@ -14,7 +14,6 @@ from formulations.solvers import _solve_file
 from seqopt._cli.main import main
 from seqopt.errors import FileError, ProblemError, SolverError
 from seqopt.graph.instance import Instance, _Target
-from seqopt.plan._states import able
 from seqopt.sequence.rules import with_robots
 from tests.builders import small_arch
 
@@ -95,7 +94,7 @@ def test_the_best_of_the_scene_is_the_best_of_the_instance(compiled, kind):
 def test_every_formulation_that_fits_agrees(compiled, kind):
     one = compiled(kind)
     best = seqopt.solve(one).certificate.objective
-    for name in able(one):
+    for name in one.fitting:
         if name == "makespan_flow" or (name == "flow_mip" and kind == "orders"):
             continue  # they take long; tests of their own hold them to others
         try:

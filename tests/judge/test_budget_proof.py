@@ -20,7 +20,7 @@ from seqopt.judge import _budget_proof as budget_proof
 from seqopt.judge._budget_proof import least_within
 from seqopt.judge._claims import budget_bounds
 from seqopt.plan._infeasible import smallest_conflict
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from tests.layered import Costs, answer
 from tests.strategies import budgeted
 

@@ -14,7 +14,7 @@ from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import travel
 from seqopt.judge.certificate import TOLERANCE
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.problem import Aim
 from tests.layered import Costs, answer, changed, path_of, told
 from tests.strategies import problems

@@ -15,7 +15,7 @@ from seqopt.graph.states.states import build_states, within
 from seqopt.judge.schedules import judge_schedule
 from seqopt.network.build import build_network
 from seqopt.plan.front import FrontProblem, find_front
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.problem.standing import slack

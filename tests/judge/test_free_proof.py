@@ -13,7 +13,7 @@ from seqopt.graph.states.states import build_states
 from seqopt.judge._proof import Proof
 from seqopt.judge._rule_moves import RuleTables
 from seqopt.network.build import build_network
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.sequence.steps import StepKind
 from tests.plain_rules import PlainBook

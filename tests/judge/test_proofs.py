@@ -22,7 +22,7 @@ from seqopt.judge._budget_proof import least_within
 from seqopt.judge._proof import Proof
 from seqopt.judge._spaces import TooManyPartsError
 from seqopt.judge._states import StateEvaluator
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY

@@ -13,7 +13,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.scene.parts import Anywhere, Robot, Sphere
 from seqopt.sequence.rules import FreeRules

@@ -13,7 +13,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever
 from seqopt.stability.assessment import assess

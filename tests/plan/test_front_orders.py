@@ -14,7 +14,7 @@ from seqopt.graph._orders import TooManySetsError, order_rules
 from seqopt.graph.formulation import find_formulation
 from seqopt.plan import front as fronts
 from seqopt.plan.front import find_front
-from seqopt.plan.solving import graph_of
+from seqopt.plan.pose import graph_of
 from seqopt.responses.table import analyze
 from tests.builders import small_arch
 

@@ -18,7 +18,7 @@ from seqopt.graph._orders import among_orders
 from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import build_states
 from seqopt.plan.front import FrontProblem, find_front
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.amounts import parse_goals
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit

@@ -17,7 +17,7 @@ from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._range import NONE_KEEPS, UNKNOWN, keeping
 from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
-from seqopt.plan.solving import states_of
+from seqopt.plan.pose import states_of
 from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits

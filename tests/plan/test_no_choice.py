@@ -25,7 +25,7 @@ from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.solution import Solution
 from seqopt.network.build import build_network
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.responses import _blocks as batches
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene

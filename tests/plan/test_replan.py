@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError, StepError
+from seqopt.plan.pose import states_of
 from seqopt.plan.replan import compared, goes_on, without
-from seqopt.plan.solving import states_of
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.site import Site
 from tests.brute_force import ONES

@@ -23,7 +23,7 @@ from seqopt.graph.layers.costs import LayeredCosts, largest_of
 from seqopt.graph.layers.layers import candidate_layers, in_scenarios
 from seqopt.plan._paths import find_path
 from seqopt.plan.out_of_sample import judge_unseen
-from seqopt.plan.solving import graph_of, layers_of
+from seqopt.plan.pose import graph_of, layers_of
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
 from seqopt.responses.resources import Resources
 from seqopt.scene.scenarios import scenarios

@@ -10,7 +10,7 @@ import pytest
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Finding, Watch, find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from tests.layered import Costs
 
 

@@ -11,7 +11,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SolverError
 from seqopt.graph.layers.layers import candidate_layers, windows
 from seqopt.plan.search._window_search import search_windows
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
 from seqopt.responses import _choices
 from seqopt.responses.table import analyze

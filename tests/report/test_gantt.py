@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgba
 
 from seqopt.errors import StepError
 from seqopt.plan.build import GivenSequence
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.report._gantt import gantt_picture
 from seqopt.sequence.schedule import holds
 from seqopt.sequence.two_robots import sequential

@@ -15,7 +15,7 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, TimeUpError
 from seqopt.graph.formulation import formulations
-from seqopt.plan.solving import layers_of
+from seqopt.plan.pose import layers_of
 from seqopt.problem.problem import Aim
 from seqopt.report._speed._chart import PALE, speed_chart
 from seqopt.report._speed._measure import Reference, Timer, speed_accuracy

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from seqopt._files import csv_text
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.workflow import optimize
 
 

@@ -19,7 +19,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MemoryShortError, ProblemError, SceneError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.responses import _blocks as batches
 from seqopt.responses import _grip_sets as division
 from seqopt.responses._blocks import Block, answer, packed

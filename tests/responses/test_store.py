@@ -18,7 +18,7 @@ from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, SceneError
 from seqopt.graph.layers.layers import candidate_layers, in_scenarios
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WeightedSum
 from seqopt.problem.problem import WORST_TOTAL
 from seqopt.responses import _blocks as blocks

@@ -13,7 +13,7 @@ from seqopt.graph.formulation import formulations
 from seqopt.judge._proof import Proof
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan.front import find_front
-from seqopt.plan.solving import states_of
+from seqopt.plan.pose import states_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.scene.arm import Arm
 from seqopt.sequence._carrying import can_carry, loads

@@ -11,7 +11,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import StepError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
-from seqopt.plan.solving import solve
+from seqopt.plan.solve import solve
 from seqopt.sequence.steps import StepKind, idle_robots
 from seqopt.sequence.three_robots import SCHEDULES, _two_robot_loop, robot_loop, three_robot_loop
 from seqopt.sequence.two_robots import placing_node, sequential

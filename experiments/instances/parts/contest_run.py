@@ -21,7 +21,6 @@ from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instance import Instance
 from seqopt.graph.paths import fewest_moves, reached
 from seqopt.plan._paths import _claims
-from seqopt.plan._states import able
 
 OUTSIDE = ("HiGHS", "CP-SAT", "linopy")
 MOST_ARCS = 20_000  # of what outside solvers are given
@@ -31,7 +30,7 @@ def solvers(one: Instance) -> tuple[str, ...]:
     """Return the ways to solve an instance: formulations that fit, then outside solvers."""
     plain = not one.asks_time and one.goals[0].kind in ("sum", "peak")
     outside = OUTSIDE if plain else OUTSIDE[:2]
-    return (*able(one), *(outside if one.arcs <= MOST_ARCS else ()))
+    return (*one.fitting, *(outside if one.arcs <= MOST_ARCS else ()))
 
 
 def run(name: str, solver: str, seconds: float) -> dict[str, object]:

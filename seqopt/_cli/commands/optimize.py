@@ -25,7 +25,8 @@ from seqopt.plan._range import at_sufficient_level
 from seqopt.plan._softer import _payload_advice
 from seqopt.plan._status import order_bound_said
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import _solve_run, usual
+from seqopt.plan.pose import usual
+from seqopt.plan.solve import _solve_run
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import value_text

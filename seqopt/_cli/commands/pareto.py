@@ -23,7 +23,7 @@ from seqopt.errors import ProblemError, TimeUpError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence
 from seqopt.plan.front import Front, find_front, pick
-from seqopt.plan.solving import states_of
+from seqopt.plan.pose import states_of
 from seqopt.problem.amounts import judged_by
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import _said_limits

@@ -20,7 +20,7 @@ from seqopt.engines.registry import Recipe, engine_for, recipe_for
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
 from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts, ScenarioCosts, largest_of
 from seqopt.graph.solution import Solution
-from seqopt.graph.source import Source
+from seqopt.graph.source import CANDIDATES, Source
 from seqopt.problem.criteria import Ranked, RankSum, _counts_every_step
 from seqopt.problem.problem import WORST_PEAK, Aim, RobustAim
 from seqopt.problem.requirements import (
@@ -99,6 +99,8 @@ class Layers(Source, Shown):
     the criterion has the numbers of the nominal scene in them; ``over``: what counts of the values
     in all of them; ``known``: costs in scenarios, where they were computed before.
     """
+
+    kind = CANDIDATES
 
     criterion: Criterion
     limits: tuple[Limit, ...]

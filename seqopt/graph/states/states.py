@@ -15,7 +15,7 @@ from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
-from seqopt.graph.source import Source
+from seqopt.graph.source import STATES, Source
 from seqopt.graph.states._checks import check_parts, checked_limits, of_states
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -63,6 +63,8 @@ class States(Source, Shown):
     further requirements of states; ``orders``: which orders of the bricks are searched, by default
     the scene's own alone: values keep its scales.
     """
+
+    kind = STATES
 
     engine: Engine
     rules: FreeRules | Schedule

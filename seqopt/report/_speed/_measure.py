@@ -23,18 +23,11 @@ from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, si
 from seqopt.errors import ProblemError, SeqoptError, SolverError, TimeUpError
 from seqopt.graph.formulation import QUESTIONS, End, Formulation, FormulationKind, formulations
 from seqopt.graph.layers.costs import TINY
+from seqopt.graph.source import CANDIDATES
 from seqopt.judge.schedules import plan_values
-from seqopt.plan._layers import on_the_way
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import (
-    CANDIDATES,
-    graph_kind,
-    layers_of,
-    questions_of,
-    solve,
-    states_of,
-    usual,
-)
+from seqopt.plan.pose import graph_kind, layers_of, questions_of, states_of, usual
+from seqopt.plan.solve import on_the_way, solve
 from seqopt.problem.problem import Aim, Problem
 from seqopt.report._speed._table import CUT, DONE, FAILED, SpeedTable
 from seqopt.responses.quantities import RESPONSES

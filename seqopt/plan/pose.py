@@ -1,9 +1,7 @@
-"""Solve a problem by any formulation; the answer is checked and becomes a plan."""
+"""Pose a problem: what is asked of a build, and the graph of choices that it becomes."""
 
 from __future__ import annotations
 
-import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -12,22 +10,26 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import Formulation, Run, as_formulation
-from seqopt.graph.instance import Instance
-from seqopt.graph.layers.layers import Layers, candidate_layers, in_scenarios
-from seqopt.graph.source import Source
+from seqopt.graph.layers.compiled import best_in_order
+from seqopt.graph.layers.costs import Budget
+from seqopt.graph.layers.layers import Layers, candidate_layers, in_scenarios, steps_over, travel
+from seqopt.graph.source import CANDIDATES, STATES
 from seqopt.graph.states._checks import check_parts
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
-from seqopt.plan._layers import solve_layers, with_budgets
-from seqopt.plan._range import best_within
-from seqopt.plan.plan import Plan
 from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.problem.filters import Filter
-from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, parse_budgets
+from seqopt.problem.problem import (
+    WORST_PEAK,
+    Aim,
+    AskedBudget,
+    Orders,
+    Problem,
+    RobustAim,
+    parse_budgets,
+)
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
-from seqopt.scene.arm import from_arms
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
@@ -37,7 +39,7 @@ if TYPE_CHECKING:
     Graph = Layers | States
 
 AIMS = {Aim.SUM: SUM, Aim.PEAK: MINMAX}
-CANDIDATES, STATES, ORDERS = "candidates", "states", "orders"  # graphs of a problem
+ORDERS = "orders"  # the graph of states in all orders, beside `CANDIDATES` and `STATES`
 
 
 def pose(  # noqa: PLR0913  # every question is a word of its own
@@ -127,6 +129,17 @@ def usual(problem: Problem) -> str:
     return "labels" if problem.budgets else "overlap_dp"
 
 
+def questions_of(problem: Problem) -> tuple[str, ...]:
+    """Return the questions that a formulation of a problem must support."""
+    if problem.orders is not None:
+        return ("order",)
+    if problem.is_timed:
+        return ("time",)
+    if not (problem.scenarios and problem.over.aim is Aim.SUM):
+        return ("goals",)
+    return ("tail", "instance") if graph_kind(problem) == CANDIDATES else ("tail",)
+
+
 def graph_of(problem: Problem, kind: str = "") -> Any:
     """Return the graph of choices of a problem, cached with what was computed for it.
 
@@ -167,7 +180,25 @@ def _layers(problem: Problem) -> Layers:
     _require_candidates(problem)
     if problem.scenarios:
         return _scenarios(problem)
-    return with_budgets(_plain_layers(problem), parse_budgets(problem.budgets))
+    return _with_budgets(_plain_layers(problem), parse_budgets(problem.budgets))
+
+
+def _with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
+    """Return a problem with budgets; a share refers to the optimum without budgets.
+
+    ``problem``: must evaluate the responses of the budgets.
+    """
+    budgets: list[Budget] = []
+    for each in asked:
+        if each.response:
+            budget = steps_over(problem, each.response, each.level, each.bound)
+        else:
+            budget = travel(problem, each.bound)
+        if each.share:
+            free = best_in_order([(problem.sums, Aim.SUM)])
+            budget = replace(budget, bound=each.bound * budget.spent(free))
+        budgets.append(budget)
+    return replace(problem, budgets=tuple(budgets)) if budgets else problem
 
 
 def _scenarios(problem: Problem) -> Layers:
@@ -248,133 +279,3 @@ BUILDERS: dict[str, Callable[[Problem], Graph]] = {
     STATES: _in_own_order,
     ORDERS: _all_orders,
 }
-
-
-def _solver(kind: str) -> Callable[[Any, Formulation, Run], Plan]:
-    """Return the solver of a kind of graph."""
-    if kind == CANDIDATES:
-        return solve_layers
-    from seqopt.plan._states import solve_states  # noqa: PLC0415  # with their proofs
-
-    return solve_states
-
-
-def solve(
-    problem: Problem | Layers | States | Instance,
-    formulation: Formulation | str | None = None,
-    *,
-    proof: bool = True,
-    lazy: bool = False,
-    time_limit: float = math.inf,
-    progress: Callable[[Any], object] | None = None,
-    **options: Any,
-) -> Plan:
-    """Solve a problem by a formulation and check the answer from the problem's own data.
-
-    Parameters
-    ----------
-    problem : Problem or Instance
-        From `seqopt.pose` or `seqopt.read_instance`; or a graph of choices, as of
-        `seqopt.plan.solving.graph_of`.
-    formulation : Formulation or str, optional
-        Or a name in `seqopt.formulations`; by default the fastest exact one that there is for it.
-    proof : bool, optional
-        False: no gap is known; ``cascade`` or ``rank_search`` solve only models that they need.
-    lazy : bool, optional
-        Solve only the models that the proof needs, as is always done where states are chosen.
-    time_limit : float, optional
-        Seconds of choosing after which it returns its best choice and a bound, as at an interrupt;
-        without proof of all it does: an error names the moves that were chosen by then. An
-        interrupt of the proof leaves that out: values and bounds are then claimed.
-    progress : callable, optional
-        Called with every better choice and bound as it is found, or with a few words.
-    **options
-        Options of the formulation.
-
-    Returns
-    -------
-    Plan
-
-    Raises
-    ------
-    InfeasibleError, ProblemError, SolverError
-        If no choice is allowed, the arguments do not fit together, or a solver or claim fails.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> problem = seqopt.optimize("arch25").problem
-    >>> seqopt.solve(problem, "overlap_lp").status
-    <Status.OPTIMAL: 'optimal'>
-    """
-    return _solve_run(problem, formulation, Run(time_limit, progress, proof, lazy, options))
-
-
-def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
-    """Solve a problem or a given graph of choices, within the limits of a run.
-
-    Parts without time are skipped and noted by the clock: without the proof, values and bounds are
-    claimed only. Raises `TimeUpError` if there is no plan in time.
-    """
-    if not isinstance(problem, Problem):
-        return _of_graph(problem, formulation, run)
-    found = as_formulation(formulation or usual(problem), *questions_of(problem))
-    kind = _kind_for(problem, found)
-    aim = found.aim if kind == CANDIDATES else None
-    if aim is not None and problem.goals not in ((), (AIMS[aim],)):
-        asked = ", ".join(map(str, problem.goals))
-        raise ProblemError(
-            f"aim {asked}: {found.name} minimizes the {aim.value} of costs; "
-            "take another formulation"
-        )
-
-    end = time.perf_counter() + run.time_limit
-
-    def best(asked: Problem) -> Plan:
-        own = asked is problem  # else the same within the linear range, in the time that is left
-        left = run.time_limit if own else max(0.0, end - time.perf_counter())
-        how = replace(run, time_limit=left, explains=own)
-
-        def solved(one: Problem) -> Plan:
-            with run.clock.needed("posing the problem"):
-                graph = graph_of(one, kind)
-            return _solver(kind)(graph, found, how)
-
-        plan = solved(asked)
-        return from_arms("with_postures")(asked, plan, solved) if asked.scene.has_arms else plan
-
-    return replace(best_within(problem, best, run.clock), problem=problem)
-
-
-def questions_of(problem: Problem) -> tuple[str, ...]:
-    """Return the questions that a formulation of a problem must support."""
-    if problem.orders is not None:
-        return ("order",)
-    if problem.is_timed:
-        return ("time",)
-    if not (problem.scenarios and problem.over.aim is Aim.SUM):
-        return ("goals",)
-    return ("tail", "instance") if graph_kind(problem) == CANDIDATES else ("tail",)
-
-
-def _kind_for(problem: Problem, formulation: Formulation) -> str:
-    """Return the kind of graph of a problem that a formulation takes."""
-    kind = graph_kind(problem)
-    totals = problem.scenarios and problem.over.aim is Aim.SUM
-    if kind == CANDIDATES and formulation.of_states and not totals:
-        return STATES
-    of_candidates = in_layers(problem.moves) and len(problem.goals) <= 1 and not problem.is_timed
-    return CANDIDATES if kind == STATES and of_candidates and formulation.aim else kind
-
-
-def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
-    """Solve a given graph of choices or instance."""
-    from seqopt.plan._states import solve_instance  # noqa: PLC0415  # few are given
-
-    if isinstance(problem, Instance):
-        return solve_instance(problem, formulation, run)
-    if not isinstance(problem, Source):
-        kind = type(problem).__name__
-        raise ProblemError(f"a {kind} is not a problem; give one that seqopt.pose made")
-    found = as_formulation(formulation or problem.default_formulation, *problem.questions)
-    return _solver(CANDIDATES if problem.candidates else STATES)(problem, found, run)
