@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from seqopt.graph._timed import TimedGraph
 
 SUM, PEAK, TAIL, TIME = "sum", "peak", "tail", "time"
-AIMS = {SUM: Aim.SUM, PEAK: Aim.PEAK}
 
 
 class _Target(NamedTuple):
@@ -134,9 +133,9 @@ class Instance(Source, FrozenValue, Shown):
         every = formulations()
         asked = ("time" if self.asks_time else "goals", "instance")
         found = [n for n, f in every.items() if f.fits(*asked) and not f.aim]
-        if len(self.goals) == 1 and self.goals[0].kind in AIMS and not self.asks_time:
-            aim = AIMS[self.goals[0].kind]
-            found += [n for n, f in every.items() if f.aim is aim]
+        if len(self.goals) == 1 and not self.asks_time:
+            kind = self.goals[0].kind
+            found += [n for n, f in every.items() if f.aim and f.aim.value == kind]
         if self.caps:
             found = [name for name in found if every[name].takes_budgets]
         usual = ("makespan_labels", "labels" if self.caps else "path_dp", "schedule_search")

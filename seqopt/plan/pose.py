@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
@@ -34,9 +34,6 @@ from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
-
-if TYPE_CHECKING:
-    Graph = Layers | States
 
 AIMS = {Aim.SUM: SUM, Aim.PEAK: MINMAX}
 ORDERS = "orders"  # the graph of states in all orders, beside `CANDIDATES` and `STATES`
@@ -92,7 +89,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     worlds = {"scenarios": scenarios, "over": over, "orders": orders}
     more = {"also": also, "resources": resources}
     problem = Problem.asked(simplest(engine), moves, criterion, **asked, **worlds, **more)
-    graph: Graph
+    graph: Layers | States
     if graph_kind(problem) != CANDIDATES:
         graph = states_of(problem)
     else:
@@ -202,7 +199,6 @@ def _with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
 
 
 def _scenarios(problem: Problem) -> Layers:
-    _require_candidates(problem)
     if problem.budgets:
         raise ProblemError(
             f"budget {problem.budgets[0]}: aims over scenarios take none where candidates are "
@@ -274,7 +270,7 @@ def _all_orders(problem: Problem) -> States:
     return among_orders(_states(problem), problem.orders)
 
 
-BUILDERS: dict[str, Callable[[Problem], Graph]] = {
+BUILDERS: dict[str, Callable[[Problem], Layers | States]] = {
     CANDIDATES: _layers,
     STATES: _in_own_order,
     ORDERS: _all_orders,

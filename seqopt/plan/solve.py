@@ -112,14 +112,6 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
         raise ProblemError(f"a {kind} is not a problem; give one that seqopt.pose made")
     found = as_formulation(formulation or usual(problem), *questions_of(problem))
     kind = _kind_for(problem, found)
-    aim = found.aim if kind == CANDIDATES else None
-    if aim is not None and problem.goals not in ((), (AIMS[aim],)):
-        asked = ", ".join(map(str, problem.goals))
-        raise ProblemError(
-            f"aim {asked}: {found.name} minimizes the {aim.value} of costs; "
-            "take another formulation"
-        )
-
     end = time.perf_counter() + run.time_limit
 
     def best(asked: Problem) -> Plan:
@@ -139,13 +131,22 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
 
 
 def _kind_for(problem: Problem, formulation: Formulation) -> str:
-    """Return the kind of graph of a problem that a formulation takes."""
+    """Return the kind of graph of a problem that a formulation takes, if it has its aim."""
     kind = graph_kind(problem)
     totals = problem.scenarios and problem.over.aim is Aim.SUM
     if kind == CANDIDATES and formulation.of_states and not totals:
         return STATES
     of_candidates = in_layers(problem.moves) and len(problem.goals) <= 1 and not problem.is_timed
-    return CANDIDATES if kind == STATES and of_candidates and formulation.aim else kind
+    aim = formulation.aim
+    if aim is None or not (kind == CANDIDATES or (kind == STATES and of_candidates)):
+        return kind
+    if problem.goals not in ((), (AIMS[aim],)):
+        asked = ", ".join(map(str, problem.goals))
+        raise ProblemError(
+            f"aim {asked}: {formulation.name} minimizes the {aim.value} of costs; "
+            "take another formulation"
+        )
+    return CANDIDATES
 
 
 def _chosen(graph: Any, formulation: Formulation, run: Run) -> Plan:
@@ -156,13 +157,6 @@ def _chosen(graph: Any, formulation: Formulation, run: Run) -> Plan:
     """
     found = ROUTES[graph.kind](graph, formulation, run)
     return Plan(graph, graph.at(found.selection.order), formulation, *found)
-
-
-def _from_states(graph: States, formulation: Formulation, run: Run) -> Found:
-    """Choose the states of a build."""
-    from seqopt.plan._states import find_states  # noqa: PLC0415  # with their proofs
-
-    return find_states(graph, formulation, run)
 
 
 def _from_arcs(instance: Instance, formulation: Formulation, run: Run) -> Found:
@@ -186,20 +180,6 @@ def _from_layers(graph: Layers, formulation: Formulation, run: Run) -> Found:
         require_proof(run.proof)
         return _by_pairs(graph, formulation, run)
     return (_by_all_costs if run.proof else _by_windows)(graph, formulation, run)
-
-
-ROUTES: dict[str, Callable[[Any, Formulation, Run], Found]] = {
-    CANDIDATES: _from_layers,
-    STATES: _from_states,
-    ARCS: _from_arcs,
-}
-
-
-def on_the_way(plan: Plan) -> Plan:
-    """Return the plan; re-raise `KeyboardInterrupt` if its formulation was interrupted."""
-    if plan.ended is End.INTERRUPTED:
-        raise KeyboardInterrupt
-    return plan
 
 
 def _by_all_costs(graph: Layers, formulation: Formulation, run: Run) -> Found:
@@ -285,3 +265,24 @@ def _checked(steps: tuple[Step, ...], graph: Layers) -> tuple[Step, ...]:
     except StepError as error:
         raise SolverError(f"a choice is not allowed: {error}") from error
     return steps
+
+
+def _from_states(graph: States, formulation: Formulation, run: Run) -> Found:
+    """Choose the states of a build."""
+    from seqopt.plan._states import find_states  # noqa: PLC0415  # with their proofs
+
+    return find_states(graph, formulation, run)
+
+
+ROUTES: dict[str, Callable[[Any, Formulation, Run], Found]] = {
+    CANDIDATES: _from_layers,
+    STATES: _from_states,
+    ARCS: _from_arcs,
+}
+
+
+def on_the_way(plan: Plan) -> Plan:
+    """Return the plan; re-raise `KeyboardInterrupt` if its formulation was interrupted."""
+    if plan.ended is End.INTERRUPTED:
+        raise KeyboardInterrupt
+    return plan
