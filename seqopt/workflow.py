@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from seqopt.contact.mortar import Mortar
+from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import find_formulation
@@ -22,7 +23,7 @@ from seqopt.plan.solve import solve
 from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.filters import Filter
-from seqopt.problem.problem import WORST_PEAK, Orders, RobustAim
+from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
@@ -169,25 +170,14 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     shared = Resources(search.workers, search.executor, search.cache)
     options, tell = dict(search.options), progress
     asked = parse_limits(limits, own.network.scene)
-    filters = [each for each in asked if isinstance(each, Filter)]
-    states = _chooses_states(moves, formulation, others=(aim, stands, sought, filters))
+    states = _chooses_states(moves, formulation, asked, (aim, stands, sought))
     if not states:
         shared, tell = replace(shared, max_memory=search.max_memory, progress=progress), None
     elif search.max_memory is not None:
         options["max_memory"] = search.max_memory
-    problem = pose(
-        own,
-        moves,
-        *_with_defaults(criterion, aim, over, states=states),
-        asked,
-        budgets=budgets,
-        stands=stands,
-        scenarios=scenarios,
-        over=over,
-        orders=Orders.TIED if sought else None,
-        also=also,
-        resources=shared,
-    )
+    words: dict[str, Any] = {"limits": asked, "budgets": budgets, "stands": stands, "also": also}
+    words |= {"scenarios": scenarios, "over": over, "sought": sought, "resources": shared}
+    problem = _pose_words(own, moves, criterion, aim, states=states, **words)
     assemble = time.perf_counter() - start
     plan = solve(
         problem,
@@ -201,23 +191,40 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
 
 
-def _with_defaults(
-    criterion: Criterion | str | None, aim: str | None, over: RobustAim | str, *, states: bool
-) -> tuple[Criterion, str | tuple[()]]:
-    """Return the given criterion and aims, or their defaults."""
+def _pose_words(
+    engine: Engine,
+    moves: Schedule | FreeRules,
+    criterion: Criterion | str | None,
+    aim: str | None,
+    *,
+    states: bool,
+    sought: bool,
+    over: RobustAim | str = WORST_PEAK,
+    **words: Any,
+) -> Problem:
+    """Pose a problem, by default with the usual criterion and aims of states or of candidates.
+
+    ``sought``: whether the best order of the bricks is; ``words``: as of `pose`.
+    """
     usual = DEFAULTS[FREE if states else "any other"]
     of_totals = str(over) != str(WORST_PEAK)  # they are of sums
-    return find_criterion(criterion or usual.criterion), aim or (not of_totals and usual.aim) or ()
+    goals = aim or (not of_totals and usual.aim) or ()
+    orders = Orders.TIED if sought else None
+    found = find_criterion(criterion or usual.criterion)
+    return pose(engine, moves, found, goals, over=over, orders=orders, **words)
 
 
 def _chooses_states(
-    moves: Schedule | FreeRules, formulation: str | None, others: Sequence[object] = ()
+    moves: Any, formulation: str | None, limits: Sequence[object], others: Sequence[object]
 ) -> bool:
-    """Return whether states are chosen, not candidates; ``others``: options that need states."""
-    if any(others) or not in_layers(moves):
+    """Return whether states are chosen, not candidates.
+
+    ``moves``: a schedule or rules, or their name; ``others``: options that need states.
+    """
+    filtered = any(isinstance(each, Filter) for each in limits)
+    if any(others) or filtered or moves == FREE or not in_layers(moves):
         return True
-    named = None if formulation is None else find_formulation(formulation)
-    return named is not None and named.of_states
+    return formulation is not None and find_formulation(formulation).of_states
 
 
 def _find_moves(

@@ -261,9 +261,9 @@ def find_scene(asked: options.Built) -> Scene:
 
 
 def in_seconds(asked: options.Timed, scene: Scene) -> Scene:
-    """Return a scene with the durations of --durations."""
+    """Return a scene with the durations of --durations, if any."""
     try:
-        return scene.with_durations(*asked.durations)
+        return scene.with_durations(*asked.durations) if asked.durations else scene
     except SceneError as error:
         raise SceneError(f"--{error}") from None
 

@@ -4,31 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeAlias
 
 from seqopt._cli import grammar, inputs, options
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
-from seqopt.graph.formulation import find_formulation
 from seqopt.network.build import build_network
-from seqopt.plan.pose import pose
 from seqopt.problem._limit_words import parse_limits
-from seqopt.problem.filters import Filter
-from seqopt.problem.problem import (
-    WORST_PEAK,
-    Orders,
-    Problem,
-    RobustAim,
-    parse_budgets,
-    parse_robust,
-)
+from seqopt.problem.problem import WORST_PEAK, Problem, RobustAim, parse_budgets, parse_robust
+from seqopt.problem.standing import Standing
 from seqopt.scene.scenarios import Scenarios, scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, Direction, FreeRules
 from seqopt.sequence.steps import StepKind
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._steps import step_times
-from seqopt.workflow import DEFAULTS, SEARCH, _chooses_states, _find_moves, _with_defaults
+from seqopt.workflow import DEFAULTS, SEARCH, _chooses_states, _find_moves, _pose_words
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
 COUNT = 30
@@ -69,57 +61,42 @@ def pose_problem(asked: options.Posed, change: Change | None = None) -> PosedPro
     ``change``: applied to scene and start. Raises `ProblemError` or `StepError` that names an
     option if options are incompatible.
     """
-    choice = _choice(asked)
-    of_states = _wants_states(asked, choice)
+    choice = asked if isinstance(asked, options.Chosen) else options.Chosen()  # of a Pareto set
+    sought, aim = asked.order == SEARCH, str(asked.aim or "")
+    of_states = _chooses_states(asked.schedule, choice.formulation, (), (aim, asked.stands, sought))
     _require_known(asked, choice, of_states=of_states)
-    sought = asked.order == SEARCH
-    asked = replace(asked, order=None) if sought else asked
-    criterion = grammar.parse_criterion(
-        choice, DEFAULTS[FREE if of_states else "any other"].criterion
-    )
-    scene = inputs.find_scene(asked)
-    scene, begin, end, robots = _ends(asked, scene, change)
-    scene = inputs.in_seconds(choice, scene) if choice.durations else scene
+    usual = DEFAULTS[FREE if of_states else "any other"].criterion
+    criterion = grammar.parse_criterion(choice, usual)
+    scene = inputs.find_scene(replace(asked, order=None) if sought else asked)
+    stands = grammar.parse_standing(asked)
+    scene, begin, end, robots = _ends(asked, inputs.in_seconds(choice, scene), stands, change)
     find_postures(scene, choice.cache, asked.tell)
-    words: dict[str, Any] = {"limits": parse_limits(asked.limits, scene, "--limit")}
+    limits = parse_limits(asked.limits, scene, "--limit")
     parse_budgets(choice.budgets, of_states=of_states)  # said before anything is built
-    words["resources"] = grammar.parse_resources(choice, None if of_states else asked.tell)
-    aim, known, unseen = _scenarios(choice, scene)
-    words |= {} if aim is None else {"scenarios": known, "over": aim}
+    resources = grammar.parse_resources(choice, None if of_states else asked.tell)
+    over, known, unseen = _scenarios(choice, scene)
     engine = inputs.find_engine(asked, build_network(scene))
-    rules = asked.rules if asked.schedule == FREE else None
-    names = grammar.parse_robots(robots) or None
-    every = _find_moves(engine.network, asked.schedule, names, choice.candidates, rules, "--rule")
+    named, rules = grammar.parse_robots(robots) or None, asked.rules or None
+    every = _find_moves(engine.network, asked.schedule, named, choice.candidates, rules, "--rule")
     if isinstance(every, FreeRules) and asked.direction is not None:
         every = replace(every, **dict[str, Any](direction=asked.direction))
-    words |= {"stands": grammar.parse_standing(asked), "budgets": choice.budgets}
-    words |= {"orders": Orders.TIED} if sought else {}
-    aims = None if asked.aim is None else str(asked.aim)
-    filters = [each for each in words["limits"] if isinstance(each, Filter)]
-    others = (aims, words["stands"], sought, filters)
+    words: dict[str, Any] = {"limits": limits, "budgets": choice.budgets, "stands": stands}
+    words |= {"scenarios": known or (), "over": over or WORST_PEAK}
+    words |= {"sought": sought, "resources": resources}
 
     def posed(begin: inputs.Place) -> Problem:
         moves = inputs.between(every, begin, end)
-        states = _chooses_states(moves, choice.formulation, others)
-        what = _with_defaults(criterion, aims, aim or WORST_PEAK, states=states)
-        return pose(engine, moves, *what, **words)
+        states = _chooses_states(moves, choice.formulation, limits, (aim, stands, sought))
+        return _pose_words(engine, moves, criterion, aim, states=states, **words)
 
     whole = posed(inputs.Place()) if begin.site is not None and change is None else None
-    return PosedProblem(posed(begin), whole, aim, known, unseen)
+    return PosedProblem(posed(begin), whole, over, known, unseen)
 
 
-def _choice(asked: options.Posed) -> options.Chosen:
-    """Return the options of a choice; defaults for a Pareto set."""
-    return asked if isinstance(asked, options.Chosen) else options.Chosen()
-
-
-def _aged(asked: options.Posed, scene: Scene, begin: inputs.Place) -> inputs.Place:
+def _aged(scene: Scene, begin: inputs.Place, standing: Standing | None) -> inputs.Place:
     """Return the start of a build, with curing mortar including the ages of bricks in the plan."""
-    standing = grammar.parse_standing(asked) if begin.done else None
     if begin.site is None or not begin.done or standing is None or standing.curing is None:
         return begin
-    choice = _choice(asked)
-    scene = inputs.in_seconds(choice, scene) if choice.durations else scene
     waits = CuringBuilds(build_network(scene), standing.mortar, standing.curing).waits
     try:
         times = step_times(scene, begin.done, waits)
@@ -131,11 +108,11 @@ def _aged(asked: options.Posed, scene: Scene, begin: inputs.Place) -> inputs.Pla
 
 
 def _ends(
-    asked: options.Posed, scene: Scene, change: Change | None
+    asked: options.Posed, scene: Scene, standing: Standing | None, change: Change | None
 ) -> tuple[Scene, inputs.Place, inputs.Place, int | options.Words | None]:
     """Return scene after the changes, start, end, and participating robots of a build."""
     scene, begin = inputs.find_place(asked.begin, "from", scene)
-    begin, robots = _aged(asked, scene, begin), asked.robots
+    begin, robots = _aged(scene, begin, standing), asked.robots
     if change is not None:
         scene, begin, robots = change(scene, begin)
     if asked.keep is not None:
@@ -145,14 +122,6 @@ def _ends(
     if found != scene:
         raise StepError(f"--to {asked.to}: its bricks are not those that follow in this order")
     return scene, begin, end, robots
-
-
-def _wants_states(asked: options.Posed, choice: options.Chosen) -> bool:
-    """Return whether options ask for a choice of states rather than of candidates."""
-    if asked.schedule == FREE or asked.aim or asked.stands or asked.order == SEARCH:
-        return True
-    named = choice.formulation
-    return named is not None and find_formulation(named).of_states
 
 
 def _require_known(asked: options.Posed, choice: options.Chosen, *, of_states: bool) -> None:
@@ -183,10 +152,9 @@ def _scenarios(
         aim = parse_robust(asked.robust)
     except ProblemError as error:
         raise ProblemError(f"--robust: {error}") from error
-    drawn = _drawn(scene, asked.vary, asked.scenarios or COUNT, asked.seed)
-    if asked.unseen is None:
-        return aim, drawn, None
-    return aim, drawn, _drawn(scene, asked.vary, asked.unseen, asked.seed + 1)
+    drawn = partial(_drawn, scene, asked.vary)
+    unseen = None if asked.unseen is None else drawn(asked.unseen, asked.seed + 1)
+    return aim, drawn(asked.scenarios or COUNT, asked.seed), unseen
 
 
 def _drawn(scene: Scene, vary: options.Numbers, count: int, seed: int) -> Scenarios:
