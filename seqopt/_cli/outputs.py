@@ -114,10 +114,16 @@ def put_table(
     return {"text": f"{said} written to {path}", "written": (path,)}
 
 
-def written_to(folder: Path | None, *, page: bool = True, what: str = "it step by step") -> str:
-    """Describe the folder and its page, or how to request one."""
+def written_to(
+    folder: Path | None,
+    *,
+    page: bool = True,
+    tables: str = "the plan, its tables",
+    what: str = "it step by step",
+) -> str:
+    """Describe the folder and its page, or how to request one; ``what``: that the page shows."""
     if folder is None:
-        return "--out DIR writes the plan, its tables and a page that shows it step by step"
+        return f"--out DIR writes {tables} and a page that shows {what}"
     return f"written to {folder}" + f"; {folder / PAGE} shows {what}" * page
 
 

@@ -150,24 +150,21 @@ def _value(known: Field[Any], value: Any) -> Any:
         several = value if isinstance(value, Sequence) and not isinstance(value, str) else [value]
         return tuple(map(_text, several))
     kind, more = str(known.type), known.metadata
+    flag = more.get("flag", _flag(known.name))
     if kind in ("float", "float | None"):
-        return value if value == known.default else _number(known, value)
+        if value == known.default:
+            return value
+        try:
+            return number_word(str(value), flag, zero=more.get("zero", False))
+        except ProblemError as error:
+            raise ProblemError(f"{error}{more.get('advice', '')}") from None
     if kind in ("int", "int | None"):
-        return parse_count(value, _flag(known.name), more["most"], more.get("least", 1))
+        return parse_count(value, flag, more["most"], more.get("least", 1))
     text, choices = _text(value), more.get("choices")
     if choices is not None and text not in choices:
         hint = did_you_mean(text, choices)
         raise ProblemError(f"{known.name} {text!r} does not exist{hint}; give {', '.join(choices)}")
     return Path(text) if FILE.match(str(known.type)) and isinstance(text, str) else text
-
-
-def _number(known: Field[Any], value: float | str) -> float:
-    """Parse the number of an option; errors end with its ``advice``."""
-    flag, zero = known.metadata.get("flag", _flag(known.name)), known.metadata.get("zero", False)
-    try:
-        return number_word(str(value), flag, zero=zero)
-    except ProblemError as error:
-        raise ProblemError(f"{error}{known.metadata.get('advice', '')}") from None
 
 
 def _text(value: Any) -> Any:

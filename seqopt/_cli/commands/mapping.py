@@ -40,11 +40,7 @@ def answer_map(asked: options.Fixed, over: str, holds: Sequence[str]) -> Answer:
         found = failure_map(scene, builds, holds, axis, values, asked.tell)
     written = outputs.write_outputs(asked, lambda: _files(scene, builds, found))
     blocks = failure_blocks(scene, found, wrapped)
-    if written:
-        where = outputs.written_to(asked.path, what="how steps fall")
-        notes += [*outputs.figure_notes()]
-    else:
-        where = "--out DIR writes tables, a picture and a page that shows how steps fall"
+    where = outputs.written_to(asked.path, tables="tables, a picture", what="how steps fall")
     falls = found.cases["fall"].any()
     return Answer(
         facts={"versions": versions(), "cases": found.cases, "steps": found.steps},
@@ -53,7 +49,7 @@ def answer_map(asked: options.Fixed, over: str, holds: Sequence[str]) -> Answer:
         written=written,
         scene=scene,
         value=found.cases,
-        notes=tuple(notes),
+        notes=(*notes, *outputs.figure_notes(written)),
         status=Status.DOES_NOT_HOLD if falls else Status.DONE,
     )
 

@@ -72,7 +72,7 @@ class Pareto(options.Written, options.Judged, options.Built, options.Moves):
     seconds: float = options.word(inf, zero=True)
 
 
-class ParetoWords(options.Posed, Pareto):
+class ParetoWords(Pareto, options.Posed):
     """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
 
     No other plan beats it in all aims at once (the Pareto set). Check each, and write a table, the
@@ -101,8 +101,6 @@ class ParetoWords(options.Posed, Pareto):
     seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front
     """
 
-    schedule: str | Path | None = FREE
-    aim: options.Words | None = FOUR
     pick: str | None = None
     under: options.Words = ()
 

@@ -17,6 +17,7 @@ from seqopt._cli.terminal import wrapped
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
 from seqopt.exchange._measured import read_measured
+from seqopt.exchange.exports import read_folder
 from seqopt.plan.plan import Plan
 from seqopt.plan.replan import compared, without
 from seqopt.responses._tolerance import is_tolerance, value_text
@@ -26,7 +27,6 @@ from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence._parts import SAME
 from seqopt.sequence.rules import FREE, _usual_grips, with_robots
-from seqopt.sequence.schedule_file import read_plan
 from seqopt.study.published import CRITERIA
 
 
@@ -151,8 +151,7 @@ def find(asked: ReplanWords) -> Found:
 def answered(asked: ReplanWords, found: Found) -> Answer:
     """Write the new plan, and return its changes."""
     folder, base, new, notes = found
-    scene = load_scene(folder / "scene.json")
-    steps = read_plan(scene, folder / "plan.csv")
+    scene, steps = read_folder(folder)
     old = [step for step in steps if step.number > int(asked.at)]
 
     def differs() -> dict[str, object]:
