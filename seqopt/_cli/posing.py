@@ -39,9 +39,8 @@ _WRONG = {
 }
 
 
-Change: TypeAlias = Callable[
-    [Scene, inputs.Place], tuple[Scene, inputs.Place, str]
-]  # and who takes part
+# the last is who takes part
+Change: TypeAlias = Callable[[Scene, inputs.Place], tuple[Scene, inputs.Place, str]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.problem.problem import Aim
-from seqopt.responses._tolerance import value_text
+from seqopt.responses._tolerance import values_text
 from seqopt.sequence.steps import Step
 
 if TYPE_CHECKING:
@@ -118,10 +118,9 @@ class Source:
 
     def said(self, objective: Mapping[str, float], gap: float | None, status: str) -> str:
         """Return objective, gap and status of a plan in words."""
-        values = ", ".join(f"{name} {value_text(name, v)}" for name, v in objective.items())
         within = f" within {gap:.2g}" if gap and gap < inf else ""
         among = f" among candidates {self.among}" if self.among else ""
-        return f"{values}, {status}{within}{among}"
+        return f"{values_text(objective)}, {status}{within}{among}"
 
     def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
         """Return the settings of the problem for a summary; ``limits``: bounds by name."""

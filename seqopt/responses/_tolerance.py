@@ -6,7 +6,7 @@ linear in the misplacement: one solution per grip and direction gives the worst 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import itemgetter
@@ -36,10 +36,13 @@ def is_tolerance(name: str) -> bool:
     return name == TOLERANCE or name.startswith(f"{TOLERANCE}[")
 
 
-def value_text(name: str, value: float) -> str:
-    """Format the value of an aim or a response: a length with its unit, else six digits."""
-    length = is_tolerance(name) or name == "D_max"
-    return length_text(value) if length else f"{value:.6g}"
+def values_text(values: Mapping[str, float]) -> str:
+    """Format values of aims or responses by name: lengths with their units, else six digits."""
+    lengths = {name for name in values if is_tolerance(name) or name == "D_max"}
+    return ", ".join(
+        f"{name} {length_text(value) if name in lengths else format(value, '.6g')}"
+        for name, value in values.items()
+    )
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from seqopt.plan.pose import usual
 from seqopt.plan.solve import _solve_run
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN, overloads
-from seqopt.responses._tolerance import value_text
+from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.steps import StepKind, _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts
@@ -266,9 +266,8 @@ def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], P
 
 def _values(plan: Plan) -> str:
     """Describe the values and the number of steps of a plan."""
-    values = [f"{name} {value_text(name, v)}" for name, v in plan.objective.items()]
-    steps = [] if "steps" in plan.objective else [f"{len(plan.steps)} steps"]
-    return f"{OUTSIDE}: " * plan.is_far + ", ".join([*values, *steps])
+    steps = "" if "steps" in plan.objective else f", {len(plan.steps)} steps"
+    return f"{OUTSIDE}: " * plan.is_far + values_text(plan.objective) + steps
 
 
 def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
@@ -347,8 +346,7 @@ def _value(found: Found) -> str:
     """Describe objective, bound and gap of a plan."""
     plan = found.plan
     if plan.order:
-        values = ", ".join(f"{name} {value_text(name, v)}" for name, v in plan.objective.items())
-        return f"{values}, {plan.status}, {order_bound_said(plan)}"
+        return f"{values_text(plan.objective)}, {plan.status}, {order_bound_said(plan)}"
     known = found.posed.known
     if known is None or not plan.graph.candidates:
         return plan._value

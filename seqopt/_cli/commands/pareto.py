@@ -30,7 +30,7 @@ from seqopt.problem.requirements import _said_limits
 from seqopt.report._pages import front_page, plan_page
 from seqopt.report.comparison import _worst_of, fixed_methods, shown_table
 from seqopt.report.page import task_texts
-from seqopt.responses._tolerance import value_text
+from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import Departure, LinearRange, _analyze_builds, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
@@ -221,8 +221,7 @@ def _chosen(asked: ParetoWords, name: str, found: Found) -> tuple[int, dict[str,
         raise TimeUpError(f"--pick {name}: --under was not looked at; give more")
     chosen = pick(found.value.table, name, _under(asked.under, found))
     values = shown_table(found.value.table).iloc[chosen]
-    row = ", ".join(f"{name} {value_text(str(name), v)}" for name, v in values.items())
-    return chosen, {"point": chosen + 1, **values}, row
+    return chosen, {"point": chosen + 1, **values}, values_text(values.to_dict())
 
 
 def _files(

@@ -20,7 +20,7 @@ from seqopt.exchange._measured import read_measured
 from seqopt.exchange.exports import read_folder
 from seqopt.plan.plan import Plan
 from seqopt.plan.replan import compared, without
-from seqopt.responses._tolerance import is_tolerance, value_text
+from seqopt.responses._tolerance import is_tolerance, values_text
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
 from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene
@@ -248,8 +248,7 @@ def _in_words(facts: Mapping[str, Any]) -> Sequence[str]:
     if was is None:
         line = f"as planned the build cannot go on: {facts['broken']}"
     else:
-        values = ", ".join(f"{name} {value_text(name, value)}" for name, value in was.items())
-        line = f"as planned the rest takes: {values}"
+        line = f"as planned the rest takes: {values_text(was)}"
     if "off_m" in facts:
         off, left = length_text(facts["off_m"]), length_text(facts["tolerance_left_m"])
         which = "every brick is"
