@@ -271,14 +271,14 @@ def in_seconds(asked: options.Timed, scene: Scene) -> Scene:
 def find_engine(asked: options.Computed, network: Network) -> Engine:
     """Return the requested engine, by default that of the scene."""
     mortar = None if asked.mortar is None else grammar.parse_mortar(asked.mortar, "--mortar")
-    proven = isinstance(asked, options.Judged) and asked.stability
-    of_verdicts = asked.engine not in LIMITED and proven
+    if asked.engine not in LIMITED and isinstance(asked, options.Judged) and asked.stability:
+        mortar = None  # it is that of verdicts alone
     if asked.engine is None:
-        engine = make_engine(DEFAULT, network, None if of_verdicts else mortar)
+        engine = make_engine(DEFAULT, network, mortar)
         # with a mortar of its own an engine is asked where joints open: set by set
-        return simplest(engine) if of_verdicts or mortar is None else engine
+        return simplest(engine) if mortar is None else engine
     try:
-        return make_engine(asked.engine, network, None if of_verdicts else mortar)
+        return make_engine(asked.engine, network, mortar)
     except SceneError as error:
         why = str(error).removeprefix(f"engine {asked.engine}: ")
         raise SceneError(f"--engine {asked.engine}: {why}") from error
