@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from typing import Any
 
@@ -65,8 +65,7 @@ def _completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
     }
     folder = shtab.DIRECTORY
     paths: dict[Any, object] = {"DIR": folder, "PLAN_DIR": folder, "FILE": shtab.FILE}
-    subs = (each for each in whole._actions if isinstance(each, argparse._SubParsersAction))
-    for command in (command for each in subs for command in each.choices.values()):
+    for command in _commands(whole):
         command.description = COMMANDS[command.prog.split()[-1]].about
         for action in command._actions:
             if found := known.get(action.dest, paths.get(action.metavar)):
@@ -74,6 +73,12 @@ def _completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
             if action.help and action.help != argparse.SUPPRESS:
                 action.help = SHORT.split(action.help)[0]
     return whole
+
+
+def _commands(whole: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    for action in whole._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            yield from action.choices.values()
 
 
 def _names() -> dict[str, list[str]]:
