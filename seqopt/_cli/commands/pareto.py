@@ -220,8 +220,9 @@ def _chosen(asked: ParetoWords, name: str, found: Found) -> tuple[int, dict[str,
     if asked.under and not found.methods and found.clock.left_out:
         raise TimeUpError(f"--pick {name}: --under was not looked at; give more")
     chosen = pick(found.value.table, name, _under(asked.under, found))
-    values = shown_table(found.value.table).iloc[chosen]
-    return chosen, {"point": chosen + 1, **values}, values_text(values.to_dict())
+    row = shown_table(found.value.table).iloc[chosen]
+    values = {str(name): value for name, value in row.items()}
+    return chosen, {"point": chosen + 1, **values}, values_text(values)
 
 
 def _files(
