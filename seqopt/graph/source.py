@@ -100,7 +100,7 @@ class Source:
         """Return values of the first goals by their names, in display units."""
         return dict(zip(self.names_of(aim), values, strict=False))
 
-    def bounded(self, bounds: Sequence[float]) -> Sequence[float]:
+    def bounded(self, bounds: Sequence[Any]) -> Sequence[Any]:
         """Return the bounds of goals, without those of budgets."""
         return bounds
 

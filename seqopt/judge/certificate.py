@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from itertools import chain
+from math import isfinite
 
 import numpy as np
 
@@ -81,6 +83,14 @@ def _known_gap(gap: float) -> float:
     return 0.0 if gap <= TOLERANCE else gap
 
 
+class Basis(StrEnum):
+    """What a lower bound rests on."""
+
+    REBUILT = "rebuilt"  # states and their responses, which the judge computed again
+    GIVEN = "given"  # costs: of an instance, or of all choices of open grips
+    CLAIMED = "claimed"  # by the formulation; nothing is proven
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(FrozenValue):
     """The values of a plan and bounds on all others, from the problem's data alone.
@@ -102,6 +112,8 @@ class Certificate(FrozenValue):
         The amount that the plan uses of each budget.
     states : int
         Number of states in the proof, where it is about states.
+    basis : Basis
+        What proven bounds rest on.
 
     Examples
     --------
@@ -117,6 +129,7 @@ class Certificate(FrozenValue):
     claimed_gap: float
     spent: Mapping[str, float] = field(default_factory=dict)
     states: int = 0
+    basis: Basis = Basis.GIVEN
 
     def __repr__(self) -> str:
         values = f"objective {self.objective:.6g}, no choice below {self.bound:.6g}"
@@ -131,3 +144,8 @@ class Certificate(FrozenValue):
     def bound(self) -> float:
         """Lower bound of the first goal."""
         return self.bounds[0]
+
+    @property
+    def rests_on(self) -> tuple[Basis, ...]:
+        """What the bound of each goal rests on: a claim where nothing is proven."""
+        return tuple(self.basis if isfinite(bound) else Basis.CLAIMED for bound in self.bounds)

@@ -24,7 +24,7 @@ from seqopt.judge._spaces import TooManyPartsError
 from seqopt.judge._states import largest_load
 from seqopt.judge._step_checks import check_props, check_shape, proven_margins, require_margin
 from seqopt.judge._twin import PathTwin, exceeds, own_values, twin_of
-from seqopt.judge.certificate import Certificate
+from seqopt.judge.certificate import Basis, Certificate
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.standing import _size, slack
 from seqopt.responses._props import EXCESS_COLUMN
@@ -74,7 +74,7 @@ def judge_schedule(
             bounds = _first_bound(problem, selection, bounds)
         gap = _gap(problem.aims, values, bounds)
         left = gap if is_claimed else _gap(problem.aims, values, selection.bound)
-        return Certificate(values, bounds, gap, left)
+        return Certificate(values, bounds, gap, left, basis=Basis.REBUILT)
     try:
         return _proven(problem, selection, values, hint, exact=exact)
     except TooManyPartsError:
@@ -136,7 +136,8 @@ def _proven(
         claimed = bounds
     claimed = _closed(values, tuple(map(max, bounds, claimed)))
     gap, left = (_gap(problem.goals, values, each) for each in (bounds, claimed))
-    return Certificate(values, (*bounds, *values[aims:]), gap, left, {}, proof.states)
+    bounds = (*bounds, *values[aims:])
+    return Certificate(values, bounds, gap, left, {}, proof.states, Basis.REBUILT)
 
 
 def _closed(values: Sequence[float], bounds: Sequence[float]) -> Bounds:

@@ -39,12 +39,20 @@ def bare_summary(plan: Any) -> dict[str, object]:
         "stopped": plan.stopped,
         "objective": plan.objective,
         "bound": {n: b if isfinite(b) else None for n, b in zip(names, bounds, strict=False)},
+        "bound_rests_on": rests_on(plan),
         "gap": plan.gap,
         "claimed_gap": None if proof is None or plan.gap is None else _known_gap(proof.claimed_gap),
         "budgets": {} if proof is None else dict(proof.spent),
         "nodes_of_path": [*plan.nodes],
         "seconds": dict(plan.seconds),
     }
+
+
+def rests_on(plan: Any) -> dict[str, str]:
+    """Return what the lower bound of each goal rests on; empty without a proof."""
+    proof, names = plan.certificate, plan.graph.names_of(plan.formulation.aim)
+    found = () if proof is None else plan.graph.bounded(proof.rests_on)
+    return dict(zip(names, map(str, found), strict=False))
 
 
 def order_bound(plan: Any) -> tuple[float, bool]:

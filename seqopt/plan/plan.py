@@ -21,7 +21,7 @@ from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
 from seqopt.judge._step_checks import certified
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
-from seqopt.plan._status import ENDS, Status, bare_summary, order_facts
+from seqopt.plan._status import ENDS, Status, bare_summary, order_facts, rests_on
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
@@ -370,8 +370,9 @@ class Plan(ShownBuild):
         """Return the summary of the plan, ready for JSON; its keys are the same for all plans.
 
         Result: names of scene, schedule, formulation and criterion, ``aims``; ``candidates``, all
-        or a choice of them; ``status``; by aim ``objective`` and ``bound``, then the ``gap`` and
-        the ``claimed_gap``; of every one of the ``budgets`` what is there, spent, and what one more
+        or a choice of them; ``status``; by aim ``objective``, ``bound`` and what that
+        rests on (``bound_rests_on``: rebuilt, given or claimed); then the ``gap`` and the
+        ``claimed_gap``; of every one of the ``budgets`` what is there, spent, and what one more
         unit would save; ``limits``, ``rules``, ``scenarios``, what ``stands``; how it ``ended`` and
         what ``stopped`` it; ``steps``, ``steps_before_release`` without those that let all go at
         the end, ``regrips``, ``makespan`` (s, if it is known how long robots take),
@@ -419,6 +420,7 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "stopped": plan.stopped,
         "objective": plan.objective,
         "bound": _bounds(plan),
+        "bound_rests_on": rests_on(plan),
         "gap": plan.gap,
         "claimed_gap": None if proof is None or plan.gap is None else _known_gap(proof.claimed_gap),
         **plan.objectives(),

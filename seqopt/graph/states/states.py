@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -190,7 +190,7 @@ class States(Source, Shown):
         found = zip(self.names, self.goals, values, strict=False)
         return {name: goal.shown(value) for name, goal, value in found}
 
-    def bounded(self, bounds: Sequence[float]) -> Sequence[float]:
+    def bounded(self, bounds: Sequence[Any]) -> Sequence[Any]:
         """Return the bounds of goals, without those of budgets."""
         return bounds[: len(self.aims)]
 
