@@ -1,12 +1,13 @@
 """Extension points of the core: offers of outer rooms, found by name and loaded on demand.
 
 A room with another amount, filter or picture adds a line here. The core works without any of them.
-Plug-ins add amounts and filters by entry points of the group ``seqopt.parts``, users by
-`seqopt.register`.
+Plug-ins add amounts, filters, formats and pictures by entry points of the group ``seqopt.parts``,
+users by `seqopt.register`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Container
 from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any
@@ -38,8 +39,18 @@ OFFERS = {
 }
 """By name, the module of an outer room that has it."""
 PARTS = ("makespan",)  # which of these are amounts or filters
-ADDED: dict[str, Any] = {}
-"""Amounts and filters that users registered, by name."""
+ADDED: dict[tuple[type, str], Any] = {}
+"""What users registered, by its kind and name."""
+
+
+class Part:
+    """Base of what outer rooms take from packages and users by name: formats, pictures."""
+
+    name: str
+
+    def reserved(self) -> Container[str]:
+        """Return names that are always there."""
+        raise NotImplementedError
 
 
 def offered(name: str) -> Any:
@@ -54,7 +65,8 @@ def offered(name: str) -> Any:
 
 
 def registered(kind: type) -> dict[str, Any]:
-    """Return the amounts or filters that rooms, plug-ins and users registered, by name."""
+    """Return the parts of a kind that rooms, plug-ins and users registered, by name."""
     points = entry_points(group="seqopt.parts")
-    every = {name: offered(name) for name in PARTS} | {p.name: p.load() for p in points} | ADDED
-    return {name: part for name, part in every.items() if isinstance(part, kind)}
+    every = [(name, offered(name)) for name in PARTS] + [(p.name, p.load()) for p in points]
+    every += [(name, part) for (_, name), part in ADDED.items()]
+    return {name: part for name, part in every if isinstance(part, kind)}

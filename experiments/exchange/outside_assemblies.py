@@ -45,8 +45,9 @@ from seqopt._cli.main import main
 from seqopt.contact.faces import step_assembly
 from seqopt.errors import SceneWarning
 from seqopt.exchange._content import Given
-from seqopt.exchange.exports import EXPORTS, read_folder
-from seqopt.exchange.imports import import_scene, read_content, sniffed
+from seqopt.exchange.exports import read_folder
+from seqopt.exchange.formats import sniffed, writable
+from seqopt.exchange.imports import import_scene, read_content
 from seqopt.report._style import styled
 from seqopt.report.draw import View, draw_bricks
 from seqopt.stability._prover import Prover
@@ -177,7 +178,7 @@ def row_of(outside: Outside, path: Path, folder: Path) -> dict[str, object]:
         return row | {"outcome": "no plan", "said": said}
     summary = json.loads((plan / "summary.json").read_text(encoding="utf-8"))
     again, steps = silently(read_folder, plan)
-    outs = {form: ("--format", form, "--out", str(folder / form)) for form in EXPORTS}
+    outs = {form: ("--format", form, "--out", str(folder / form)) for form in writable()}
     exported = [run("export", str(plan), *words)[0] for words in outs.values()]
     row |= {"outcome": PLAN if not any(exported) else "not exported", "said": summary["status"]}
     return row | {"steps": len(steps), **verdicts(again, steps)}

@@ -89,12 +89,11 @@ def time_files(plan: ShownBuild) -> dict[str, bytes]:
 
 def task_files(plan: Plan) -> dict[str, str]:
     """Return the tasks of robots for their programming, by file name."""
-    from seqopt.exchange._tasks import _in_postures, plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
+    from seqopt.exchange._tasks import plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
 
     scene = plan.engine.network.scene
-    tasks = [*plan_tasks(scene, plan.steps)]
-    if plan.arms is not None:
-        tasks = [*_in_postures(scene, tasks, plan.arms.postures)]
+    postures = None if plan.arms is None else plan.arms.postures
+    tasks = [*plan_tasks(scene, plan.steps, postures=postures)]
     return {"tasks.json": tasks_json(scene, tasks), "tasks.csv": tasks_csv(tasks)}
 
 

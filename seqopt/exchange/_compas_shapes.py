@@ -1,7 +1,8 @@
-"""Shapes, frames and transformations of COMPAS as arrays."""
+"""Shapes, frames and transformations of COMPAS: read as arrays, and written."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,14 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.exchange._content import Entry, entry, listing, mapping, number, point, points
+from seqopt.exchange._grip_frames import Frame
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.shape import normal_of
 
 _PLAIN = 1e-9  # by how much rounding may change the last row of a transformation
+_DIGITS = 9  # of lengths, m, and of axes that are written: a nanometer
+Document = dict[str, Any]
 _Solid = tuple[Floats, list[list[int]]]
 
 
@@ -134,3 +138,34 @@ def _plate(where: str, held: Entry) -> _Solid:
     around = zip(first, first[1:] + first[:1], behind, behind[1:] + behind[:1], strict=True)
     sides = [[b, a, c, d] for a, b, c, d in around]
     return np.vstack([front, front - thickness * normal / size]), [first, behind[::-1], *sides]
+
+
+def typed(kind: str, data: object) -> Document:
+    """Return data as COMPAS stores a value of a type."""
+    return {"dtype": kind, "data": data}
+
+
+def compas_frame(frame: Frame | None) -> Document | None:
+    """Return a frame; None where there is none."""
+    if frame is None:
+        return None
+    rows = {"point": frame.point, "xaxis": frame.xaxis, "yaxis": frame.yaxis}
+    data = {name: [round(x, _DIGITS) + 0.0 for x in row] for name, row in rows.items()}
+    return typed("compas.geometry/Frame", data)
+
+
+def mesh_data(points: Floats, faces: Sequence[Iterable[int]]) -> Document:
+    """Return what a mesh of COMPAS holds."""
+    rows = points.tolist()
+    return {
+        "attributes": {},
+        "default_vertex_attributes": {"x": 0.0, "y": 0.0, "z": 0.0},
+        "default_edge_attributes": {},
+        "default_face_attributes": {},
+        "vertex": {str(i): dict(zip("xyz", row, strict=True)) for i, row in enumerate(rows)},
+        "face": {str(i): list(face) for i, face in enumerate(faces)},
+        "facedata": {},
+        "edgedata": {},
+        "max_vertex": len(rows) - 1,
+        "max_face": len(faces) - 1,
+    }

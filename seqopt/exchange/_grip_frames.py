@@ -7,16 +7,15 @@ the robot, or up where the robot may be anywhere.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats, Vector
+from seqopt.scene._checks import frames
 from seqopt.scene.boxes import as_vector, vertices_of
-from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side, Sphere
+from seqopt.scene.parts import Brick, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import fans
 
@@ -38,8 +37,7 @@ class Frame:
     @cached_property
     def axes(self) -> Floats:
         """Its axes as rows, (3, 3)."""
-        first, second = np.array(self.xaxis), np.array(self.yaxis)
-        return np.stack([first, second, np.cross(first, second)])
+        return frames(np.array(self.xaxis), np.array(self.yaxis))
 
     def moved(self, along: Floats, distance: float) -> Frame:
         """Return the frame shifted along a unit vector (3,) of the scene, m."""
@@ -72,16 +70,22 @@ def hold(scene: Scene, robot: Robot, node: int) -> Held:
     brick = scene.brick_of_node[node]
     at = np.array(brick.node_position(node))
     normals, depths = _faces_seen(brick, at)
-    now, later = _covers(scene, brick)
+    now, later = _joint_normals(scene, brick)
     reach, toward = robot.reach, np.array(scene.up)  # up where the robot may be anywhere
     if isinstance(reach, Side):
         toward = np.array(reach.toward)
     if isinstance(reach, Sphere) and reach.center != tuple(at):
         toward = np.array(reach.center) - at
     score = normals @ (toward / np.linalg.norm(toward) + _UP * np.array(scene.up))
-    score -= _NEVER * _covered(normals, now) + _LATER * _covered(normals, later)
+    for joints, cost in ((now, _NEVER), (later, _LATER)):
+        score -= cost * (normals @ joints.T > _SQUARE).any(axis=1)
     best = int(score.argmax())
-    grip = _tool(brick, as_vector(at), normals[best])
+    # a tool comes square to the face, its first axis along the brick
+    along = next(axis for axis in brick.frame if abs(axis @ normals[best]) < _PARALLEL)
+    first = along - (along @ normals[best]) * normals[best]
+    first /= np.linalg.norm(first)
+    second = np.cross(-normals[best], first)
+    grip = Frame(as_vector(at), as_vector(first), as_vector(second))
     tried = np.vstack([normals[best], scene.up, normals])
     mean = -now.sum(axis=0)  # away from all that the brick touches
     if np.linalg.norm(mean) > 1e-9:
@@ -114,67 +118,17 @@ def _faces_seen(brick: Brick, at: Floats) -> tuple[Floats, Floats]:
     return (normals[kept], depths[kept]) if kept.any() else (normals, depths)
 
 
-def _covers(scene: Scene, brick: Brick) -> tuple[Floats, Floats]:
+def _joint_normals(scene: Scene, brick: Brick) -> tuple[Floats, Floats]:
     """Return the outward normals (k, 3) of a brick's joints with what stands when it is placed.
 
     Then those of its joints with bricks that come later.
     """
-    since, sides = scene.since, {True: list[Floats](), False: list[Floats]()}
-    springs: list[Joint | Ground] = [s for s in scene.joints if brick.name in s.bricks]
-    springs += [end for end in scene.grounds if end.brick == brick.name]
-    for spring in springs:
-        along = np.array(spring.along)
-        out = (np.array(spring.position) - np.array(brick.position)) @ along >= 0
-        stands = all(since[end] <= since[brick.name] for end in spring.ends)
-        sides[stands].append(along if out else -along)
-    now, later = (np.array(sides[key]).reshape(-1, 3) for key in (True, False))
+    sides: tuple[list[Floats], list[Floats]] = ([], [])
+    for spring in (*scene.joints, *scene.grounds):
+        if brick.name in spring.ends:
+            along = np.array(spring.along)
+            out = (np.array(spring.position) - np.array(brick.position)) @ along >= 0
+            later = any(scene.since[end] > scene.since[brick.name] for end in spring.ends)
+            sides[later].append(along if out else -along)
+    now, later = (np.array(normals).reshape(-1, 3) for normals in sides)
     return now, later
-
-
-def _covered(normals: Floats, joints: Floats) -> Floats:
-    """Return 1 for faces with normals (n, 3) that a joint lies on, else 0, (n,)."""
-    return np.asarray((normals @ joints.T > _SQUARE).any(axis=1).astype(float))
-
-
-def _tool(brick: Brick, at: Vector, normal: Floats) -> Frame:
-    """Return the frame of a tool that comes square to a face, its first axis along the brick."""
-    along = next(axis for axis in brick.frame if abs(axis @ normal) < _PARALLEL)
-    first = along - (along @ normal) * normal
-    first /= np.linalg.norm(first)
-    return Frame(at, as_vector(first), as_vector(np.cross(-normal, first)))
-
-
-Document = dict[str, Any]
-_DIGITS = 9  # of lengths, m, and of axes: a nanometer
-
-
-def typed(kind: str, data: object, **more: object) -> Document:
-    """Return data as COMPAS stores a value of a type; ``more``: what it has beside, as a name."""
-    return {"dtype": kind, "data": data, **more}
-
-
-def compas_frame(frame: Frame | None) -> Document | None:
-    """Return a frame; None where there is none."""
-    if frame is None:
-        return None
-    rows = (frame.point, frame.xaxis, frame.yaxis)
-    parts = zip(("point", "xaxis", "yaxis"), rows, strict=True)
-    data = {name: [round(x, _DIGITS) + 0.0 for x in row] for name, row in parts}
-    return typed("compas.geometry/Frame", data)
-
-
-def mesh_data(points: Floats, faces: Sequence[Iterable[int]]) -> Document:
-    """Return what a mesh of COMPAS holds."""
-    rows = points.tolist()
-    return {
-        "attributes": {},
-        "default_vertex_attributes": {"x": 0.0, "y": 0.0, "z": 0.0},
-        "default_edge_attributes": {},
-        "default_face_attributes": {},
-        "vertex": {str(i): dict(zip("xyz", row, strict=True)) for i, row in enumerate(rows)},
-        "face": {str(i): list(face) for i, face in enumerate(faces)},
-        "facedata": {},
-        "edgedata": {},
-        "max_vertex": len(rows) - 1,
-        "max_face": len(faces) - 1,
-    }

@@ -28,6 +28,8 @@ from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import LARGEST, UNITS, Content, FileBlock, moved
 from seqopt.exchange._meshes import mesh_content, object_content
 from seqopt.scene._checks import short
+from seqopt.scene.boxes import vertices_of
+from seqopt.scene.scene import Scene
 
 _UNASKED = logging.NullHandler()  # else Python prints what no one listens to
 _NEEDS = {  # packages and the extra that brings them
@@ -79,6 +81,18 @@ def read_obj(text: str, source: str) -> Content:
             named[words[0]] = " ".join(words[1:])
     points = np.array(vertices, dtype=float).reshape(-1, 3)
     return mesh_content(points, faces, source, max(names.values(), key=lambda own: len(set(own))))
+
+
+def write_obj(scene: Scene) -> str:
+    """Return bricks as a mesh each, in m: objects of an OBJ file, called as the bricks are."""
+    lines, first = list[str](), 1
+    for brick in scene.bricks:
+        points, faces = vertices_of(brick)
+        lines.append(f"o {brick.name}")
+        lines += ["v " + " ".join(map(repr, row)) for row in np.asarray(points).tolist()]
+        lines += ["f " + " ".join(str(first + i) for i in face) for face in faces]
+        first += len(points)
+    return "\n".join(lines) + "\n"
 
 
 def read_off(text: str, source: str) -> Content:

@@ -8,8 +8,8 @@ a block that it holds out of the structure and stores it. All others hold on.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 
@@ -18,29 +18,15 @@ import pandas as pd
 
 from seqopt._files import csv_text
 from seqopt.arms._plan_postures import plan_postures
-from seqopt.arms._postures import PostureTable
-from seqopt.arrays import Floats
-from seqopt.errors import StepError
-from seqopt.exchange._grip_frames import (
-    Document,
-    Frame,
-    Held,
-    brick_frame,
-    compas_frame,
-    hold,
-    mesh_data,
-    typed,
-)
+from seqopt.errors import ExtraError, SceneError
+from seqopt.exchange._compas_shapes import Document, compas_frame, mesh_data, typed
+from seqopt.exchange._grip_frames import Frame, Held, brick_frame, hold
 from seqopt.scene._armed import PlanPostures
-from seqopt.scene._checks import finite, positive, rows, short
+from seqopt.scene._checks import positive
 from seqopt.scene.boxes import as_vector, vertices_of
-from seqopt.scene.parts import Brick, Robot, Sphere
+from seqopt.scene.parts import Robot, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step, StepKind
-
-Postures = Mapping[tuple[str, int], Sequence[float]]
-"""Joint values of arms by the names of robots and by nodes."""
-_Key = tuple[str, int]
 
 
 class Action(Enum):
@@ -90,7 +76,7 @@ def plan_tasks(
     scene: Scene,
     steps: Sequence[Step],
     distance: float | None = None,
-    postures: Postures | None = None,
+    postures: PlanPostures | None = None,
 ) -> Iterator[Task]:
     """Yield what robots do in a checked plan, step by step.
 
@@ -101,7 +87,7 @@ def plan_tasks(
     distance
         From a grip to where a tool comes from, and goes to, m; by default a block's longest side.
     postures
-        Joint values of arms by robot and node, where they are known.
+        Of the arms in every step; without them, grips are proposals.
 
     Yields
     ------
@@ -111,9 +97,7 @@ def plan_tasks(
     Raises
     ------
     SceneError
-        If the distance is not positive, or a posture is of no numbers.
-    StepError
-        If postures name no robot or node of the scene.
+        If the distance is not positive.
 
     Examples
     --------
@@ -125,37 +109,34 @@ def plan_tasks(
     [('rob2', 'pick', 2), ('rob2', 'place', 2), ('rob1', 'hold', 1)]
     """
     far = None if distance is None else positive("distance", distance, "m")
-    known = _checked(scene, postures or {})
-
-    @cache
-    def found(robot: Robot, node: int) -> _Grip:
-        brick = scene.brick_of_node[node]
-        away = max(brick.dimensions) if far is None else far
-        posture = known.get((robot.name, node))
-        return _Grip(robot.name, node, brick.name, hold(scene, robot, node), away, posture)
-
+    found = cache(lambda robot, node: hold(scene, robot, node))
     last: Grips = (None,) * len(scene.robots)
     for step in steps:
         tasks = []
-        for robot, old, new in zip(scene.robots, last, step.grips, strict=True):
+        for r, (robot, old, new) in enumerate(zip(scene.robots, last, step.grips, strict=True)):
             node = old if new is None else new
-            if node is not None:
-                grip = found(robot, node)
-                tasks += [_task(step, action, grip) for action in _actions(step, old, new)]
+            for action in () if node is None else _actions(step, old, new):
+                held, joints = found(robot, node), None
+                at = step.number - 1 - (action is Action.RELEASE)  # it lets go as it held
+                row = None if postures is None else postures.steps[at][r]
+                if postures is not None and row is not None:
+                    held = _in_posture(scene, node, held, postures.table.axes[row])
+                    own = postures.table.joints[row]
+                    joints = tuple(own[np.isfinite(own)].tolist())
+                tasks.append(_task(scene, step, action, (robot, node, held), far, joints))
         yield from sorted(tasks, key=lambda task: task.action is Action.HOLD)
         last = step.grips
 
 
-@dataclass(frozen=True)
-class _Grip:
-    """A node in a robot's hand."""
-
-    robot: str
-    node: int
-    block: int
-    held: Held
-    far: float  # m; from the grip to where the tool comes from
-    posture: tuple[float, ...] | None
+def tasks_in_postures(
+    scene: Scene, steps: Sequence[Step], distance: float | None = None
+) -> Iterator[Task]:
+    """Yield tasks of a plan as `plan_tasks`, in postures of arms where these can be computed."""
+    try:
+        found = plan_postures(scene, steps)
+    except (ExtraError, SceneError):
+        found = None
+    return plan_tasks(scene, steps, distance, found)
 
 
 def _actions(step: Step, old: int | None, new: int | None) -> tuple[Action, ...]:
@@ -168,44 +149,46 @@ def _actions(step: Step, old: int | None, new: int | None) -> tuple[Action, ...]
     return (Action.PICK, Action.PLACE) if step.kind is StepKind.PLACE else (Action.REPOSITION,)
 
 
-def _task(step: Step, action: Action, grip: _Grip) -> Task:
-    """Return what a robot does, with the frames that this has."""
-    held, there = grip.held, action not in (Action.PICK, Action.STORE)
-    block, tool = held.block, held.grip
-    back = tool.moved(-tool.axes[2], grip.far)
-    away = tool.moved(np.array(held.away), grip.far)
-    approach = {Action.PLACE: away, Action.REPOSITION: back}
-    retreat = {Action.RELEASE: back, Action.REMOVE: away}
+def _in_posture(scene: Scene, node: int, held: Held, axes: np.ndarray) -> Held:
+    """Return a grip with a tool whose axes (3, 3) are those of an arm, as columns."""
+    brick = scene.brick_of_node[node]
+    tool = Frame(held.grip.point, as_vector(axes[:, 0]), as_vector(axes[:, 1]))
+    outward = -tool.axes[2]
+    half = 0.5 * float(np.abs(brick.frame @ outward) @ np.array(brick.dimensions))
+    depth = half - float(np.subtract(tool.point, brick.position) @ outward)
+    return Held(held.block, tool, depth, held.away)
+
+
+def _task(
+    scene: Scene,
+    step: Step,
+    action: Action,
+    grip: tuple[Robot, int, Held],
+    far: float | None,
+    joints: tuple[float, ...] | None,
+) -> Task:
+    """Return what a robot does, with the frames that this has; a block comes along its own way."""
+    robot, node, held = grip
+    there, tool = action not in (Action.PICK, Action.STORE), held.grip
+    brick = scene.brick_of_node[node]
+    gone = max(brick.dimensions) if far is None else far
+    back, away = tool.moved(-tool.axes[2], gone), tool.moved(np.array(held.away), gone)
     return Task(
         step=step.number,
         kind=step.kind,
         action=action,
-        robot=grip.robot,
-        block=grip.block,
-        node=grip.node,
+        robot=robot.name,
+        block=brick.name,
+        node=node,
         built=step.bricks,
-        grip_in_block=tool.inside(block),
+        grip_in_block=tool.inside(held.block),
         depth=held.depth,
-        block_frame=block if there else None,
+        block_frame=held.block if there else None,
         grip=tool if there else None,
-        approach=approach.get(action),
-        retreat=retreat.get(action),
-        posture=grip.posture if there else None,
+        approach={Action.PLACE: away, Action.REPOSITION: back}.get(action),
+        retreat={Action.RELEASE: back, Action.REMOVE: away}.get(action),
+        posture=joints if there else None,
     )
-
-
-def _checked(scene: Scene, postures: Postures) -> dict[_Key, tuple[float, ...]]:
-    """Return joint values if each is of a robot and a node of the scene."""
-    named = {(robot.name, node) for robot in scene.robots for node in scene.brick_of_node}
-    out: dict[_Key, tuple[float, ...]] = {}
-    for key, values in postures.items():
-        if key not in named:
-            raise StepError(f"posture of {short(key)}: give the name of a robot, and a node")
-        where = f"posture of {key[0]} at node {key[1]}"
-        out[key] = tuple(finite(where, value) for value in rows(where, values, "numbers"))
-    if len(counts := {len(values) for values in out.values()}) > 1:
-        raise StepError(f"postures have {min(counts)} to {max(counts)} values; give as many each")
-    return out
 
 
 def tasks_json(scene: Scene, tasks: Iterable[Task]) -> str:
@@ -244,13 +227,12 @@ def tasks_json(scene: Scene, tasks: Iterable[Task]) -> str:
 
 def _row(task: Task) -> Document:
     """Return a task with the frames of COMPAS; what there is not is null."""
-    said: Document = {name: getattr(task, name) for name in _SAID}
-    said |= {name: compas_frame(getattr(task, name)) for name in FRAMES}
     return {
         "step": task.step,
         "type": task.kind.value,
         "action": task.action.value,
-        **said,
+        **{name: getattr(task, name) for name in _SAID},
+        **{name: compas_frame(getattr(task, name)) for name in FRAMES},
         "depth": round(task.depth, 9),
         "posture": task.posture,
     }
@@ -273,12 +255,9 @@ def tasks_csv(tasks: Iterable[Task]) -> str:
         }
     )
     parts = [_places(name, [getattr(task, name) for task in held]) for name in FRAMES]
-    most = max((len(task.posture or ()) for task in held), default=0)
-    joints = [
-        [*own, *[np.nan] * (most - len(own))] for own in (task.posture or () for task in held)
-    ]
-    parts.append(pd.DataFrame(joints, columns=[f"joint_{i}" for i in range(1, most + 1)]))
-    return csv_text(pd.concat([table, *parts], axis=1), _DIGITS)
+    rows = [dict(enumerate(task.posture or (), start=1)) for task in held]
+    joints = pd.DataFrame(rows, dtype=float).add_prefix("joint_")
+    return csv_text(pd.concat([table, *parts, joints], axis=1), _DIGITS)
 
 
 def _places(name: str, frames: Sequence[Frame | None]) -> pd.DataFrame:
@@ -287,68 +266,11 @@ def _places(name: str, frames: Sequence[Frame | None]) -> pd.DataFrame:
     known = [i for i, frame in enumerate(frames) if frame is not None]
     held = [frame for frame in frames if frame is not None]
     if held:
-        axes = np.array([frame.axes for frame in held])
         from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to import
 
+        axes = np.array([frame.axes for frame in held])
         turned = Rotation.from_matrix(axes.transpose(0, 2, 1)).as_quat(canonical=True)
         out[known, :3] = [frame.point for frame in held]
         out[known, 3:] = turned[:, [3, 0, 1, 2]]
     ends = ("x", "y", "z", "qw", "qx", "qy", "qz")
     return pd.DataFrame(out.round(9) + 0.0, columns=[f"{name}_{end}" for end in ends])
-
-
-def _known_tasks(
-    scene: Scene,
-    steps: Sequence[Step],
-    distance: float | None = None,
-    postures: Postures | None = None,
-) -> Iterator[Task]:
-    """Yield tasks of a plan as `plan_tasks` does, by default in the postures of its arms.
-
-    Raises `ExtraError` if these have to be computed and nothing is installed that does.
-    """
-    tasks = plan_tasks(scene, steps, distance, postures)
-    found = plan_postures(scene, steps) if postures is None else None
-    return tasks if found is None else _in_postures(scene, tasks, found)
-
-
-def _in_postures(scene: Scene, tasks: Iterable[Task], found: PlanPostures) -> Iterator[Task]:
-    """Yield tasks of a plan with the postures of its steps; those of steps without stay.
-
-    A robot that lets go does so in the posture in which it held, that of the step before.
-    """
-    places = {robot.name: i for i, robot in enumerate(scene.robots)}
-    for task in tasks:
-        step = task.step - 1 - (task.action is Action.RELEASE)
-        row = found.steps[step][places[task.robot]]
-        brick = scene.brick_of_node[task.node]
-        yield task if row is None else _in_posture(task, brick, found.table, row)
-
-
-def _in_posture(task: Task, brick: Brick, table: PostureTable, row: int) -> Task:
-    """Return a task with the joints and the frames of a row of the table."""
-    axes, block = table.axes[row], brick_frame(brick)
-    tool = Frame(brick.node_position(task.node), as_vector(axes[:, 0]), as_vector(axes[:, 1]))
-    outward = -tool.axes[2]
-    half = 0.5 * float(np.abs(brick.frame @ outward) @ np.array(brick.dimensions))
-    depth = half - float(np.subtract(tool.point, brick.position) @ outward)
-    out = replace(task, grip_in_block=tool.inside(block), depth=depth)
-    if task.grip is None:
-        return out
-    joints = table.joints[row]
-    approach, retreat = (_gone(task, tool, frame) for frame in (task.approach, task.retreat))
-    posture = tuple(joints[np.isfinite(joints)].tolist())
-    return replace(out, grip=tool, approach=approach, retreat=retreat, posture=posture)
-
-
-def _gone(task: Task, tool: Frame, frame: Frame | None) -> Frame | None:
-    """Return where a tool comes from or goes to, as far from its grip as was proposed.
-
-    A block that is placed comes along its own way; else the tool goes straight back.
-    """
-    if frame is None or task.grip is None:
-        return None
-    way: Floats = np.subtract(frame.point, task.grip.point)
-    far = float(np.linalg.norm(way))
-    back = way / far if task.action is Action.PLACE else -tool.axes[2]
-    return tool.moved(back, far)

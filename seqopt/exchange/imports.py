@@ -1,68 +1,26 @@
-"""File formats of other programs, how they are recognized, and reading them; tables, folders."""
+"""Scenes of files and folders that other programs wrote, and measured places."""
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from seqopt._files import read_bytes, read_table, read_text
-from seqopt.errors import FileError, SceneError, SceneWarning
+from seqopt._files import read_table, read_text
+from seqopt.errors import FileError, SceneError, SceneWarning, StepError
 from seqopt.exchange._building import build_scene
-from seqopt.exchange._compas_models import is_meshes, read_assembly, read_meshes, read_model
-from seqopt.exchange._compas_shapes import kind, payload
-from seqopt.exchange._content import LARGEST, MOST_BLOCKS, Content, FileBlock, Given, assembly_json
-from seqopt.exchange._mesh_files import (
-    counted,
-    read_3dm,
-    read_mesh,
-    read_obj,
-    read_objects,
-    read_off,
-)
+from seqopt.exchange._content import MOST_BLOCKS, Content, FileBlock, Given
+from seqopt.exchange._mesh_files import counted
 from seqopt.exchange._meshes import without_repeats
+from seqopt.exchange.formats import JSON, of_ending, read_file
 from seqopt.scene._checks import cut, printable, short
-from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import warn_of
+from seqopt.sequence._parts import SAME, _are_near
 
-_DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
-    "compas_assembly": read_assembly,
-    "compas_model": read_model,
-    "compas_dem": read_model,
-    "compas_meshes": read_meshes,
-}
-_BYTES: dict[str, Callable[[bytes, str], Content]] = {
-    "3dm": read_3dm,
-    "glb": partial(read_objects, form="glb"),
-    "3mf": partial(read_objects, form="3mf"),
-    "ply": partial(read_mesh, form="ply"),
-    "stl": partial(read_mesh, form="stl"),
-}
-_SUFFIXES = {"csv": "boxes", "obj": "obj", "off": "off", "json": "", **{key: key for key in _BYTES}}
-_MESHED = ".glb or .obj, every block a closed mesh with a name"
-_INSTEAD = {  # what to save in place of what is not read
-    "dwg dxf": "open it in Rhino and save as .3dm, or export closed solids as .stl",
-    "gh ghx": "bake it and save from Rhino as .3dm",
-    "step stp iges igs sat x_t fcstd": "open it in Rhino and save as .3dm, or in FreeCAD and save "
-    "as .obj",
-    "ifc rvt": "convert it (IfcConvert a.ifc a.obj, of IfcOpenShell), or export closed meshes as "
-    ".obj",
-    "skp blend fbx dae max c4d usd usdz": f"export {_MESHED}",
-    "gltf": "export .glb, which is one file",
-}
-_REFUSED = {  # kinds of COMPAS, and what to save in their place
-    "scene": "save its meshes as a list (compas.json_dump)",
-    "timbermodel": "save the meshes of its beams as a list (compas.json_dump)",
-}
 _LYING = 3  # blocks on the ground from which on it is odd if most are there
-FORMATS = (*_DOCUMENTS, "boxes", "obj", "off", *_BYTES)
+_IN_JSON = "compas_meshes"  # what a JSON file in a folder is
 
 
 def import_scene(path: str | Path, form: str | None = None, given: Given | None = None) -> Scene:
@@ -73,7 +31,7 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     path
         The file or folder.
     form
-        One of `FORMATS`; by default what the file looks like.
+        The name of a format; by default what the file looks like.
     given
         What the file does not say: a unit of length, a density and more.
 
@@ -130,127 +88,11 @@ def _warn_of_lying(scene: Scene, up: str) -> None:
 
 
 def read_content(path: Path, form: str | None = None) -> Content:
-    """Return what a file says, in one of `FORMATS`; by default in that which it looks like.
+    """Return what a file says, in the format of a name; by default in that which it looks like.
 
     A folder has a block in each of its files.
     """
-    if path.is_dir():
-        return without_repeats(_read_folder(path, form))
-    return without_repeats(_read(path, form))
-
-
-def _read(path: Path, form: str | None = None) -> Content:
-    source, suffix = str(path), path.suffix.lower().removeprefix(".")
-    named = _SUFFIXES.get(suffix) if form is None else form
-    if named is None or (form is not None and form not in FORMATS):
-        raise SceneError(_not_read(source, suffix, form))
-    if named in _BYTES:
-        return _BYTES[named](read_bytes(path), source)
-    text = read_text(path)
-    texts = {"boxes": _read_boxes, "obj": read_obj, "off": read_off}
-    if named in texts:
-        return texts[named](text, source)
-    document = assembly_json(text, source)
-    return _DOCUMENTS[named or sniffed(document, source)](document, source)
-
-
-def _not_read(source: str, suffix: str, form: str | None) -> str:
-    """Return why a format is not read, and what to save instead."""
-    for suffixes, remedy in _INSTEAD.items():
-        if form is None and suffix in suffixes.split():
-            return f"{source}: a .{suffix} cannot be read; {remedy}"
-    what = f"format is {short(form)}" if form else f"{source}: its format is not known"
-    return f"{what}; give one of {', '.join(FORMATS)}"
-
-
-def sniffed(document: Any, source: str) -> str:
-    """Return which of `_DOCUMENTS` a JSON document is."""
-    if kind(document) in ("blockmodel", "problem"):
-        return "compas_dem"
-    if kind(document) in _REFUSED:
-        raise SceneError(f"{source}: a {kind(document)} cannot be read; {_REFUSED[kind(document)]}")
-    held = payload(document)
-    inner = {*held} if isinstance(held, dict) else {*()}
-    if {"elements", "tree"} <= inner:
-        return "compas_model"
-    keys = {*document} if isinstance(document, dict) else {*()}
-    if document and isinstance(document, dict) and document.get("format") == "seqopt-scene":
-        raise SceneError(f"{source}: it is a scene of seqopt already; give it as such")
-    if is_meshes(document):
-        return "compas_meshes"
-    if keys & {"graph", "node", "blocks", "assembly", "data"}:
-        return "compas_assembly"
-    raise SceneError(f"{source}: no assembly that is known; give one of {', '.join(FORMATS)}")
-
-
-_NEEDED = ("x", "y", "z", "length", "width", "height")
-_TURNS = ("roll", "pitch", "yaw")
-_COLUMNS = (*_NEEDED, *_TURNS, "name", "support", "density", "mass", "course")
-_YES, _NO = ("1", "true", "yes"), ("", "0", "false", "no")
-
-
-def _read_boxes(text: str, source: str) -> Content:
-    """Return the boxes of a table with the columns `_NEEDED`, the centroid and sizes.
-
-    Others of `_COLUMNS` may be there: turns are in degrees about x, then y, then z.
-    """
-    names, found = read_table(text, source, SceneError)
-    rows = [row for _, row in found]
-    missing = [name for name in _NEEDED if name not in names]
-    if missing:
-        raise SceneError(f"{source}: column {missing[0]} is missing; give {', '.join(_NEEDED)}")
-    for name in names:
-        if name not in _COLUMNS or names.count(name) > 1:
-            why = "occurs twice" if name in _COLUMNS else "is not known"
-            raise SceneError(f"{source}: column {short(name)} {why}; give {', '.join(_COLUMNS)}")
-    if not rows or len(rows) > MOST_BLOCKS:
-        raise SceneError(f"{source}: {len(rows)} rows; give 1 to {MOST_BLOCKS} boxes")
-    return Content(
-        tuple(_box(f"{source}, row {i}", str(i), row) for i, row in enumerate(rows, start=1)),
-        said=("a table of boxes: no faces",),
-    )
-
-
-def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
-    center = np.array([_number(where, row, name) for name in "xyz"])
-    size = np.array([_number(where, row, name) for name in ("length", "width", "height")])
-    if not size.min() > 0:
-        raise SceneError(f"{where}: its sizes are {size.tolist()}; give positive ones")
-    angles = [_number(where, row, name, "0") for name in _TURNS]
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to import
-
-    frame = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
-    optional = (_number(where, row, name, "nan") for name in ("density", "mass", "course"))
-    density, mass, course = (None if math.isnan(value) else value for value in optional)
-    if mass is not None and not mass > 0:
-        raise SceneError(f"{where}: mass is {mass:g}; give a positive number of kg")
-    text = (row.get("support") or "").strip().lower()
-    if text not in (*_YES, *_NO):
-        raise SceneError(f"{where}: support is {short(text)}; give 1 or 0")
-    return FileBlock(
-        row.get("name", "").strip() or key,
-        center + 0.5 * (BOX_CORNERS * size) @ frame.T,
-        BOX_FACES,
-        support=text in _YES,
-        density=density,
-        mass=mass,
-        course=course,
-    )
-
-
-def _number(where: str, row: dict[str, str], name: str, otherwise: str = "") -> float:
-    text = (row.get(name) or "").strip()
-    try:
-        value = float(text or otherwise)
-    except ValueError:
-        value = math.inf
-    if abs(value) > LARGEST or (text and math.isnan(value)):
-        raise SceneError(f"{where}: {name} is {short(text)}; give a number")
-    return value
-
-
-_MESHES = ("obj", "off", "stl", "ply", "glb", "3mf", "3dm")
-_IN_JSON = "compas_meshes"
+    return without_repeats((_read_folder if path.is_dir() else read_file)(path, form))
 
 
 def _read_folder(path: Path, form: str | None) -> Content:
@@ -263,43 +105,65 @@ def _read_folder(path: Path, form: str | None) -> Content:
         inside = [file for file in path.iterdir() if not file.name.startswith(".")]
     except OSError as error:
         raise FileError(f"cannot read {path}: {error.strerror}") from error
-    forms = {file: _SUFFIXES.get(file.suffix.lower()[1:]) for file in inside if file.is_file()}
-    form = form or _form_of(path, {*forms.values()})
-    files = [file for file, own in forms.items() if (own or _IN_JSON) == form]
+    known = {file: of_ending(file) for file in inside if file.is_file()}
+    forms = {file: each.name or _IN_JSON for file, each in known.items() if each is not None}
+    form = form or _form_of(path, {*forms.values()} - {"boxes"})
+    files = [file for file, own in forms.items() if own == form]
     files.sort(key=lambda file: (counted(file.stem), file.name))
     if not 0 < len(files) <= MOST_BLOCKS:
         raise SceneError(f"{path}: it has {len(files)} files of {form}; give 1 to {MOST_BLOCKS}")
-    contents = [_read(file, form) for file in files]
+    contents = [read_file(file, None if known[file] is JSON else form) for file in files]
     units = {content.unit for content in contents}
     if len(units) > 1:
-        known = ", ".join(sorted(str(unit) for unit in units))
-        raise SceneError(f"{path}: its files are in different units, {known}; save all in one")
+        named = ", ".join(sorted(str(unit) for unit in units))
+        raise SceneError(f"{path}: its files are in different units, {named}; save all in one")
     left = sorted(file.name for file in {*inside} - {*files})
     said = [f"a folder of {len(files)} files of {form}, a block each: no supports, faces or order"]
     if left:
         said.append(f"{len(left)} other files are left out: {cut(', '.join(left), 80)}")
-    pairs = zip(files, contents, strict=True)
-    blocks = tuple(_one_block(file, content) for file, content in pairs)
+    blocks = tuple(map(_one_block, files, contents))
     return replace(contents[0], blocks=blocks, said=tuple(said))
 
 
-def _form_of(path: Path, forms: set[str | None]) -> str:
-    """Return the format of the meshes in a folder."""
-    found = [form for form in _MESHES if form in forms]
+def _form_of(path: Path, forms: set[str]) -> str:
+    """Return the format of the meshes in a folder; JSON only where there are no others."""
+    found = sorted(forms - {_IN_JSON}) or [*forms]
     if len(found) > 1:
         raise SceneError(f"{path}: it has meshes in {' and '.join(found)}; choose one (--format)")
-    if not found and "" not in forms:
+    if not found:
         raise SceneError(
-            f"{path}: a folder without meshes; give one with a block in each file, in "
-            f"{', '.join(_MESHES)} or JSON of COMPAS"
+            f"{path}: a folder without meshes; give one with a block in each file, in obj, off, "
+            "stl, ply, glb, 3mf, 3dm or JSON of COMPAS"
         )
-    return found[0] if found else _IN_JSON
+    return found[0]
 
 
 def _one_block(file: Path, content: Content) -> FileBlock:
-    if len(content.blocks) > 1:
+    if len(content.blocks) != 1:
         raise SceneError(
             f"{file}: its mesh is {len(content.blocks)} pieces; unite them to one closed mesh, or "
             "give each a file of its own"
         )
     return replace(content.blocks[0], key=file.stem)
+
+
+def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:
+    """Return where bricks were measured, m, from a CSV file (brick, x, y, z) or of COMPAS."""
+    if path.suffix == ".json":
+        found = {brick.name: brick.position for brick in import_scene(path).bricks}
+        own = {brick.name: brick.position for brick in scene.bricks}
+        return {n: p for n, p in found.items() if n not in own or math.dist(own[n], p) > SAME}
+    names, rows = read_table(read_text(path), str(path), StepError)
+    columns = ("brick", "x", "y", "z")
+    if not rows or not {*columns} <= {*names}:
+        raise StepError(f"{path}: give a CSV file with columns {', '.join(columns)}")
+    out = {}
+    for number, row in rows:
+        try:
+            values = [float(row[name]) for name in columns]
+        except (TypeError, ValueError):
+            values = [math.nan]
+        if not _are_near(values) or values[0] % 1:
+            raise StepError(f"{path}, line {number}: give numbers for {', '.join(columns)}")
+        out[int(values[0])] = tuple(values[1:])
+    return out

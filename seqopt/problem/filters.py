@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._registry import ADDED
+from seqopt._registry import ADDED, Part
 from seqopt.arrays import Bools
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError
@@ -197,20 +197,20 @@ def filters_of(problem: Any) -> tuple[Filter, ...]:
     return (*out, *map(_limit_filter, problem.limits), *problem.filters)
 
 
-def register(*parts: Amount | Filter) -> None:
-    """Add amounts and filters of your own, which aims, budgets and limits then ask for by name.
+def register(*parts: Amount | Filter | Part) -> None:
+    """Add amounts, filters, formats and pictures of your own, which are then asked for by name.
 
     Packages register theirs by entry points of the group ``seqopt.parts``.
 
     Parameters
     ----------
-    *parts : Amount or Filter
-        Each takes the place of one that was registered by its name before.
+    *parts : Amount, Filter, Format or Picture
+        Each takes the place of one of its kind that was registered by its name before.
 
     Raises
     ------
     ProblemError
-        If something is neither, or has the name of something that is always there.
+        If something is none of these, or has the name of something that is always there.
 
     Examples
     --------
@@ -221,8 +221,12 @@ def register(*parts: Amount | Filter) -> None:
     26.0
     """
     for part in parts:
-        if not isinstance(part, Amount | Filter):
-            raise ProblemError(f"{short(part)}: give an Amount or a Filter of seqopt.problem")
-        if part.name in (*BUILT_IN, *TAKEN):
+        if not isinstance(part, Amount | Filter | Part):
+            raise ProblemError(
+                f"{short(part)}: give an Amount or a Filter of seqopt.problem, a Format of "
+                "seqopt.exchange, or a Picture of seqopt.report"
+            )
+        taken = part.reserved() if isinstance(part, Part) else (*BUILT_IN, *TAKEN)
+        if part.name in taken:
             raise ProblemError(f"{part!r}: this name has a meaning already; give another one")
-        ADDED[part.name] = part
+        ADDED[type(part), part.name] = part

@@ -18,5 +18,14 @@ chain 9: 9 bricks, 3 robots
 
 from seqopt.report._compared import format_comparison
 from seqopt.report.comparison import Comparison, compare, largest, method_tables
+from seqopt.report.picture import Picture, picture
 
-__all__ = ["Comparison", "compare", "format_comparison", "largest", "method_tables"]
+__all__ = [
+    "Comparison",
+    "Picture",
+    "compare",
+    "format_comparison",
+    "largest",
+    "method_tables",
+    "picture",
+]

@@ -26,8 +26,8 @@ from seqopt._files import csv_text
 from seqopt.arms._urdf import shape_notes
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
-from seqopt.errors import ExtraError, ProblemError, SceneError
-from seqopt.exchange._tasks import _known_tasks, plan_tasks, tasks_csv, tasks_json
+from seqopt.errors import ProblemError
+from seqopt.exchange._tasks import tasks_csv, tasks_in_postures, tasks_json
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, Sketches, arm_data
@@ -432,10 +432,7 @@ def task_texts(scene: Scene, steps: Sequence[Step]) -> dict[str, str]:
 
     Arms are in their postures; where nothing computes these, grips are proposals.
     """
-    try:
-        tasks = [*_known_tasks(scene, steps)]
-    except (ExtraError, SceneError):
-        tasks = [*plan_tasks(scene, steps)]
+    tasks = [*tasks_in_postures(scene, steps)]
     return {"csv": tasks_csv(tasks), "json": tasks_json(scene, tasks)}
 
 

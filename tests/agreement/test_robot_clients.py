@@ -25,7 +25,6 @@ compas = pytest.importorskip("compas")
 SCENE = six_bricks()
 STEPS = METHODS["cantilever"](build_network(SCENE), ())
 TASKS = [*plan_tasks(SCENE, STEPS)]
-POSTURES = {("rob1", task.node): (0.1, 0.2, 0.3) for task in TASKS if task.robot == "rob1"}
 
 
 def opened(form, **more):
@@ -62,11 +61,8 @@ def test_compas_has_frames_and_meshes():
 
 
 def test_pandas_has_a_row_for_every_task():
-    table = pd.read_csv(io.StringIO(export_plan(SCENE, STEPS, "tasks_csv", postures=POSTURES)))
+    table = pd.read_csv(io.StringIO(export_plan(SCENE, STEPS, "tasks_csv")))
     assert [*table["action"]] == [task.action.value for task in TASKS]
-    assert table["joint_3"].notna().sum() == sum(
-        t.robot == "rob1" and t.grip is not None for t in TASKS
-    )
     for name in FRAMES:
         known = [getattr(task, name) for task in TASKS]
         rows = table[
@@ -80,31 +76,19 @@ def test_pandas_has_a_row_for_every_task():
                 np.testing.assert_allclose(turned, frame.axes, atol=1e-7)
 
 
-def test_compas_fab_has_a_cell_states_and_targets():
+def test_compas_fab_takes_blocks_and_targets_of_tasks():
     robots = pytest.importorskip("compas_fab.robots")
-    found = opened("compas_fab", postures=POSTURES)
-    cell, states = found["cell"], found["states"]
-    assert isinstance(cell, robots.RobotCell)
-    assert {*cell.rigid_body_models} == {*states} == {f"block_{n}" for n in SCENE.build_order}
+    found = opened("tasks")
     for task, mine in zip(found["tasks"], TASKS, strict=True):
-        for name in ("approach", "grip", "retreat"):
-            target = task[name]
-            assert (target is None) == (getattr(mine, name) is None)
-            if target is not None:
-                assert isinstance(target, robots.FrameTarget)
-                assert target.target_mode is robots.TargetMode.TOOL
-                assert same(target.target_frame, getattr(mine, name))
-        has = mine.robot == "rob1" and mine.grip is not None
-        assert (task["posture"] is not None) == has
-        if has:
-            assert task["posture"].target_configuration.joint_values == [0.1, 0.2, 0.3]
         if mine.grip is not None:  # a block that hangs from the tool is where it is built
-            held = compas.geometry.Transformation.from_frame(task["grip"].target_frame)
-            hung = held * compas.geometry.Transformation.from_frame(task["attachment"])
+            target = robots.FrameTarget(task["grip"], robots.TargetMode.TOOL)
+            assert same(target.target_frame, mine.grip)
+            held = compas.geometry.Transformation.from_frame(target.target_frame)
+            hung = held * compas.geometry.Transformation.from_frame(task["grip_in_block"]).inverse()
             assert same(compas.geometry.Frame.from_transformation(hung), mine.block_frame)
-    for brick in SCENE.bricks:
-        body = cell.rigid_body_models[f"block_{brick.name}"].collision_meshes[0]
-        assert np.allclose(body.centroid(), 0.0, atol=1e-9)
+    for block, brick in zip(found["blocks"], SCENE.placed, strict=True):
+        body = robots.RigidBody.from_mesh(block["shape"]).collision_meshes[0]
+        assert np.allclose(body.centroid(), brick.position, atol=1e-9)
 
 
 def test_compas_opens_an_assembly_and_writes_it_again(tmp_path):
@@ -133,7 +117,7 @@ def test_the_page_for_compas_fab_runs_and_prints_what_it_says(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     words = "optimize arch25 --schedule free --aim minmax --out best"
     assert main(words.split()) == 0
-    assert main(["export", "best", "--format", "compas_fab", "--out", "best_fab.json"]) == 0
+    assert main(["export", "best", "--format", "tasks", "--out", "tasks.json"]) == 0
     capsys.readouterr()
     exec(compile(code, "page", "exec"), {})
     assert capsys.readouterr().out == said

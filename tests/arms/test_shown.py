@@ -21,7 +21,7 @@ from seqopt._cli.outputs import task_files
 from seqopt._files import csv_text
 from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
-from seqopt.exchange._tasks import Action, _in_postures, plan_tasks, tasks_json
+from seqopt.exchange._tasks import Action, plan_tasks, tasks_json
 from seqopt.exchange.exports import export_plan, read_folder
 from seqopt.report._film import Film
 from seqopt.report._pictures import VIEW, steps_picture
@@ -43,7 +43,7 @@ def test_tasks_have_the_joints_and_the_tool_of_the_posture(plan):
     scene, found = plan.engine.network.scene, plan.arms.postures
     table, names = found.table, [robot.name for robot in scene.robots]
     proposed = [*plan_tasks(scene, plan.steps)]
-    tasks = [*_in_postures(scene, proposed, found)]
+    tasks = [*plan_tasks(scene, plan.steps, postures=found)]
     turned = 0
     for old, task in zip(proposed, tasks, strict=True):
         if task.robot not in table.robots:
@@ -103,13 +103,13 @@ def test_what_is_exported_later_has_the_same_postures(plan, folder, form, name, 
 def test_an_export_without_postures_is_of_proposals(plan, folder, monkeypatch, capsys, kind):
     scene, steps = read_folder(folder)
     proposed = tasks_json(scene, plan_tasks(scene, steps))
-    assert export_plan(scene, steps, "tasks", postures={}) == proposed
     assert proposed != task_files(plan)["tasks.json"]  # the control
 
     def missing(*_):
         raise kind("arms need pinocchio and coal: pip install 'seqopt[arms]'")
 
-    monkeypatch.setattr("seqopt._cli.inputs.find_postures", missing)
+    for where in ("seqopt._cli.inputs", "seqopt.arms._plan_postures"):
+        monkeypatch.setattr(f"{where}.find_postures", missing)
     out = folder / "proposed.json"
     assert main(["export", str(folder), "--format", "tasks", "--out", str(out)]) == 0
     assert "grips are proposals without postures; arms need pinocchio" in capsys.readouterr().err

@@ -36,6 +36,7 @@ RUN = (
     "adding_formulation",
     "comparing_formulations",
     "own_amount",
+    "own_format",
 )  # others: when the site is built
 
 

@@ -12,7 +12,8 @@ from seqopt._files import write_text
 from seqopt.errors import FileError, SceneError, StepError
 from seqopt.exchange._content import Given
 from seqopt.exchange._tables import BlockState, step_states
-from seqopt.exchange.exports import EXPORTS, export_plan, read_folder
+from seqopt.exchange.exports import export_plan, read_folder
+from seqopt.exchange.formats import writable
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import save_scene
@@ -94,7 +95,7 @@ def test_a_folder_is_read_whole(tmp_path):
     assert read_folder(tmp_path) == (SCENE, STEPS)
 
 
-@pytest.mark.parametrize("form", EXPORTS)
+@pytest.mark.parametrize("form", writable())
 def test_every_format_is_text_of_a_line_or_more(form):
     assert export_plan(SCENE, STEPS, form).endswith("\n")
 

@@ -8,8 +8,9 @@ import pytest
 
 from experiments.harness.scenes import running_bond
 from seqopt.exchange._content import Given
-from seqopt.exchange.exports import EXPORTS, LOST, export_plan
-from seqopt.exchange.imports import FORMATS, import_scene
+from seqopt.exchange.exports import export_plan
+from seqopt.exchange.formats import formats, readable, writable
+from seqopt.exchange.imports import import_scene
 from seqopt.scene.boxes import as_vectors, block_brick, vertices_of
 from seqopt.scene.shape import Polyhedron
 from seqopt.sequence.steps import Step, StepKind
@@ -77,7 +78,7 @@ def test_what_is_said_to_be_lost_is_lost_and_nothing_else(tmp_path, form):
     assert [b.name for b in back.bricks] == [b.name for b in scene.bricks]
     lost = [name for name, part in PARTS.items() if part(back) != part(scene)]
     lost += ["steps"] if form != "compas_assembly" else []  # which has them for others to read
-    assert sorted(lost) == sorted(LOST[form])
+    assert sorted(lost) == sorted(formats()[form].lost)
 
 
 def with_order(scene):
@@ -88,5 +89,5 @@ def with_order(scene):
 
 
 def test_every_format_that_goes_both_ways_says_what_it_loses():
-    assert {*LOST} == {*EXPORTS} & {*FORMATS}
-    assert {*ENDS} == {*LOST}
+    lose = {name for name, each in formats().items() if each.lost}
+    assert lose == {*ENDS} == {*readable()} & {*writable()}

@@ -7,6 +7,7 @@ import io
 import json
 from collections import Counter
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from seqopt.exchange._tasks import Action, plan_tasks, tasks_csv, tasks_json
 from seqopt.exchange.contacts import face_ground, flat_face
 from seqopt.exchange.exports import export_plan
 from seqopt.network.build import build_network
+from seqopt.scene._armed import PlanPostures
 from seqopt.scene.boxes import block_brick, vertices_of
 from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot, Side, Sphere
@@ -180,32 +182,23 @@ def test_distance_is_that_given_and_by_default_the_longest_side():
 
 
 def test_postures_are_written_where_they_are_given():
-    node = STEPS[0].held[0]
-    name = SCENE.robots[STEPS[0].grips.index(node)].name
-    tasks = [*plan_tasks(SCENE, STEPS, postures={(name, node): (0.1, -2.0)})]
+    rows = tuple(tuple(None if n is None else 0 for n in step.grips) for step in STEPS)
+    table = SimpleNamespace(joints=np.array([[0.1, -2.0, np.nan]]), axes=np.eye(3)[None])
+    tasks = [*plan_tasks(SCENE, STEPS, postures=PlanPostures(table, rows, ()))]
     told = [task for task in tasks if task.posture is not None]
-    assert {(task.robot, task.node) for task in told} == {(name, node)}
+    assert told == [task for task in tasks if task.action is not Action.PICK]
+    assert {task.grip.xaxis for task in told} == {(1.0, 0.0, 0.0)}
     assert json.loads(tasks_json(SCENE, tasks))["tasks"][1]["posture"] == [0.1, -2.0]
-    rows = [*csv.DictReader(io.StringIO(tasks_csv(tasks)))]
-    assert (rows[1]["joint_1"], rows[1]["joint_2"]) == ("0.1", "-2")
-    assert rows[0]["joint_1"] == ""
+    lines = [*csv.DictReader(io.StringIO(tasks_csv(tasks)))]
+    assert (lines[1]["joint_1"], lines[1]["joint_2"]) == ("0.1", "-2")
+    assert lines[0]["joint_1"] == ""
+    assert "joint_3" not in lines[0]
 
 
-@pytest.mark.parametrize(
-    ("more", "said"),
-    [
-        ({"distance": 0.0}, "distance is 0.0"),
-        ({"postures": {("nobody", 1): (0.0,)}}, "posture of ('nobody', 1): give the name of a"),
-        ({"postures": {("rob1", 999): (0.0,)}}, "give the name of a robot, and a node"),
-        ({"postures": {("rob1", 1): (np.nan,)}}, "posture of rob1 at node 1 is nan"),
-        ({"postures": {("rob1", 1): (0.0,), ("rob1", 2): ()}}, "postures have 0 to 1 values"),
-    ],
-)
-def test_what_is_wrong_is_one_line(more, said):
-    with pytest.raises(SeqoptError) as error:
-        [*plan_tasks(SCENE, STEPS, **more)]
-    assert said in str(error.value)
-    with pytest.raises(SeqoptError, match="format csv takes no distance or postures"):
+def test_what_is_wrong_is_one_line():
+    with pytest.raises(SeqoptError, match=r"distance is 0\.0"):
+        [*plan_tasks(SCENE, STEPS, 0.0)]
+    with pytest.raises(SeqoptError, match="format csv takes no distance; leave it out, or write t"):
         export_plan(SCENE, STEPS, "csv", distance=0.1)
 
 

@@ -24,9 +24,8 @@ from seqopt.arms._postures import PostureTable
 from seqopt.arms._reached import Site as ArmSite
 from seqopt.arms._tables import _read as read_postures
 from seqopt.errors import SeqoptError
-from seqopt.exchange._measured import read_measured
 from seqopt.exchange.exports import export_plan
-from seqopt.exchange.imports import import_scene, read_content
+from seqopt.exchange.imports import import_scene, read_content, read_measured
 from seqopt.responses._blocks import Answers, Block, Store
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence._parts import read_site

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import SceneError, StepError
-from seqopt.exchange._measured import read_measured
+from seqopt.exchange.imports import read_measured
 from seqopt.scene.scenarios import as_built
 from tests.builders import six_bricks
 

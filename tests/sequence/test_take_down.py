@@ -11,8 +11,8 @@ import pytest
 
 import seqopt
 from seqopt.errors import ProblemError, SolverError, StepError
+from seqopt.exchange._tables import plan_csv
 from seqopt.exchange._tasks import Action, plan_tasks
-from seqopt.exchange.exports import plan_csv
 from seqopt.graph._orders import among_orders, order_rules
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states

@@ -9,8 +9,8 @@ from seqopt._cli import inputs, options
 from seqopt._cli.answer import Answer
 from seqopt._files import require_apart, write_text
 from seqopt.arms._kept import arm_faults
-from seqopt.exchange._tasks import Postures
-from seqopt.exchange.exports import EXPORTS, LOST, TASKS, export_plan, read_folder
+from seqopt.exchange.exports import export_plan, read_folder
+from seqopt.exchange.formats import formats, writable
 
 
 class Export(options.Postures, options.Written):
@@ -27,8 +27,8 @@ class Export(options.Postures, options.Written):
     source : FILE
         with compas_assembly: the assembly that was imported, to write the plan into
     distance : M
-        with tasks, tasks_csv or compas_fab: from a grip to where the tool comes from and goes to, m
-        (default: the longest side of each block)
+        with tasks or tasks_csv: from a grip to where the tool comes from and goes to, m (default:
+        the longest side of each block)
 
     What is written and printed?
     out : FILE
@@ -41,7 +41,7 @@ class Export(options.Postures, options.Written):
     """
 
     folder: options.BuiltFrom = field(kw_only=False, metadata={"place": True})
-    format: str = field(default="csv", kw_only=False, metadata={"choices": EXPORTS})
+    format: str = field(default="csv", kw_only=False, metadata={"choices": writable()})
     source: options.File | None = None
     distance: float | None = None
 
@@ -54,14 +54,14 @@ def run(asked: Export) -> Answer:
     require_apart([*filter(None, [asked.path])], [*read, *filter(None, [source])])
     scene, steps = read_folder(folder)
     notes: tuple[str, ...] = ()
-    postures: Postures | None = None  # of other formats than tasks
-    if asked.format in TASKS and scene.has_arms:
+    form = formats()[asked.format]
+    if "distance" in form.takes and scene.has_arms:
         if trouble := inputs.posture_trouble(asked, scene):
-            notes, postures = (f"arms: grips are proposals without postures; {trouble}",), {}
+            notes = (f"arms: grips are proposals without postures; {trouble}",)
         else:
             notes = tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps))
-    text = export_plan(scene, steps, asked.format, source, asked.distance, postures)
-    said, lost = f"{len(steps)} steps", LOST.get(asked.format)
+    text = export_plan(scene, steps, asked.format, source, asked.distance)
+    said, lost = f"{len(steps)} steps", form.lost
     if lost:
         plan = "" if "steps" in lost else f" and {said}"
         said = f"{len(scene.bricks)} blocks{plan}, without {', '.join(lost)},"

@@ -9,7 +9,8 @@ from seqopt._cli.answer import Answer
 from seqopt._files import require_apart, write_text
 from seqopt.errors import ProblemError
 from seqopt.exchange._content import UNITS, UPS, Given
-from seqopt.exchange.imports import FORMATS, import_scene
+from seqopt.exchange.formats import readable
+from seqopt.exchange.imports import import_scene
 from seqopt.problem._limit_words import number_word
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import dump_scene
@@ -68,7 +69,7 @@ class Import(options.Asked):
 
     file: Path = options.word(place=True)
     out: Path = options.word()
-    format: str | None = options.word(None, choices=FORMATS)
+    format: str | None = options.word(None, choices=readable())
     name: str | None = None
     unit: str | None = options.word(None, choices=UNITS)
     up: str | None = options.word(None, choices=UPS)

@@ -16,8 +16,8 @@ from seqopt._cli.commands import optimize
 from seqopt._cli.terminal import wrapped
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
-from seqopt.exchange._measured import read_measured
 from seqopt.exchange.exports import read_folder
+from seqopt.exchange.imports import read_measured
 from seqopt.plan.plan import Plan
 from seqopt.plan.replan import compared, without
 from seqopt.responses._tolerance import is_tolerance, values_text

@@ -1,0 +1,227 @@
+"""File formats: who reads and who writes each of them, and how a file is recognized."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from seqopt._files import read_bytes, read_text
+from seqopt._registry import Part, registered
+from seqopt.errors import SceneError
+from seqopt.exchange._boxes import boxes_csv, read_boxes
+from seqopt.exchange._compas_models import (
+    assembly_with_plan,
+    is_meshes,
+    read_assembly,
+    read_meshes,
+    read_model,
+)
+from seqopt.exchange._compas_shapes import kind, payload
+from seqopt.exchange._content import Content, assembly_json
+from seqopt.exchange._mesh_files import (
+    read_3dm,
+    read_mesh,
+    read_obj,
+    read_objects,
+    read_off,
+    write_obj,
+)
+from seqopt.exchange._tables import plan_csv, plan_json
+from seqopt.exchange._tasks import tasks_csv, tasks_in_postures, tasks_json
+from seqopt.scene._checks import short
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step
+
+_NEVER = ("nodes", "joints", "ground ends", "robots", "loads")  # what files of blocks are without
+_MESHED = ".glb or .obj, every block a closed mesh with a name"
+_INSTEAD = {  # what to save in place of what is not read
+    "dwg dxf": "open it in Rhino and save as .3dm, or export closed solids as .stl",
+    "gh ghx": "bake it and save from Rhino as .3dm",
+    "step stp iges igs sat x_t fcstd": "open it in Rhino and save as .3dm, or in FreeCAD and save "
+    "as .obj",
+    "ifc rvt": "convert it (IfcConvert a.ifc a.obj, of IfcOpenShell), or export closed meshes as "
+    ".obj",
+    "skp blend fbx dae max c4d usd usdz": f"export {_MESHED}",
+    "gltf": "export .glb, which is one file",
+}
+_REFUSED = {  # kinds of COMPAS, and what to save in their place
+    "scene": "save its meshes as a list (compas.json_dump)",
+    "timbermodel": "save the meshes of its beams as a list (compas.json_dump)",
+}
+DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
+    "compas_assembly": read_assembly,
+    "compas_model": read_model,
+    "compas_dem": read_model,
+    "compas_meshes": read_meshes,
+}
+
+
+@dataclass(frozen=True, repr=False)
+class Format(Part):
+    r"""A file format of blocks or of plans.
+
+    Parameters
+    ----------
+    name : str
+        By which it is asked for.
+    endings : tuple of str
+        Of the names of its files, by which it is recognized.
+    read : callable, optional
+        Takes the path of a file; returns its `Content`.
+    write : callable, optional
+        Takes a scene, the steps of a plan, and by name what the format ``takes``; returns the text
+        of a file.
+    takes : tuple of str
+        Of ``source`` and ``distance``, see `export_plan`.
+    lost : tuple of str
+        What a scene is without, once it was written and read again.
+
+    Examples
+    --------
+    >>> Format("places", write=lambda scene, steps: "".join(f"{s.bricks}\n" for s in steps))
+    Format('places')
+    """
+
+    name: str
+    endings: tuple[str, ...] = ()
+    read: Callable[[Path], Content] | None = field(default=None, compare=False)
+    write: Callable[..., str] | None = field(default=None, compare=False)
+    takes: tuple[str, ...] = ()
+    lost: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"Format({self.name!r})"
+
+    def reserved(self) -> Sequence[str]:
+        """Return the names of the formats that are always there."""
+        return [*BUILT_IN]
+
+
+def _of_text(read: Callable[[str, str], Content], path: Path) -> Content:
+    return read(read_text(path), str(path))
+
+
+def _of_bytes(read: Callable[[bytes, str], Content], path: Path) -> Content:
+    return read(read_bytes(path), str(path))
+
+
+def _document(form: str | None, path: Path) -> Content:
+    """Return the content of a JSON document, by default of the format that it looks like."""
+    source = str(path)
+    document = assembly_json(read_text(path), source)
+    return DOCUMENTS[form or sniffed(document, source)](document, source)
+
+
+def sniffed(document: Any, source: str) -> str:
+    """Return which of `DOCUMENTS` a JSON document is."""
+    if kind(document) in ("blockmodel", "problem"):
+        return "compas_dem"
+    if kind(document) in _REFUSED:
+        raise SceneError(f"{source}: a {kind(document)} cannot be read; {_REFUSED[kind(document)]}")
+    held = payload(document)
+    inner = {*held} if isinstance(held, dict) else {*()}
+    if {"elements", "tree"} <= inner:
+        return "compas_model"
+    keys = {*document} if isinstance(document, dict) else {*()}
+    if document and isinstance(document, dict) and document.get("format") == "seqopt-scene":
+        raise SceneError(f"{source}: it is a scene of seqopt already; give it as such")
+    if is_meshes(document):
+        return "compas_meshes"
+    if keys & {"graph", "node", "blocks", "assembly", "data"}:
+        return "compas_assembly"
+    raise SceneError(f"{source}: no assembly that is known; give one of {', '.join(readable())}")
+
+
+def _tasks_text(scene: Scene, steps: Sequence[Step], distance: float | None = None) -> str:
+    return tasks_json(scene, tasks_in_postures(scene, steps, distance))
+
+
+def _tasks_table(scene: Scene, steps: Sequence[Step], distance: float | None = None) -> str:
+    return tasks_csv(tasks_in_postures(scene, steps, distance))
+
+
+JSON = Format("", ("json",), partial(_document, None))  # of COMPAS, whichever it is
+BUILT_IN = {
+    each.name: each
+    for each in (
+        Format("csv", write=plan_csv),
+        Format("json", write=plan_json),
+        Format("tasks", write=_tasks_text, takes=("distance",)),
+        Format("tasks_csv", write=_tasks_table, takes=("distance",)),
+        Format(
+            "compas_assembly",
+            read=partial(_document, "compas_assembly"),
+            write=assembly_with_plan,
+            takes=("source",),
+            lost=("densities", *_NEVER),
+        ),
+        *(Format(n, read=partial(_document, n)) for n in [*DOCUMENTS][1:]),
+        Format(
+            "boxes",
+            ("csv",),
+            partial(_of_text, read_boxes),
+            lambda scene, _: boxes_csv(scene),
+            lost=("shapes other than boxes", *_NEVER, "steps"),
+        ),
+        Format(
+            "obj",
+            ("obj",),
+            partial(_of_text, read_obj),
+            lambda scene, _: write_obj(scene),
+            lost=("densities", "the order", *_NEVER, "steps"),
+        ),
+        Format("off", ("off",), partial(_of_text, read_off)),
+        Format("3dm", ("3dm",), partial(_of_bytes, read_3dm)),
+        *(
+            Format(n, (n,), partial(_of_bytes, partial(read_objects, form=n)))
+            for n in ("glb", "3mf")
+        ),
+        *(Format(n, (n,), partial(_of_bytes, partial(read_mesh, form=n))) for n in ("ply", "stl")),
+    )
+}
+
+
+def formats() -> dict[str, Format]:
+    """Return all formats by name: those that are always there, and those that are registered."""
+    return {**BUILT_IN, **registered(Format)}
+
+
+def readable() -> list[str]:
+    """Return the names of the formats that can be read."""
+    return [name for name, each in formats().items() if each.read]
+
+
+def writable() -> list[str]:
+    """Return the names of the formats that can be written."""
+    return [name for name, each in formats().items() if each.write]
+
+
+def of_ending(path: Path) -> Format | None:
+    """Return the format of a file by the end of its name, if one is known."""
+    suffix = path.suffix.lower().removeprefix(".")
+    every = (*formats().values(), JSON)
+    return next((each for each in every if each.read and suffix in each.endings), None)
+
+
+def read_file(path: Path, form: str | None = None) -> Content:
+    """Return what a file says, in the format of a name; by default in that of its ending."""
+    found = of_ending(path) if form is None else formats().get(form)
+    if found is None or found.read is None:
+        raise SceneError(_not_read(path, form))
+    content: object = found.read(path)
+    if not isinstance(content, Content):
+        raise SceneError(f"format {found.name}: it reads {short(content)}; return a Content")
+    return content
+
+
+def _not_read(path: Path, form: str | None) -> str:
+    """Return why a format is not read, and what to save instead."""
+    suffix = path.suffix.lower().removeprefix(".")
+    for suffixes, remedy in _INSTEAD.items():
+        if form is None and suffix in suffixes.split():
+            return f"{path}: a .{suffix} cannot be read; {remedy}"
+    what = f"format is {short(form)}" if form else f"{path}: its format is not known"
+    return f"{what}; give one of {', '.join(readable())}"
