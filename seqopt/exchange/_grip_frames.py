@@ -15,7 +15,7 @@ import numpy as np
 from seqopt.arrays import Floats, Vector
 from seqopt.scene._checks import frames
 from seqopt.scene.boxes import as_vector, vertices_of
-from seqopt.scene.parts import Brick, Robot, Side, Sphere
+from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import fans
 
@@ -123,12 +123,13 @@ def _joint_normals(scene: Scene, brick: Brick) -> tuple[Floats, Floats]:
 
     Then those of its joints with bricks that come later.
     """
+    springs: list[Joint | Ground] = [*scene.joints, *scene.grounds]
     sides: tuple[list[Floats], list[Floats]] = ([], [])
-    for spring in (*scene.joints, *scene.grounds):
+    for spring in springs:
         if brick.name in spring.ends:
             along = np.array(spring.along)
             out = (np.array(spring.position) - np.array(brick.position)) @ along >= 0
-            later = any(scene.since[end] > scene.since[brick.name] for end in spring.ends)
-            sides[later].append(along if out else -along)
+            comes = any(scene.since[end] > scene.since[brick.name] for end in spring.ends)
+            sides[comes].append(along if out else -along)
     now, later = (np.array(normals).reshape(-1, 3) for normals in sides)
     return now, later

@@ -115,7 +115,9 @@ def plan_tasks(
         tasks = []
         for r, (robot, old, new) in enumerate(zip(scene.robots, last, step.grips, strict=True)):
             node = old if new is None else new
-            for action in () if node is None else _actions(step, old, new):
+            if node is None:
+                continue
+            for action in _actions(step, old, new):
                 held, joints = found(robot, node), None
                 at = step.number - 1 - (action is Action.RELEASE)  # it lets go as it held
                 row = None if postures is None else postures.steps[at][r]
