@@ -81,22 +81,17 @@ class Film:
 
 
 def _gif(figures: Iterator[Figure], seconds: float) -> bytes:
-    """Return figures as a GIF of few colors, the same in all: less than half of the bytes."""
+    """Return figures as a GIF of few colors, those of the middle one: less than half the bytes."""
     frames = []
     for figure in figures:
         shown = io.BytesIO()
         figure.savefig(shown, format="png", dpi=_DPI)
         frames.append(Image.open(shown).convert("RGB"))
-    wide, high = frames[0].size
-    some = [frames[k * (len(frames) - 1) // 3] for k in range(4)]
-    sample = Image.new("RGB", (wide, len(some) * high))
-    for k, frame in enumerate(some):
-        sample.paste(frame, (0, k * high))
-    colors, plain = sample.quantize(_COLORS, Image.Quantize.FASTOCTREE), Image.Dither.NONE
+    colors = frames[len(frames) // 2].quantize(_COLORS, Image.Quantize.FASTOCTREE)
     palette = np.array(colors.getpalette()).reshape(-1, 3)
     palette[palette.sum(axis=1).argmax()] = 255  # the background stays white
     colors.putpalette(palette.ravel().tolist())
-    first, *more = (frame.quantize(palette=colors, dither=plain) for frame in frames)
+    first, *more = (frame.quantize(palette=colors, dither=Image.Dither.NONE) for frame in frames)
     out = io.BytesIO()
     how: Any = {"save_all": True, "append_images": more, "loop": 0, "optimize": True}
     first.save(out, format="GIF", duration=round(1000 * seconds), **how)

@@ -21,14 +21,13 @@ from seqopt.problem.requirements import overloads
 from seqopt.report._robots import _known_arms
 from seqopt.report._speed._table import SpeedTable
 from seqopt.report.comparison import CLOSED, Comparison, fixed_methods, largest, shown_table
-from seqopt.report.page import Build, Scatter, _Drawn, _grips_off, report_page
+from seqopt.report.page import Build, Scatter, _Drawn, report_page
 from seqopt.report.text import IN_UNITS, _worst_along, in_words
 from seqopt.responses.table import (
     OUTSIDE,
     REMEDY,
     Departure,
     LinearRange,
-    _Key,
     _steps_in_table,
     analyze,
     builds_in_words,
@@ -157,17 +156,8 @@ def plan_page(
             along = _worst_along(scene, first.table, plan.goals[0], criterion)
     builds = [replace(first, along=along, tasks=tasks or {}), *rest]
     found = f"Found by: {in_words(name)} ({plan.result})."
-    return _sole_page(engine, builds, plan._within.offs, found)
-
-
-def _sole_page(
-    engine: Engine, builds: Sequence[Build], offs: dict[_Key, float], found: str = ""
-) -> str:
-    """Return the page whose sentence is about the first of some builds."""
-    scene, first = engine.network.scene, builds[0]
-    sentence = first.sentence(scene, _grips_off(engine, first, offs))
     shown = [_worst_table(scene, builds)]
-    return report_page(engine, builds, sentence, shown, found=found, offs=offs)
+    return report_page(engine, builds, builds[0].sentence(scene), shown, found=found)
 
 
 def comparison_page(engine: Engine, result: Comparison) -> str:
@@ -216,10 +206,11 @@ def _speed_parts(speed: SpeedTable) -> Iterator[tuple[str, pd.DataFrame | _Drawn
 def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:
     """Return the page of the plans in a folder that a command has written."""
     scene, builds = engine.network.scene, folder_builds(engine, folder, prover)
+    shown = [_worst_table(scene, builds)]
     if len(builds) == 1:
-        return _sole_page(engine, builds, {})
+        return report_page(engine, builds, builds[0].sentence(scene), shown)
     sentence = f"{scene.name}, built in {len(builds)} ways, step by step"
-    return _page(engine, builds, sentence, [_worst_table(scene, builds)])
+    return _page(engine, builds, sentence, shown)
 
 
 def folder_builds(engine: Engine, folder: Path, prover: BuildProver) -> list[Build]:

@@ -15,15 +15,7 @@ from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ExtraError, SceneError
 from seqopt.network.build import build_network
 from seqopt.report._robots import ROBOT_COLORS, Cell, _known_arms
-from seqopt.report.page import (
-    Build,
-    _as_json,
-    _build_data,
-    _filled,
-    _part,
-    _rounded,
-    _structure_data,
-)
+from seqopt.report.page import Build, _build_data, _filled, _part, _rounded, _structure_data
 from seqopt.responses.table import force_column
 from seqopt.scene.parts import Side, Sphere
 from seqopt.scene.scene import Scene
@@ -67,7 +59,7 @@ def scene_page(scene: Scene) -> str:
         title=escape(scene.name),
         sentence=sentence + escape("".join(doubts)),
         tables="".join(_part(caption, part) for caption, part in tables.items()),
-        data=_as_json(data),
+        data=data,
     )
 
 

@@ -191,7 +191,15 @@ def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
         look["linewidths"] = (THIN + (THICK - THIN) * np.abs(edge_force) / size).tolist()
     axes.add_collection(LineCollection(segments, **look))
     kind = network.node_kind[:nodes]
-    _draw_nodes(axes, kind, seen, 1.0 if edge_force is None else SPARE)
+    for which, marker, size, face in (
+        (PartKind.INNER, "o", 9, INK),
+        (PartKind.JOINT, "o", 12, "white"),
+        (PartKind.BASE, "s", 36, INK),
+    ):
+        area = size * (1.0 if edge_force is None else SPARE)
+        mark: Any = {"marker": marker, "c": face, "edgecolors": INK, "linewidths": 0.7}
+        x, y = seen[kind == which].T
+        axes.scatter(x, y, area, zorder=3, **mark)
     if numbers:
         inner = np.flatnonzero(kind == PartKind.INNER.value)
         for i, shift in zip(inner, aside(seen[inner], segments), strict=True):
@@ -211,18 +219,6 @@ def force_key(largest_force: float) -> list[Line2D]:
     for share in (0.1, 0.5, 1.0):
         entries.append((INK, THIN + (THICK - THIN) * share, f"{share * largest_force:.0f} N"))
     return [Line2D([], [], color=color, lw=width, label=said) for color, width, said in entries]
-
-
-def _draw_nodes(axes: Axes, kind: Ints, seen: Floats, size_by: float) -> None:
-    """Draw nodes of given kinds (N,) where they are seen (N, 2)."""
-    for which, marker, size, face in (
-        (PartKind.INNER, "o", 9, INK),
-        (PartKind.JOINT, "o", 12, "white"),
-        (PartKind.BASE, "s", 36, INK),
-    ):
-        x, y = seen[kind == which].T
-        look: Any = {"marker": marker, "c": face, "edgecolors": INK, "linewidths": 0.7}
-        axes.scatter(x, y, size_by * size, zorder=3, **look)
 
 
 def draw_bricks(  # what is drawn, and how, each by its name

@@ -16,7 +16,6 @@ from hashlib import sha256
 from html import escape
 from importlib import resources
 from itertools import compress, cycle
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -31,15 +30,13 @@ from seqopt.exchange._tasks import tasks_csv, tasks_in_postures, tasks_json
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, Sketches, arm_data
-from seqopt.report.text import _deciding_step, _far_off, _in_a_sentence, _robot_words, in_words
-from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
+from seqopt.report.text import _deciding_step, _in_a_sentence, _robot_words, in_words
 from seqopt.responses.quantities import _number_text
 from seqopt.responses.table import (
     OUTSIDE,
     Departure,
     _distinct,
     _each_fields,
-    _Key,
     force_column,
     step_fields,
 )
@@ -51,7 +48,6 @@ from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._builds import WORDS, BuildVerdicts
 
 LARGEST = 32767
-_FEW = 100  # bricks up to which it is said how far grips may be off
 FIELDS = ("twist", "edge", "push", "turn")  # packed, a row for every step
 RESPONSES = {
     "F_largest": "largest grip force, N",
@@ -99,10 +95,9 @@ class Build:
     along: Floats | None = None
     tasks: Mapping[str, str] = field(default_factory=dict)
 
-    def sentence(self, scene: Scene, off: Floats | None = None) -> str:
-        """Return what it is, as one sentence; ``off``: how far grips may be off in steps, m."""
-        known = self.verdicts, self.departures
-        return _in_a_sentence(scene, self.table, *known, off, self.faults)
+    def sentence(self, scene: Scene) -> str:
+        """Return what it is, as one sentence."""
+        return _in_a_sentence(scene, self.table, self.verdicts, self.departures, self.faults)
 
     def overloads(self, scene: Scene) -> tuple[Excess, ...]:
         """Return the payloads that steps exceed."""
@@ -147,8 +142,7 @@ class _Drawn:
 def _structure_data(network: Network) -> dict[str, object]:
     """Return a structure as lists, ready for JSON.
 
-    Edges end with their brick count; ``carried`` are the bricks that every node moves with, none
-    for those that are fixed.
+    Edges end with their brick count; ``carried`` are the bricks that every node moves with.
     """
     scene, springs = network.scene, network.springs
     cell = Cell(scene)
@@ -213,30 +207,23 @@ def _solid(brick: Brick) -> dict[str, object]:
     return {"corners": _rounded(points), "faces": fans}
 
 
-class _Known(NamedTuple):
-    """What is known of states of builds, by bricks and what is held; who holds.
-
-    ``offs``: how far grips may be off, m; ``fields``: of bricks, edges and ground ends;
-    ``sketched``: arms, by robot and node.
-    """
-
-    offs: dict[_Key, float]
-    fields: dict[tuple[int, Grips], Fields]
-    sketched: Sketches
-
-
 def _build_data(
-    engine: Engine, build: Build, known: _Known | None = None, *, fields: bool = True
+    engine: Engine,
+    build: Build,
+    known: Mapping[tuple[int, Grips], Fields] | None = None,
+    sketched: Sketches | None = None,
+    *,
+    fields: bool = True,
 ) -> dict[str, object]:
     """Return the steps of a build as lists, ready for JSON.
 
     Rows of the table of responses are text; ``stands`` says whether every step stands with every
     mortar, ``marks`` what is wrong with it; the packed fields ``twist``, ``edge``, ``push`` and
     ``turn`` (force and moment of every ground end) have the ``scale`` of each step, or are None.
+    ``known``: fields by state; ``sketched``: arms by robot and node.
     """
-    known = _Known({}, {}, {}) if known is None else known
     lines = [line.split(",") for line in csv_text(build.table).splitlines()]
-    scene, off = engine.network.scene, _grips_off(engine, build, known.offs)
+    scene = engine.network.scene
     stands = [[f"{WORDS[v]} {each.how}" for v in each.verdicts] for each in build.verdicts]
     return {
         "name": build.name,
@@ -249,12 +236,9 @@ def _build_data(
             for each in build.verdicts
         ],
         "decides": _deciding_step(scene, build.table, build.verdicts, build.along),
-        "sentence": build.sentence(scene, off),
+        "sentence": build.sentence(scene),
         "words": in_words(build.name),
-        "off": []
-        if off is None
-        else [f"Grips {_far_off(far)}." if far < np.inf else "" for far in off.tolist()],
-        "arms": arm_data(scene, build.steps, build.arms, known.sketched),
+        "arms": arm_data(scene, build.steps, build.arms, sketched),
         "steps": [
             {
                 "number": step.number,
@@ -268,19 +252,8 @@ def _build_data(
         "rows": lines[1:],
         "forces": [force_column(robot) for robot in scene.robots],
         "fall": None if build.falls is None else _packed(build.falls),
-        **(_fields(engine, build, known.fields) if fields else dict.fromkeys(FIELDS)),
+        **(_fields(engine, build, known or {}) if fields else dict.fromkeys(FIELDS)),
     }
-
-
-def _grips_off(engine: Engine, build: Build, known: dict[_Key, float]) -> Floats | None:
-    """Return how far grips may be off in every step, m; None where that is not known.
-
-    ``known``: of states that were asked before; what is found is added.
-    """
-    scene = engine.network.scene
-    if not is_linear(engine) or len(scene.bricks) > _FEW or build.order:
-        return None
-    return each_tolerance(engine, held_in_steps(scene, build.steps), known)
 
 
 def _marks(scene: Scene, build: Build) -> list[str]:
@@ -339,13 +312,11 @@ def report_page(
     scatter: Scatter | None = None,
     *,
     found: str = "",
-    offs: dict[_Key, float] | None = None,
 ) -> str:
     """Return a page that shows builds of one scene, as HTML that needs nothing else.
 
     The first build is shown first; a row of a table whose first cell names a build shows it. Fields
     of some builds are left out, and the page says so, where there are more than `MOST` numbers.
-    ``offs``: how far grips may be off, m, of states that were asked before.
 
     Examples
     --------
@@ -357,7 +328,7 @@ def report_page(
     >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
     True
     """
-    data = _data(engine, builds, offs) | {"scatter": None if scatter is None else scatter.data()}
+    data = _data(engine, builds) | {"scatter": None if scatter is None else scatter.data()}
     scene = engine.network.scene
     loading = f" Counted, and not drawn: {scene.loading}." if scene.loading else ""
     loading += "".join(f" Of {note}." for note in shape_notes(scene))
@@ -366,12 +337,16 @@ def report_page(
         sentence=escape(sentence + loading),
         found=escape(found),
         tables="".join(_part(caption, part) for caption, part in tables),
-        data=_as_json(data),
+        data=data,
     )
 
 
-def _filled(**parts: str) -> str:
-    """Return the page with its parts in their places, and the policy that lets its own run."""
+def _filled(data: Mapping[str, object], **parts: str) -> str:
+    """Return the page with its parts in their places, and the policy that lets its own run.
+
+    No ``<`` in the ``data`` of the viewer can end the script it stands in.
+    """
+    parts["data"] = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     viewer = resources.files("seqopt") / "data/viewer"
     own = {part: (viewer / name).read_text(encoding="utf-8") for part, name in PARTS.items()}
     digests = (b64encode(sha256(text.encode()).digest()).decode() for text in own.values())
@@ -386,14 +361,7 @@ def _filled(**parts: str) -> str:
     return page
 
 
-def _as_json(data: Mapping[str, object]) -> str:
-    """Return what the viewer reads; no ``<`` in it can end the script it stands in."""
-    return json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-
-
-def _data(
-    engine: Engine, builds: Sequence[Build], offs: dict[_Key, float] | None
-) -> dict[str, object]:
+def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
     """Return what the viewer reads of builds, fields of as many as there is room for."""
     if not builds:
         raise ProblemError("a report of nothing; give at least one build")
@@ -401,18 +369,15 @@ def _data(
     numbers = 6 * len(network.inner) + len(network.edge_nodes)  # of the fields of a step
     ends = np.cumsum([numbers * len(build.steps) for build in builds])
     drawn = [bool(end <= MOST) and not b.order for b, end in zip(builds, ends, strict=True)]
-    known = _Known({} if offs is None else offs, {}, {})
-    every = [step for build in builds if not build.order for step in build.steps]
-    if every:
-        _grips_off(engine, Build("", every, pd.DataFrame()), known.offs)
     states = _distinct(build.steps for build in compress(builds, drawn))
-    known.fields.update(zip(states, _each_fields(engine, states.values(), _WANT), strict=True))
+    known = dict(zip(states, _each_fields(engine, states.values(), _WANT), strict=True))
+    sketched: Sketches = {}
     why = "they place bricks in another order than the scene" if len(drawn) > sum(drawn) else ""
     why = "there are too many steps" if ends[-1] > MOST else why
     return {
         "structure": _structure_data(network),
         "builds": [
-            _build_data(engine, build, known, fields=fields)
+            _build_data(engine, build, known, sketched, fields=fields)
             | {"tasks": _tasks(engine, build) if build is builds[0] and not build.order else None}
             for build, fields in zip(builds, drawn, strict=True)
         ],

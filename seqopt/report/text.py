@@ -19,7 +19,6 @@ from seqopt.stability._builds import BuildVerdicts, _settlement_said
 from seqopt.stability.assessment import Verdict
 
 _NUMBERED = re.compile(r"rob(?:ot)?[ _-]?(\d+)")
-_SHORTEST = 1e-6  # m: below, a length is no tolerance that anybody keeps
 
 
 def _robot_words(name: str) -> str:
@@ -99,12 +98,11 @@ def _in_a_sentence(
     table: pd.DataFrame,
     verdicts: Sequence[BuildVerdicts] = (),
     departures: Sequence[Departure] = (),
-    off: Floats | None = None,
     faults: Sequence[str] = (),
 ) -> str:
     """Return what a build is, as one sentence; first, if so, that it leaves the linear range.
 
-    ``off``: how far grips may be off in every step, m; ``faults``: why arms cannot be in steps.
+    ``faults``: why arms cannot be in steps.
     """
     used = [robot for robot in scene.robots if table[f"{robot.name}_node"].notna().any()]
     verb = ("take down", "takes down") if (table["type"] == "remove").any() else ("build", "builds")
@@ -124,11 +122,6 @@ def _in_a_sentence(
     said += [*_stands(verdicts[:-1] if fallen else verdicts), *([moves] if moves else [])] or (
         [] if verdicts else ["whether its steps stand was not asked"]
     )
-    least = np.inf if off is None or wrong else float(off.min(initial=np.inf))
-    if off is not None and np.isfinite(least):
-        gives = any(robot.stiffness or robot.arm for robot in scene.robots)
-        where = f" in step {int(table['step'].iloc[off.argmin()])}" if least < _SHORTEST else ""
-        said.append(f"{'' if gives else 'rigid '}grips {_far_off(least)}{where}")
     outside = f"{OUTSIDE.capitalize()}: {'; '.join(map(str, departures))}. Do not rely on it. "
     return (outside if departures else "") + "; ".join(said) + "."
 
@@ -169,17 +162,6 @@ def _stands(verdicts: Sequence[BuildVerdicts]) -> Iterator[str]:
         if not each.first and not open_:
             yield f"every step stands{',' if each.how == 'dry' else ''} {each.how}"
             return  # with more than this it stands too
-
-
-def _far_off(length: float) -> str:
-    """Return how far grips may be off, in words.
-
-    >>> _far_off(0.000312), _far_off(2.7e-7), _far_off(0.0)
-    ('may be 310 µm off', 'may not even be 0.001 mm off', 'may not be off at all')
-    """
-    if length >= _SHORTEST:
-        return f"may be {length_text(float(f'{length:.2g}'))} off"
-    return "may not even be 0.001 mm off" if length > 0 else "may not be off at all"
 
 
 QUANTITIES = {

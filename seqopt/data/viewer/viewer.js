@@ -437,7 +437,7 @@
     const s = Math.min(at, build.steps.length - 1), step = build.steps[s], out = document.createElement("div"), what = happens(build, s);
     out.append(text("h2", `${build.words}, step ${step.number} of ${build.steps.length}`));
     if (s === build.decides) out.append(text("p", build.marks[s] ? "The step that decides: the first where something is wrong." : "The step that decides: the worst of all.", "hint"));
-    out.append(text("p", `${what[0].toUpperCase()}${what.slice(1)}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "") + (build.off[s] ? ` ${build.off[s]}` : "")));
+    out.append(text("p", `${what[0].toUpperCase()}${what.slice(1)}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "")));
     if (build.marks[s]) out.append(text("p", build.marks[s], "over"));
     const grips = document.createElement("table"), rows = document.createElement("table");
     grips.innerHTML = "<tr><th>robot</th><th>brick</th><th>node</th><th>force, N</th><th>of payload</th></tr>";

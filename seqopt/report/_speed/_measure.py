@@ -17,7 +17,6 @@ import numpy as np
 import pandas as pd
 
 from seqopt._interrupts import ending
-from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
 from seqopt.errors import ProblemError, SeqoptError, SolverError, TimeUpError
@@ -37,6 +36,37 @@ from seqopt.work.progress import Stage, Tell
 
 ROUNDING = 1e-9  # gaps and errors below are none
 SHOWN = [RESPONSES[name].column for name in ("M_sup", "T_max", "D_max")]  # beside grip forces
+TIMES = 3
+UNPROVEN = ("cascade", "schedule_search")  # what needs the fewest models, of costs and of states
+Found = TypeVar("Found")
+_Way = tuple[Formulation, bool]  # with its proof or without
+
+
+@dataclass(frozen=True)
+class Timer:
+    """What tells the time, s, and what ends a block in time by a `TimeoutError`."""
+
+    now: Callable[[], float] = time.perf_counter
+    within: Callable[[float], AbstractContextManager[None]] = ending
+
+    def least(self, seconds: float, call: Callable[[], Found]) -> tuple[float, Found]:
+        """Return the least time that a call takes, and what it returns; `TimeoutError` if late."""
+        start = self.now()
+        with self.within(seconds):
+            found = call()
+        best = spent = self.now() - start
+        for _ in range(1, TIMES):
+            if spent + best > seconds:
+                break
+            start = self.now()
+            with suppress(TimeoutError), self.within(seconds):
+                found = call()
+                best = min(best, self.now() - start)
+            spent += self.now() - start
+        return best, found
+
+
+WALL = Timer()
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,51 +112,13 @@ class Reference:
 
     def error(self, engine: Engine, steps: Sequence[Step]) -> float:
         """Return the largest difference of a response of steps, over the largest of its kind."""
-        pairs = zip(
-            self._kinds(engine, steps), self._kinds(self.problem.engine, steps), strict=True
-        )
-        found = max(
-            float(np.nanmax(np.abs(own - known)) / (np.nanmax(np.abs(known)) or 1.0))
-            for own, known in pairs
-        )
-        return 0.0 if found < ROUNDING else found
-
-    def _kinds(self, engine: Engine, steps: Sequence[Step]) -> Iterator[Floats]:
-        """Yield the responses of steps, kind by kind: grip forces, moments, tension, motion."""
-        table: pd.DataFrame = analyze(engine, steps)
-        forces = [force_column(robot) for robot in self.problem.scene.robots]
+        own, known = analyze(engine, steps), analyze(self.problem.engine, steps)
+        forces, worst = [force_column(robot) for robot in self.problem.scene.robots], 0.0
         for columns in (forces, *([name] for name in SHOWN)):
-            yield table[columns].to_numpy(float)
-
-
-TIMES = 3
-UNPROVEN = ("cascade", "schedule_search")  # what needs the fewest models, of costs and of states
-Found = TypeVar("Found")
-
-
-@dataclass(frozen=True)
-class Timer:
-    """What tells the time, s, and what ends a block in time by a `TimeoutError`."""
-
-    now: Callable[[], float] = time.perf_counter
-    within: Callable[[float], AbstractContextManager[None]] = ending
-
-
-WALL = Timer()
-
-
-@dataclass(frozen=True)
-class _Way:
-    """A formulation, with its proof or without."""
-
-    formulation: Formulation
-    proof: bool = True
-
-    @property
-    def facts(self) -> dict[str, object]:
-        """What a row says of it."""
-        proves = self.proof and self.formulation.kind is not FormulationKind.HEURISTIC
-        return {"formulation": self.formulation.name, "proof": self.proof, "exact": proves}
+            one, other = (table[columns].to_numpy(float) for table in (own, known))
+            off = np.nanmax(np.abs(one - other)) / (np.nanmax(np.abs(other)) or 1.0)
+            worst = max(worst, float(off))
+        return 0.0 if worst < ROUNDING else worst
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,74 +126,61 @@ class _Stage:
     """One engine that solves a problem, made anew for every repetition."""
 
     name: str
-    problem: Problem
     reference: Reference
     seconds: float
     timer: Timer
 
     def posed(self) -> Problem:
         """Return the problem with an engine of its own, of which nothing is computed yet."""
-        found = recipe_of(self.problem.engine)
+        problem = self.reference.problem
+        found = recipe_of(problem.engine)
         if found is None:  # an object of one's own
-            return self.problem.but()
+            return problem.but()
         options = found.options if self.name in LIMITED or self.name == found.name else {}
-        network = self.problem.engine.network
-        made = make_engine(self.name, network, options.get("mortar"))  # type: ignore[arg-type]
-        return self.problem.but(engine=simplest(made))
+        mortar: object = options.get("mortar")
+        made = make_engine(self.name, problem.engine.network, mortar)  # type: ignore[arg-type]
+        return problem.but(engine=simplest(made))
 
-    def least(self, call: Callable[[], Found]) -> tuple[float, Found]:
-        """Return the least time that a call takes, and what it returns; `TimeoutError` if late."""
-        start = self.timer.now()
-        with self.timer.within(self.seconds):
-            found = call()
-        best = spent = self.timer.now() - start
-        for _ in range(1, TIMES):
-            if spent + best > self.seconds:
-                break
-            start = self.timer.now()
-            with suppress(TimeoutError), self.timer.within(self.seconds):
-                found = call()
-                best = min(best, self.timer.now() - start)
-            spent += self.timer.now() - start
-        return best, found
+    def prepared(self) -> Problem:
+        """Return the problem with the costs of all its choices."""
+        found = self.posed()
+        _ = layers_of(found).sums
+        return found
 
     def rows(self, ways: list[_Way]) -> Iterator[dict[str, object]]:
-        """Yield a row for every way to choose."""
-        prepared: Problem | None = None
-        before, why = 0.0, ""
+        """Yield a row for every way to choose; those with a proof share the costs of choices."""
+        before, shared, why = 0.0, None, ""
         if self.reference.in_layers:
-
-            def prepare() -> Problem:
-                found = self.posed()
-                _ = layers_of(found).sums
-                return found
-
             try:
-                before, prepared = self.least(prepare)
+                before, shared = self.timer.least(self.seconds, self.prepared)
             except (SeqoptError, TimeoutError) as error:
                 why = _reason(error)
-        for way in ways:
-            own = prepared if way.proof else None
-            if way.proof and why:
-                found = self._without(why)
-            else:
-                found = self._row(way, own, before if own is not None else 0.0)
-            yield {"engine": self.name, **way.facts, **found}
+        for formulation, proof in ways:
+            exact = proof and formulation.kind is not FormulationKind.HEURISTIC
+            row = {"formulation": formulation.name, "proof": proof, "exact": exact}
+            own = (shared, before) if proof else (None, 0.0)
+            found = self._without(why) if proof and why else self._found(formulation, proof, own)
+            yield {"engine": self.name, **row, **found}
 
     def _without(self, why: str) -> dict[str, object]:
-        late = why == CUT
-        nothing = {"gap": np.nan, "error": np.nan}
-        return {"seconds": self.seconds if late else np.nan, **nothing} | {
-            "status": CUT if late else FAILED,
-            "why": "" if late else why,
-        }
+        """Return a row without a plan."""
+        spent, status, why = (self.seconds, CUT, "") if why == CUT else (np.nan, FAILED, why)
+        return {"seconds": spent, "gap": np.nan, "error": np.nan, "status": status, "why": why}
 
-    def _row(self, way: _Way, prepared: Problem | None, before: float) -> dict[str, object]:
+    def _found(
+        self,
+        formulation: Formulation,
+        proof: bool,  # noqa: FBT001  # of a way
+        own: tuple[Problem | None, float],
+    ) -> dict[str, object]:
+        """Return the row of a formulation; ``own``: a problem with its costs, and their time, s."""
+        shared, before = own
+
         def call() -> Plan:
-            return on_the_way(solve(prepared or self.posed(), way.formulation, proof=way.proof))
+            return on_the_way(solve(shared or self.posed(), formulation, proof=proof))
 
         try:
-            seconds, plan = self.least(call)
+            seconds, plan = self.timer.least(self.seconds, call)
         except (SeqoptError, TimeoutError) as error:
             return self._without(_reason(error))
         off = np.nan
@@ -230,8 +209,7 @@ def _ways(problem: Problem) -> list[_Way]:
         for each in formulations("goals").values()
         if bool(each.aim) == of_costs and each.aim is not Aim.PEAK
     ]
-    unproven = [_Way(f, proof=False) for f in known if f.name in UNPROVEN]
-    return [*map(_Way, known), *unproven]
+    return [*((f, True) for f in known), *((f, False) for f in known if f.name in UNPROVEN)]
 
 
 def speed_accuracy(
@@ -258,7 +236,7 @@ def speed_accuracy(
     names = [name, *(each for each in ENGINES if each != name)] if recipe else [name]
     for done, each in enumerate(names):
         progress(Stage(f"speed of {each}", done / len(names)))
-        stage = _Stage(each, problem, reference, seconds, timer)
+        stage = _Stage(each, reference, seconds, timer)
         try:
             stage.posed()
         except SeqoptError as error:
