@@ -23,11 +23,10 @@ from formulations.states._search import after_margins, best_total, chosen, watch
 from formulations.states._totals import cheapest_by, least_total
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
-from seqopt.graph.formulation import Formulation, FormulationKind, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
 from seqopt.graph.paths import path_values, tied
-from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import WORST_TOTAL, Aim, cvar
 from seqopt.work.progress import Tell

@@ -20,9 +20,8 @@ from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import in_layers, pose
 from seqopt.plan.solve import solve
-from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.criteria import WORST_OVER_METHODS
-from seqopt.problem.filters import Filter
+from seqopt.problem.filters import Filter, parse_limits
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing

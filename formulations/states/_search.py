@@ -18,7 +18,7 @@ from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph._budgets import Within, is_beyond, within_budgets
 from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph.formulation import Watch
+from seqopt.graph.formulation import Solution, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import (
     Best,
@@ -30,7 +30,6 @@ from seqopt.graph.paths import (
     strictly_below,
     tied,
 )
-from seqopt.graph.solution import Solution
 from seqopt.graph.space import Space
 from seqopt.graph.states.explored import build_space, explore, floors_of_goals
 from seqopt.graph.states.states import States

@@ -51,8 +51,7 @@ from seqopt.graph._orders import (
     order_value,
     trying,
 )
-from seqopt.graph.formulation import Formulation, FormulationKind, Watch, find_formulation
-from seqopt.graph.solution import Solution
+from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch, find_formulation
 from seqopt.graph.states.states import States
 from seqopt.scene.scene import ORDERS, Order
 from seqopt.work._workers import hire, map_ordered

@@ -23,8 +23,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats
 from seqopt.errors import TimeUpError
-from seqopt.graph.formulation import Formulation, FormulationKind, Watch
-from seqopt.graph.solution import Solution
+from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
 from seqopt.plan.front import FrontProblem
 from seqopt.work.progress import Tell
 

@@ -31,8 +31,7 @@ from formulations.states._search import (
 from formulations.states._totals import StopError
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Explorer
-from seqopt.graph.formulation import Formulation, FormulationKind, Watch
-from seqopt.graph.solution import Solution
+from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.work.progress import Tell

@@ -55,9 +55,8 @@ from formulations.states._search import (
     watched,
 )
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import Formulation, FormulationKind, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
 from seqopt.graph.instance import Instance
-from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
 from seqopt.work.progress import Tell
 

@@ -27,10 +27,9 @@ from formulations.times._stages import ALMOST, Choose, Goals, StageFound, Stages
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph.formulation import Formulation, FormulationKind, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
 from seqopt.graph.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
-from seqopt.graph.solution import Solution
 from seqopt.graph.states._visits import steps_of
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States

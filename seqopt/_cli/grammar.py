@@ -13,9 +13,8 @@ from seqopt.contact.curing import _find_curing
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
 from seqopt.graph.formulation import Formulation, as_formulation
-from seqopt.problem._limit_words import LARGEST, number_word, split_word
 from seqopt.problem.criteria import Ranked, RankSum
-from seqopt.problem.requirements import NEVER, Criterion
+from seqopt.problem.requirements import LARGEST, NEVER, Criterion, number_word, split_word
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
 from seqopt.scene._checks import short

@@ -11,7 +11,7 @@ from seqopt._cli import grammar, inputs, options
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
-from seqopt.problem._limit_words import parse_limits
+from seqopt.problem.filters import parse_limits
 from seqopt.problem.problem import WORST_PEAK, Problem, RobustAim, parse_budgets, parse_robust
 from seqopt.problem.standing import Standing
 from seqopt.scene.scenarios import Scenarios, scenarios

@@ -15,7 +15,7 @@ from seqopt._cli.grammar import parse_count
 from seqopt._cli.options import NAMES, Asked
 from seqopt._cli.terminal import columns, wrapped
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.problem._limit_words import number_word
+from seqopt.problem.requirements import number_word
 
 QUESTIONS = (
     "What is built, and by whom?",

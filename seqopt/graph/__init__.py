@@ -2,7 +2,7 @@
 
 A *space* says which states there are, which moves lead from one to the next, and what they take. An
 `Explorer` visits the states below a threshold and gives them as a `Graph`, which is arrays alone:
-`seqopt.graph.paths` finds best paths through it, and `seqopt.graph.duality` proves from the same
+`seqopt.graph.paths` finds best paths through it, and `seqopt.graph.paths` proves from the same
 arrays that no path is better.
 
 >>> import numpy as np

@@ -23,10 +23,9 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
 from seqopt.graph._labels import CappedSums, LabelSearch, widening
 from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
-from seqopt.graph.duality import ROUNDING, least_sum
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import tied
+from seqopt.graph.paths import ROUNDING, least_sum, tied
 
 ROUNDS = 60  # of cutting planes
 CLOSED = 1e-9  # share of a bound to which multipliers are the best

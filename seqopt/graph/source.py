@@ -13,7 +13,7 @@ from seqopt.responses._tolerance import values_text
 from seqopt.sequence.steps import Step
 
 if TYPE_CHECKING:
-    from seqopt.graph.solution import Solution
+    from seqopt.graph.formulation import Solution
     from seqopt.problem.standing import Standing
     from seqopt.scene.scene import Order
     from seqopt.sequence.site import Site

@@ -14,8 +14,7 @@ from seqopt._files import parse_json, read_text
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.instance import Instance
-from seqopt.judge._arithmetic import Answer, judge_path
-from seqopt.judge._claims import Claim
+from seqopt.judge.arithmetic import Answer, Claim, judge_path
 from seqopt.judge.certificate import Certificate
 from seqopt.scene._checks import as_float, short
 

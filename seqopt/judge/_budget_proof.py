@@ -27,9 +27,8 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph.duality import least_sum
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances, tied
+from seqopt.graph.paths import distances, least_sum, tied
 
 MIXTURES = 80  # multipliers that are tried
 DEAREST = 1e7  # largest multiplier, over the size of costs and caps

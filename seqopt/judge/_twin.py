@@ -45,7 +45,7 @@ class PathTwin(NamedTuple):
     lower bound of all builds by some rules; ``bounds``: makes of an evaluator, rebuilt states, the
     values and what is claimed a function from subgraphs to lower bounds of the
     goals after those about margins; ``path_value``: of arcs and acts of an instance; ``claimed``:
-    what a claim about an instance proves, as of `seqopt.judge._claims.proven`.
+    what a claim about an instance proves, as of `seqopt.judge.arithmetic.proven`.
     """
 
     value: Callable[[Any, Sequence[Any], Sequence[float]], float]

@@ -20,10 +20,9 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError, SeqoptError, SolverError, message_of
-from seqopt.graph.formulation import Formulation, formulations
+from seqopt.graph.formulation import Formulation, Solution, formulations
 from seqopt.graph.graph import LabelProof
 from seqopt.graph.layers.costs import Budget
-from seqopt.graph.solution import Solution
 from seqopt.scene._checks import LARGEST_NUMBER, short
 
 Result = TypeVar("Result")

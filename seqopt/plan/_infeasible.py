@@ -15,16 +15,13 @@ from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, Solve
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
 from seqopt.graph._orders import TooManySetsError
-from seqopt.graph.duality import least_sum
 from seqopt.graph.instance import Instance, _Cap
-from seqopt.graph.paths import distances, tied
+from seqopt.graph.paths import distances, least_sum, tied
 from seqopt.graph.states.explored import barred
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import is_kept, least_within
-from seqopt.judge._proof import Proof
-from seqopt.judge._spaces import TooManyPartsError
-from seqopt.plan._remedies import LateError, Look, Remedies
-from seqopt.plan._stops import stops_of
+from seqopt.judge._proof import Proof, TooManyPartsError
+from seqopt.plan._remedies import LateError, Look, Remedies, stops_of
 from seqopt.plan.search._margin_search import STEPS, WORST, with_margin
 from seqopt.problem.amounts import Amount
 

@@ -1,43 +1,56 @@
 """Remedies of infeasible problems: constraints to relax, and the least sufficient relaxation.
 
 Every filter lists its relaxations: rules, standing, payloads, arms, limits and others. In addition
-reaches and grips are tried. A remedy counts if it alone makes the problem feasible.
+reaches and grips are tried. A remedy counts if it alone makes the problem feasible. Rigid grips
+keep nodes in place against every movement of the structure, with forces that may be many times its
+weight: then softer grips, if any suffice, are the remedy, and not a larger payload.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import islice
+from math import inf
 
 import numpy as np
 
-from seqopt.engines.registry import recipe_of
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import InfeasibleError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.paths import least_peak
 from seqopt.graph.states.explored import barred, explore
 from seqopt.graph.states.states import States
-from seqopt.plan._softer import HARD, ground_moves, softer_grips, whole_load
-from seqopt.plan._stops import Stops, stops_of
+from seqopt.network.network import Network
 from seqopt.plan.search._margin_search import STEPS, StandingLook, bisected
 from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.filters import IGNORED, STANDING
-from seqopt.problem.requirements import Limit
+from seqopt.problem.requirements import Excess, Limit, overloads
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import (
     PROP_EXCESS,
     _payload_text,
+    _plain,
     _rounded_up,
     length_text,
     robot_response,
 )
+from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
+from seqopt.sequence._carrying import loads
+from seqopt.sequence._rule_check import RuleBook, unbearable
+from seqopt.sequence.rules import FreeRules, Payload
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import _enough_reach
+
+STIFFNESSES = (1e8, 1e7, 1e6, 1e5, 1e4, 1e3)  # of grips, N/m, the stiffest that helps first
+HARD = "softer grips were not found to help; ground that moves less, or softer supports, may"
 
 
 class LateError(Exception):
@@ -282,3 +295,130 @@ def _as_it_is(words: str, *, of_arms: bool = False) -> Remedy:
 def _payload_said(newton: float) -> str:
     said = _payload_text(newton)
     return f"a payload of {said} N (--payload {said})"
+
+
+@dataclass(frozen=True)
+class StepStops:
+    """Where the steps of a schedule stop: its grips may carry more than payloads."""
+
+    problem: States
+    schedule: Schedule
+    scenes: tuple[Scene, ...]
+    heaviest: float = inf
+    held_at_ends: frozenset[int] = frozenset()
+
+    @property
+    def asks_payload(self) -> bool:
+        """Whether some robot cannot bear a brick that it places or takes away."""
+        return bool(self._unbearable)
+
+    @cached_property
+    def _unbearable(self) -> dict[int, str]:
+        return unbearable(self.scenes, self.schedule.steps, self.schedule.begin)
+
+    def where(self, reached: int) -> str:
+        """Name the first step without a feasible state, and a robot that cannot carry its brick."""
+        heavy = "".join(f": in step {n} {why}" for n, why in [*self._unbearable.items()][:1])
+        last = self.problem.space.levels
+        return f"step {reached + 1} of {last} has no state that is allowed{heavy}"
+
+
+@dataclass(frozen=True)
+class RuleStops:
+    """Where builds by rules stop."""
+
+    problem: States
+    rules: FreeRules
+    scenes: tuple[Scene, ...]
+
+    @cached_property
+    def heaviest(self) -> float:
+        """The heaviest brick of the build, with the tool of any robot of the team, N."""
+        bricks = slice(*sorted(self.rules.span(self.scenes[0])))
+        team = self.rules.team(self.scenes[0])
+        pairs = ((scene, scene.robots[r]) for scene in self.scenes for r in team)
+        return max(float(loads(scene, robot)[bricks].max()) for scene, robot in pairs)
+
+    @property
+    def held_at_ends(self) -> frozenset[int]:
+        """Nodes that are held where builds begin or end."""
+        sites = [site for site in (self.rules.begin, self.rules.finish) if site is not None]
+        return frozenset(n for site in sites for n in site.holds(self.scenes[0]) if n is not None)
+
+    @property
+    def asks_payload(self) -> bool:
+        """Whether states must stand, held by what robots carry."""
+        return bool(self.problem.demands) and self.rules.payload is Payload.KEPT
+
+    def where(self, reached: int) -> str:
+        """Name the brick that is never placed or removed, and the next that is too heavy."""
+        placed, space = self.scenes[0].placed, self.problem.space
+        end, down = space.bricks_at(space.levels), self.rules.takes_down
+        if reached == space.levels:
+            return f"after brick {placed[end - 1].name} the build cannot end"
+        at = space.bricks_at(reached) + (not down)
+        left = range(at, end, -1) if down else range(at, end + 1)
+        done = "removed" if down else "placed"
+        where = f"brick {placed[at - 1].name} ({at} of {len(placed)}) is never {done}"
+        book = RuleBook(self.problem.network, self.rules, self.problem.worlds)
+        for bricks in left:
+            near = [r for r in book.team if book.named(r) and book.newest_nodes[r, bricks]]
+            heavy = book.too_heavy(bricks, near)
+            if heavy and (bricks == left[0] or not any(book.places(r, bricks) for r in near)):
+                return f"{where}: {heavy}"  # the next brick, or one that no robot can lift
+        return where
+
+
+Stops = StepStops | RuleStops
+
+
+def stops_of(problem: States) -> Stops:
+    """Return the stops of a problem, by the kind of its schedule."""
+    rules, scenes = problem.rules, (problem.network.scene, *problem.worlds)
+    if isinstance(rules, Schedule):
+        return StepStops(problem, rules, scenes)
+    return RuleStops(problem, rules, scenes)
+
+
+def whole_load(network: Network) -> float:
+    """Return the sum of the sizes of all weights, loads and wind, N: the most any robot carries."""
+    applied = network.applied(len(network.inner))[:, :3]
+    return float(np.linalg.norm(np.concatenate([network.weight, applied]), axis=1).sum())
+
+
+def _payload_advice(engine: Engine, steps: Sequence[Step], over: Sequence[Excess]) -> str:
+    """Describe remedies of the exceeded payloads of a plan, as of `overloads`."""
+    network = engine.network
+    held = max((each.largest for each in over if each.brick is None), default=0.0)
+    if held <= whole_load(network):
+        least = _payload_text(max(each.largest for each in over))
+        how = f"--payload {least}, or payload of its robots in the scene file"
+        return f"payload of {least} N is enough for this plan: {how}"
+
+    def kept(scene: Scene) -> bool:
+        found = overloads(scene, analyze(engine_for(engine, scene), steps))
+        return all(each.brick is not None for each in found)  # what is carried stays as heavy
+
+    still = " that hold nodes in place while the ground moves" * ground_moves(network.scene)
+    why = f"stiff grips{still}"
+    what = f"{held:,.0f} N, {_plain(held / whole_load(network), 3)} times all weights and loads,"
+    helps = softer_grips(engine, kept)
+    return f"no payload helps: {what} come of {why}; {f'{helps} are enough' if helps else HARD}"
+
+
+def ground_moves(scene: Scene) -> bool:
+    """Return whether any ground end has a movement."""
+    return any(any(ground.movement or ()) for ground in scene.grounds)
+
+
+def softer_grips(engine: Engine, exists: Callable[[Scene], bool]) -> str:
+    """Describe the stiffest sufficient grips below those of the scene; empty if there are none."""
+    scene = engine.network.scene
+    own = [float(np.min(robot.stiffness)) for robot in scene.robots if robot.stiffness]
+    if recipe_of(engine) is None or scene.has_arms:
+        return ""
+    for stiffness in (each for each in STIFFNESSES if each < min(own, default=np.inf)):
+        if exists(scene.with_grips(stiffness)):
+            said = f"{stiffness:.0e}".replace("e+0", "e")
+            return f"grips of {said} N/m (--grips {said})"
+    return ""

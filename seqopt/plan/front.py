@@ -14,18 +14,17 @@ from seqopt.arrays import Floats, Ints, Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
 from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph.formulation import Formulation, as_formulation
+from seqopt.graph.formulation import Formulation, Solution, as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
-from seqopt.graph.solution import Solution
 from seqopt.graph.space import Space
 from seqopt.graph.states._visits import steps_of, steps_with, with_held
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import States
-from seqopt.judge.schedules import ordered, plan_values
+from seqopt.judge._schedules import ordered, plan_values
+from seqopt.plan._answers import PROOF
 from seqopt.plan._guard import called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
-from seqopt.plan._paths import PROOF
 from seqopt.plan._range import INTERRUPTED, RANGE, keeping, leaves
 from seqopt.plan.pose import states_of
 from seqopt.problem.amounts import REGRIPS, STEPS, Amount

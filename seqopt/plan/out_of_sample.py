@@ -20,7 +20,7 @@ from seqopt.graph.layers.compiled import best_in_order
 from seqopt.graph.layers.costs import LayeredCosts, ScenarioCosts
 from seqopt.graph.layers.layers import Layers, in_scenarios
 from seqopt.graph.states.states import over_scenarios
-from seqopt.judge.schedules import plan_values
+from seqopt.judge._schedules import plan_values
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import WORST_PEAK, Aim
 from seqopt.scene.scenarios import Scenarios

@@ -13,13 +13,12 @@ import pandas as pd
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import provenance
-from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind
+from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Solution
 from seqopt.graph.instance import Instance
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.ranking import Objectives, objectives
-from seqopt.graph.solution import Solution
 from seqopt.graph.states.states import States
-from seqopt.judge._step_checks import certified
+from seqopt.judge._schedules import certified
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan._status import ENDS, Status, bare_summary, order_facts, rests_on
 from seqopt.plan.build import ShownBuild

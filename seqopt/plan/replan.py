@@ -9,7 +9,7 @@ from seqopt._registry import offered
 from seqopt.errors import SeqoptError, StepError
 from seqopt.graph.states.states import States
 from seqopt.judge._rule_moves import check_free
-from seqopt.judge.schedules import plan_values
+from seqopt.judge._schedules import plan_values
 from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.responses.table import analyze

@@ -13,19 +13,33 @@ loosened, from which remedies of an infeasible problem are found. A further one 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from seqopt._registry import ADDED, Part
+from seqopt._registry import ADDED, Part, registered
 from seqopt.arrays import Bools
 from seqopt.engines.registry import recipe_of
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays, call
-from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Limit
+from seqopt.problem.requirements import (
+    LIFTED,
+    LIMIT_TOLERANCE,
+    LINEAR_RANGE,
+    NAMES,
+    Limit,
+    as_limits,
+    length_word,
+    number_word,
+    payload_limits,
+    split_word,
+)
+from seqopt.responses.quantities import TOLERANCE
 from seqopt.scene._checks import short
+from seqopt.scene.scene import Scene
 
 Passes = Callable[[StateArrays], Bools]
 Loosened = Callable[[Any], Iterator[tuple[str, Any]]]
@@ -195,6 +209,53 @@ def filters_of(problem: Any) -> tuple[Filter, ...]:
     out += [_payloads_filter()]
     out += [_arms_filter()] if problem.network.scene.has_arms else []
     return (*out, *map(_limit_filter, problem.limits), *problem.filters)
+
+
+def parse_limits(
+    given: Sequence[str | Limit | Filter] | str | Limit | Filter, scene: Scene, where: str = "limit"
+) -> tuple[Limit | Filter, ...]:
+    """Return limits and filters that are given as such, or in words.
+
+    Words are ``payload``, of the scene's robots, ``RESPONSE=VALUE``, SI units,
+    ``linear_range=SHARE``, or ``any`` to lift it, and names of filters that were registered.
+    ``where``: for messages.
+    """
+    several = (given,) if isinstance(given, str | Limit | Filter) else given
+    if not isinstance(several, Sequence):
+        return as_limits(several)
+    out: list[Limit | Filter] = []
+    for each in several:
+        if isinstance(each, Filter):
+            out.append(each)
+        elif not isinstance(each, str):
+            out += as_limits([each])
+        elif each == "payload":
+            out += payload_limits(scene)
+        elif "=" not in each and each in (own := registered(Filter)):
+            out.append(own[each])
+        else:
+            out.append(_limit_of(each, where))
+    return tuple(out)
+
+
+def _limit_of(text: str, where: str) -> Limit:
+    """Return a limit from ``NAME=VALUE``."""
+    (name, value), said = split_word(text), f"{where} {text}"
+    if name == "payload":
+        raise ProblemError(f"{said}: give payload alone, and values with --payload")
+    if name == LINEAR_RANGE and value == LIFTED:
+        return Limit(name, math.inf)
+    if name == LINEAR_RANGE:
+        try:
+            return Limit(name, number_word(value, said))
+        except ProblemError as error:
+            hint = f"give a share of it, as 0.5, or {LIFTED} to lift it"
+            raise ProblemError(f"{error}; {hint}") from None
+    if name not in (*NAMES, "F_each") and not name.startswith("F_"):
+        names = ("payload", *NAMES, LINEAR_RANGE)
+        hint = did_you_mean(name, names)
+        raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
+    return Limit(name, (length_word if name == TOLERANCE else number_word)(value, said))
 
 
 def register(*parts: Amount | Filter | Part) -> None:

@@ -21,9 +21,8 @@ from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
-from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.amounts import BUILT_IN, Amount, parse_goals, worst
-from seqopt.problem.filters import Filter
+from seqopt.problem.filters import Filter, parse_limits
 from seqopt.problem.requirements import (
     LINEAR_RANGE,
     Criterion,

@@ -18,12 +18,14 @@ from seqopt.engines.interface import Engine, linear_limit
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
+from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses._props import EXCESS_COLUMN
 from seqopt.responses._tolerance import Allowed, is_tolerance, misfits_along
 from seqopt.responses.quantities import (
     NO_TOLERANCE,
     PROP_EXCESS,
     RESPONSES,
+    TOLERANCE,
     _steps_in_words,
     length_text,
     robot_response,
@@ -53,6 +55,9 @@ About a thirty-sixth of a brick's weight, a ninth of it at a brick's length, and
 what a joint gives way under it: 1 N, 1 N m and 1e-6 m on the arch of Bruun et al., whose published
 choices speak for such a rounding.
 """
+LARGEST = 1e100  # number: products of larger ones overflow
+NAMES = (*CHOICE_RESPONSES, TOLERANCE)
+_LENGTHS = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "m": 1.0}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -504,3 +509,28 @@ def pickled(content: object, criterion: Criterion) -> bytes:
             f"criterion {criterion.name}: it cannot be sent to other processes ({error}); "
             "define it in a module, or let this process work alone"
         ) from error
+
+
+def number_word(text: str, where: str, *, zero: bool = False) -> float:
+    """Return a positive number, or zero too; ``where`` is the argument, for messages."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value <= LARGEST and not (zero and value == 0):
+        most = f" up to {LARGEST:g}" if value > LARGEST else ""
+        raise ProblemError(f"{where}: {text!r} is not a positive number{' or zero' * zero}{most}")
+    return value
+
+
+def length_word(text: str, where: str) -> float:
+    """Return a positive length, m, from words such as ``0.4mm``; ``where``: for messages."""
+    unit = next((unit for unit in _LENGTHS if text.endswith(unit)), "")
+    return number_word(text.removesuffix(unit), where) * _LENGTHS.get(unit, 1.0)
+
+
+def split_word(text: str) -> tuple[str, str]:
+    """Return a response, whose brackets may hold anything, and the number after ``=``, if any."""
+    end = text.rfind("]") + 1
+    name, _, number = text[end:].partition("=")
+    return text[:end] + name, number

@@ -11,7 +11,6 @@ import pandas as pd
 from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.graph.layers.layers import Layers
-from seqopt.problem._limit_words import NAMES, number_word, split_word
 from seqopt.problem.criteria import (
     OVER_METHODS,
     WORST_OVER_METHODS,
@@ -20,7 +19,7 @@ from seqopt.problem.criteria import (
     WorstRatio,
     equal,
 )
-from seqopt.problem.requirements import Criterion
+from seqopt.problem.requirements import NAMES, Criterion, number_word, split_word
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.table import support_columns

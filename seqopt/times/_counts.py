@@ -17,8 +17,8 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats
-from seqopt.graph.duality import least_sum
 from seqopt.graph.graph import Graph
+from seqopt.graph.paths import least_sum
 from seqopt.network.network import Network
 from seqopt.scene._durations import Durations
 from seqopt.sequence.rules import Ending, FreeRules

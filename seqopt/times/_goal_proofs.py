@@ -8,10 +8,9 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
-from seqopt.graph.duality import cut, potentials
+from seqopt.graph.formulation import Solution
 from seqopt.graph.graph import Graph, LabelProof
-from seqopt.graph.paths import tied
-from seqopt.graph.solution import Solution
+from seqopt.graph.paths import cut, potentials, tied
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
 from seqopt.sequence.schedule import Schedule

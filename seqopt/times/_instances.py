@@ -12,7 +12,7 @@ from seqopt.errors import SolverError
 from seqopt.graph._timed import TimedGraph
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import Instance
-from seqopt.judge._claims import Claim, Labels, Stage, _sum
+from seqopt.judge.arithmetic import Claim, Labels, Stage, _sum
 from seqopt.times._acts import acts_of_instance
 from seqopt.times._label_proof import Closed, Limits, limit_below
 

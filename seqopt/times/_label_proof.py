@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph.duality import _to_go
-from seqopt.graph.paths import TIED
+from seqopt.graph.paths import TIED, _to_go
 from seqopt.times._acts import Acts
 
 BETTER = 1e-9  # over a value: a build must be better by more than this

@@ -19,7 +19,7 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.formulation import FormulationKind, exhibits, formulations
 from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.instances.compiled import compile_instance
-from seqopt.judge.schedules import plan_values
+from seqopt.judge._schedules import plan_values
 from seqopt.plan.pose import layers_of, states_of
 from seqopt.problem import Amount, Filter
 from seqopt.problem.criteria import StepCost, WeightedSum

@@ -15,14 +15,13 @@ from hypothesis import strategies as st
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.formulation import End, find_formulation
+from seqopt.graph.formulation import End, Solution, find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.paths import lexicographic
-from seqopt.graph.solution import Solution
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.network.build import build_network
-from seqopt.plan._paths import judged
+from seqopt.plan._answers import judged
 from seqopt.plan.search._pair_search import KnownCosts
 from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solve import solve

@@ -14,7 +14,7 @@ import seqopt
 from seqopt.errors import InfeasibleError, SolverError, StepError
 from seqopt.graph._orders import order_rules
 from seqopt.graph.formulation import FormulationKind, formulations
-from seqopt.judge.schedules import judge_schedule
+from seqopt.judge._schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import Orders

@@ -12,9 +12,8 @@ import pytest
 from formulations import solvers
 from formulations.overlap_flow import Flow
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError
-from seqopt.graph.formulation import Formulation, FormulationKind, formulations
+from seqopt.graph.formulation import Formulation, FormulationKind, Solution, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.solution import Solution
 from seqopt.problem.problem import Aim
 from tests.layered import Costs, answer, changed, told
 from tests.quality.degenerate import MALFORMED, judge, outcomes

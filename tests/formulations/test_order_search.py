@@ -409,7 +409,7 @@ def test_a_bound_that_is_not_proven_is_claimed(monkeypatch):
     found = seqopt.solve(problem, FORMULATION, proof=False)
     assert (found.status, found.summary()["order_bound_proven"]) == ("unproven", False)
     assert "claimed, not proven" in order_bound_said(found)
-    monkeypatch.setattr("seqopt.judge._spaces.MOST", 3)
+    monkeypatch.setattr("seqopt.judge._proof.MOST", 3)
     few = seqopt.solve(problem, FORMULATION)
     assert (few.status, few.summary()["order_bound_proven"]) == ("claimed optimal", False)
     assert few.gap is None

@@ -25,7 +25,7 @@ from seqopt.graph.paths import fewest_moves, keep_best, reached
 from seqopt.graph.states._visits import steps_with, with_held
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
-from seqopt.judge.schedules import judge_schedule, plan_values
+from seqopt.judge._schedules import judge_schedule, plan_values
 from seqopt.network.build import build_network
 from seqopt.plan.front import FrontProblem, find_front, pick, upper_bounds
 from seqopt.problem.criteria import WorstRatio

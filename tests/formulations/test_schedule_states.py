@@ -16,7 +16,7 @@ from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
 from seqopt.graph.states.states import build_states, within
-from seqopt.judge.schedules import judge_schedule
+from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit

@@ -19,7 +19,7 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneError, SolverError
 from seqopt.graph.states.states import build_states
-from seqopt.judge.schedules import judge_schedule
+from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
 from seqopt.plan._remedies import worst_least
 from seqopt.plan.front import FrontProblem, find_front

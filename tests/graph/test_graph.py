@@ -15,9 +15,8 @@ from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph import Explorer, Graph, lexicographic
 from seqopt.graph._budgets import is_beyond, within_budgets
 from seqopt.graph._explore import Moves
-from seqopt.graph.duality import _sum_bound, lexicographic_bounds
-from seqopt.graph.paths import distances, least_peak, reached
-from seqopt.judge._claims import budget_bounds
+from seqopt.graph.paths import _sum_bound, distances, least_peak, lexicographic_bounds, reached
+from seqopt.judge.arithmetic import budget_bounds
 from tests.random_graphs import graphs, simple_paths, values_of
 
 few = settings(max_examples=60, deadline=None, derandomize=True)

@@ -18,7 +18,7 @@ from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.judge import _budget_proof as budget_proof
 from seqopt.judge._budget_proof import least_within
-from seqopt.judge._claims import budget_bounds
+from seqopt.judge.arithmetic import budget_bounds
 from seqopt.plan._infeasible import smallest_conflict
 from seqopt.plan.solve import solve
 from tests.layered import Costs, answer

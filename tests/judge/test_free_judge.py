@@ -12,7 +12,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SeqoptError, SolverError, StepError
 from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation
 from seqopt.graph.states.states import build_states, within
-from seqopt.judge.schedules import judge_schedule
+from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
 from seqopt.plan.front import FrontProblem, find_front
 from seqopt.plan.solve import solve
@@ -48,7 +48,7 @@ def test_a_plan_that_is_not_the_best_is_seen(aim):
     other = solve(posed("M_sup" if aim != "minmax" else "steps,T_max", rules), "schedule_search")
     problem = posed(aim, rules)
     best = solve(problem, "schedule_search").certificate.values[0]
-    from seqopt.judge.schedules import plan_values  # noqa: PLC0415
+    from seqopt.judge._schedules import plan_values  # noqa: PLC0415
 
     value = plan_values(problem, other.steps)[0]
     claimed = replace(other.selection, objective=(value,), bound=(value,))

@@ -19,8 +19,7 @@ from seqopt.graph.states.explored import explore, floors_of_goals
 from seqopt.graph.states.states import build_states
 from seqopt.judge import _budget_proof as budget_proof
 from seqopt.judge._budget_proof import least_within
-from seqopt.judge._proof import Proof
-from seqopt.judge._spaces import TooManyPartsError
+from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.judge._states import StateEvaluator
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
@@ -159,7 +158,7 @@ def test_what_was_left_out_for_a_threshold_bounds_all_orders(monkeypatch):
         assert share * best < found.excluded <= best * (1 + 1e-6)
     assert Proof(problem).bounds_first(best)
     assert not Proof(problem).bounds_first(best * 1.01)
-    monkeypatch.setattr("seqopt.judge._spaces.MOST", 3)
+    monkeypatch.setattr("seqopt.judge._proof.MOST", 3)
     with pytest.raises(TooManyPartsError):
         Proof(problem).bounds_first(best * 1.01)  # the whole arch is below that
 

@@ -15,7 +15,7 @@ from formulations.states.pareto_zones import FORMULATION as FRONT
 from formulations.states.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError, StepError
 from seqopt.graph._orders import among_orders
-from seqopt.graph.solution import Solution
+from seqopt.graph.formulation import Solution
 from seqopt.graph.states.states import build_states
 from seqopt.plan.front import FrontProblem, find_front
 from seqopt.plan.solve import solve

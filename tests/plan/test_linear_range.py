@@ -12,14 +12,13 @@ import pytest
 import seqopt
 from seqopt.engines.interface import linear_limit
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError, TimeUpError
-from seqopt.judge._step_checks import check_shape
-from seqopt.judge.schedules import judge_schedule
+from seqopt.judge._schedules import check_shape, judge_schedule
 from seqopt.plan._range import NONE_KEEPS, UNKNOWN, keeping
 from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
 from seqopt.plan.pose import states_of
-from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.criteria import WeightedSum, WorstRatio
+from seqopt.problem.filters import parse_limits
 from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits
 from seqopt.report.comparison import compare
 from seqopt.responses._grip_sets import Moved, most_moved

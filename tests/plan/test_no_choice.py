@@ -19,11 +19,10 @@ from seqopt.errors import (
     SolverError,
 )
 from seqopt.graph import formulation as registry
-from seqopt.graph.formulation import FormulationKind, find_formulation, formulations
+from seqopt.graph.formulation import FormulationKind, Solution, find_formulation, formulations
 from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.solution import Solution
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.responses import _blocks as batches

@@ -85,7 +85,7 @@ def test_a_formulation_that_changes_what_it_is_judged_by_is_refused(cheat):
 
 
 def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):
-    monkeypatch.setattr("seqopt.judge._arithmetic.proven", lambda *_: 99.0)
+    monkeypatch.setattr("seqopt.judge.arithmetic.proven", lambda *_: 99.0)
     with pytest.raises(SolverError, match="the bound 99 is above the path's 3"):
         seqopt.solve(small(), "overlap_dp")
 

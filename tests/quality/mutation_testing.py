@@ -53,21 +53,20 @@ RIGID = (
 CHOSEN = ("formulations/test_programs", "formulations/test_degenerate")
 STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
 PROOFS = {
-    "seqopt.judge._arithmetic": ("judge/test_certificate", "judge/test_budget_proof"),
-    "seqopt.plan._paths": ("judge/test_certificate", "formulations/test_conformance"),
+    "seqopt.judge.arithmetic": ("judge/test_certificate", "judge/test_budget_proof"),
+    "seqopt.plan._answers": ("judge/test_certificate", "formulations/test_conformance"),
     "seqopt.judge._budget_proof": ("judge/test_proofs", "judge/test_budget_proof"),
     "seqopt.judge.certificate": (
         *("judge/test_certificate", "plan/test_values", "judge/test_proofs"),
         "agreement/test_pair_search",
     ),
     "seqopt.plan._infeasible": ("judge/test_budget_proof", "plan/test_no_choice"),
-    "seqopt.graph.duality": ("graph/test_graph", "judge/test_free_proof"),
+    "seqopt.graph.paths": ("graph/test_graph", "judge/test_free_proof"),
     "seqopt.judge._proof": (
         *("judge/test_proofs", "judge/test_free_proof", "judge/test_free_judge"),
     ),
     "seqopt.judge._rule_moves": ("judge/test_free_proof", "judge/test_proofs"),
     "seqopt.graph._orders": ("formulations/test_order_search",),
-    "seqopt.judge._spaces": ("judge/test_proofs", "formulations/test_order_search"),
     "seqopt.plan.search._pair_search": ("agreement/test_pair_search",),
 }  # what says that nothing is better, or that there is nothing
 MODULES = {

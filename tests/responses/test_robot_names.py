@@ -16,7 +16,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import candidate_layers, steps_over
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
-from seqopt.problem._limit_words import parse_limits
+from seqopt.problem.filters import parse_limits
 from seqopt.problem.requirements import Limit, payload_limits
 from seqopt.report.comparison import compare
 from seqopt.responses._choices import CHOICE_RESPONSES

@@ -11,7 +11,7 @@ import seqopt
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.graph.formulation import formulations
 from seqopt.judge._proof import Proof
-from seqopt.judge.schedules import judge_schedule
+from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.front import find_front
 from seqopt.plan.pose import states_of
 from seqopt.problem.requirements import _carrying_excesses, overloads

@@ -17,7 +17,7 @@ from seqopt.graph._orders import among_orders, order_rules
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge._rule_moves import check_free
-from seqopt.judge.schedules import judge_schedule
+from seqopt.judge._schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
 from seqopt.responses import analyze_staged

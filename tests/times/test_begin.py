@@ -9,7 +9,7 @@ import pytest
 
 import seqopt
 from seqopt.errors import ProblemError, SceneError, SolverError
-from seqopt.judge.schedules import judge_schedule
+from seqopt.judge._schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.contact.curing import Curing, _find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
-from seqopt.judge.schedules import judge_schedule
+from seqopt.judge._schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules, with_robots

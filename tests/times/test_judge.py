@@ -12,7 +12,7 @@ from formulations.times._search import in_time
 from seqopt.errors import SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation
 from seqopt.graph.graph import LabelProof
-from seqopt.judge.schedules import judge_schedule
+from seqopt.judge._schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.sequence.rules import FreeRules, with_robots
 from tests.brute_force import ONES

@@ -20,11 +20,10 @@ from experiments.harness.runs import scene_named
 from seqopt import CRITERIA, build_network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SeqoptError
-from seqopt.graph.formulation import End, Formulation, Watch, find_formulation
+from seqopt.graph.formulation import End, Formulation, Solution, Watch, find_formulation
 from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.layers import Layers, candidate_layers, steps_over, travel
-from seqopt.graph.solution import Solution
 
 COUNTED = ("F_largest", "M_sup")
 COMPARED = ("equations-2-3", "weighted")

@@ -20,7 +20,7 @@ import numpy as np
 import seqopt
 from seqopt import Plan, Step
 from seqopt.graph.states.states import build_states
-from seqopt.judge.schedules import _state_columns
+from seqopt.judge._schedules import _state_columns
 from seqopt.sequence.rules import with_robots
 from seqopt.study.published import WORST_RATIO, published_plan
 

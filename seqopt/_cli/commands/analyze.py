@@ -24,8 +24,7 @@ from seqopt.engines.interface import Engine, Fields, Level, OpeningEngine, Want
 from seqopt.engines.registry import USUAL, provenance, recipe_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
-from seqopt.problem._limit_words import length_word
-from seqopt.problem.requirements import _prop_faults, overloads
+from seqopt.problem.requirements import _prop_faults, length_word, overloads
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances

@@ -11,7 +11,7 @@ from seqopt.errors import ProblemError
 from seqopt.exchange._content import UNITS, UPS, Given
 from seqopt.exchange.formats import readable
 from seqopt.exchange.imports import import_scene
-from seqopt.problem._limit_words import number_word
+from seqopt.problem.requirements import number_word
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import dump_scene
 

@@ -16,7 +16,7 @@ from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instance import Instance as Graph
 from seqopt.instances._files import WRITERS, save_instance
 from seqopt.instances.compiled import compile_instance
-from seqopt.judge._claims import first_stage
+from seqopt.judge.arithmetic import first_stage
 from seqopt.work._clock import Clock
 
 SAID = ("--quiet", "--json")

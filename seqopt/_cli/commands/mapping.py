@@ -12,7 +12,7 @@ from seqopt._showing import PAGE
 from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import ProblemError, SceneError, SeqoptError
 from seqopt.network.build import build_network
-from seqopt.problem._limit_words import number_word
+from seqopt.problem.requirements import number_word
 from seqopt.report._failures import Builds, failure_blocks, failure_page, usual_builds
 from seqopt.scene._checks import MOST_BRICKS
 from seqopt.scene._counts import scene_of_bricks

@@ -18,8 +18,8 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, engine_for, recipe_for
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
+from seqopt.graph.formulation import Solution
 from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts, ScenarioCosts, largest_of
-from seqopt.graph.solution import Solution
 from seqopt.graph.source import CANDIDATES, Source
 from seqopt.problem.criteria import Ranked, RankSum, _counts_every_step
 from seqopt.problem.problem import WORST_PEAK, Aim, RobustAim

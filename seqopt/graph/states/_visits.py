@@ -26,7 +26,7 @@ from seqopt.sequence.steps import Step, StepKind, check_sequence
 def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
     """Return the checked steps that lead from one state to the next.
 
-    ``states``: as of a `seqopt.graph.solution.Solution`. Raises
+    ``states``: as of a `seqopt.graph.formulation.Solution`. Raises
     `SolverError` if the states are none of this space; `StepError` if no single step leads from one
     state to the next.
     """

@@ -38,7 +38,7 @@ from seqopt.sequence.steps import Grips, Step
 from seqopt.stability.assessment import Stability
 
 if TYPE_CHECKING:
-    from seqopt.graph.solution import Solution
+    from seqopt.graph.formulation import Solution
     from seqopt.sequence._rule_space import FreeSpace
     from seqopt.sequence._schedule_space import ScheduleSpace
 

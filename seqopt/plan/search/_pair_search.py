@@ -31,14 +31,13 @@ import numpy as np
 from seqopt._interrupts import answered
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, TimeUpError
-from seqopt.graph.formulation import Formulation, FormulationKind, Run, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, Instance, _Target
 from seqopt.graph.layers.compiled import on_paths
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.layers import Layers, possible_after, windows
-from seqopt.graph.solution import Solution
-from seqopt.plan._paths import find_path
+from seqopt.plan._answers import find_path
 from seqopt.plan.search._window_search import (
     WindowSearch,
     alone_steps,

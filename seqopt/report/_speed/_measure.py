@@ -23,7 +23,7 @@ from seqopt.errors import ProblemError, SeqoptError, SolverError, TimeUpError
 from seqopt.graph.formulation import QUESTIONS, End, Formulation, FormulationKind, formulations
 from seqopt.graph.layers.costs import TINY
 from seqopt.graph.source import CANDIDATES
-from seqopt.judge.schedules import plan_values
+from seqopt.judge._schedules import plan_values
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import graph_kind, layers_of, questions_of, states_of, usual
 from seqopt.plan.solve import on_the_way, solve
