@@ -12,17 +12,21 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any
 
+VIEWS = {
+    "Shown.html": "seqopt.report._notebook:card",
+    "Scene.plot": "seqopt.report._pictures:scene_picture",
+    "Network.plot": "seqopt.report._pictures:network_picture",
+    "Schedule.gantt": "seqopt.report._gantt:gantt_picture",
+    "ShownBuild.plot": "seqopt.report._pictures:steps_picture",
+    "ShownBuild.gantt": "seqopt.report._gantt:gantt_picture",
+    "ShownBuild.animate": "seqopt.report._pictures:Film",
+    "ShownBuild.report": "seqopt.report._pages:build_page",
+    "Stability.plot": "seqopt.report.charts:tilt_picture",
+    "FailureMap.plot": "seqopt.report.charts:failure_figure",
+    "SpeedTable.plot": "seqopt.report._speed._chart:speed_chart",
+}
+"""By a class of values and a way, what shows them so; values of its subclasses, too."""
 OFFERS = {
-    "card": "seqopt.report._notebook",
-    "scene_picture": "seqopt.report._pictures",
-    "network_picture": "seqopt.report._pictures",
-    "steps_picture": "seqopt.report._pictures",
-    "tilt_picture": "seqopt.report.charts",
-    "gantt_picture": "seqopt.report._gantt",
-    "Film": "seqopt.report._film",
-    "build_page": "seqopt.report._pages",
-    "failure_figure": "seqopt.report.charts",
-    "speed_chart": "seqopt.report._speed._chart",
     "PostureRules": "seqopt.arms._judge",
     "check_postures": "seqopt.arms._judge",
     "compute_held_postures": "seqopt.arms._held",
@@ -62,6 +66,13 @@ def offered(name: str) -> Any:
         if error.name != ".".join(home.split(".")[:2]):
             raise
         return None
+
+
+def view(kind: type, way: str) -> Any:
+    """Return what shows values of a class in a way, loaded on first use."""
+    keys = (f"{each.__name__}.{way}" for each in kind.__mro__)
+    home, name = next(VIEWS[key] for key in keys if key in VIEWS).split(":")
+    return getattr(import_module(home), name)
 
 
 def registered(kind: type) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""Renderers of values, found by name, since values may not import them.
+"""What shows values, registered by their classes, since values may not import it.
 
-Pictures are drawn by `seqopt.report`, which imports scenes and plans. To avoid an import cycle
-these call `display`, which loads the function on demand.
+Pictures are drawn by `seqopt.report`, which imports scenes and plans. These ask `display` for what
+is registered for them.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from pathlib import Path
 from typing import Any
 
 from seqopt._files import write_text
-from seqopt._registry import offered
+from seqopt._registry import view
 from seqopt.errors import ExtraError
 
 PAGE = "report.html"  # the page in a folder that a command writes
 
 
-def display(name: str) -> Callable[..., Any]:
-    """Return the drawing function of a name, loaded on first use.
+def display(kind: type, way: str) -> Callable[..., Any]:
+    """Return what shows values of a class in a way, as ``plot``, loaded on first use.
 
     Raises `ExtraError` if it needs matplotlib and that is not installed.
     """
     try:
-        found: Callable[..., Any] = offered(name)
+        found: Callable[..., Any] = view(kind, way)
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] != "matplotlib":
             raise
@@ -42,7 +42,7 @@ class Shown:
 
     def _repr_html_(self) -> str:
         """Return the table and, where matplotlib is installed, the picture, as HTML."""
-        return str(display("card")(self))
+        return str(display(type(self), "html")(self))
 
 
 @dataclass(frozen=True, repr=False)

@@ -14,7 +14,7 @@ import pytest
 
 from experiments.harness.claim import claims
 from seqopt._cli.arguments import COMMANDS
-from seqopt._registry import OFFERS
+from seqopt._registry import OFFERS, VIEWS
 
 ROOT = Path(__file__).resolve().parent.parent
 pytestmark = pytest.mark.xdist_group("architecture")  # one worker reads every file, once
@@ -183,7 +183,7 @@ def test_rooms_are_looked_up_in_four_places_only():
     assert hidden_arrows(sources("seqopt")) == ["seqopt", *(f"seqopt.{each}" for each in known)]
     commands = {f"seqopt._cli.commands.{c.where.partition(':')[0]}" for c in COMMANDS.values()}
     assert commands <= set(graph("seqopt"))
-    assert {room(module) for module in OFFERS.values()} <= OUTER
+    assert {room(module) for module in (*OFFERS.values(), *VIEWS.values())} <= OUTER
 
 
 @pytest.mark.parametrize("name", ["'seqopt.report.draw'", "f'seqopt.{x}'", "name"])
@@ -427,3 +427,17 @@ def test_experiments_take_few_parameters():
             if isinstance(node, ast.FunctionDef):
                 own = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
                 assert len(own) <= PARAMETERS, f"{path}: {node.name}"
+
+
+def named_views(text: str) -> list[str]:
+    """Return the functions that show values and are named in a text."""
+    names = sorted(home.partition(":")[2] for home in VIEWS.values())
+    return [name for name in names if re.search(rf"\b{name}\b", text)]
+
+
+def test_values_name_nothing_that_shows_them():
+    assert named_views('display("gantt_picture")(self)') == ["gantt_picture"]
+    inner = [path for path in sources("seqopt") if room(dotted(path)) not in OUTER | TOP]
+    texts = {path.name: path.read_text("utf-8") for path in inner if path.stem != "_registry"}
+    words = {"Film", "card"}  # which mean other things, too
+    assert {n: found for n, t in texts.items() if (found := {*named_views(t)} - words)} == {}

@@ -31,8 +31,7 @@ from seqopt._cli.main import main
 from seqopt.arms._model import PosedArm, idle_arm
 from seqopt.errors import ExtraError, SceneError
 from seqopt.exchange.exports import read_folder
-from seqopt.report._film import Film
-from seqopt.report._pictures import VIEW, _build_box, _mark_grips
+from seqopt.report._pictures import VIEW, Film, _build_box, _mark_grips
 from seqopt.report._robots import Arms, Cell
 from seqopt.report._style import styled
 from seqopt.report.draw import _draw_robots, draw_bricks

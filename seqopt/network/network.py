@@ -349,7 +349,7 @@ class Network(Shown, FrozenValue):
 
     def plot(self, bricks: int | None = None) -> Figure:
         """Draw the network, or its part of the first ``bricks``, in build order."""
-        figure: Figure = display("network_picture")(self, bricks)
+        figure: Figure = display(Network, "plot")(self, bricks)
         return figure
 
     @cached_property

@@ -184,7 +184,7 @@ class ShownBuild(Shown):
         all. Result: a notebook shows it; ``savefig`` writes it to a file. Raises `ExtraError` if
         matplotlib is not installed (extra ``plot``); `StepError` if there is no such step.
         """
-        figure: Figure = display("steps_picture")(
+        figure: Figure = display(ShownBuild, "plot")(
             self.engine, self.steps, step, forces=forces, magnify=magnify
         )
         return figure
@@ -214,7 +214,7 @@ class ShownBuild(Shown):
         scene, responses = self.engine.network.scene, self.responses()
         timed = self._timed if seconds is None else seconds
         clock = (self._waits, self._begin) if timed else None
-        draw = display("gantt_picture")
+        draw = display(ShownBuild, "gantt")
         figure: Figure = draw(scene, self.steps, responses, (first, last), clock)
         return figure
 
@@ -225,7 +225,7 @@ class ShownBuild(Shown):
         notebook plays the film; ``save("build.gif")`` writes it to a file. Raises `ExtraError` if
         matplotlib is not installed (extra ``plot``).
         """
-        return display("Film")(self.engine, self.steps, forces, magnify, seconds)
+        return display(ShownBuild, "animate")(self.engine, self.steps, forces, magnify, seconds)
 
     def report(self, *others: ShownBuild) -> Page:
         """Return a page that shows the build step by step, in three dimensions.
@@ -237,7 +237,7 @@ class ShownBuild(Shown):
         shows it; ``save("report.html")`` writes it to a file, and ``open()`` shows it in a browser.
         Raises `ProblemError` if another plan is for another scene.
         """
-        page: Page = display("build_page")(self, *others)
+        page: Page = display(ShownBuild, "report")(self, *others)
         return page
 
 

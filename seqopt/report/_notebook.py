@@ -105,9 +105,7 @@ def _scene(value: Scene) -> _Card:
         "nodes that may be held": 2 * len(value.bricks) - len(value.blocked_nodes),
         **({"beside the weight": value.loading} if value.loading else {}),
     }
-    return _Card(
-        f"Scene {value.name}", rows, lambda: [display("scene_picture")(value, width=WIDTH)]
-    )
+    return _Card(f"Scene {value.name}", rows, lambda: [display(Scene, "plot")(value, width=WIDTH)])
 
 
 @facts.register
@@ -122,7 +120,7 @@ def _network(value: Network) -> _Card:
         "springs of supports": supports,
     }
     name = f"Network of {value.scene.name}"
-    return _Card(name, rows, lambda: [display("network_picture")(value, width=WIDTH)])
+    return _Card(name, rows, lambda: [display(Network, "plot")(value, width=WIDTH)])
 
 
 @facts.register
@@ -186,7 +184,7 @@ def _build(value: ShownBuild) -> _Card:
         rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
 
     def draw() -> list[Figure]:  # some steps and, of a small build, its first grips
-        paint, count = display("steps_picture"), len(value.steps)
+        paint, count = display(ShownBuild, "plot"), len(value.steps)
         from seqopt.report._pictures import spread_steps  # noqa: PLC0415  # matplotlib is an extra
 
         if not small:
@@ -228,4 +226,4 @@ def _stability(value: Stability) -> _Card:
     title = f"Stability: {value.verdict.value}"
     if not np.isfinite(value.tilt):
         return _Card(title, rows)
-    return _Card(title, rows, lambda: [display("tilt_picture")(value)])
+    return _Card(title, rows, lambda: [display(Stability, "plot")(value)])

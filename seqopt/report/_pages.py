@@ -193,7 +193,7 @@ def _speed_parts(speed: SpeedTable) -> Iterator[tuple[str, pd.DataFrame | _Drawn
     """Yield speed against accuracy as a picture, where matplotlib is installed, and a table."""
     title = f"Speed against accuracy, errors beside {speed.reference}"
     with suppress(ExtraError):
-        draw = display("speed_chart")
+        draw = display(SpeedTable, "plot")
         from seqopt.report._style import WIDTH, picture_files  # noqa: PLC0415  # an extra
 
         wide, narrow = (

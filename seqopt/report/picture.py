@@ -50,12 +50,12 @@ class Picture(Part):
 
 
 def _steps(engine: Engine, steps: Sequence[Step], table: pd.DataFrame) -> Figure:  # noqa: ARG001
-    figure: Figure = display("steps_picture")(engine, steps)
+    figure: Figure = display(ShownBuild, "plot")(engine, steps)
     return figure
 
 
 def _grips(engine: Engine, steps: Sequence[Step], table: pd.DataFrame) -> Figure:
-    figure: Figure = display("gantt_picture")(engine.network.scene, steps, table)
+    figure: Figure = display(ShownBuild, "gantt")(engine.network.scene, steps, table)
     return figure
 
 

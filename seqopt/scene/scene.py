@@ -438,7 +438,7 @@ class Scene(Shown):
 
     def plot(self, bricks: int | None = None) -> Figure:
         """Draw the scene, or its first ``bricks`` in build order and the others pale."""
-        figure: Figure = display("scene_picture")(self, bricks)
+        figure: Figure = display(Scene, "plot")(self, bricks)
         return figure
 
     @property

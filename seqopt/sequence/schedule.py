@@ -256,7 +256,7 @@ class Schedule(Shown):
 
     def gantt(self, first: int | None = None, last: int | None = None) -> Figure:
         """Draw the grips over some steps, a lane per robot; those to be chosen are hatched."""
-        figure: Figure = display("gantt_picture")(self.scene, self.steps, None, (first, last))
+        figure: Figure = display(Schedule, "gantt")(self.scene, self.steps, None, (first, last))
         return figure
 
     @cached_property

@@ -83,7 +83,7 @@ class FailureMap:
         Result: a notebook shows it; ``savefig`` writes it to a file. Raises `ExtraError` if
         matplotlib is not installed (extra ``plot``).
         """
-        figure: Figure = display("failure_figure")(self)
+        figure: Figure = display(FailureMap, "plot")(self)
         return figure
 
 

@@ -23,8 +23,7 @@ from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_json
 from seqopt.exchange.exports import export_plan, read_folder
-from seqopt.report._film import Film
-from seqopt.report._pictures import VIEW, steps_picture
+from seqopt.report._pictures import VIEW, Film, steps_picture
 from seqopt.report._robots import _known_arms
 from seqopt.report.page import Build, _tasks
 from tests.arms.scenes import TOOL, beside, two_arms

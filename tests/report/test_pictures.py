@@ -10,8 +10,7 @@ from PIL import Image
 from seqopt._cli.main import main
 from seqopt.errors import FileError, StepError
 from seqopt.plan.build import GivenSequence
-from seqopt.report._film import Film
-from seqopt.report._pictures import spread_steps
+from seqopt.report._pictures import Film, spread_steps
 from seqopt.sequence.two_robots import sequential
 
 

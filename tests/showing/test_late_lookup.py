@@ -10,10 +10,12 @@ from importlib import import_module
 import pytest
 
 import seqopt
-from seqopt._registry import OFFERS
+from seqopt._registry import OFFERS, VIEWS
 from seqopt._showing import Page, display
 from seqopt.errors import ExtraError
+from seqopt.plan.plan import Plan
 from seqopt.problem.amounts import Amount
+from seqopt.report._gantt import gantt_picture
 
 WITHOUT = """
 import sys
@@ -36,7 +38,10 @@ def test_what_outer_rooms_offer_is_where_it_is_said_to_be():
     for name, module in OFFERS.items():
         found = getattr(import_module(module), name)
         assert callable(found) or isinstance(found, Amount), name
-        assert display(name) is getattr(import_module(module), name)
+    for key, home in VIEWS.items():
+        module, name = home.split(":")
+        assert callable(getattr(import_module(module), name)), key
+    assert display(Plan, "gantt") is gantt_picture  # as of all that are shown as builds
 
 
 def test_without_matplotlib_there_are_tables_and_one_line_that_says_what_to_install():
@@ -52,9 +57,9 @@ def test_without_matplotlib_there_are_tables_and_one_line_that_says_what_to_inst
 
 
 def test_another_module_that_is_missing_is_not_taken_for_matplotlib(monkeypatch):
-    monkeypatch.setitem(OFFERS, "nothing", "seqopt.report.nothing")
+    monkeypatch.setitem(VIEWS, "Plan.nothing", "seqopt.report.nothing:any")
     with pytest.raises(ModuleNotFoundError, match=r"seqopt\.report\.nothing") as caught:
-        display("nothing")
+        display(Plan, "nothing")
     assert not isinstance(caught.value, ExtraError)
 
 

@@ -11,6 +11,7 @@ from seqopt._cli.answer import Answer
 from seqopt._files import require_folder, write_folder, write_text
 from seqopt._showing import PAGE, display
 from seqopt.network.build import build_network
+from seqopt.plan.build import ShownBuild
 from seqopt.report._pages import folder_builds, folder_page
 from seqopt.stability._builds import BuildProver
 
@@ -57,7 +58,7 @@ class ReportWords(Report, options.Built):
 def run(asked: ReportWords) -> Answer:
     """Write the page of the plans in a folder."""
     film, figures = (None if p is None else Path(p) for p in (asked.film, asked.figures))
-    draws: Any = None if film is None else display("Film")
+    draws: Any = None if film is None else display(ShownBuild, "animate")
     if film is not None:
         draws.require(film)
     folder, taken = inputs.plan_folder(asked, asked.folder)

@@ -77,7 +77,7 @@ class SpeedTable:
 
     def plot(self) -> Figure:
         """Return the chart of speed against accuracy (extra ``plot``)."""
-        found: Figure = display("speed_chart")(self)
+        found: Figure = display(SpeedTable, "plot")(self)
         return found
 
     @cached_property
