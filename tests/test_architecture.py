@@ -431,7 +431,7 @@ def test_experiments_take_few_parameters():
 
 def named_views(text: str) -> list[str]:
     """Return the functions that show values and are named in a text."""
-    names = sorted(home.partition(":")[2] for home in VIEWS.values())
+    names = sorted({home.partition(":")[2] for home in VIEWS.values()})
     return [name for name in names if re.search(rf"\b{name}\b", text)]
 
 
