@@ -45,8 +45,8 @@ from seqopt._cli.main import main
 from seqopt.contact.faces import step_assembly
 from seqopt.errors import SceneWarning
 from seqopt.exchange._content import Given
+from seqopt.exchange._formats import sniffed, writable
 from seqopt.exchange.exports import read_folder
-from seqopt.exchange.formats import sniffed, writable
 from seqopt.exchange.imports import import_scene, read_content
 from seqopt.report._style import styled
 from seqopt.report.draw import View, draw_bricks

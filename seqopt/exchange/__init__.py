@@ -29,9 +29,9 @@ from seqopt._later import later
 
 if TYPE_CHECKING:
     from seqopt.exchange._content import Content, FileBlock, Given
+    from seqopt.exchange._formats import Format
     from seqopt.exchange._tasks import plan_tasks
     from seqopt.exchange.exports import export_plan
-    from seqopt.exchange.formats import Format
     from seqopt.exchange.imports import import_scene
 
 __all__ = ["Content", "FileBlock", "Format", "Given", "export_plan", "import_scene", "plan_tasks"]
@@ -40,7 +40,7 @@ __getattr__, __dir__ = later(
     {
         "Content": "_content",
         "FileBlock": "_content",
-        "Format": "formats",
+        "Format": "_formats",
         "Given": "_content",
         "export_plan": "exports",
         "import_scene": "imports",

@@ -14,7 +14,7 @@ import numpy as np
 from seqopt.errors import SceneError
 from seqopt.exchange._content import GROUND, MOST_CORNERS, UNITS, UPS, Content, FileBlock, Given
 from seqopt.exchange._meshes import Repaired, repair_shape
-from seqopt.exchange.contacts import Contacts, _find_contacts, _widest_gap, face_ground, face_joint
+from seqopt.exchange.contacts import _Contacts, _find_contacts, _widest_gap, face_ground, face_joint
 from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
 from seqopt.scene._overlaps import find_overlaps
 from seqopt.scene.boxes import block_brick
@@ -190,7 +190,7 @@ def block_numbers(keys: Sequence[str]) -> list[int]:
 
 
 def _springs(
-    touching: Contacts, bricks: Mapping[int, Brick], law: JointLaw
+    touching: _Contacts, bricks: Mapping[int, Brick], law: JointLaw
 ) -> tuple[tuple[Joint, ...], tuple[Ground, ...]]:
     made: list[Joint | Ground] = []
     for (a, b), face in touching.faces:
@@ -209,7 +209,7 @@ def _springs(
 
 
 def _order(
-    touching: Contacts,
+    touching: _Contacts,
     content: Content,
     bricks: Mapping[int, Brick],
     sunk: Collection[int],

@@ -295,7 +295,7 @@ _Held = tuple[tuple[int, int], _FlatFace]
 
 
 @dataclass(frozen=True)
-class Contacts:
+class _Contacts:
     """Where blocks touch: faces whose normals point into the second.
 
     Places are those of the file; the ground is -1 and comes first.
@@ -307,7 +307,7 @@ class Contacts:
 
 def _find_contacts(
     content: Content, given: Given, blocks: Sequence[Repaired], bricks: Mapping[int, Brick]
-) -> Contacts:
+) -> _Contacts:
     """Return where blocks touch each other and the ground, which those not built belong to."""
     _require_polygons()
     solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]
@@ -324,7 +324,7 @@ def _find_contacts(
     if len(bricks) == len(solids):
         faces += _standing(bricks, facets, gap)
         said.append("no supports are named: blocks with a face at the lowest level stand there")
-    return Contacts(tuple(faces), tuple(said))
+    return _Contacts(tuple(faces), tuple(said))
 
 
 def _widest_gap(given: Given, bricks: Mapping[int, Brick]) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from seqopt.errors import FileError, StepError
-from seqopt.exchange.formats import formats, writable
+from seqopt.exchange._formats import formats, writable
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene

@@ -11,9 +11,9 @@ from seqopt._files import read_table, read_text
 from seqopt.errors import FileError, SceneError, SceneWarning, StepError
 from seqopt.exchange._building import build_scene
 from seqopt.exchange._content import MOST_BLOCKS, Content, FileBlock, Given
+from seqopt.exchange._formats import JSON, of_ending, read_file
 from seqopt.exchange._mesh_files import counted
 from seqopt.exchange._meshes import without_repeats
-from seqopt.exchange.formats import JSON, of_ending, read_file
 from seqopt.scene._checks import cut, printable, short
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import warn_of

@@ -17,8 +17,8 @@ chain 9: 9 bricks, 3 robots
 """
 
 from seqopt.report._compared import format_comparison
+from seqopt.report._picture import Picture, picture
 from seqopt.report.comparison import Comparison, compare, largest, method_tables
-from seqopt.report.picture import Picture, picture
 
 __all__ = [
     "Comparison",

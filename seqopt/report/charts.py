@@ -16,6 +16,7 @@ from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 from seqopt.engines.interface import Engine
 from seqopt.plan.front import Front
 from seqopt.report._failures import AXIS_WORDS
+from seqopt.report._picture import pictures
 from seqopt.report._style import (
     BLUE,
     GRAY,
@@ -32,7 +33,6 @@ from seqopt.report._style import (
 )
 from seqopt.report.comparison import _in_shown_unit, _worst_of
 from seqopt.report.page import Build
-from seqopt.report.picture import pictures
 from seqopt.report.text import in_words, typed
 from seqopt.stability.assessment import Stability, Verdict
 from seqopt.stability.failure_map import FailureMap
@@ -72,7 +72,7 @@ VERDICTS = {
 def responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the largest responses at every number of bricks; equal builds share a line."""
     tables = {}
-    for first, names in merged(builds).items():
+    for first, names in _merged(builds).items():
         called = typed(first) if len(names) == 1 else f"the same plan: {', '.join(names)}"
         numbers = builds[first].select_dtypes("number")
         tables[called] = numbers.groupby("bricks").max().reset_index()
@@ -111,7 +111,7 @@ def draw_responses(
     axes[0].legend(frameon=False, ncols=min(len(tables), 4), fontsize=SMALL)
 
 
-def merged(tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[str, ...]]:
+def _merged(tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[str, ...]]:
     """Return the names of tables by the first with the same numbers: a line would hide another."""
     out: dict[str, tuple[str, ...]] = {}
     numbers = {name: table.select_dtypes("number") for name, table in tables.items()}

@@ -80,7 +80,7 @@ def _frame(axes: Axes) -> None:
     axes.set_axis_off()
 
 
-def aside(marks: Floats, segments: Sequence[Floats]) -> list[tuple[float, float]]:
+def _aside(marks: Floats, segments: Sequence[Floats]) -> list[tuple[float, float]]:
     """Return how far beside its mark (n, 2) every label stands, to the right and up, in points.
 
     Each takes the direction in which the nearest line, mark or label before it is farthest.
@@ -202,7 +202,7 @@ def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
         axes.scatter(x, y, area, zorder=3, **mark)
     if numbers:
         inner = np.flatnonzero(kind == PartKind.INNER.value)
-        for i, shift in zip(inner, aside(seen[inner], segments), strict=True):
+        for i, shift in zip(inner, _aside(seen[inner], segments), strict=True):
             _write(axes, str(network.node_name[i]), seen[i], shift, ha="center", zorder=4)
     _frame(axes)
 

@@ -16,9 +16,9 @@ from experiments.harness.scenes import running_bond
 from seqopt.errors import SeqoptError
 from seqopt.exchange._building import build_scene
 from seqopt.exchange._content import Given
+from seqopt.exchange._formats import DOCUMENTS as READERS
+from seqopt.exchange._formats import sniffed
 from seqopt.exchange.exports import export_plan
-from seqopt.exchange.formats import DOCUMENTS as READERS
-from seqopt.exchange.formats import sniffed
 from seqopt.network.build import build_network
 from seqopt.sequence.two_robots import METHODS
 from tests.documents import DOCUMENTS as OTHERS

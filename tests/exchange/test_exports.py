@@ -11,9 +11,9 @@ import pytest
 from seqopt._files import write_text
 from seqopt.errors import FileError, SceneError, StepError
 from seqopt.exchange._content import Given
+from seqopt.exchange._formats import writable
 from seqopt.exchange._tables import BlockState, step_states
 from seqopt.exchange.exports import export_plan, read_folder
-from seqopt.exchange.formats import writable
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import save_scene

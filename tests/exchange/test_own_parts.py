@@ -11,7 +11,7 @@ from seqopt._cli.main import main
 from seqopt._registry import ADDED
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.exchange import Content, FileBlock, Format, Given, export_plan, import_scene
-from seqopt.exchange.formats import readable, writable
+from seqopt.exchange._formats import readable, writable
 from seqopt.network.build import build_network
 from seqopt.problem import Amount
 from seqopt.report import Picture, picture

@@ -8,8 +8,8 @@ import pytest
 
 from experiments.harness.scenes import running_bond
 from seqopt.exchange._content import Given
+from seqopt.exchange._formats import formats, readable, writable
 from seqopt.exchange.exports import export_plan
-from seqopt.exchange.formats import formats, readable, writable
 from seqopt.exchange.imports import import_scene
 from seqopt.scene.boxes import as_vectors, block_brick, vertices_of
 from seqopt.scene.shape import Polyhedron

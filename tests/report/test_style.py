@@ -13,8 +13,8 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from seqopt.report._style import COLORS, look, looks, new_figure, picture_files, plain, styled
-from seqopt.report.charts import front_figure, merged, responses_figure
-from seqopt.report.draw import POINTS, aside
+from seqopt.report.charts import _merged, front_figure, responses_figure
+from seqopt.report.draw import POINTS, _aside
 from seqopt.report.text import WORDS, in_words, typed
 from tests.pictures import flaws
 
@@ -102,7 +102,7 @@ def test_logarithmic_axes_have_plain_numbers(limits, words):
 def test_numbers_stand_beside_lines_and_apart():
     marks = np.array([[0.0, y] for y in np.linspace(0, 10, 12)])
     line = np.array([[0.0, 0.0], [0.0, 10.0]])
-    shifts = np.array(aside(marks, [line]))
+    shifts = np.array(_aside(marks, [line]))
     assert np.hypot(*shifts.T) == pytest.approx(POINTS)
     assert (np.abs(shifts[1:-1, 0]) > POINTS / 2).all()  # aside of a line that goes up
 
@@ -117,7 +117,7 @@ def test_words_say_what_is_typed_where_it_differs():
 def test_equal_tables_are_one_line():
     table = pd.DataFrame({"bricks": [1, 1, 2], "M": [1.0, 3.0, 2.0], "phase": list("abc")})
     other = table.assign(M=[1.0, 3.0, 2.5])
-    assert merged({"a": table, "b": other, "c": table.copy()}) == {"a": ("a", "c"), "b": ("b",)}
+    assert _merged({"a": table, "b": other, "c": table.copy()}) == {"a": ("a", "c"), "b": ("b",)}
 
 
 def test_the_worst_step_of_every_number_of_bricks_is_drawn():

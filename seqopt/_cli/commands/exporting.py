@@ -9,8 +9,8 @@ from seqopt._cli import inputs, options
 from seqopt._cli.answer import Answer
 from seqopt._files import require_apart, write_text
 from seqopt.arms._kept import arm_faults
+from seqopt.exchange._formats import formats, writable
 from seqopt.exchange.exports import export_plan, read_folder
-from seqopt.exchange.formats import formats, writable
 
 
 class Export(options.Postures, options.Written):

@@ -9,7 +9,7 @@ from seqopt._cli.answer import Answer
 from seqopt._files import require_apart, write_text
 from seqopt.errors import ProblemError
 from seqopt.exchange._content import UNITS, UPS, Given
-from seqopt.exchange.formats import readable
+from seqopt.exchange._formats import readable
 from seqopt.exchange.imports import import_scene
 from seqopt.problem.requirements import number_word
 from seqopt.scene.library.common import JointLaw
