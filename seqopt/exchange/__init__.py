@@ -13,14 +13,7 @@ needed:
 >>> print(scene.provenance.splitlines()[1])
 a table of boxes: no faces
 
-Plans are written as tables, JSON, tasks of robots, and for COMPAS:
-
->>> import seqopt
->>> from seqopt.exchange import export_plan
->>> scene = seqopt.load_scene("arch25")
->>> steps = seqopt.sequential(seqopt.build_network(scene))
->>> export_plan(scene, steps, "csv").splitlines()[0][:40]
-'step,type,bricks,placed,rob1_node,rob1_b'
+Plans are written as tables, JSON, tasks of robots, and for COMPAS (`export_plan`).
 """
 
 from typing import TYPE_CHECKING

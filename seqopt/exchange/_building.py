@@ -37,8 +37,17 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
     """
     try:
         said = list(content.said)
-        _check_size(content)
-        content = content.placed(_unit(content, given, said), _up(content, given, said))
+        corners = sum(len(face) for block in content.blocks for face in block.faces)
+        if not content.blocks:
+            raise SceneError("it has no blocks; give an assembly with some")
+        if corners > MOST_CORNERS:
+            raise SceneError(f"its blocks have {corners} corners; {MOST_CORNERS} is the most")
+        unit = _unit(content, given, said)
+        up = content.up if given.up is None else one_of("up", given.up, UPS)
+        if up == "y":
+            origin = "as given" if given.up else "as the format has it"
+            said.append(f"y is up in the file, {origin}: (x, y, z) is (x, -z, y) here")
+        content = content.placed(unit, up)
         supports = _supports(content, given, said)
         blocks = [repair_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
         total = sum((block.mended for block in blocks), Counter[str]())
@@ -69,14 +78,6 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
     )
 
 
-def _check_size(content: Content) -> None:
-    corners = sum(len(face) for block in content.blocks for face in block.faces)
-    if not content.blocks:
-        raise SceneError("it has no blocks; give an assembly with some")
-    if corners > MOST_CORNERS:
-        raise SceneError(f"its blocks have {corners} corners; {MOST_CORNERS} is the most")
-
-
 def _unit(content: Content, given: Given, said: list[str]) -> float:
     """Return the file's unit of length in m."""
     known = content.unit
@@ -99,15 +100,6 @@ def _unit(content: Content, given: Given, said: list[str]) -> float:
     elif unit != known:
         raise SceneError(f"its lengths are known in {known}; give no other unit")
     return UNITS[unit]
-
-
-def _up(content: Content, given: Given, said: list[str]) -> str:
-    """Return the axis of the file that points up."""
-    up = content.up if given.up is None else one_of("up", given.up, UPS)
-    if up == "y":
-        origin = "as given" if given.up else "as the format has it"
-        said.append(f"y is up in the file, {origin}: (x, y, z) is (x, -z, y) here")
-    return up
 
 
 def _supports(content: Content, given: Given, said: list[str]) -> set[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -21,16 +21,9 @@ from seqopt.exchange._compas_models import (
 )
 from seqopt.exchange._compas_shapes import kind, payload
 from seqopt.exchange._content import Content, assembly_json
-from seqopt.exchange._mesh_files import (
-    read_3dm,
-    read_mesh,
-    read_obj,
-    read_objects,
-    read_off,
-    write_obj,
-)
+from seqopt.exchange._mesh_files import read_3dm, read_glb, read_mesh, read_obj, write_obj
 from seqopt.exchange._tables import plan_csv, plan_json
-from seqopt.exchange._tasks import tasks_csv, tasks_in_postures, tasks_json
+from seqopt.exchange._tasks import Task, tasks_csv, tasks_in_postures, tasks_json
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
@@ -46,6 +39,7 @@ _INSTEAD = {  # what to save in place of what is not read
     ".obj",
     "skp blend fbx dae max c4d usd usdz": f"export {_MESHED}",
     "gltf": "export .glb, which is one file",
+    "off 3mf": f"export {_MESHED}",
 }
 _REFUSED = {  # kinds of COMPAS, and what to save in their place
     "scene": "save its meshes as a list (compas.json_dump)",
@@ -135,12 +129,13 @@ def sniffed(document: Any, source: str) -> str:
     raise SceneError(f"{source}: no assembly that is known; give one of {', '.join(readable())}")
 
 
-def _tasks_text(scene: Scene, steps: Sequence[Step], distance: float | None = None) -> str:
-    return tasks_json(scene, tasks_in_postures(scene, steps, distance))
-
-
-def _tasks_table(scene: Scene, steps: Sequence[Step], distance: float | None = None) -> str:
-    return tasks_csv(tasks_in_postures(scene, steps, distance))
+def _tasks(
+    scene: Scene,
+    steps: Sequence[Step],
+    distance: float | None = None,
+    text: Callable[[Scene, Iterable[Task]], str] = tasks_json,
+) -> str:
+    return text(scene, tasks_in_postures(scene, steps, distance))
 
 
 JSON = Format("", ("json",), partial(_document, None))  # of COMPAS, whichever it is
@@ -149,8 +144,12 @@ BUILT_IN = {
     for each in (
         Format("csv", write=plan_csv),
         Format("json", write=plan_json),
-        Format("tasks", write=_tasks_text, takes=("distance",)),
-        Format("tasks_csv", write=_tasks_table, takes=("distance",)),
+        Format("tasks", write=_tasks, takes=("distance",)),
+        Format(
+            "tasks_csv",
+            write=partial(_tasks, text=lambda _, tasks: tasks_csv(tasks)),
+            takes=("distance",),
+        ),
         Format(
             "compas_assembly",
             read=partial(_document, "compas_assembly"),
@@ -173,13 +172,10 @@ BUILT_IN = {
             lambda scene, _: write_obj(scene),
             lost=("densities", "the order", *_NEVER, "steps"),
         ),
-        Format("off", ("off",), partial(_of_text, read_off)),
         Format("3dm", ("3dm",), partial(_of_bytes, read_3dm)),
-        *(
-            Format(n, (n,), partial(_of_bytes, partial(read_objects, form=n)))
-            for n in ("glb", "3mf")
-        ),
-        *(Format(n, (n,), partial(_of_bytes, partial(read_mesh, form=n))) for n in ("ply", "stl")),
+        Format("glb", ("glb",), partial(_of_bytes, read_glb)),
+        Format("ply", ("ply",), partial(_of_bytes, partial(read_mesh, form="ply"))),
+        Format("stl", ("stl",), partial(_of_bytes, partial(read_mesh, form="stl"))),
     )
 }
 

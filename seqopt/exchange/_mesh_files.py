@@ -1,9 +1,9 @@
-"""Files of meshes: OBJ and OFF with their polygons; PLY, STL, GLB and 3MF.
+"""Files of meshes: OBJ with its polygons; PLY, STL and GLB; Rhino.
 
-trimesh reads the last four. Of an OBJ and an OFF it keeps triangles alone, cut as fans, which a
-face that is not convex does not survive, and of an OBJ it joins all objects; so these have a few
-lines of their own here. rhino3dm does not mesh: polysurfaces with flat faces are read face by face,
-for others the file must hold the mesh with which Rhino last rendered it.
+trimesh reads PLY, STL and GLB. Of an OBJ it keeps triangles alone, cut as fans, which a face that
+is not convex does not survive, and it joins all objects; so this has a few lines of its own here.
+rhino3dm does not mesh: polysurfaces with flat faces are read face by face, for others the file must
+hold the mesh with which Rhino last rendered it.
 """
 
 from __future__ import annotations
@@ -17,11 +17,9 @@ from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
-from zipfile import ZipFile
 
 import numpy as np
 
-from seqopt._archives import Archive
 from seqopt._files import parse_json
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import FileError, SceneError
@@ -36,7 +34,6 @@ _NEEDS = {  # packages and the extra that brings them
     "ply": ("trimesh", "blocks"),
     "stl": ("trimesh", "blocks"),
     "glb": ("trimesh", "blocks"),
-    "3mf": ("trimesh lxml", "cad"),
     "3dm": ("rhino3dm", "cad"),
 }
 _UNIT_NAMES = {"millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
@@ -50,14 +47,11 @@ def known_unit(name: str, source: str) -> str:
     return _UNIT_NAMES[plain]
 
 
-def require_readers(form: str, source: str) -> None:
+def require_reader(form: str, source: str) -> None:
     """Raise if what reads a format is not installed."""
-    packages, extra = _NEEDS[form]
-    missing = [name for name in packages.split() if find_spec(name) is None]
-    if missing:
-        raise FileError(
-            f"{source}: reading {form} needs {missing[0]}; pip install 'seqopt[{extra}]'"
-        )
+    package, extra = _NEEDS[form]
+    if find_spec(package) is None:
+        raise FileError(f"{source}: reading {form} needs {package}; pip install 'seqopt[{extra}]'")
 
 
 def read_obj(text: str, source: str) -> Content:
@@ -95,40 +89,6 @@ def write_obj(scene: Scene) -> str:
     return "\n".join(lines) + "\n"
 
 
-def read_off(text: str, source: str) -> Content:
-    """Return the blocks of an OFF file."""
-    rows = [words for line in text.splitlines() if (words := line.split("#", 1)[0].split())]
-    if not rows or rows[0][0] != "OFF":
-        raise SceneError(f"{source}: no off file that can be read; its first word is OFF")
-    rows[0] = rows[0][1:]
-    counts, *rows = [words for words in rows if words] or [[]]
-    try:
-        corners, sides = (int(word) for word in counts[:2])
-    except ValueError:
-        raise SceneError(f"{source}: its counts are {short(' '.join(counts))}") from None
-    if not 0 <= corners <= corners + max(sides, 0) <= len(rows):
-        raise SceneError(f"{source}: {len(rows)} lines where {corners} + {sides} are announced")
-    points = [_numbers(f"{source}, vertex {i}", row[:3]) for i, row in enumerate(rows[:corners])]
-    faces = [
-        _polygon(f"{source}, face {i}", row, corners)
-        for i, row in enumerate(rows[corners : corners + sides])
-    ]
-    return mesh_content(np.array(points, dtype=float).reshape(-1, 3), faces, source)
-
-
-def _polygon(where: str, row: list[str], count: int) -> list[int]:
-    """Return the places of the vertices of a face: how many, these, and perhaps a color."""
-    try:
-        size, *named = (int(word) for word in row[: 1 + int(row[0])])
-    except ValueError:
-        size, named = 0, []
-    if not 3 <= size == len(named) or not 0 <= min(named) <= max(named) < count:
-        raise SceneError(
-            f"{where} is {short(' '.join(row))}; give three vertices of {count} or more"
-        )
-    return named
-
-
 def read_mesh(content: bytes, source: str, form: str) -> Content:
     """Return the blocks of a ``ply`` or ``stl`` file, for which trimesh is needed."""
     vertices, faces = _arrays(_loaded(content, source, form, "load_mesh"), source)
@@ -138,16 +98,13 @@ def read_mesh(content: bytes, source: str, form: str) -> Content:
     return mesh_content(vertices, faces.tolist(), source)
 
 
-def read_objects(content: bytes, source: str, form: str) -> Content:
-    """Return the blocks of a ``glb`` or ``3mf`` file, named as its nodes, each where it stands.
+def read_glb(content: bytes, source: str) -> Content:
+    """Return the blocks of a ``glb`` file, named as its nodes, each where it stands.
 
-    A GLB is in m, and y is up there, by the definition of glTF; a 3MF says its unit.
+    It is in m, and y is up there, by the definition of glTF.
     """
-    found = _loaded(content, source, form, "load_scene")
-    said = object_content(_nodes(found, source), source)
-    if form == "glb":
-        return replace(said, usual_unit="m", up="y")
-    return replace(said, unit=known_unit(str(found.units), source))
+    found = _loaded(content, source, "glb", "load_scene")
+    return replace(object_content(_nodes(found, source), source), usual_unit="m", up="y")
 
 
 def _nodes(scene: Any, source: str) -> Iterator[FileBlock]:
@@ -180,11 +137,11 @@ def _arrays(mesh: Any, source: str) -> tuple[Floats, Ints]:
 
 def _loaded(content: bytes, source: str, form: str, loader: str) -> Any:
     """Return what trimesh makes of bytes; what it logs is for those who asked for logs."""
-    require_readers(form, source)
+    require_reader(form, source)
     logging.getLogger("trimesh").addHandler(_UNASKED)
     joined = {"merge_primitives": True} if form == "glb" else {}  # of several materials
     try:
-        content = _BOUNDED[form](content) if form in _BOUNDED else content
+        content = _counted_glb(content) if form == "glb" else content
         load = getattr(import_module("trimesh"), loader)
         return load(io.BytesIO(content), file_type=form, process=False, **joined)
     except MemoryError:
@@ -192,15 +149,6 @@ def _loaded(content: bytes, source: str, form: str, loader: str) -> Any:
     except Exception as error:  # whatever a reader of broken bytes may raise
         said = short(str(error) or type(error).__name__, 80)
         raise SceneError(f"{source}: no {form} file that can be read: {said}") from error
-
-
-def _unpacked(content: bytes) -> bytes:
-    """Return an archive with the same parts, none of them packed: it takes no more when read."""
-    archive, out = Archive(content, "its archive"), io.BytesIO()
-    with ZipFile(out, "w") as plain:
-        for name in archive.names:
-            plain.writestr(name, archive.read(name))
-    return out.getvalue()
 
 
 def _counted_glb(content: bytes) -> bytes:
@@ -217,9 +165,6 @@ def _counted_glb(content: bytes) -> bytes:
     if not sum(numbers) <= len(content):
         raise FileError(f"it counts {sum(numbers):g} points or corners, and has none")
     return content
-
-
-_BOUNDED = {"3mf": _unpacked, "glb": _counted_glb}
 
 
 def _numbers(where: str, words: list[str]) -> list[float]:
@@ -251,7 +196,7 @@ _Solid = tuple[Floats, list[Sequence[int]]]
 
 def read_3dm(content: bytes, source: str) -> Content:
     """Return the closed objects that are visible in a file of Rhino."""
-    require_readers("3dm", source)
+    require_reader("3dm", source)
     file = import_module("rhino3dm").File3dm.FromByteArray(content)
     if file is None:
         raise SceneError(f"{source}: no 3dm file that can be read")

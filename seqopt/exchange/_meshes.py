@@ -234,8 +234,15 @@ def repair_shape(block: FileBlock, *, may_be_open: bool = False) -> Repaired:
     size = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
     times = Counter(frozenset(edge) for face in faces for edge in edges(face))
     if any(count != 2 for count in times.values()):
-        faces = _welded(points, faces, mended)
-    faces = [face for face in _unrepeated(faces, mended) if len(face) > 2]
+        place = _united(points)
+        kept, first = np.unique(place, return_index=True)
+        if united := len(points) - len(kept):
+            mended[_WELDED] += united
+        faces = [_plain(tuple(first[place[[*face]]].tolist())) for face in faces]
+    single = {frozenset(face): face for face in reversed(faces)}  # of those with the same vertices
+    if len(single) < len(faces):
+        mended[_TWICE] += len(faces) - len(single)
+    faces = [face for face in faces if single.get(frozenset(face)) is face and len(face) > 2]
     faces = _agreeing(points, faces, mended)
     facets = Surface(points, tuple(face for face in faces if bend(points[list(face)]) < np.inf))
     faces = [part for face in faces for part in _flat(points, face, size, mended)]
@@ -265,23 +272,6 @@ def _remedy(key: str, faces: Sequence[_Loop]) -> str:
 def _plain(face: Sequence[int]) -> _Loop:
     """Return a face without vertices that follow themselves."""
     return tuple(v for v, before in zip(face, (*face[-1:], *face[:-1]), strict=True) if v != before)
-
-
-def _unrepeated(faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
-    """Return faces of which no two have the same vertices."""
-    found = {frozenset(face): face for face in reversed(faces)}
-    if len(found) < len(faces):
-        mended[_TWICE] += len(faces) - len(found)
-    return [face for face in faces if found.get(frozenset(face)) is face]
-
-
-def _welded(points: Floats, faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
-    """Return faces between the first of all points in one place."""
-    place = _united(points)
-    kept, first = np.unique(place, return_index=True)
-    if united := len(points) - len(kept):
-        mended[_WELDED] += united
-    return [_plain(tuple(first[place[[*face]]].tolist())) for face in faces]
 
 
 def _flat(points: Floats, face: _Loop, size: float, mended: Counter[str]) -> list[_Loop]:

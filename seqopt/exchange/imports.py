@@ -132,8 +132,8 @@ def _form_of(path: Path, forms: set[str]) -> str:
         raise SceneError(f"{path}: it has meshes in {' and '.join(found)}; choose one (--format)")
     if not found:
         raise SceneError(
-            f"{path}: a folder without meshes; give one with a block in each file, in obj, off, "
-            "stl, ply, glb, 3mf, 3dm or JSON of COMPAS"
+            f"{path}: a folder without meshes; give one with a block in each file, in obj, stl, "
+            "ply, glb, 3dm or JSON of COMPAS"
         )
     return found[0]
 

@@ -126,9 +126,8 @@ _GENERATED = {"dome163": "dome:courses=10,around=22,rise=0.7,opening=0.6,thickne
 """Built-in scenes in words; the dome is of the size at which benchmarks of domes are taken."""
 
 
-_MESHES = {".obj": True, ".off": True, ".ply": True, ".stl": True} | dict.fromkeys(
-    (".3dm", ".3mf", ".glb"), False
-)  # and whether one has to say its unit
+_MESHES = {".obj": True, ".ply": True, ".stl": True, ".3dm": False, ".glb": False}
+"""By ending, whether one has to say the unit."""
 
 
 KINDS = {

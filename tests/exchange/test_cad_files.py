@@ -274,17 +274,7 @@ def test_a_glb_is_in_meters_with_y_up_unless_said_otherwise(tmp_path):
     assert small.bricks[0].mass == pytest.approx(16e-9)
 
 
-def test_a_3mf_says_its_unit(tmp_path):
-    path = tmp_path / "tower.3mf"
-    tower = scene_of_trimesh().apply_scale(1e3)
-    path.write_bytes(tower.export(file_type="3mf"))
-    scene = import_scene(path, given=DENSE)
-    assert placed(scene) == TOWER
-    with pytest.raises(SceneError, match="its lengths are known in mm; give no other unit"):
-        import_scene(path, given=Given(unit="m", density=1.0))
-
-
-@pytest.mark.parametrize("form", ["glb", "3mf", "3dm", "off"])
+@pytest.mark.parametrize("form", ["glb", "3dm", "ply"])
 def test_a_file_that_is_broken_is_one_line(tmp_path, form):
     path = tmp_path / f"broken.{form}"
     path.write_bytes(b"OFX 1 2 3")
@@ -293,65 +283,18 @@ def test_a_file_that_is_broken_is_one_line(tmp_path, form):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("form", "package"), [("3dm", "rhino3dm"), ("3mf", "lxml")])
-def test_a_package_that_is_missing_is_named(tmp_path, monkeypatch, form, package):
+@pytest.mark.parametrize(
+    ("form", "package", "extra"), [("3dm", "rhino3dm", "cad"), ("glb", "trimesh", "blocks")]
+)
+def test_a_package_that_is_missing_is_named(tmp_path, monkeypatch, form, package, extra):
     path = tmp_path / f"a.{form}"
     path.write_bytes(b"")
     found = "seqopt.exchange._mesh_files.find_spec"
     monkeypatch.setattr(found, lambda name: None if name == package else object())
     with pytest.raises(
-        FileError, match=rf"reading {form} needs {package}; pip install 'seqopt\[cad\]'"
+        FileError, match=rf"reading {form} needs {package}; pip install 'seqopt\[{extra}\]'"
     ):
         import_scene(path, given=DENSE)
-
-
-BOX_OFF = """# a box, and the color of its last face
-OFF
-8 6 12
-
-0 0 0
-2 0 0
-2 1 0
-0 1 0
-0 0 .5
-2 0 .5
-2 1 .5
-0 1 .5
-4 0 3 2 1
-4 4 5 6 7
-4 0 1 5 4
-4 1 2 6 5
-4 2 3 7 6
-4 3 0 4 7 255 0 0
-"""
-
-
-def test_off_keeps_polygons_and_leaves_colors(tmp_path):
-    path = tmp_path / "box.off"
-    path.write_text(BOX_OFF)
-    assert import_scene(path, given=GIVEN).bricks[0].mass == pytest.approx(2000.0)
-    assert len(read_content(path).blocks[0].faces) == 6
-    trimesh.creation.box((2, 1, 0.5)).export(path)
-    assert len(read_content(path).blocks[0].faces) == 12
-    assert import_scene(path, given=GIVEN).bricks[0].mass == pytest.approx(2000.0)
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("OFF\n", "its counts are ''"),
-        ("OFF 3 2\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "4 lines where 3 \\+ 2 are announced"),
-        ("OFF 3 1\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "face 0 is '3 0 1 3'; give"),
-        ("OFF 3 1\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n", "face 0 is '4 0 1 2'; give"),
-        ("OFF 3 1\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "vertex 1: a vertex is '1 0'; give three"),
-        ("OFF -3 1\n0 0 0\n", "-3 \\+ 1 are announced"),
-    ],
-)
-def test_an_off_that_is_none_is_one_line(tmp_path, text, said):
-    path = tmp_path / "a.off"
-    path.write_text(text)
-    with pytest.raises(SceneError, match=said):
-        import_scene(path, given=Given(unit="m", density=1.0))
 
 
 def boxes():

@@ -129,8 +129,8 @@ def _of_imports() -> Iterator[tuple[str, File]]:
         text = export_plan(scene, steps, form)
         yield form, (f"i.{end}", text.encode() if isinstance(text, str) else text, brought)
     made = trimesh.Scene([trimesh.creation.box((0.2, 0.1, 0.1))])
-    for end in ("glb", "ply", "stl", "off", "3mf"):
-        whole = made if end in ("glb", "3mf") else made.to_mesh()
+    for end in ("glb", "ply", "stl"):
+        whole = made if end == "glb" else made.to_mesh()
         content = whole.export(file_type=end)
         yield (
             end,

@@ -130,7 +130,7 @@ def test_a_program_that_is_killed_leaves_nothing_or_a_whole(number):
 KINDS = (
     *("instance", "timed instance", "answer", "answer as text", "bound 1", "bound 2", "bound 3"),
     *("scene", "plan", "schedule", "state", "measured", "summary", "compas_assembly", "boxes"),
-    *("obj", "glb", "ply", "stl", "off", "3mf", "postures", "answers"),
+    *("obj", "glb", "ply", "stl", "postures", "answers"),
 )
 
 
@@ -180,7 +180,6 @@ MOST = 80e6  # bytes; a file may take 64 MB before anything is unpacked
         ("instance", "amount_0.npy", MANY, None),
         ("instance", "amount_0.npy", SOME, 900),
         ("instance", "more.npy", SOME, None),
-        ("3mf", "3D/3dmodel.model", SOME, 900),
     ],
 )
 def test_no_more_is_unpacked_than_may_be(tmp_path, kind, name, size, announced):
