@@ -135,12 +135,10 @@ def entry(where: str, holder: object, *keys: str) -> Any:
     raise SceneError(f"{where}: {' or '.join(keys)} is missing")
 
 
-def listing(where: str, value: object, most: int = 10**7) -> list[Any]:
-    """Return a list of a document. ``most``: entries that it may have."""
+def listing(where: str, value: object) -> list[Any]:
+    """Return a list of a document."""
     if not isinstance(value, list):
         raise SceneError(f"{where} is {short(value)}; a list is expected")
-    if len(value) > most:
-        raise SceneError(f"{where} has {len(value)} entries; {most} is the most")
     return value
 
 

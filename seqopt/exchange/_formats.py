@@ -11,7 +11,6 @@ from typing import Any
 from seqopt._files import read_bytes, read_text
 from seqopt._registry import Part, registered
 from seqopt.errors import SceneError
-from seqopt.exchange._boxes import boxes_csv, read_boxes
 from seqopt.exchange._compas_models import (
     assembly_with_plan,
     is_meshes,
@@ -22,7 +21,7 @@ from seqopt.exchange._compas_models import (
 from seqopt.exchange._compas_shapes import kind, payload
 from seqopt.exchange._content import Content, assembly_json
 from seqopt.exchange._mesh_files import read_3dm, read_glb, read_mesh, read_obj, write_obj
-from seqopt.exchange._tables import plan_csv, plan_json
+from seqopt.exchange._tables import boxes_csv, plan_csv, plan_json, read_boxes
 from seqopt.exchange._tasks import Task, tasks_csv, tasks_in_postures, tasks_json
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene

@@ -132,19 +132,6 @@ def touching_faces(
     ``shapes``: where they are in the scene; ``gap``: most that may lie between two faces, or by
     which they may interpenetrate, m; ``progress``: called with how far it is, once it takes longer
     than a second. Raises `FileError` if shapely is not installed.
-
-    Examples
-    --------
-    >>> from seqopt.scene.shape import Polyhedron
-    >>> corners = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1))
-    >>> sides = ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
-    >>> up = Polyhedron(corners, (*sides, (3, 2, 1, 0)))
-    >>> down = Polyhedron(
-    ...     tuple((x, y, -z) for x, y, z in corners),
-    ...     (*(side[::-1] for side in sides), (0, 1, 2, 3)),
-    ... )
-    >>> [(face.blocks, face.normal.tolist()) for face in touching_faces([up, down], 1e-6)]
-    [((0, 1), [0.0, 0.0, -1.0])]
     """
     _require_polygons()
     gap = positive("gap", gap, "m")

@@ -10,7 +10,7 @@ from pathlib import Path
 from seqopt._files import read_table, read_text
 from seqopt.errors import FileError, SceneError, SceneWarning, StepError
 from seqopt.exchange._building import build_scene
-from seqopt.exchange._content import MOST_BLOCKS, Content, FileBlock, Given
+from seqopt.exchange._content import MOST_BLOCKS, Content, Given
 from seqopt.exchange._formats import JSON, of_ending, read_file
 from seqopt.exchange._mesh_files import counted
 from seqopt.exchange._meshes import without_repeats
@@ -70,21 +70,17 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     name = where.resolve().name if where.is_dir() else where.stem
     scene = build_scene(content, given or Given(), printable("file", name or "file"))
     warn_of(scene, scene.name)
-    if given is None or (given.supports is None and given.up is None):
-        _warn_of_lying(scene, "z" if content.up == "y" else "y")
-    return scene
-
-
-def _warn_of_lying(scene: Scene, up: str) -> None:
-    """Warn if most blocks rest on the ground, as they do where another axis is up in the file."""
     low = {ground.brick for ground in scene.grounds}
-    if len(low) >= _LYING and 2 * len(low) > len(scene.bricks):
+    silent = given is None or (given.supports is None and given.up is None)
+    if silent and len(low) >= _LYING and 2 * len(low) > len(scene.bricks):
+        up = "z" if content.up == "y" else "y"
         warnings.warn(
             f"scene {scene.name}: {len(low)} of {len(scene.bricks)} blocks rest on the ground; if "
             f"{up} is up in the file, say so (--up {up})",
             SceneWarning,
-            stacklevel=3,
+            stacklevel=2,
         )
+    return scene
 
 
 def read_content(path: Path, form: str | None = None) -> Content:
@@ -121,7 +117,14 @@ def _read_folder(path: Path, form: str | None) -> Content:
     said = [f"a folder of {len(files)} files of {form}, a block each: no supports, faces or order"]
     if left:
         said.append(f"{len(left)} other files are left out: {cut(', '.join(left), 80)}")
-    blocks = tuple(map(_one_block, files, contents))
+    for file, content in zip(files, contents, strict=True):
+        if len(content.blocks) != 1:
+            raise SceneError(
+                f"{file}: its mesh is {len(content.blocks)} pieces; unite them to one closed mesh, "
+                "or give each a file of its own"
+            )
+    pairs = zip(files, contents, strict=True)
+    blocks = tuple(replace(content.blocks[0], key=file.stem) for file, content in pairs)
     return replace(contents[0], blocks=blocks, said=tuple(said))
 
 
@@ -136,15 +139,6 @@ def _form_of(path: Path, forms: set[str]) -> str:
             "ply, glb, 3dm or JSON of COMPAS"
         )
     return found[0]
-
-
-def _one_block(file: Path, content: Content) -> FileBlock:
-    if len(content.blocks) != 1:
-        raise SceneError(
-            f"{file}: its mesh is {len(content.blocks)} pieces; unite them to one closed mesh, or "
-            "give each a file of its own"
-        )
-    return replace(content.blocks[0], key=file.stem)
 
 
 def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:

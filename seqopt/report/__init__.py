@@ -16,9 +16,8 @@ this page does not import.
 chain 9: 9 bricks, 3 robots
 """
 
-from seqopt.report._compared import format_comparison
 from seqopt.report._picture import Picture, picture
-from seqopt.report.comparison import Comparison, compare, largest, method_tables
+from seqopt.report.comparison import Comparison, compare, format_comparison, largest, method_tables
 
 __all__ = [
     "Comparison",

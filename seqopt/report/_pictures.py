@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -24,7 +23,7 @@ from seqopt.errors import FileError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._robots import Arms, Cell, _known_arms, _require_arms
-from seqopt.report._style import WIDTH, new_figure, new_picture, styled
+from seqopt.report._style import WIDTH, new_picture, styled
 from seqopt.report.draw import (
     PROP_MARK,
     View,
@@ -41,36 +40,6 @@ from seqopt.scene._checks import short
 from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step, StepKind
-
-
-@styled
-def reach_picture(table: pd.DataFrame) -> Figure:
-    """Return a picture of a table of `seqopt.arms.reach_table`: a row a robot, a column a node.
-
-    Shades say how many postures there are; a cross marks a node that is never reached.
-    """
-    robots = [*dict.fromkeys(table["robot"])]
-    nodes = [*dict.fromkeys(table["node"])]
-    counts = table.pivot_table(index="robot", columns="node", values="postures", sort=False)
-    possible = table.pivot_table(index="robot", columns="node", values="to_bricks", sort=False) > 0
-    grid = np.where(possible, counts, 0)
-    figure = new_figure(1.1 + 0.3 * len(robots))
-    axes = figure.subplots()
-    shown = axes.imshow(np.sqrt(grid), aspect="auto", cmap="Blues", vmin=0, interpolation="nearest")
-    rows, columns = np.nonzero(grid == 0)
-    axes.plot(columns, rows, "x", color="black", ms=4)
-    step = max(1, len(nodes) // 25)
-    axes.set_xticks(range(0, len(nodes), step), [str(node) for node in nodes[::step]])
-    axes.set_yticks(range(len(robots)), robots)
-    axes.set_xlabel("node, in build order")
-    axes.spines[:].set_visible(False)
-    most = int(grid.max(initial=0))
-    ticks = sorted({0, 1, most // 4, most})
-    bar = figure.colorbar(shown, ax=axes, ticks=np.sqrt(ticks), pad=0.01)
-    bar.ax.set_yticklabels([str(tick) for tick in ticks])
-    bar.set_label("postures")
-    return figure
-
 
 VIEW = View(azimuth=25, elevation=18)
 NUMBERED = 30  # bricks up to which the nodes of a network are numbered

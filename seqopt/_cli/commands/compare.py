@@ -18,9 +18,8 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance, simplest
 from seqopt.network.build import build_network
 from seqopt.problem.requirements import Criterion
-from seqopt.report._compared import comparison_blocks, printed_largest
 from seqopt.report._pages import comparison_page
-from seqopt.report.comparison import Comparison, compare
+from seqopt.report.comparison import Comparison, _comparison_blocks, _printed_largest, compare
 from seqopt.responses.table import builds_in_words
 from seqopt.stability._builds import BuildProver
 from seqopt.workflow import DEFAULTS
@@ -99,7 +98,7 @@ def answered(asked: Compare, found: Found) -> Answer:
     scene = engine.network.scene
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
     about = {"criteria": criteria, **provenance(engine)}
-    blocks = comparison_blocks(result, scene, criterion, columns())
+    blocks = _comparison_blocks(result, scene, criterion, columns())
     headings = [block.partition("\n")[0] for block in blocks]
     if result.speed is not None:
         blocks.append("\n".join([SPEED, *result.speed.describe(wrapped)]))
@@ -147,7 +146,7 @@ def _facts(result: Comparison) -> dict[str, object]:
     """Return rows, notes and the published values, for scripts."""
     table = result.table.assign(
         steps=[len(result.tables[name]) for name in result.table.index],
-        paper=pd.Series({name: printed_largest(result, name) for name in result.table.index}),
+        paper=pd.Series({name: _printed_largest(result, name) for name in result.table.index}),
     )
     loop, printed = result.loop, result.printed
     paper = None if printed is None else printed.set_axis(result.maxima.columns, axis=1)

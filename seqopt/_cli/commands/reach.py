@@ -55,19 +55,12 @@ def run(asked: Reach) -> Answer:
         text="\n".join(map(wrapped, lines)),
         written=written,
         value=table,
-        notes=outputs.figure_notes(written and scene.has_arms),
     )
 
 
 def _files(scene: Scene, table: pd.DataFrame) -> dict[str, bytes | str]:
-    """Return the files by name: tables, and the picture if matplotlib is installed."""
+    """Return the tables by file name."""
     files: dict[str, bytes | str] = {"reach.csv": csv_text(table)}
-    if not scene.has_arms:
-        return files
-    files["postures.csv"] = csv_text(find_table(scene).table())
-    if outputs.figure_notes():
-        return files
-    from seqopt.report._pictures import reach_picture  # noqa: PLC0415  # matplotlib is an extra
-    from seqopt.report._style import picture_files  # noqa: PLC0415
-
-    return files | picture_files("reach", reach_picture(table))
+    if scene.has_arms:
+        files["postures.csv"] = csv_text(find_table(scene).table())
+    return files
