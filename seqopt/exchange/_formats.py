@@ -205,18 +205,13 @@ def read_file(path: Path, form: str | None = None) -> Content:
     """Return what a file says, in the format of a name; by default in that of its ending."""
     found = of_ending(path) if form is None else formats().get(form)
     if found is None or found.read is None:
-        raise SceneError(_not_read(path, form))
+        suffix = path.suffix.lower().removeprefix(".")
+        remedies = (said for endings, said in _INSTEAD.items() if suffix in endings.split())
+        if form is None and (remedy := next(remedies, "")):
+            raise SceneError(f"{path}: a .{suffix} cannot be read; {remedy}")
+        what = f"format is {short(form)}" if form else f"{path}: its format is not known"
+        raise SceneError(f"{what}; give one of {', '.join(readable())}")
     content: object = found.read(path)
     if not isinstance(content, Content):
         raise SceneError(f"format {found.name}: it reads {short(content)}; return a Content")
     return content
-
-
-def _not_read(path: Path, form: str | None) -> str:
-    """Return why a format is not read, and what to save instead."""
-    suffix = path.suffix.lower().removeprefix(".")
-    for suffixes, remedy in _INSTEAD.items():
-        if form is None and suffix in suffixes.split():
-            return f"{path}: a .{suffix} cannot be read; {remedy}"
-    what = f"format is {short(form)}" if form else f"{path}: its format is not known"
-    return f"{what}; give one of {', '.join(readable())}"

@@ -41,15 +41,7 @@ class StepStates:
 
 
 def step_states(scene: Scene, steps: Sequence[Step]) -> Iterator[StepStates]:
-    """Yield what becomes of every block in every step of a checked plan for the scene.
-
-    >>> import seqopt
-    >>> scene = seqopt.load_scene("arch25")
-    >>> steps = seqopt.sequential(seqopt.build_network(scene))
-    >>> second = [*step_states(scene, steps)][1]
-    >>> second.new, [second.states[name].value for name in (1, 2, 3)]
-    ((2,), ['held', 'held', 'absent'])
-    """
+    """Yield what becomes of every block in every step of a checked plan for the scene."""
     begins = any(step.kind is StepKind.REMOVE for step in steps)
     before = steps[0].bricks if begins else 0  # of a take-down nothing is placed
     names = [brick.name for brick in scene.placed]

@@ -52,8 +52,11 @@ def gantt_picture(
 
     With a ``clock`` over seconds: with what robots prepare, and waits for mortar behind all lanes.
     """
-    first, last = numbers = _numbers(steps, shown)
-    begins = steps[0].number
+    begins, done = steps[0].number, steps[-1].number
+    first = begins if shown[0] is None else shown[0]
+    last = done if shown[1] is None else shown[1]
+    if not begins <= first <= last <= done:
+        raise StepError(f"steps {first} to {last}: the build has steps {begins} to {done}")
     times = None if clock is None else step_times(scene, steps, *clock)
     ends: Floats = np.asarray(
         np.arange(len(steps) + 1) + begins - 0.5
@@ -62,8 +65,8 @@ def gantt_picture(
         ends = np.array([0.0, *(time.end for time in times)])
     span = float(ends[first - begins]), float(ends[last - begins + 1])
     stops = partial(_stops, begins, ends, times)
-    drawn = _lanes(scene, steps, responses, numbers, stops, span, "seconds" if times else "steps")
-    figure, axes, shade = drawn
+    along = "seconds" if times else "steps"
+    figure, axes, shade = _lanes(scene, steps, responses, (first, last), stops, span, along)
     marks: list[Line2D | Patch] = [
         Line2D([], [], color=DARK, marker="|", ms=11, mew=3.2, lw=0, label="places the brick"),
         Patch(fc="white", ec=DARK, label="holds it (brick · node)"),
@@ -112,16 +115,6 @@ def _prepared(axes: Axes, times: Sequence[StepTime], before: Floats) -> bool:
             axes.axvspan(ready, time.start, fc=CURES, lw=0, zorder=0, gid="cures")
             cures = True
     return cures
-
-
-def _numbers(steps: Sequence[AnyStep], shown: tuple[int | None, int | None]) -> tuple[int, int]:
-    """Return the first and the last number of the steps that are shown, all by default."""
-    begins, ends = steps[0].number, steps[-1].number
-    first = begins if shown[0] is None else shown[0]
-    last = ends if shown[1] is None else shown[1]
-    if not begins <= first <= last <= ends:
-        raise StepError(f"steps {first} to {last}: the build has steps {begins} to {ends}")
-    return first, last
 
 
 def _lanes(
