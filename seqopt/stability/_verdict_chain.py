@@ -37,12 +37,10 @@ from seqopt.work._threads import one_thread
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
 _CLEAR = 10 * EXACT  # least bound of a motion that is
-_LEAST = 1e-3  # corner force below which it changes no less, over the force scale
 _KEPT = 8  # answers that are tried on steps with more grips
 _NEAR = 0.7  # share of all blocks up to which those near a change take less than all
 _BESIDE = 2  # contacts from where something changes, within which all may
 _MOVES = 1e-2  # of the largest motion, over which a block falls
-_ACROSS = 0.3  # how much forces along faces change, beside those across them
 
 
 class Way(Enum):
@@ -89,19 +87,13 @@ class VerdictChain:
 
     Forces and a motion are remembered in N, m and rad. Where not the cone program proves a case, z
     is only as good as the answer to whether it is zero.
-
-    ``near``: whether what is sought is sought near what has changed first.
+    What is sought is sought near what has changed first.
     """
 
     def __init__(
-        self,
-        parts: Parts,
-        mortar: Mortar,
-        compiled: Compile = compile_equilibrium,
-        *,
-        near: bool = False,
+        self, parts: Parts, mortar: Mortar, compiled: Compile = compile_equilibrium
     ) -> None:
-        self._parts, self._mortar, self._compile, self._near = parts, mortar, compiled, near
+        self._parts, self._mortar, self._compile = parts, mortar, compiled
         self._corner_force: Floats | None = None
         self._grip_force: dict[int, Floats] = {}
         self._motion: Floats | None = None
@@ -126,7 +118,7 @@ class VerdictChain:
             if known is None and before is not None:
                 before()
                 known = self._known((bricks, grips), assembly, case, held)
-            known = known or _first(self._sought(assembly, case, held))
+            known = known or _first(self._sought(assembly, case))
         proven, way = known or (Prover(assembly, self._compile)(case), Way.CONES)
         self._learn(assembly, proven, held)
         return assembly, proven, way
@@ -135,9 +127,7 @@ class VerdictChain:
         """Prefetch proofs for several cases, solved as one batch."""
         assemblies = [self._parts(*state) for state in states]
         pairs = [(assembly, bonded(assembly, self._mortar)) for assembly in assemblies]
-        counts = [len(each.corner) + len(each.payload) for each in assemblies]
-        starts = [_none_yet(count) for count in counts]
-        sought = [Sought(*pair, *start) for pair, start in zip(pairs, starts, strict=True)]
+        sought = [Sought(*pair) for pair in pairs]
         done = np.zeros(len(states), dtype=bool)
         for answers in approach_all(sought, done):
             for number, answer in answers:
@@ -157,8 +147,15 @@ class VerdictChain:
     def _claimed(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
         """Yield proofs by earlier forces and motions, the latest first."""
         none = np.zeros((len(assembly.corner), 3)), np.zeros((len(held), 3))
-        motions = _extended(assembly, self._motion)
-        falls = (Answer(Claim.SOLVED, 1.0, *none, motion) for motion in motions)
+        falls = list[Answer]()
+        if self._motion is not None:  # later blocks rest
+            motion, size = (
+                np.zeros((len(assembly.centroid), 6)),
+                np.repeat([1, assembly.scales[1]], 3),
+            )
+            blocks = min(len(motion), len(self._motion))
+            motion[:blocks] = self._motion[:blocks] * size
+            falls.append(Answer(Claim.SOLVED, 1.0, *none, motion))
         ways = [
             (falls, Way.EARLIER_MOTION),
             (self._kept_forces(assembly, held), Way.EARLIER_FORCES),
@@ -167,38 +164,23 @@ class VerdictChain:
             for claim in claims:
                 yield judged(assembly, case, claim), way
 
-    def _sought(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
+    def _sought(self, assembly: Assembly, case: Case) -> Iterator[_Tried]:
         """Yield proofs by forces and motions sought for this case, the cheapest search first."""
-        forces = len(assembly.corner) + len(held)
-        force, level = np.zeros((forces, 3)), np.ones((forces, 3))
-        if self._near:
-            yield from self._sought_near(assembly, case, held)
-        if _bonded(case):
-            for answer in islice(approach(Sought(assembly, case, force, level)), 1):
-                yield _labeled(judged(assembly, case, answer), Way.FORCES)
-        way = Way.FORCES
-        if self._corner_force is not None:
-            force, level = self._earlier(assembly, held)
-            way = Way.EARLIER_FORCES
-        for answer in approach(Sought(assembly, case, force, level)):
-            yield _labeled(judged(assembly, case, answer), way)
-            way = Way.FORCES
-
-    def _sought_near(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
-        """Yield proofs by candidate motions and forces near changes, or near what fell before."""
         part = self._bearing(assembly) if self._stood else self._falling(assembly)
-        if part is None or part.blocks.mean() > _NEAR:
-            return
-        forces = np.concatenate([part.corners, part.grips])
-        force, level = self._earlier(assembly, held) if self._stood else _none_yet(len(forces))
-        way = Way.EARLIER_FORCES if self._stood else Way.FORCES
-        answers = approach(Sought(assembly, case, force[forces], level[forces], part))
+        if part is not None and part.blocks.mean() <= _NEAR:
+            yield from self._sought_near(Sought(assembly, case, part))
+        for answer in approach(Sought(assembly, case)):
+            yield _labeled(judged(assembly, case, answer), Way.FORCES)
+
+    def _sought_near(self, sought: Sought) -> Iterator[_Tried]:
+        """Yield proofs by candidate motions and forces near changes, or near what fell before."""
+        way, case = Way.EARLIER_FORCES if self._stood else Way.FORCES, sought.case
+        answers, bonded_ = approach(sought), case.tension[0] > 0 or case.cohesion[0] > 0
         # the first is near what was before: mostly enough with a bond, seldom without one
-        for answer in islice(answers, 1) if _bonded(case) else islice(answers, 1, None):
+        for answer in islice(answers, 1) if bonded_ else islice(answers, 1, None):
             if not self._stood and answer.value <= _TIGHT:
                 return  # others may fall
-            proven = judged(assembly, case, answer)
-            yield _labeled(proven, way)
+            yield _labeled(judged(sought.assembly, case, answer), way)
             if self._stood and answer.value <= _TIGHT:
                 return  # it does not hold what is beside it
 
@@ -238,21 +220,6 @@ class VerdictChain:
                 forces = corner / assembly.scales[0], borne / assembly.scales[0]
                 yield Answer(Claim.SOLVED, 0.0, *forces, np.zeros((len(assembly.centroid), 6)))
 
-    def _earlier(self, assembly: Assembly, held: Sequence[int]) -> tuple[Floats, Floats]:
-        """Return forces found before, none where there were none, and how much each may change."""
-        assert self._corner_force is not None
-        corners = len(assembly.corner)
-        force, level = np.zeros((corners + len(held), 3)), np.ones((corners + len(held), 3))
-        known = min(corners, len(self._corner_force))
-        force[:known] = self._corner_force[:known]
-        for i, node in enumerate(held):
-            force[corners + i] = self._grip_force.get(node, 0.0)
-        force /= assembly.scales[0]
-        pressed = np.maximum(np.abs(force[:corners, 0]), _LEAST)
-        pressed[known:] = np.median(pressed[:known]) if known else 1.0
-        level[:corners] = pressed[:, None] * [1.0, _ACROSS, _ACROSS]
-        return force, level
-
     def _learn(self, assembly: Assembly, proven: Proven, held: Sequence[int]) -> None:
         force, length = assembly.scales
         answer = proven.answer
@@ -266,15 +233,6 @@ class VerdictChain:
             self._kept = [*same, (self._corner_force, self._grip_force)][-_KEPT:]
         if proven.bound > EXACT and np.isfinite(answer.motion).all():
             self._motion = answer.motion / np.repeat([1.0, length], 3)
-
-
-def _bonded(case: Case) -> bool:
-    return case.tension[0] > 0 or case.cohesion[0] > 0
-
-
-def _none_yet(count: int) -> tuple[Floats, Floats]:
-    """Return no forces, which may all change alike."""
-    return np.zeros((count, 3)), np.ones((count, 3))
 
 
 def _neighbors(assembly: Assembly, which: Bools) -> Bools:
@@ -310,34 +268,3 @@ def _around(assembly: Assembly, blocks: Ints, steps: int) -> Bools:
     for _ in range(steps):
         out = _neighbors(assembly, out)
     return out
-
-
-def _extended(assembly: Assembly, known: Floats | None) -> Iterator[Floats]:
-    """Yield motions (B, 6) in which later blocks rest, or go with one that they touch.
-
-    ``known``: motion of as many blocks, less, or more, m and rad; none is extended to none.
-    """
-    if known is None:
-        return
-    blocks, before = len(assembly.centroid), min(len(assembly.centroid), len(known))
-    motion = np.zeros((blocks, 6))
-    motion[:before] = known[:before]
-    size = np.repeat([1.0, assembly.scales[1]], 3)
-    yield motion * size
-    if before == blocks:
-        return
-    tried = [motion.copy()]
-    for side in (np.min, np.max):
-        for new in range(before, blocks):
-            beside = assembly.bodies[(assembly.bodies == new).any(axis=1)]
-            others = beside[(beside < new) & (beside != GROUND)]
-            if len(others):
-                other = int(side(others))
-                x, y, z = (assembly.centroid[new] - assembly.centroid[other]).tolist()
-                a, b, c = motion[other, 3:].tolist()
-                turned = b * z - c * y, c * x - a * z, a * y - b * x  # ten times as fast as NumPy
-                motion[new, :3] = motion[other, :3] + turned
-                motion[new, 3:] = motion[other, 3:]
-        if not any(np.array_equal(motion, other) for other in tried):
-            yield motion * size
-        tried.append(motion.copy())

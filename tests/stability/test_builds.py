@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import seqopt
@@ -18,9 +17,11 @@ from seqopt.report.page import Build, _build_data
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import dump_scene
 from seqopt.stability import _builds
+from seqopt.stability import steps as stability_steps
 from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
 from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import Verdict, assess, verdict
+from seqopt.stability.steps import each_verdict
 
 FLAT = "arch:span=2,rise=0.8,pattern=VLR"
 
@@ -53,17 +54,7 @@ def test_they_are_those_of_every_step_on_its_own(flat, builds, found):
     assert counts == {"sequential": [18, 0], "cantilever": [20, 0]}
 
 
-@pytest.mark.parametrize("how", ["one by one", "many at once", "left open"])
-def test_every_way_says_the_same(flat, builds, found, monkeypatch, how):
-    monkeypatch.setattr(_builds, "SCREENED" if how == "one by one" else "_SETS", 0)
-    if how == "left open":
-        nothing = lambda self, bricks, held, payload: np.zeros(len(held), np.int8)  # noqa: E731
-        monkeypatch.setattr(_builds.Screen, "stands", nothing)
-    assert BuildProver(flat).of_builds(builds) == found
-
-
 def test_another_process_that_begins_says_the_same(flat, builds, found, monkeypatch):
-    monkeypatch.setattr(_builds, "SCREENED", 0)
     monkeypatch.setattr(_builds, "_SHARED", 0)
     monkeypatch.setattr(_builds, "cores", lambda: 2)
     prover, steps = BuildProver(flat), builds["cantilever"]
@@ -76,13 +67,13 @@ def test_another_process_that_begins_says_the_same(flat, builds, found, monkeypa
 @pytest.mark.parametrize(("names", "left"), [(("dry", "epoxy"), True), (("epoxy", "dry"), False)])
 def test_what_one_mortar_proves_is_not_proven_with_another(flat, builds, monkeypatch, names, left):
     """What stands dry stands with epoxy; what falls with epoxy falls dry, and here nothing does."""
-    asked, real = {}, _builds._one_by_one
+    asked, real = {}, _builds.each_verdict
 
-    def noted(parts, steps, mortar, tell=None, crew=None):
-        asked[mortar] = {(step.bricks, step.grips) for step in steps}
-        return real(parts, steps, mortar, tell, crew)
+    def noted(parts, steps, mortar):
+        asked.setdefault(mortar, {(step.bricks, step.grips) for step in steps})
+        return real(parts, steps, mortar)
 
-    monkeypatch.setattr(_builds, "_one_by_one", noted)
+    monkeypatch.setattr(_builds, "each_verdict", noted)
     prover, steps = BuildProver(flat, {name: SHOWN[name] for name in names}), builds["cantilever"]
     (said, _) = prover.of_builds({"a": steps})["a"]
     pairs = zip(steps, said.verdicts, strict=True)
@@ -117,10 +108,7 @@ def test_what_is_not_known_has_a_reason(arch25, tmp_path, capsys):
     assert (out / "report.html").exists()
 
 
-@pytest.mark.parametrize("most", [0, 60])
-def test_progress_is_told_as_verdicts_are_found(flat, builds, monkeypatch, most):
-    monkeypatch.setattr(_builds, "SCREENED", most)
-    monkeypatch.setattr(_builds, "_SETS", 0)
+def test_progress_is_told_as_verdicts_are_found(flat, builds):
     known = []
     prover = BuildProver(flat, SHOWN, lambda _: known.append(len(prover._known["dry"])))
     prover.of_builds(builds)
@@ -128,43 +116,27 @@ def test_progress_is_told_as_verdicts_are_found(flat, builds, monkeypatch, most)
     assert len(set(known)) > 10  # not told all at once, before the first is found
 
 
-@pytest.mark.parametrize("held", [None, 0, 2])
-def test_what_is_tried_ahead_changes_no_verdict(flat, builds, found, monkeypatch, held):
-    calls, real = [], VerdictChain.__call__
+def test_what_is_tried_ahead_changes_no_verdict(flat, builds, found, monkeypatch):
+    """Steps of as many bricks are tried by what they have in common, of use or not."""
+    tried, real = [], VerdictChain.__call__
 
-    def counted(self, *asked):
-        calls.append(asked)
-        return real(self, *asked)
+    def counted(self, bricks, grips, before=None):
+        tried.append(grips)
+        return real(self, bricks, grips, before)
 
     monkeypatch.setattr(VerdictChain, "__call__", counted)
-    monkeypatch.setattr(_builds, "_DEAR", 0)
-    if held is not None:  # of no use
-        nodes = flat.scene.placed[0].nodes[:held]
-        grips = (*(None for _ in flat.scene.robots), *nodes)
-        for name in ("_common_grips", "_all_grips"):
-            monkeypatch.setattr(_builds, name, lambda *_: grips)
+    monkeypatch.setattr(stability_steps, "_LARGE", 0)
     for name, steps in builds.items():
         for said in found[name]:
-            mortar = SHOWN[said.mortar]
-            assert tuple(_builds.quick_verdicts(flat, steps, mortar)) == said.verdicts
-    assert len(calls) > 2 * sum(map(len, builds.values()))  # some were tried ahead
-
-
-def test_the_backoff_grows_with_what_is_of_no_use():
-    backoff, waited = _builds._Backoff(), []
-    for _ in range(4):
-        waited.append(next(n for n in range(99) if backoff.ready()))
-        backoff.learn(useful=False)
-    assert waited == [0, 1, 2, 4]
-    backoff.learn(useful=True)
-    assert backoff.ready()
+            each = each_verdict(flat, steps, SHOWN[said.mortar])
+            assert tuple(one.verdict for one in each) == said.verdicts
+    assert len(tried) > 2 * sum(map(len, builds.values()))  # some were tried ahead
 
 
 def test_equal_structures_are_asked_once(flat, builds, found, monkeypatch):
     prover = BuildProver(flat)
     prover.of_builds(builds)
-    monkeypatch.setattr(_builds, "_screened", None)
-    monkeypatch.setattr(_builds, "_one_by_one", None)
+    monkeypatch.setattr(_builds, "each_by_workers", None)
     assert prover.of_builds(builds) == found
 
 

@@ -31,18 +31,13 @@ class Changing(NamedTuple):
 
 
 class Sought(NamedTuple):
-    """A search for forces or a motion: assembly, case and starting point.
+    """A search for forces or a motion: assembly, case, and what alone changes, by default all.
 
-    Of the case, only what it bears at a z of zero counts. ``force`` (N, 3): of corners and then of
-    grips, over the force scale; ``level`` (N, 3), positive: how much each may change beside the
-    others to come into equilibrium first; ``part``: what alone changes, by default all; forces and
-    levels are then those of its corners and grips.
+    Of the case, only what it bears at a z of zero counts.
     """
 
     assembly: Assembly
     case: Case
-    force: Floats
-    level: Floats
     part: Changing | None = None
 
     def changing(self) -> Changing:

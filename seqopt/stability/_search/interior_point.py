@@ -21,7 +21,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
-from operator import attrgetter
 
 import numpy as np
 from scipy import sparse
@@ -86,12 +85,11 @@ class _Search:
 
     @np.errstate(all="ignore")
     def start(self) -> tuple[_Point, Floats]:
-        """Return a point in equilibrium near forces, and the motions that nothing hinders."""
+        """Return the point of least forces in equilibrium, and motions that nothing hinders."""
         balance, cones = self._balance, self._cones
-        force, level = (self._joined(attrgetter(name)) for name in ("force", "level"))
-        weight = np.eye(3)[:, :, None] * np.square(level)
-        motion = balance.solver(weight)(self._load + balance.wrench(force))
-        force = force - np.square(level) * balance.parting(motion)
+        weight = np.repeat(np.eye(3)[:, :, None], cones.owners, axis=2)
+        motion = balance.solver(weight)(self._load)
+        force = -balance.parting(motion)
         worst = np.zeros(len(self._parts))
         np.maximum.at(worst, self._bodies, np.abs(self._load + balance.wrench(force)))
         loose = np.where((worst > _DONE)[self._bodies], motion, 0.0)
@@ -103,13 +101,6 @@ class _Search:
         press = slack * FLIP / product(slack, slack * FLIP)
         press /= cones.sums(press[0])[cones.group]
         return _Point(force, raised, slack, 0 * motion, press), loose
-
-    def _joined(self, of: Callable[[Sought], Floats]) -> Floats:
-        """Return values (3, N) of all corners, and then of all grips."""
-        corners = [np.count_nonzero(part.corners) for part in self._parts]
-        pairs = [*zip(map(of, self._sought), corners, strict=True)]
-        both = [each[:count] for each, count in pairs], [each[count:] for each, count in pairs]
-        return np.ascontiguousarray(np.concatenate([*both[0], *both[1]]).T)
 
     @np.errstate(all="ignore")
     def better(self, point: _Point, done: Bools) -> _Point | None:
@@ -229,10 +220,10 @@ def approach_all(sought: Sequence[Sought], done: Bools) -> Iterator[list[tuple[i
     """Yield forces and motions, each nearer to a proof, with the numbers of their assemblies.
 
     ``done`` (A,): of which nothing more is asked, as the caller says. The first answers have the
-    forces in equilibrium next to those given. Ends when all is done, when all that is left is
-    stuck, or after `ROUNDS`.
+    least forces in equilibrium. Ends when all is done or stuck, or after `ROUNDS`.
     """
-    numbers = np.flatnonzero([len(each.force) > 0 for each in sought])
+    parts = map(Sought.changing, sought)
+    numbers = np.flatnonzero([part.corners.any() or part.grips.any() for part in parts])
     if not len(numbers):
         return
     search = _Search([sought[number] for number in numbers.tolist()])
