@@ -38,8 +38,8 @@ from seqopt.sequence.two_robots import sequential
 from seqopt.stability._held_states import _HoldingForces, _Known
 from seqopt.stability._load_factor import load_factor
 from seqopt.stability._prover import Prover
+from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import assess, bonded
-from seqopt.stability.steps import each_verdict
 from tests.blocks import box
 
 COMPRESSED = (sparse.csr_array, sparse.csc_array)

@@ -38,8 +38,8 @@ from seqopt.scene.scene import Order
 from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
+from seqopt.stability._step_verdicts import each_stability, step_verdicts
 from seqopt.stability.assessment import MARGINS, Stability, Verdict
-from seqopt.stability.steps import each_stability, step_verdicts
 
 ENDED = ("time", "memory", "interrupt")  # searches that were told to end: no bound is proven
 TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what the engine says

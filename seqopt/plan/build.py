@@ -22,8 +22,9 @@ from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, _Columns, analyze, grips_table
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, _check_part
+from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
-from seqopt.stability.steps import assess_steps, stability_table, step_verdicts
+from seqopt.stability.steps import assess_steps, stability_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -19,8 +19,8 @@ from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step
+from seqopt.stability._step_verdicts import each_by_workers, each_verdict
 from seqopt.stability.assessment import Verdict
-from seqopt.stability.steps import each_by_workers, each_verdict
 from seqopt.work._threads import cores
 from seqopt.work._workers import Crew, hire
 from seqopt.work.progress import Tell, with_progress

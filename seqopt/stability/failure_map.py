@@ -27,8 +27,8 @@ from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 from seqopt.stability._prover import horizontal
+from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import Stability, Verdict, assess
-from seqopt.stability.steps import each_verdict
 from seqopt.work.progress import Tell, with_progress
 
 if TYPE_CHECKING:

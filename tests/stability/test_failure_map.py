@@ -17,9 +17,9 @@ from seqopt.scene._counts import scene_of_bricks
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._prover import Prover
 from seqopt.stability._screens import Screen
+from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.failure_map import _brick_map, failure_map
-from seqopt.stability.steps import step_verdicts
 
 FRICTIONS = (0.15, 0.45)
 

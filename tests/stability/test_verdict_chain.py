@@ -27,9 +27,9 @@ from seqopt.sequence.two_robots import METHODS
 from seqopt.stability import _verdict_chain as chain
 from seqopt.stability._search.cones import Sought
 from seqopt.stability._search.interior_point import approach, approach_all
+from seqopt.stability._step_verdicts import each_verdict, step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded, verdict
 from seqopt.stability.limit_analysis import EXACT, Answer, Claim, bound, violation
-from seqopt.stability.steps import each_verdict, step_verdicts
 from tests.blocks import with_shapes
 from tests.builders import branch, from_both_ends, six_bricks
 from tests.limit_scenes import chain as leaning_chain

@@ -22,8 +22,8 @@ from seqopt.network.network import Network
 from seqopt.responses.quantities import _steps_in_words
 from seqopt.sequence.steps import Step
 from seqopt.stability._load_factor import format_load_factors, load_factor_table, load_factors
+from seqopt.stability._step_verdicts import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import Verdict
-from seqopt.stability.steps import each_stability, find_margins, format_rows, stability_row
 from seqopt.work.progress import with_progress
 
 

@@ -1,0 +1,262 @@
+"""The steps of a build one after the other: verdicts, margins, and the rows that show them."""
+
+from __future__ import annotations
+
+import pickle
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import replace
+from functools import lru_cache, partial
+from itertools import accumulate, groupby, islice
+from operator import attrgetter
+from typing import Any, TypeVar
+
+import numpy as np
+
+from seqopt.contact._partial_assemblies import PartialAssemblies
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.mortar import Mortar
+from seqopt.errors import SceneError, did_you_mean
+from seqopt.network.network import Network
+from seqopt.sequence.steps import Grips, Step
+from seqopt.stability._prover import DIRECTIONS, Proven
+from seqopt.stability._verdict_chain import VerdictChain
+from seqopt.stability.assessment import (
+    MARGINS,
+    Stability,
+    Verdict,
+    _first_to_fail,
+    _verdict_of,
+    assess,
+)
+from seqopt.stability.limit_analysis import Claim, Compile, compile_equilibrium
+from seqopt.work._workers import Crew, hire, map_ordered
+
+_CHUNKS = 8  # for every worker, of neighboring steps, which are proven by one another
+_LARGE = 50  # bricks from which on steps are proven one by one, by the grips they have in common
+_TOGETHER = 1500  # bricks in all steps that are proven beside each other, where there are fewer
+
+
+_Found = TypeVar("_Found")
+_Find = Callable[[PartialAssemblies, Sequence[Step]], Iterator[_Found]]
+
+
+def parts_of(built: Network | PartialAssemblies, steps: Sequence[Step]) -> PartialAssemblies:
+    """Return the partial structures of steps, those given or cut from as large a whole."""
+    most = max((step.bricks for step in steps), default=1) or 1
+    return PartialAssemblies(built, most) if isinstance(built, Network) else built
+
+
+def each_verdict(
+    built: Network | PartialAssemblies,
+    steps: Sequence[Step],
+    mortar: Mortar,
+    compiled: Compile = compile_equilibrium,
+) -> Iterator[Stability]:
+    """Yield the verdict of every step as soon as it is found, without margins, mostly unsolved.
+
+    Of equal partial structures it is asked once. What is found for one is tried on those that
+    follow, so steps of a build are asked best in their order. ``compiled``: makes the programs of
+    the steps for which that proves nothing.
+    """
+    prove = VerdictChain(parts_of(built, steps), mortar, compiled)
+    found: dict[tuple[int, Grips], Stability] = {}
+    for step, before in _with_searches(prove, steps):
+        key = step.bricks, step.grips
+        if not step.bricks:
+            found[key] = _NOTHING
+        if key not in found:
+            assembly, proven, way = prove(*key, before)
+            found[key] = _without_margins(assembly, proven, way.value)
+        yield found[key]
+
+
+def _with_searches(
+    prove: VerdictChain, steps: Sequence[Step]
+) -> Iterator[tuple[Step, Callable[[], object] | None]]:
+    """Yield every step, and what may prove it together with others, if no earlier proof does.
+
+    Small structures are proven beside each other. Forces that hold a large one by the grips that
+    steps of as many bricks have in common hold it in all of these; a trial is never a verdict.
+    """
+    at = 0
+    for bricks, same in groupby(steps, attrgetter("bricks")):
+        group = [*same]
+        common = tuple(
+            held[0] if len({*held}) == 1 else None
+            for held in zip(*(step.grips for step in group), strict=True)
+        )
+        for number, step in enumerate(group):
+            if bricks <= _LARGE:
+                yield step, partial(_search, prove, steps, at + number)
+            else:
+                shared = number == 0 and common != step.grips
+                yield step, partial(prove, bricks, common) if shared else None
+        at += len(group)
+
+
+def _search(prove: VerdictChain, steps: Sequence[Step], first: int) -> None:
+    """Seek proofs of a step and those after it, as many as go together."""
+    near = [*islice(steps, first, first + _TOGETHER)]
+    total = accumulate(step.bricks for step in near)
+    few = [step for step, bricks in zip(near, total, strict=True) if bricks <= _TOGETHER]
+    small = (step for step in few if 0 < step.bricks <= _LARGE)
+    prove.search([*dict.fromkeys((step.bricks, step.grips) for step in small)])
+
+
+def _without_margins(assembly: Assembly, proven: Proven, proof: str) -> Stability:
+    """Return what is proven of a step, and how it falls if it does."""
+    verdict, motion = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
+    if verdict is Verdict.FALLS:
+        motion = proven.answer.motion / np.abs(proven.answer.motion).max()
+    block, contact = _first_to_fail(assembly, motion)
+    return Stability(
+        verdict,
+        proof,
+        motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
+        first_block=block,
+        first_contact=contact,
+        unproven=int(verdict is Verdict.UNDECIDED),
+    )
+
+
+_NOTHING = Stability(
+    Verdict.STANDS,
+    proof="nothing stands",
+    bond=0.0,
+    friction=0.0,
+    pull=np.full(DIRECTIONS, np.inf),
+    tilt=np.pi / 2,
+    grip=0.0,
+)  # of the empty site, where a take-down ends
+
+
+def step_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> tuple[Verdict, ...]:
+    """Return the verdict of every step; of equal partial structures it is asked once."""
+    return tuple(found.verdict for found in each_verdict(network, steps, mortar))
+
+
+def find_margins(asked: Collection[str] | str) -> tuple[str, ...]:
+    """Return margins by their names, as of `assess_steps`; text has commas between them."""
+    names = tuple(asked.split(",")) if isinstance(asked, str) else tuple(asked)
+    for name in names:
+        if name not in (*MARGINS, "all"):
+            hint = did_you_mean(str(name), MARGINS)
+            raise SceneError(f"margin {name!r}{hint}: give all, or some of {', '.join(MARGINS)}")
+    return MARGINS if "all" in names else names
+
+
+def each_stability(
+    network: Network,
+    steps: Sequence[Step],
+    mortar: Mortar,
+    margins: tuple[str, ...] = (),
+    at: Collection[int] | None = None,
+    shared: tuple[Executor | None, int] = (None, 1),
+) -> Iterator[Stability]:
+    """Yield what `assess_steps` returns, as soon as it is found.
+
+    ``at``: numbers of the steps whose margins are found, by default of all; ``shared``: an executor
+    and among how many workers the steps are shared.
+    """
+    numbers = {step.number for step in steps} if at is None else at
+    find = partial(_each, mortar=mortar, margins=margins, at=numbers if margins else ())
+    parts = parts_of(network, steps)
+    with hire(*shared) as crew:
+        yield from each_by_workers(parts, find, steps, crew)
+
+
+def each_by_workers(
+    parts: PartialAssemblies, find: _Find[_Found], steps: Sequence[Step], crew: Crew | None
+) -> Iterator[_Found]:
+    """Yield what a function of a module finds in steps, in order, by workers if there are any."""
+    if crew is None:
+        yield from find(parts, steps)
+        return
+    size = -(-len(steps) // (_CHUNKS * crew.workers)) or 1
+    chunks = [tuple(steps[i : i + size]) for i in range(0, len(steps), size)]
+    for found in map_ordered(partial(_in_worker, pickle.dumps(parts), find), chunks, crew):
+        yield from found
+
+
+def _in_worker(parts: bytes, find: _Find[_Found], steps: Sequence[Step]) -> tuple[_Found, ...]:
+    return tuple(find(_unpickled(parts), steps))
+
+
+@lru_cache(maxsize=1)
+def _unpickled(parts: bytes) -> PartialAssemblies:
+    """Return what a worker is sent, the same for all chunks of a build."""
+    out: PartialAssemblies = pickle.loads(parts)  # our own, of `by_workers`
+    return out
+
+
+def _each(
+    parts: PartialAssemblies,
+    steps: Sequence[Step],
+    mortar: Mortar,
+    margins: tuple[str, ...],
+    at: Collection[int],
+) -> Iterator[Stability]:
+    """Yield the verdicts of steps, with margins of those whose numbers are given."""
+    up = parts.network.scene.up
+    for step, found in zip(steps, each_verdict(parts, steps, mortar), strict=True):
+        if step.number not in at or not step.bricks:
+            yield found
+            continue
+        whole = assess(parts(step.bricks, step.grips), mortar, up, margins=margins)
+        yield replace(whole, verdict=found.verdict, proof=found.proof)
+
+
+def stability_row(step: Step, result: Stability) -> dict[str, object]:
+    """Return the row of a step in `seqopt.stability.steps.stability_table`."""
+    return {
+        "step": step.number,
+        "type": step.kind.value,
+        "bricks": step.bricks,
+        "verdict": result.verdict.value,
+        "proof": result.proof,
+        "bond_needed_Pa": result.bond,
+        "friction_needed": result.friction,
+        "tilt_survived_deg": float(np.degrees(result.tilt)),
+        "largest_grip_force_N": result.grip,
+        "first_brick": result.first_block,
+        "first_joint": result.first_contact,
+        "jammed": result.jammed,
+        "almost_solved": result.claims.get(Claim.ALMOST, 0),
+        "stalled": result.claims.get(Claim.STALLED, 0),
+        "unproven": result.unproven,
+    }
+
+
+_TILT = "tilt_survived_deg"
+_MARGINS = (
+    ("bond_needed_Pa", "bond", "needs {} kPa at most", 1e-3),
+    ("friction_needed", "friction", "needs {} at most", 1.0),
+    (_TILT, "tilt", "survives {}° at least", 1.0),
+    ("largest_grip_force_N", "grip force", "needs {} N at most", 1.0),
+)  # in the table of `seqopt.stability.steps.stability_table`
+
+
+def format_rows(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return in a line how many steps stand, fall and are undecided, and what proved it.
+
+    ``rows``: as of `stability_row`.
+    """
+    found, proofs = (Counter(row[name] for row in rows) for name in ("verdict", "proof"))
+    each = zip(Verdict, ("stand", "do not stand", "are undecided"), strict=True)
+    said = ", ".join(f"{found[verdict.value]} {word}" for verdict, word in each)
+    jammed = sum(bool(row["jammed"]) for row in rows)
+    said += f" ({jammed} only jammed: do not trust these)" if jammed else ""
+    by = ", ".join(f"{count} by {proof}" for proof, count in proofs.most_common())
+    unproven = sum(row["unproven"] for row in rows)
+    ends = f"; {unproven} cases unproven" if unproven else ""
+    for column, name, words, scale in _MARGINS:  # of the worst step
+        values = np.array([row[column] for row in rows], dtype=float)
+        if np.isnan(values).all():
+            continue
+        worst = int(np.nanargmin(values) if column == _TILT else np.nanargmax(values))
+        value = words.format(f"{values[worst] * scale:.4g}")
+        value = value if np.isfinite(values[worst]) else "no value is enough"
+        ends += f"; {name}: {value} (step {rows[worst]['step']})"
+    return f"{len(rows)} steps: {said}; proven {by}{ends}"
