@@ -19,9 +19,8 @@ from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.network.network import GROUND
 from seqopt.sequence.steps import Grips
+from seqopt.stability._interior_point import Changing, Sought, approach, approach_all
 from seqopt.stability._prover import Proven, Prover
-from seqopt.stability._search.cones import Changing, Sought
-from seqopt.stability._search.interior_point import approach, approach_all
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import (
     EXACT,

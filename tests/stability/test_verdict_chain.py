@@ -25,8 +25,7 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability import _verdict_chain as chain
-from seqopt.stability._search.cones import Sought
-from seqopt.stability._search.interior_point import approach, approach_all
+from seqopt.stability._interior_point import Sought, approach, approach_all
 from seqopt.stability._step_verdicts import each_verdict, step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded, verdict
 from seqopt.stability.limit_analysis import EXACT, Answer, Claim, bound, violation
