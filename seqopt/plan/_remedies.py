@@ -42,7 +42,7 @@ from seqopt.responses.quantities import (
 )
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
-from seqopt.sequence._carrying import loads
+from seqopt.sequence._robot_kinds import loads
 from seqopt.sequence._rule_check import RuleBook, unbearable
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule

@@ -33,7 +33,7 @@ from seqopt.responses.quantities import (
 from seqopt.responses.table import _analyzed, _Columns, _steps_in_table, force_column
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence._carrying import carried, loads
+from seqopt.sequence._robot_kinds import carried, loads
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import AnyStep
 from seqopt.sequence.two_robots import METHODS

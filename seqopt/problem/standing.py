@@ -16,8 +16,7 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._grip_sets import KnownRows
 from seqopt.scene._checks import settle, short
-from seqopt.stability._margins import Margins
-from seqopt.stability._screens import FALLS, OPEN, STANDS, Proofs, Screen
+from seqopt.stability._screens import FALLS, OPEN, STANDS, Margins, Proofs, Screen
 
 MARGINS = ("bond", "friction", "tilt")
 """Margins of stability that goals minimize: the least bond (Pa, in tension, with that times

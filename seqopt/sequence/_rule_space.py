@@ -1,11 +1,11 @@
-"""States of a free schedule and the moves between them, in batches.
+"""States of a schedule and the moves between them, in batches: of rules, or with open grips.
 
-A state is a brick count and the node that every robot holds. States of one brick count are rows of
-integers, a column per robot, those of one kind adjacent: 0 for a free robot, n for one that holds
-the n-th node (from 1, brick by brick in build order). Robots of one kind are interchangeable, so
-their entries are sorted, largest first, which removes symmetric states. If a rule limits regrips, a
-further column counts those since the last brick. If travel counts, a free robot stays at the node
-that it held last, -n.
+A state is a brick count, or a step, and the node that every robot holds. States of one level are
+rows of integers, a column per robot: 0 for a free robot, n for one that holds the n-th node (from
+1, brick by brick in build order). Robots of one kind of a free schedule are interchangeable: their
+columns are adjacent, and their entries sorted, largest first, which removes symmetric states. If a
+rule limits regrips, a further column counts those since the last brick. If travel counts, a free
+robot stays at the node that it held last, -n.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -23,10 +24,11 @@ from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.scene._armed import go_together
 from seqopt.scene.scene import Scene
-from seqopt.sequence._robot_kinds import RobotKind, node_numbers, sort_robots
+from seqopt.sequence._robot_kinds import RobotKind, can_carry, carried, node_numbers, sort_robots
 from seqopt.sequence.rules import Ending, FreeRules, Newest
-from seqopt.sequence.schedule import islands
-from seqopt.sequence.site import Site
+from seqopt.sequence.schedule import OpenGrip, Schedule, islands
+from seqopt.sequence.site import Site, _begin_step
+from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
 class Moves(NamedTuple):
@@ -432,3 +434,133 @@ def free_space(
     space = (_TakeDownSpace if rules.takes_down else FreeSpace)(network, rules, kinds, parks)
     space.require_codes(rules.regrips or 0)
     return space
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScheduleSpace(StateRows):
+    """The states of a schedule and the moves between them; a level for every step."""
+
+    network: Network
+    schedule: Schedule
+    caps: Mapping[str, float]  # largest forces of robots' grips, by their names, N
+    parks: bool = False  # free robots stay where they were, for their travel
+    worlds: tuple[Scene, ...] = ()  # of scenarios, in which robots must carry their bricks as well
+
+    def __post_init__(self) -> None:
+        self.require_codes()
+
+    first = 0  # the level before the first step
+
+    @property
+    def levels(self) -> int:
+        """Number of steps."""
+        return len(self.schedule.steps)
+
+    @property
+    def ends_bare(self) -> bool:
+        """Whether the last step has no grips."""
+        return all(grip is None for grip in self.schedule.steps[-1].grips)
+
+    @property
+    def fewest_steps(self) -> int:
+        """Number of steps, equal for all builds."""
+        return self.levels
+
+    def bricks_at(self, level: int) -> int:
+        """Return the brick count after a number of steps."""
+        return self.schedule.steps[level - 1].bricks if level else self._begin.bricks
+
+    @cached_property
+    def _begin(self) -> Step:
+        return _begin_step(self.network.scene, self.schedule.begin)
+
+    def may_place(self, level: int, states: Ints) -> Bools:
+        """Return from which states the next step is feasible: all, (n,)."""
+        return np.ones(len(states), dtype=bool)
+
+    @cached_property
+    def kinds(self) -> tuple[RobotKind, ...]:  # type: ignore[override]  # no field here
+        """A kind per robot: robots of a schedule are not interchangeable."""
+        every = np.ones(2 * len(self.network.inner), dtype=bool)
+        carries = every[: len(self.network.inner)]  # each step says by itself who carries which
+        return tuple(
+            RobotKind((i,), every, every, carries, self.caps.get(robot.name, np.inf))
+            for i, robot in enumerate(self.network.scene.robots)
+        )
+
+    @cached_property
+    def _too_heavy(self) -> frozenset[int]:
+        """Numbers of the steps in which a brick exceeds the payload of its robot."""
+        scene = self.network.scene
+        able = [can_carry((scene, *self.worlds), robot) for robot in range(self.robots)]
+        every = carried(scene, (self._begin, *self.schedule.steps))
+        return frozenset(c.step for c in every if not able[c.robot][scene.since[c.brick] - 1])
+
+    def start(self) -> Ints:
+        """Return the initial state, (1, robots) int."""
+        held, site = self._begin.grips, self.schedule.begin
+        stays = site.stays if site and site.stays and self.parks else (None,) * self.robots
+        out = [self._place.get(n, -self._place.get(s, 0)) for n, s in zip(held, stays, strict=True)]
+        return np.array([out], dtype=np.int32)
+
+    def within(
+        self, level: int, states: Ints, *, regrips: bool = True
+    ) -> tuple[tuple[Moves, bool], ...]:
+        """Return the moves that stay in a step: there are none."""
+        return ()
+
+    def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
+        """Return the moves to the next step, and whether they are regrips."""
+        step = self.schedule.steps[level]
+        before = self.schedule.steps[level - 1].grips if level else self._begin.grips
+        after, fresh = states.copy(), []
+        for robot, grip in enumerate(step.grips):
+            if grip is None:
+                after[:, robot] = -np.abs(states[:, robot]) if self.parks else 0
+            elif not isinstance(grip, OpenGrip):
+                after[:, robot] = self._place[grip]
+            elif before[robot] != grip:
+                open_to = self.schedule.moves[grip.move].candidates
+                fresh.append((robot, [self._place[node] for node in open_to]))
+        grids = np.meshgrid(*(places for _, places in fresh), indexing="ij")
+        count = prod(len(places) for _, places in fresh)
+        source, after = (np.repeat(rows, count, axis=0) for rows in (np.arange(len(states)), after))
+        for (robot, _), places in zip(fresh, grids, strict=True):
+            after[:, robot] = np.tile(places.ravel(), len(states))
+        held = self.held(after)
+        kept = ~((held[:, 1:] == held[:, :-1]) & (held[:, 1:] > 0)).any(axis=1)  # a node each
+        kept &= self.for_arms(step.bricks, after) & (step.number not in self._too_heavy)
+        source, after = source[kept], after[kept]
+        way, came = np.zeros(len(source)), states[source]
+        if self.parks:
+            gone = (after > 0) & (after != came) & (came != 0)
+            moved = self._at[np.abs(after)] - self._at[np.abs(came)]
+            way = (np.linalg.norm(moved, axis=2) * gone).sum(axis=1)
+        return ((Moves(source, after, way), step.kind is StepKind.REPOSITION),)
+
+    @cached_property
+    def _at(self) -> Floats:
+        """Positions of nodes (2B + 1, 3), m, instead of the much larger matrix of distances."""
+        return np.pad(self.network.node_position[self.network.inner.ravel()], ((1, 0), (0, 0)))
+
+    def without_choice(self) -> Iterator[tuple[int, Ints]]:
+        """Yield the levels, last first, of steps without an open grip, and their state (1, r)."""
+        for level, step in reversed([*enumerate(self.schedule.steps, start=1)]):
+            held = [grip for grip in step.grips if not isinstance(grip, OpenGrip)]
+            if len(held) == len(step.grips):
+                places = [self._place.get(grip, 0) for grip in held]
+                yield level, np.array([places], dtype=np.int32)
+
+    def ended(self, states: Ints) -> Bools:
+        """Return which states of the last step end the build: all, (n,)."""
+        return np.ones(len(states), dtype=bool)
+
+    def steps(self, rows: Ints) -> tuple[Step, ...]:
+        """Return the checked steps of a sequence of states (levels, robots)."""
+        numbers = np.array([None, *node_numbers(self.network)])
+        grips = numbers[rows.clip(min=0)].tolist()
+        steps = [
+            Step(s.number, s.kind, s.bricks, tuple(nodes))
+            for s, nodes in zip(self.schedule.steps, grips, strict=True)
+        ]
+        return check_sequence(self.network.scene, steps, self._begin)

@@ -19,8 +19,7 @@ An assembly of blocks is assessed with the mortar in its joints. Every verdict i
 from typing import TYPE_CHECKING
 
 from seqopt._later import later
-from seqopt.stability._margins import Margins
-from seqopt.stability._screens import Screen
+from seqopt.stability._screens import Margins, Screen
 from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.stability.steps import assess_steps, stability_table
 

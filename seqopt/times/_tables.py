@@ -21,7 +21,7 @@ from seqopt.network.network import Network
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence._carrying import can_carry, carried
+from seqopt.sequence._robot_kinds import can_carry, carried
 from seqopt.sequence.schedule import Hold
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind, idle_robots

@@ -29,8 +29,8 @@ from seqopt.problem.standing import NARROW, Standing, StandingSets, _without_imp
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.stability._margins import Margins
 from seqopt.stability._prover import Prover
+from seqopt.stability._screens import Margins
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import GAP
 from tests.builders import small_arch

@@ -16,7 +16,7 @@ from seqopt.plan.front import find_front
 from seqopt.plan.pose import states_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.scene.arm import Arm
-from seqopt.sequence._carrying import can_carry, loads
+from seqopt.sequence._robot_kinds import can_carry, loads
 from seqopt.sequence._rule_check import check_carried, too_heavy
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.steps import StepKind, _turned_round

@@ -14,8 +14,7 @@ from seqopt.contact._prop_grips import prop_grips
 from seqopt.contact.faces import step_assembly
 from seqopt.errors import SceneError
 from seqopt.stability._load_factor import load_factors
-from seqopt.stability._margins import Margins
-from seqopt.stability._screens import FALLS, STANDS, Screen
+from seqopt.stability._screens import FALLS, STANDS, Margins, Screen
 from seqopt.stability.assessment import Verdict, assess
 
 UP = (0.0, 0.0, 1.0)

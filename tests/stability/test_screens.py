@@ -15,8 +15,16 @@ from seqopt.errors import GripError, SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Robot
 from seqopt.stability._held_states import _Known
-from seqopt.stability._margins import Margins
-from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen, _decided, _lacking, held_places
+from seqopt.stability._screens import (
+    FALLS,
+    OPEN,
+    STANDS,
+    Margins,
+    Screen,
+    _decided,
+    _lacking,
+    held_places,
+)
 from seqopt.stability.limit_analysis import CAP, EXACT, Claim, bound, violation
 from tests.builders import held, small_arch
 

@@ -14,9 +14,8 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
-from seqopt.stability._margins import Margins
 from seqopt.stability._prover import _MORE, DIRECTIONS, Prover, hulls, safe_pull, sideways
-from seqopt.stability._screens import FALLS, STANDS, Screen
+from seqopt.stability._screens import FALLS, STANDS, Margins, Screen
 from seqopt.stability.assessment import Verdict, assess, bonded
 
 UP = (0.0, 0.0, 1.0)

@@ -13,9 +13,8 @@ from formulations.contact.held_equilibrium import compile_held
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.scene.parts import Robot
 from seqopt.stability._held_states import HeldStates
-from seqopt.stability._margins import Margins, _narrow
 from seqopt.stability._prover import sideways
-from seqopt.stability._screens import STANDS, Screen, _decided, _lacking
+from seqopt.stability._screens import STANDS, Margins, Screen, _decided, _lacking, _narrow
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import EXACT
 from tests.builders import block, held

@@ -16,8 +16,7 @@ from seqopt.problem.amounts import MoveArrays
 from seqopt.scene.scene import Order
 from seqopt.sequence import _rule_space as free_space
 from seqopt.sequence._robot_kinds import node_numbers
-from seqopt.sequence._rule_space import FreeSpace
-from seqopt.sequence._schedule_space import ScheduleSpace
+from seqopt.sequence._rule_space import FreeSpace, ScheduleSpace
 from seqopt.sequence.rules import Ending
 from seqopt.sequence.site import _begin_step
 from seqopt.sequence.steps import Step, StepKind, check_sequence

@@ -39,8 +39,7 @@ from seqopt.stability.assessment import Stability
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
-    from seqopt.sequence._rule_space import FreeSpace
-    from seqopt.sequence._schedule_space import ScheduleSpace
+    from seqopt.sequence._rule_space import FreeSpace, ScheduleSpace
 
 COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
@@ -232,8 +231,8 @@ class States(Source, Shown):
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
-        from seqopt.sequence._rule_space import free_space  # noqa: PLC0415  # candidates need none
-        from seqopt.sequence._schedule_space import ScheduleSpace  # noqa: PLC0415
+        # candidates need none
+        from seqopt.sequence._rule_space import ScheduleSpace, free_space  # noqa: PLC0415
 
         if isinstance(self.rules, Schedule):
             return ScheduleSpace(self.network, self.rules, self.caps, self.parks, self.worlds)
