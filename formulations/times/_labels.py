@@ -1,7 +1,7 @@
 """Labels over a build in time, in batches, and multipliers of the robots' time, which bound them.
 
-A label of a state is when the last step ended, since when the robots of its columns are free, and
-what sums took by then; it is set and dropped as any (`seqopt.graph._labels`).
+A label of a state is when the last step ended, since when the robots of its columns are free, what
+sums took by then, and what further resources came to (`seqopt.graph._labels`).
 
 Whatever a build does, it takes no less than the time of all that its steps take one after the
 other, and no less than the time of any robot: preparing, acting, and holding while others act. With
@@ -16,11 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph._labels import Labels, Sweep, Swept
+from seqopt.graph._labels import Asked, Carried, Joint, Sums, Sweep, Swept
 from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
 from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.formulation import Watch
+from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, fewest_moves, moves_along
+from seqopt.problem.resources import Resource, StepArrays
 
 ROUNDS = 25  # of cutting planes
 CLOSED = 1e-7  # share of the bound to which prices are the best
@@ -113,68 +115,47 @@ class Caps:
         return np.array([self.time, *(cap for _, cap in self.sums)])
 
 
-class TimedLabels:
-    """Labels over the acts of some moves of a build in time.
+class InTime(Carried):
+    """The readiness of robots, and ages of mortar where it cures, over the acts of some moves.
 
-    A label takes, in this order: the end of the last step, s; since when robots of columns are
-    free, s, zero where they hold; sums; and where mortar cures when bricks were in their places, s,
-    zero of those that are not. ``prices``: bound how long builds take from any state; ``kept``
-    (m,): the moves that may be taken.
+    Values are, in this order: the end of the last step, s; since when robots of columns are free,
+    s, zero where they hold; and where mortar cures when bricks were in their places, s, zero of
+    those that are not. ``prices``: bound how long builds take from any state; ``acts`` (a,): that
+    may be taken; ``most``: the end of the build, s.
     """
 
-    def __init__(self, timed: TimedGraph, prices: Prices, kept: Bools, caps: Caps) -> None:
-        self._timed, self._prices, self._caps, graph = timed, prices, caps, timed.graph
-        self.ends, self.levels = graph.ends, timed.levels
-        rows = np.flatnonzero(kept[timed.move])
-        self._move, self._column = timed.move[rows], timed.column[rows]
-        self._origin = timed.origin[rows]
-        source = graph.source[self._move]
-        self.starts = np.searchsorted(source, np.arange(graph.states + 1))
-        self.target = graph.target[self._move].astype(np.int64)
-        self.look_back = len(rows)  # all of them
-        amounts = np.column_stack([graph.amounts, np.ones(len(graph.source))])
-        self._amounts = amounts[self._move][:, caps.columns]
-        some = graph.only(kept)
-        left = [distances(some, amounts[kept, c], back=True) for c in caps.columns]
-        self._left = np.column_stack([np.zeros((graph.states, 0)), *left])
+    def __init__(self, timed: TimedGraph, prices: Prices, acts: Ints, most: float) -> None:
+        self._timed, self._prices, self.limits = timed, prices, np.array([most])
+        self._move, self._column = timed.move[acts], timed.column[acts]
+        self._origin = timed.origin[acts]
+        graph = timed.graph
+        self._before = graph.source[self._move].astype(np.int64)
+        self._after = graph.target[self._move].astype(np.int64)
         self._sorts = np.bincount(timed.kinds).max() > 1
-        self._sums = 1 + timed.free.shape[1]
-        self._placed = self._sums + len(caps.sums)
+        self._placed = 1 + timed.free.shape[1]
         bricks = np.zeros(0) if timed.curing is None else timed.curing.placed
-        self.first = np.concatenate([np.zeros(self._placed), bricks])[None]
+        self.first = np.concatenate([np.zeros(self._placed), bricks])
 
-    def sweep(
-        self, watch: Watch, *, width: int | None = None, goal: int | None = None, most: int = 0
-    ) -> Swept:
-        """Return the best label within the caps, in the time or in a sum, and what was kept.
+    def totals(self, values: Floats) -> Floats:
+        """Return makespans, s, (N, 1)."""
+        return values[:, :1]
 
-        ``width``: how many labels of a level are continued; by default all; ``goal``: the place of
-        the sum that is minimized; by default the time is; ``most``: labels that may be kept, 0 for
-        any number.
-        """
-        aim = 0 if goal is None else 1 + goal
-        return Sweep(self, self._caps.limits, aim=aim, width=width).run(watch, most)
+    def bounds(self, state: Ints, values: Floats) -> Floats:
+        """Return lower bounds of the makespan, s, (N, 1)."""
+        end = values[:, 0]
+        since = np.where(self._timed.free[state], values[:, 1 : self._placed], end[:, None])
+        return self._prices.ends(state, end, since)[:, None]
 
-    def values(self, taken: Floats, aim: int) -> Floats:
-        """Return makespans, s, or the value of a sum, (N,)."""
-        return np.asarray(taken[:, 0 if aim == 0 else self._sums + aim - 1])
-
-    def bounds(self, state: Ints, taken: Floats) -> Floats:
-        """Return lower bounds (N, 1 + q) of makespan, s, and sums, over completions of labels."""
-        end = taken[:, 0]
-        since = np.where(self._timed.free[state], taken[:, 1 : self._sums], end[:, None])
-        sums = taken[:, self._sums : self._placed] + self._left[state]
-        return np.column_stack([self._prices.ends(state, end, since), sums])
-
-    def follow(self, labels: Labels, arc: Ints) -> Floats:
+    def extend(self, arc: Ints, values: Floats) -> Floats:
         """Return the values of labels after an act each, (N, k)."""
-        timed, state, taken = self._timed, self.target[arc], labels.taken
+        timed, state = self._timed, self._after[arc]
         move, column, origin = self._move[arc], self._column[arc], self._origin[arc]
-        end, since, placed = taken[:, 0], taken[:, 1 : self._sums], taken[:, self._placed :]
+        end, since, placed = values[:, 0], values[:, 1 : self._placed], values[:, self._placed :]
         ready = since[np.arange(len(arc)), column] + timed.prepares[move]
         start = np.where(column >= 0, np.maximum(end, ready), end)
         if timed.curing is not None:
-            start, placed = self._cured((labels.state, state), placed, start, timed.acts[move])
+            states = self._before[arc], state
+            start, placed = self._cured(states, placed, start, timed.acts[move])
         end = start + timed.acts[move]
         after = np.take_along_axis(since, origin.clip(min=0), axis=1)
         after = np.where(origin == NOW, end[:, None], after)
@@ -182,8 +163,7 @@ class TimedLabels:
         after = np.where(timed.graph.ends[state][:, None], end[:, None], after)  # it is over
         after[origin == HELD] = 0.0
         self._sort_alike(state, after)
-        sums = taken[:, self._sums : self._placed] + self._amounts[arc]
-        return np.column_stack([end, after, sums, placed])
+        return np.column_stack([end, after, placed])
 
     def _cured(
         self, states: tuple[Ints, Ints], placed: Floats, start: Floats, acts: Floats
@@ -215,3 +195,66 @@ class TimedLabels:
                 since[rows[:, None], [column, column + 1]] = since[
                     rows[:, None], [column + 1, column]
                 ]
+
+
+@dataclass(frozen=True, eq=False)
+class Carrying:
+    """Moves of a build, and what depends on the path through them.
+
+    ``levels`` (n,): of states; ``timed``: readiness of robots, if that counts; else moves are
+    counted in its place; ``asked``: further resources, ``steps``: what these see of moves.
+    """
+
+    graph: Graph
+    levels: Ints
+    timed: TimedGraph | None
+    asked: tuple[Resource, ...] = ()
+    steps: StepArrays | None = None
+
+    def prices(self, kept: Bools, watch: Watch) -> Prices:
+        """Return the multipliers that bound builds by some moves, (m,) bool, best."""
+        if self.timed is not None:
+            return best_prices(self.timed, kept, watch)
+        left = distances(self.graph.only(kept), np.ones(int(kept.sum())), back=True)
+        return Prices(np.zeros((0, 0)), left[None], np.zeros(0, dtype=np.int64), float(left[0]))
+
+    def joint(self, prices: Prices, kept: Bools, caps: Caps) -> Joint:
+        """Return labels of all resources and capped sums over some moves, (m,) bool."""
+        graph, timed = self.graph, self.timed
+        moves = np.flatnonzero(kept)
+        own: list[Carried] = []
+        if timed is not None:
+            acts = np.flatnonzero(kept[timed.move])
+            moves, own = timed.move[acts], [InTime(timed, prices, acts, caps.time)]
+        else:
+            own.append(Sums(np.ones((len(moves), 1)), np.array([caps.time]), prices.left.T))
+        if caps.sums:
+            amounts = np.column_stack([graph.amounts, np.ones(len(graph.source))])[:, caps.columns]
+            some = graph.only(kept)
+            left = [distances(some, each, back=True) for each in amounts[kept].T]
+            own.append(Sums(amounts[moves], caps.limits[1:], np.column_stack(left)))
+        if self.steps is not None:
+            own += [Asked(each, self.steps.only(moves)) for each in self.asked]
+        arcs = graph.source[moves].astype(np.int64), graph.target[moves].astype(np.int64)
+        return Joint(graph, self.levels, arcs, own)
+
+    def sweep(
+        self,
+        kept: Bools,
+        caps: Caps,
+        prices: Prices,
+        watch: Watch,
+        *,
+        width: int | None = None,
+        goal: int | None = None,
+        most: int = 0,
+    ) -> Swept:
+        """Return the best label within the caps, in the time or in a sum, and what was kept.
+
+        ``width``: how many labels of a level are continued; by default all; ``goal``: the place of
+        the sum that is minimized; by default the time is; ``most``: labels that may be kept, 0 for
+        any number.
+        """
+        labels = self.joint(prices, kept, caps)
+        aim = 0 if goal is None else 1 + goal
+        return Sweep(labels, labels.limits, aim=aim, width=width).run(watch, most)

@@ -23,6 +23,7 @@ from formulations.states._search import (
     watched,
 )
 from formulations.states._totals import StopError
+from formulations.times._labels import Carrying
 from formulations.times._stages import ALMOST, Choose, Goals, StageFound, Stages
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
@@ -30,7 +31,7 @@ from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
 from seqopt.graph.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
-from seqopt.graph.states._visits import steps_of
+from seqopt.graph.states._visits import seen_steps, steps_of
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.problem.amounts import MINMAX, SUM, Amount
@@ -54,6 +55,9 @@ class Soonest(NamedTuple):
     grips: tuple[tuple[int, ...], ...]
     makespan: float
     starts: tuple[float, ...]
+
+
+NEVER = Soonest((), np.nan, ())  # where time does not count
 
 
 class Waits:
@@ -109,20 +113,24 @@ class Waits:
 
 def of_instance(instance: Instance, choose: Choose, watch: Watch) -> Solution:
     """Return the best path through an instance, its states the numbers of nodes."""
-    timed = instance.timed
-    if timed is None:
+    timed = instance.timed if instance.asks_time else None
+    if timed is None and not instance.resources:
         raise ProblemError(f"instance {instance.name}: no times are asked; take path_dp")
     own = {PEAK: MINMAX, TIME: makespan}
     aims = tuple(own.get(goal.kind, SUM) for goal in instance.goals)
     caps = [makespan if cap.column is None else SUM for cap in instance.caps]
     asked = Goals((*aims, *caps), aims, tuple(cap.most for cap in instance.caps))
-    visited = Visited(timed.graph, ((0, 0, np.arange(instance.nodes)[:, None]),))
-    stages = Stages(asked, visited, choose, watch, timed)
+    graph = instance.asked if timed is None else timed.graph
+    visited = Visited(graph, ((0, 0, np.arange(instance.nodes)[:, None]),))
+    levels = instance.levels if timed is None else timed.levels
+    carrying = Carrying(graph, levels, timed, instance.resources, instance.steps)
+    stages = Stages(asked, visited, choose, watch, carrying)
     try:
         found = stages.run()
     except StopError as stop:
         return plan_by_then(None, stop)
-    values = _timed_values(aims, stages.values(found.path), stages.least(found.path))
+    end = np.nan if timed is None else stages.least(found.path)
+    values = _timed_values(aims, stages.values(found.path), end)
     states, late = tuple((node,) for node in found.path), "time" * found.late
     proofs, bounds = tuple(found.proofs), _no_higher(found.bounds, values)
     return Solution(states, values, bounds, stopped=late, proofs=proofs)
@@ -147,7 +155,7 @@ class _InTime(Terse):
 
     choose: Choose = field(repr=False)
     name: str
-    cures: bool
+    exact: bool
 
     def __call__(
         self,
@@ -161,7 +169,7 @@ class _InTime(Terse):
         watch = Watch(seconds)
         if isinstance(problem, Instance):
             return of_instance(problem, self.choose, watch)
-        if problem.standing is not None and problem.standing.curing and not self.cures:
+        if problem.standing is not None and problem.standing.curing and not self.exact:
             raise ProblemError(
                 f"{self.name}: it does not know mortar that cures; take makespan_labels"
             )
@@ -189,7 +197,7 @@ def _searched(
             plan = _plan(problem, visited, stages, found, waits)
             best += [] if plan is None else [plan]
             if plan is not None:
-                known = found.late or waits.cuts is None
+                known = found.late or waits.cuts is None or not problem.is_timed
                 if known or plan.ends <= stages.least(found.path) * (1 + ALMOST):
                     return _least_of(best, plan.bound, plan.stopped)
             if not waits.learn():
@@ -212,7 +220,7 @@ def _ceiling(problem: States, first: Solution | None, waits: Waits) -> float:
     Infinite where budgets of time, or mortar, may make that plan infeasible.
     """
     capped = any(g.in_time for g in problem.goals[len(problem.aims) :])
-    forbidden = capped or waits.cuts is not None
+    forbidden = capped or waits.cuts is not None or bool(problem.paths)
     if first is None or forbidden or not problem.goals[0].is_peak:
         return np.inf
     return first.objective[0]
@@ -224,7 +232,13 @@ def _staged(
     """Return the visited states in time, and the best path through them, goal after goal."""
     visited = wide.graph()
     asked = Goals(problem.goals, problem.aims, problem.budgets)
-    stages = Stages(asked, visited, choose, watch, timed_graph(problem, visited, waits.cuts))
+    graph, timed = visited.graph, None
+    if problem.is_timed:
+        timed = timed_graph(problem, visited, waits.cuts)
+    levels = np.repeat([key for key, *_ in visited.states], [len(s) for *_, s in visited.states])
+    seen = seen_steps(problem, visited) if problem.paths else None
+    carrying = Carrying(graph, levels, timed, problem.paths, seen)
+    stages = Stages(asked, visited, choose, watch, carrying)
     try:
         return visited, stages, stages.run()
     except InfeasibleError as error:
@@ -249,7 +263,7 @@ def _plan(
 ) -> Solution | None:
     """Return a path as a plan, by the robots that are soonest done; None if mortar forbids it."""
     states = tuple((level, *state.tolist()) for level, _, state in visited.of(found.path))
-    soonest = waits.try_soonest(problem, states)
+    soonest = waits.try_soonest(problem, states) if problem.is_timed else NEVER
     if soonest is None:
         return None
     values = _timed_values(problem.goals, stages.values(found.path), soonest.makespan)
@@ -271,6 +285,8 @@ def _by_then(
     problem: States, first: Solution | None, stop: StopError | KeyboardInterrupt, waits: Waits
 ) -> Solution:
     """Return the incumbent with its makespan; raise an error if none is within the budgets."""
+    if problem.paths:
+        raise TimeUpError("no plan within all resources was found yet; give more") from None
     found = plan_by_then(first, stop)
     soonest = waits.try_soonest(problem, found.states)
     if soonest is None:
@@ -285,12 +301,12 @@ def _by_then(
 
 
 def in_time(
-    name: str, summary: str, kind: FormulationKind, choose: Choose, *, cures: bool = False
+    name: str, summary: str, kind: FormulationKind, choose: Choose, *, exact: bool = False
 ) -> Formulation:
     """Return the formulation of time that chooses a path by a function of an `Asked`.
 
-    ``cures``: whether it knows mortar that cures.
+    ``exact``: whether it knows mortar that cures, and further resources.
     """
-    solve = _InTime(choose, name, cures)
-    answers = ("time", "instance")
+    solve = _InTime(choose, name, exact)
+    answers = ("time", *("resource",) * exact, "instance")
     return Formulation(name, summary, kind, None, solve, answers=answers, takes_budgets=True)

@@ -14,12 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from formulations.states._totals import StopError
-from formulations.times._labels import STEPS, Caps, Prices, TimedLabels, best_prices
+from formulations.times._labels import STEPS, Caps, Carrying, Prices
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError, NothingFoundError
 from seqopt.graph._explore import Visited
 from seqopt.graph._labels import Labels, LateError, Swept
-from seqopt.graph._timed import TimedGraph
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import LabelProof
 from seqopt.graph.paths import _best_moves, _on_paths, moves_along, tied
@@ -47,12 +46,12 @@ class Chosen(NamedTuple):
 class Asked:
     """The problem of the least makespan of a build in time.
 
-    ``timed``: states, moves and acts; ``kept`` (m,): the moves that may be taken; ``caps``: what
-    paths must keep to; ``prices``: bound builds; ``first``: a first path, of no states if none was
-    found; ``watch``: says when to stop.
+    ``carrying``: states, moves and resources; ``kept`` (m,): the moves that may be taken; ``caps``:
+    what paths must keep to; ``prices``: bound builds; ``first``: a first path, of no states if none
+    was found; ``watch``: says when to stop.
     """
 
-    timed: TimedGraph
+    carrying: Carrying
     kept: Bools
     caps: Caps
     prices: Prices
@@ -62,7 +61,7 @@ class Asked:
     def by(self, kept: Bools) -> Chosen:
         """Return the best path by some moves (m,), with its exact makespan."""
         caps = Caps(sums=self.caps.sums)
-        swept = TimedLabels(self.timed, self.prices, kept, caps).sweep(Watch())
+        swept = self.carrying.sweep(kept, caps, self.prices, Watch())
         return Chosen(swept.path, swept.best, self.prices.bound)
 
 
@@ -90,7 +89,7 @@ class StageFound:
 
 
 def beams(
-    timed: TimedGraph,
+    carrying: Carrying,
     kept: Bools,
     caps: Caps,
     prices: Prices,
@@ -101,8 +100,7 @@ def beams(
     best = Swept()
     for width in BEAMS:
         try:
-            labels = TimedLabels(timed, prices, kept, caps)
-            found = labels.sweep(watch, width=width, goal=goal)
+            found = carrying.sweep(kept, caps, prices, watch, width=width, goal=goal)
         except LateError:
             break
         if found.best < best.best:
@@ -127,16 +125,18 @@ class Stages:
     """Goals of a problem one after the other, on a graph in time."""
 
     def __init__(
-        self, problem: Goals, visited: Visited, choose: Choose, watch: Watch, timed: TimedGraph
+        self, problem: Goals, visited: Visited, choose: Choose, watch: Watch, carrying: Carrying
     ) -> None:
         self._problem, self._choose, self._watch = problem, choose, watch
-        self._visited, self._timed = visited, timed
+        self._visited, self._carrying, self._graph = visited, carrying, carrying.graph
         budgets = dict(enumerate(problem.budgets, start=len(problem.aims)))
         is_time = {k: problem.goals[k].in_time for k in budgets}
         time = min((tied(cap) for k, cap in budgets.items() if is_time[k]), default=np.inf)
         sums = tuple((k, tied(cap)) for k, cap in budgets.items() if not is_time[k])
-        filtered = not budgets and timed.curing is None
-        self._stage = StageFound(_on_paths(timed.graph), Caps(time, sums), filtered)
+        timed = carrying.timed
+        cures = timed is not None and timed.curing is not None
+        filtered = not (budgets or cures or carrying.asked)
+        self._stage = StageFound(_on_paths(self._graph), Caps(time, sums), filtered)
 
     def run(self) -> StageFound:
         """Return path and bounds; raise an `InfeasibleError` if no path is within all caps."""
@@ -149,7 +149,7 @@ class Stages:
                 self._makespan()
             elif self._stage.filtered:
                 kept = self._stage.kept.copy()
-                kept[kept], least = _best_moves(self._timed.graph.only(kept), k)
+                kept[kept], least = _best_moves(self._graph.only(kept), k)
                 self._stage.kept = self._on_paths(kept)
                 self._stage.bounds.append(least)
             elif goal.is_peak:
@@ -164,18 +164,20 @@ class Stages:
     def _on_paths(self, kept: Bools) -> Bools:
         """Return which of some moves (m,) are on paths from the start to an end."""
         out = kept.copy()
-        out[out] = _on_paths(self._timed.graph.only(kept))
+        out[out] = _on_paths(self._graph.only(kept))
         return out
 
     def _makespan(self) -> None:
         """Find the least makespan; from then on it is a cap."""
-        stage, timed = self._stage, self._timed
-        prices = best_prices(timed, stage.kept, self._watch)
-        swept = beams(timed, stage.kept, stage.caps, prices, self._watch)
+        stage, carrying = self._stage, self._carrying
+        prices = carrying.prices(stage.kept, self._watch)
+        swept = beams(carrying, stage.kept, stage.caps, prices, self._watch)
         first = Chosen(swept.path, swept.best, prices.bound)
         found = first
         if first.value > prices.bound * (1 + ALMOST):
-            found = self._choose(Asked(timed, stage.kept, stage.caps, prices, first, self._watch))
+            found = self._choose(
+                Asked(carrying, stage.kept, stage.caps, prices, first, self._watch)
+            )
         if not found.path and found.late:
             raise StopError("time")
         if not found.path or found.value > tied(stage.caps.time):
@@ -193,10 +195,10 @@ class Stages:
 
     def _peak(self, k: int) -> None:
         """Find the least worst amount of paths within caps, by bisection."""
-        stage, amounts = self._stage, self._timed.graph.amounts[:, k]
+        stage, amounts = self._stage, self._graph.amounts[:, k]
         levels = np.unique(amounts[stage.kept])
         low, high, labels = 0, len(levels), tuple[Labels, ...]()
-        prices = best_prices(self._timed, stage.kept, self._watch)
+        prices = self._carrying.prices(stage.kept, self._watch)
         if stage.path:
             high = int(np.searchsorted(levels, self._taken(stage.path, k)))
         try:
@@ -220,10 +222,10 @@ class Stages:
         """Return a path within caps, or none and the labels that show that there is none."""
         if not kept.any():
             return Swept()
-        found = beams(self._timed, kept, self._stage.caps, prices, self._watch)
+        found = beams(self._carrying, kept, self._stage.caps, prices, self._watch)
         if found.path:
             return found
-        return TimedLabels(self._timed, prices, kept, self._stage.caps).sweep(self._watch)
+        return self._carrying.sweep(kept, self._stage.caps, prices, self._watch)
 
     def _sum(self, k: int) -> None:
         """Find the least sum of paths within caps; from then on it is a cap."""
@@ -231,15 +233,15 @@ class Stages:
         goal = len(stage.caps.sums)
         value = self._taken(stage.path, k) if stage.path else np.inf
         caps = replace(stage.caps, sums=(*stage.caps.sums, (k, value * (1 - ALMOST))))
-        prices = best_prices(self._timed, stage.kept, self._watch)
+        prices = self._carrying.prices(stage.kept, self._watch)
         labels: tuple[Labels, ...] = ()
         bound = -np.inf
         try:
-            swept = beams(self._timed, stage.kept, caps, prices, self._watch, goal)
+            swept = beams(self._carrying, stage.kept, caps, prices, self._watch, goal)
             if swept.path:
                 stage.path, value = swept.path, swept.best
                 caps = replace(caps, sums=(*stage.caps.sums, (k, value * (1 - ALMOST))))
-            swept = TimedLabels(self._timed, prices, stage.kept, caps).sweep(self._watch, goal=goal)
+            swept = self._carrying.sweep(stage.kept, caps, prices, self._watch, goal=goal)
             if swept.path:
                 stage.path, value = swept.path, swept.best
             bound, labels = value, tuple(swept.kept)
@@ -255,40 +257,43 @@ class Stages:
         stage = self._stage
         most = float(len(stage.path) - 1)
         caps = replace(stage.caps, sums=(*stage.caps.sums, (STEPS, most)))
-        prices = best_prices(self._timed, stage.kept, Watch(0.0))
+        prices = self._carrying.prices(stage.kept, Watch(0.0))
         try:
-            narrow = TimedLabels(self._timed, prices, stage.kept, caps)
-            swept = narrow.sweep(self._watch, width=BEAMS[1], goal=len(stage.caps.sums))
+            last = len(stage.caps.sums)
+            swept = self._carrying.sweep(
+                stage.kept, caps, prices, self._watch, width=BEAMS[1], goal=last
+            )
         except LateError:
             return
         stage.path = swept.path or stage.path
 
     def _taken(self, path: Sequence[int], k: int) -> float:
         """Return the value of a goal, no makespan, of a path."""
-        graph = self._timed.graph
+        graph = self._graph
         amounts = graph.amounts[moves_along(graph, path), k]
         return float(amounts.max(initial=0.0) if graph.peaks[k] else amounts.sum())
 
     def least(self, path: Sequence[int]) -> float:
         """Return the makespan of a path, s, with the waits for mortar that are known."""
-        graph = self._timed.graph
+        graph = self._graph
         codes = graph.source.astype(np.int64) * graph.states + graph.target
         kept = np.isin(codes, codes[moves_along(graph, path)])
-        prices = best_prices(self._timed, kept, Watch(0.0))
-        return TimedLabels(self._timed, prices, kept, Caps()).sweep(Watch()).best
+        prices = self._carrying.prices(kept, Watch(0.0))
+        return self._carrying.sweep(kept, Caps(), prices, Watch()).best
 
     def values(self, path: Sequence[int]) -> list[float]:
         """Return the values of goals of a path, zero for makespans."""
         return [self._taken(path, k) for k in range(len(self._problem.goals))]
 
     def _proof(self, labels: Sequence[Labels], prices: Prices) -> LabelProof:
-        columns = self._timed.free.shape[1]
-        kinds = self._timed.kinds
-        each = np.column_stack([prices.each[:, :1], prices.each[:, 1:][:, kinds]])
+        each, kinds = prices.each, prices.kinds
+        each = np.column_stack([each[:, :1], each[:, 1:][:, kinds]])
         rows = np.concatenate([part for *_, part in self._visited.states]).astype(np.int64)
         if not labels:
-            none = np.zeros((0, 1 + columns))
+            none = np.zeros((0, each.shape[1]))
             return LabelProof(np.zeros((0, 1 + rows.shape[1]), dtype=np.int64), none, each)
         state = np.concatenate([own.state for own in labels])
-        states = np.column_stack([self._timed.levels[state], rows[state]])
-        return LabelProof(states, np.concatenate([own.taken for own in labels]), each)
+        states = np.column_stack([self._carrying.levels[state], rows[state]])
+        taken = np.concatenate([own.taken for own in labels])
+        first = int(self._carrying.timed is None)  # moves are counted for the search alone
+        return LabelProof(states, taken[:, first:], each)

@@ -32,14 +32,15 @@ from seqopt.graph.formulation import FormulationKind
 
 def _bounded(asked: Asked) -> Chosen:
     """Return the better one of the incumbent and the path of the flow, with the flow's bound."""
-    first, watch = asked.first, asked.watch
+    first, watch, timed = asked.first, asked.watch, asked.carrying.timed
+    assert timed is not None  # no further resource is asked of it
     most = min(first.value, asked.caps.time)
-    kept = useful(asked.timed, asked.prices, asked.kept, most) if np.isfinite(most) else asked.kept
-    kept = kept & ~asked.timed.graph.ends[asked.timed.graph.source]
-    flow, work = unit_flow(asked.timed.graph.only(kept)), asked.timed.work[kept]
+    kept = useful(timed, asked.prices, asked.kept, most) if np.isfinite(most) else asked.kept
+    kept = kept & ~timed.graph.ends[timed.graph.source]
+    flow, work = unit_flow(timed.graph.only(kept)), timed.work[kept]
     scale = asked.prices.bound or 1.0
     arcs, makespan = cp.Variable(len(flow.cost), boolean=True), cp.Variable(nonneg=True)
-    shared = cp.NonNeg(makespan * asked.timed.sizes - work.T / scale @ arcs)
+    shared = cp.NonNeg(makespan * timed.sizes - work.T / scale @ arcs)
     sums = [
         cp.NonNeg(cap - flow.graph.amounts[:, column] @ arcs) for column, cap in asked.caps.sums
     ]

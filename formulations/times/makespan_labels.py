@@ -32,7 +32,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from formulations.times._labels import TimedLabels
 from formulations.times._search import in_time
 from formulations.times._stages import ALMOST, Asked, Chosen
 from seqopt.graph._labels import Labels, LateError
@@ -48,8 +47,8 @@ def _least(asked: Asked) -> Chosen:
     labels: tuple[Labels, ...] = ()
     if not best.path:  # narrow searches found nothing, as budgets leave little
         try:
-            every = TimedLabels(asked.timed, asked.prices, asked.kept, asked.caps)
-            found = every.sweep(asked.watch, most=MOST)
+            own = asked.kept, asked.caps, asked.prices
+            found = asked.carrying.sweep(*own, asked.watch, most=MOST)
         except LateError:
             return Chosen((), np.inf, bound, late=True)
         return Chosen(found.path, found.best, found.best, tuple(found.kept))
@@ -58,8 +57,8 @@ def _least(asked: Asked) -> Chosen:
         limit = start + (best.value - start) * share if share < 1.0 else best.value * (1 - ALMOST)
         caps = replace(asked.caps, time=min(limit, asked.caps.time))
         try:
-            within = TimedLabels(asked.timed, asked.prices, asked.kept, caps)
-            swept = within.sweep(asked.watch, most=MOST)
+            own = asked.kept, caps, asked.prices
+            swept = asked.carrying.sweep(*own, asked.watch, most=MOST)
         except LateError:
             return Chosen(best.path, best.value, bound, labels, late=True)
         asked.watch.tell(bound=bound)
@@ -77,5 +76,5 @@ FORMULATION = in_time(
     "labels of time and readiness, bounded by multipliers of the robots' time",
     FormulationKind.EXACT,
     _least,
-    cures=True,
+    exact=True,
 )

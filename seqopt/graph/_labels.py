@@ -19,12 +19,17 @@ The bounds depend on the objective. For a sum within budgets :math:`B`, with mul
 At first a beam of few labels a level is kept, those with the least bounds, which gives an
 incumbent. The beam is widened until no pruned label could lead to a better path. If there are too
 many labels, or time is over, the least bound of the pruned ones bounds all paths.
+
+Every value belongs to a resource (`Carried`): sums, when robots are free and how old mortar is
+(`formulations.times`), and what problems ask for (`seqopt.problem.resources`). One search serves
+all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -33,6 +38,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, strictly_below
+from seqopt.problem.resources import Resource, StepArrays
 
 NARROW, WIDER = 256, 16  # labels of a level kept at first, and how many times as many then
 CHUNK = 2_000_000  # arcs of labels that are looked at together
@@ -69,7 +75,7 @@ def _joined(parts: Sequence[Labels]) -> Labels:
 
 
 class _Growth(Protocol):
-    """Extension of labels by arcs, and lower bounds of their completions."""
+    """Extension of labels by arcs, dominance, and lower bounds of their completions."""
 
     ends: Bools  # (n,)
     levels: Ints  # (n,): no arc leads to a lower one
@@ -85,7 +91,10 @@ class _Growth(Protocol):
         """Return lower bounds (N, b), over all completions of labels, of all limited values."""
 
     def values(self, taken: Floats, aim: int) -> Floats:
-        """Return the objective (N,) of paths that end with labels."""
+        """Return the objective (N,) of paths that end with labels; infinite if none may."""
+
+    def dominated(self, first: Floats, other: Floats) -> Bools:
+        """Return where the first of two labels of a state, (N, k) each, dominates the other."""
 
 
 @dataclass
@@ -209,13 +218,13 @@ def _undominated(fresh: Labels, known: Sequence[Labels], growth: _Growth) -> Lab
     order = np.lexsort((new, *every.taken.T[::-1], every.state))
     state, taken, dominated = every.state[order], every.taken[order], np.zeros(every.size, bool)
     rows, back = np.flatnonzero(new[order]), 0
-    if taken.shape[1] == 2:
+    if taken.shape[1] == 2 and isinstance(growth, SummedLabels):
         dominated, rows = _above_another(state, taken[:, 1]), rows[:0]
     while len(rows) and back < growth.look_back:
         back += 1
         rows = rows[rows >= back]
         rows = rows[state[rows] == state[rows - back]]
-        worse = (taken[rows - back] <= taken[rows]).all(axis=1)
+        worse = growth.dominated(taken[rows - back], taken[rows])
         dominated[rows[worse]] = True
         rows = rows[~worse]
     return every.only(np.sort(order[~dominated & new[order]]))
@@ -287,6 +296,10 @@ class SummedLabels:
         """Return sums after an arc each."""
         return np.asarray(labels.taken + self._amounts[arc])
 
+    def dominated(self, first: Floats, other: Floats) -> Bools:
+        """Return where no sum is larger."""
+        return np.asarray((first <= other).all(axis=1))
+
 
 class CappedSums(SummedLabels):
     """Labels of the costs (m,) and capped amounts (m, B) of moves, with Lagrangian bounds.
@@ -310,3 +323,100 @@ class CappedSums(SummedLabels):
     def values(self, taken: Floats, aim: int) -> Floats:
         """Return the costs of paths, (N,)."""
         return np.asarray(taken[:, aim])
+
+
+class Carried:
+    """A resource on the arcs of a graph; here one that limits nothing beyond its extension.
+
+    ``first`` (k,): values at the start; ``limits`` (b,): upper limits of its limited values.
+    """
+
+    first: Floats
+    limits: Floats = np.zeros(0)
+
+    def extend(self, arc: Ints, values: Floats) -> Floats:
+        """Return values (N, k) after arcs (N,); infinite where they may not be taken."""
+        raise NotImplementedError
+
+    def totals(self, values: Floats) -> Floats:
+        """Return the limited values (N, b) of paths that end with labels."""
+        return values[:, :0]
+
+    def bounds(self, state: Ints, values: Floats) -> Floats:
+        """Return lower bounds (N, b), over all completions of labels, of the limited values."""
+        return self.totals(values)
+
+    def dominated(self, first: Floats, other: Floats) -> Bools:
+        """Return where the first values (N, k) dominate the others."""
+        return np.asarray((first <= other).all(axis=1))
+
+    def ends(self, values: Floats) -> Bools:
+        """Return with which values a path may end, (N,)."""
+        return np.ones(len(values), dtype=bool)
+
+
+class Asked(Carried):
+    """A resource of a problem on the arcs of a graph, ``steps`` (a,)."""
+
+    def __init__(self, resource: Resource, steps: StepArrays) -> None:
+        self._resource, self._steps = resource, steps
+        self.first = np.array(resource.start, dtype=float)
+        self.dominated, self.ends = resource.dominated, resource.ends  # type: ignore[method-assign]
+
+    def extend(self, arc: Ints, values: Floats) -> Floats:
+        return self._resource.extended(self._steps.only(arc), values)
+
+
+class Sums(Carried):
+    """Sums of amounts of arcs (a, q) within caps (q,); ``left`` (n, q): least from a state on."""
+
+    def __init__(self, amounts: Floats, caps: Floats, left: Floats) -> None:
+        self._amounts, self.limits, self._left = amounts, caps, left
+        self.first = np.zeros(len(caps))
+
+    def extend(self, arc: Ints, values: Floats) -> Floats:
+        return np.asarray(values + self._amounts[arc])
+
+    def totals(self, values: Floats) -> Floats:
+        return values
+
+    def bounds(self, state: Ints, values: Floats) -> Floats:
+        return np.asarray(values + self._left[state])
+
+
+class Joint:
+    """Labels of several resources side by side, over arcs that are sorted by their sources.
+
+    ``graph``: has the ends; ``levels`` (n,); ``source``, ``target`` (a,): of arcs, which may stand
+    there several times.
+    """
+
+    def __init__(
+        self, graph: Graph, levels: Ints, arcs: tuple[Ints, Ints], carried: Sequence[Carried]
+    ) -> None:
+        self.ends, self.levels = graph.ends, levels
+        self.starts = np.searchsorted(arcs[0], np.arange(graph.states + 1))
+        self.target, self.look_back = arcs[1], len(arcs[1])
+        self.first = np.concatenate([each.first for each in carried])[None]
+        self.limits = np.concatenate([each.limits for each in carried])
+        cuts = np.cumsum([0, *(len(each.first) for each in carried)]).tolist()
+        self._own = [(c, slice(*cut)) for c, cut in zip(carried, pairwise(cuts), strict=True)]
+
+    def follow(self, labels: Labels, arc: Ints) -> Floats:
+        """Return the values of labels after an arc each, (N, k)."""
+        return np.hstack([each.extend(arc, labels.taken[:, own]) for each, own in self._own])
+
+    def bounds(self, state: Ints, taken: Floats) -> Floats:
+        """Return lower bounds (N, b) of limited values, over all completions of labels."""
+        return np.hstack([each.bounds(state, taken[:, own]) for each, own in self._own])
+
+    def values(self, taken: Floats, aim: int) -> Floats:
+        """Return a limited value of paths that end with labels; infinite if none may end so."""
+        found = np.hstack([each.totals(taken[:, own]) for each, own in self._own])[:, aim]
+        may = np.all([each.ends(taken[:, own]) for each, own in self._own], axis=0)
+        return np.where(may, found, np.inf)
+
+    def dominated(self, first: Floats, other: Floats) -> Bools:
+        """Return where the first labels (N, k) dominate the others in every resource."""
+        parts = [each.dominated(first[:, own], other[:, own]) for each, own in self._own]
+        return np.asarray(np.all(parts, axis=0))

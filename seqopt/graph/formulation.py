@@ -172,6 +172,7 @@ QUESTIONS = {
     "goals": "states of a build",
     "tail": "totals over scenarios",
     "time": "the time of a build",
+    "resource": "resources that depend on the path",
     "order": "orders of the bricks",
     "front": "Pareto sets",
     "instance": "instances",

@@ -16,6 +16,7 @@ from seqopt.graph.formulation import Formulation, as_formulation, formulations
 from seqopt.graph.graph import Graph, Rows
 from seqopt.graph.source import ARCS, Source
 from seqopt.problem.problem import Aim
+from seqopt.problem.resources import Resource, StepArrays
 
 if TYPE_CHECKING:
     from seqopt.graph._timed import TimedGraph
@@ -73,6 +74,8 @@ class Instance(Source, FrozenValue, Shown):
         What a search of one move alone is charged, as of `seqopt.graph.graph.Graph`.
     facts : mapping
         Where it comes from: the command that made it, and the version.
+    resources : tuple of Resource
+        What paths must keep beside; of instances in memory alone, no file has any.
 
     Examples
     --------
@@ -95,6 +98,7 @@ class Instance(Source, FrozenValue, Shown):
     timed: TimedGraph | None = field(default=None, compare=False)
     alone: Floats | None = None
     facts: Mapping[str, Any] = field(default_factory=dict, compare=False)
+    resources: tuple[Resource, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         if not self.goals:
@@ -131,9 +135,11 @@ class Instance(Source, FrozenValue, Shown):
     def fitting(self) -> tuple[str, ...]:
         """The names of formulations that fit, the default first."""
         every = formulations()
-        asked = ("time" if self.asks_time else "goals", "instance")
+        asked = ["time" if self.asks_time else "goals", "instance"]
+        if self.resources:
+            asked[0] = "resource"
         found = [n for n, f in every.items() if f.fits(*asked) and not f.aim]
-        if len(self.goals) == 1 and not self.asks_time:
+        if len(self.goals) == 1 and not self.asks_time and not self.resources:
             kind = self.goals[0].kind
             found += [n for n, f in every.items() if f.aim and f.aim.value == kind]
         if self.caps:
@@ -189,6 +195,12 @@ class Instance(Source, FrozenValue, Shown):
         return Graph(*rows, peaks, graph.ends, caps, self.alone)
 
     @property
+    def steps(self) -> StepArrays:
+        """Its arcs as resources see them."""
+        rows = self.states[:, 1:]
+        return StepArrays(self.levels[self.target], rows[self.source], rows[self.target])
+
+    @property
     def asks_time(self) -> bool:
         """Whether it counts when acts end."""
         kinds = [goal.kind == TIME for goal in self.goals]
@@ -196,8 +208,9 @@ class Instance(Source, FrozenValue, Shown):
 
     @property
     def is_plain(self) -> bool:
-        """Whether every goal is a sum or a largest amount, and nothing is capped."""
-        return not self.caps and all(goal.kind in (SUM, PEAK) for goal in self.goals)
+        """Whether every goal is a sum or a largest amount, and nothing is asked beside."""
+        beside = self.caps or self.resources
+        return not beside and all(goal.kind in (SUM, PEAK) for goal in self.goals)
 
     @cached_property
     def is_layered(self) -> bool:

@@ -91,6 +91,8 @@ def _of_states(name: str, states: States, below: float) -> Instance:
     """Return the instance of a graph of states."""
     if below < np.inf and (states.totals or not states.goals[0].is_peak):
         raise ProblemError("below: the first aim is no worst step; leave it out")
+    if states.paths:
+        raise ProblemError(f"instance: no resource is in it; leave {states.paths[0]} out")
     demanded = bool(states.demands) or any(goal.margins for goal in states.goals)
     space = build_space(states, standing=demanded)
     found = Explorer(space)

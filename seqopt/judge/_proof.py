@@ -30,9 +30,9 @@ from seqopt.graph.paths import (
 )
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import is_beyond
+from seqopt.judge._goal_proofs import label_bounds
 from seqopt.judge._rule_moves import RuleTables, Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator, ask
-from seqopt.judge._twin import PathTwin
 from seqopt.judge.arithmetic import budget_bounds
 from seqopt.network.build import build_network
 from seqopt.scene._armed import can_hold
@@ -370,12 +370,10 @@ class Proof:
         self.states = sum(map(len, rebuilt.states))
         return budget_bounds(rebuilt.graph(), values, claimed, (caps, multipliers))
 
-    def timed_bounds(
-        self, twin: PathTwin, values: Sequence[float], found: Solution
-    ) -> tuple[float, ...]:
-        """Return bounds of measures of whole paths, by their twin, of a path that is claimed."""
+    def label_bounds(self, values: Sequence[float], found: Solution) -> tuple[float, ...]:
+        """Return bounds of plans with resources, by labels that are claimed."""
         rebuilt = self.rebuilt(Filter(values, exact=True))
-        by_labels = twin.bounds(self.evaluator, rebuilt, values, found)
+        by_labels = label_bounds(self.evaluator, rebuilt, values, found)
         margins = tuple(values[: self.evaluator.margins])
         return self._where_states_stand(rebuilt, values, lambda g: (*margins, *by_labels(g)))
 

@@ -27,6 +27,7 @@ from seqopt.judge._twin import PathTwin, exceeds, own_values, twin_of
 from seqopt.judge.certificate import Basis, Certificate
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.requirements import LINEAR_RANGE, Limit
+from seqopt.problem.resources import StepArrays, first_fault
 from seqopt.problem.standing import Standing, _size, slack
 from seqopt.responses._props import EXCESS_COLUMN
 from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along, tolerances_along
@@ -74,11 +75,13 @@ def judge_schedule(
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
     twin = next((goal.twin for goal in problem.goals if goal.in_time), None)
     proves_time = twin is not None and bool(np.isfinite(selection.bound).any())
-    is_claimed = not proves_time and (selection.stopped or problem.is_timed)
+    by_labels = problem.is_timed or bool(problem.paths)
+    proves = proves_time or (bool(selection.proofs) and not problem.is_timed)
+    is_claimed = not proves and (selection.stopped or by_labels)
     none = (-np.inf,) * len(values)
     if is_claimed or not _has_twins(problem):  # bounds are claimed alone
         bounds = _with_counts(problem, twin, values, none)
-        if selection.stopped not in ENDED and not problem.is_timed:
+        if selection.stopped not in ENDED and not by_labels:
             bounds = _first_bound(problem, selection, bounds)
         gap = _gap(problem.aims, values, bounds)
         left = gap if is_claimed else _gap(problem.aims, values, selection.bound)
@@ -130,8 +133,8 @@ def _proven(
     twin = next((goal.twin for goal in problem.goals if goal.in_time), None)
     proof, claimed = Proof(_weighed(problem, selection), hint), selection.bound
     margins = _margin_bounds(problem, proof, values)
-    if twin is not None:
-        found = proof.timed_bounds(twin, values, selection)
+    if twin is not None or problem.paths:
+        found = proof.label_bounds(values, selection)
     elif problem.budgets:
         found = proof.budget_bounds(values, claimed, _multipliers(problem, selection))
     else:
@@ -139,7 +142,7 @@ def _proven(
     bounds = _closed(values, (*margins, *found[len(margins) :]))
     if twin is not None:
         bounds = _with_counts(problem, twin, values, bounds)
-    elif not problem.totals:
+    elif not (problem.totals or problem.paths):
         _require_promised(problem, bounds, values if exact and not problem.budgets else claimed)
         claimed = bounds
     claimed = _closed(values, tuple(map(max, bounds, claimed)))
@@ -155,9 +158,10 @@ def _closed(values: Sequence[float], bounds: Sequence[float]) -> Bounds:
 
 
 def _has_twins(problem: States) -> bool:
-    """Return whether all goals of states and moves, and all filters, have twins."""
+    """Return whether goals of states and moves, filters and resources all have twins."""
     goals = (twin_of(goal) is not None or goal.in_time for goal in problem.goals)
-    return all(goals) and all(each.twin is not None for each in problem.filters)
+    filters = all(each.twin is not None for each in problem.filters)
+    return all(goals) and filters and all(each.twin is not None for each in problem.paths)
 
 
 def _gap(goals: Sequence[Amount], values: Sequence[float], bounds: Sequence[float]) -> float:
@@ -284,6 +288,7 @@ def plan_values(
     _check_forces(problem, forces, steps)
     levels = [*_by_bricks(problem, columns, forces, steps)]
     _check_filters(problem, levels, steps)
+    _check_resources(problem, steps)
     margins, moves, out = proven_margins(problem, steps), _moves(problem, steps), list[float]()
     for k, goal in enumerate(problem.goals):
         if goal.margins is not None:
@@ -319,6 +324,20 @@ def _check_filters(problem: States, levels: Levels, steps: Sequence[Step]) -> No
             if refused.any():
                 number = steps[rows[np.flatnonzero(refused)[0]]].number
                 raise SolverError(f"step {number} does not pass the filter {each.name}")
+
+
+def _check_resources(problem: States, steps: Sequence[Step]) -> None:
+    """Raise a `SolverError` if a plan does not keep a resource, by its twin or itself."""
+    if not problem.paths:
+        return
+    site, scene = problem.rules.begin, problem.network.scene
+    first = (None,) * len(scene.robots) if site is None else site.holds(scene)
+    every = [first, *(step.grips for step in steps)]
+    nodes = np.array([[NONE if n is None else n for n in grips] for grips in every])
+    bricks = np.array([step.bricks for step in steps])
+    if (wrong := first_fault(problem.paths, StepArrays(bricks, nodes[:-1], nodes[1:]))) is not None:
+        number = steps[wrong[1]].number
+        raise SolverError(f"the resource {wrong[0]} is not kept up to step {number}")
 
 
 def _value(goal: Amount, levels: Levels, moves: MoveArrays) -> float:

@@ -16,7 +16,6 @@ from seqopt._registry import registered
 from seqopt.arrays import Bools, Floats
 from seqopt.errors import ProblemError
 from seqopt.graph._timed import TimedGraph
-from seqopt.graph.graph import Graph
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, Amount, MoveArrays, StateArrays
 from seqopt.problem.requirements import Limit
@@ -42,15 +41,15 @@ class PathTwin(NamedTuple):
     """How an amount of whole paths is computed and bounded once more.
 
     ``value``: of the steps of a problem, with the starts that are claimed; ``least``: combinatorial
-    lower bound of all builds by some rules; ``bounds``: makes of an evaluator, rebuilt states, the
-    values and what is claimed a function from subgraphs to lower bounds of the
-    goals after those about margins; ``path_value``: of arcs and acts of an instance; ``claimed``:
-    what a claim about an instance proves, as of `seqopt.judge.arithmetic.proven`.
+    lower bound of all builds by some rules; ``clocks``: makes of an evaluator, rebuilt states and
+    claimed motions these in time, as of `seqopt.times._clock.TimedRows`; ``path_value``: of arcs
+    and acts of an instance; ``claimed``: what a claim about an instance proves, as of
+    `seqopt.judge.arithmetic.proven`.
     """
 
     value: Callable[[Any, Sequence[Any], Sequence[float]], float]
     least: Callable[[Network, FreeRules | Schedule], float]
-    bounds: Callable[..., Callable[[Graph], tuple[float, ...]]]
+    clocks: Callable[..., Any]
     path_value: Callable[[TimedGraph, Any, Any], float]
     claimed: Callable[..., float]
 

@@ -14,8 +14,10 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
 from seqopt.graph.paths import ROUNDING, TIED, cut, least_sum, tied
 from seqopt.judge._budget_proof import least_within
+from seqopt.judge._label_proof import Book, Closed, SumBook, TwinBook, kept_below, limit_below
 from seqopt.judge._twin import path_twin
 from seqopt.judge.certificate import TOLERANCE, Certificate
+from seqopt.problem.resources import first_fault
 
 BELOW = 1e-9  # by how much a path must be better, over the size of the value
 ABOVE = 1e-6  # over a value: how far a claim may be above what is proven
@@ -84,6 +86,9 @@ def _walked(instance: Instance, answer: Answer) -> _Walk:
         at = int(instance.target[arc])
     if not instance.ends[at]:
         raise SolverError(f"the path stops at node {at}, where none may end")
+    every = instance.steps if instance.resources else None
+    if every is not None and (wrong := first_fault(instance.resources, every.only(arcs))):
+        raise SolverError(f"the resource {wrong[0]} is not kept up to step {wrong[1] + 1}")
     ends = 0.0
     if instance.timed is not None and instance.asks_time:
         twin = path_twin()
@@ -230,6 +235,8 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value:
     Raises `SolverError` where a potential, a weight or a share is dual infeasible.
     """
     limited = _priced(stage, claim)
+    if instance.resources and claim.labels is not None and goal.kind in (SUM, PEAK):
+        return _by_labels(instance, stage, goal, claim)
     if goal.kind == PEAK:
         return _peak(stage, goal, claim, limited)
     if goal.kind == SUM:
@@ -242,6 +249,68 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value:
         twin = path_twin()
         return -np.inf if twin is None else twin.claimed(instance, stage, claim, limited)
     return _sum(stage, costs, claim, limited)
+
+
+def _by_labels(instance: Instance, stage: Stage, goal: _Target, claim: Claim) -> float:
+    """Return the claimed bound of a goal; a `SolverError` if labels of resources do not close."""
+    assert claim.labels is not None
+    twins = [each.twin for each in instance.resources if each.twin is not None]
+    if claim.value is None or len(twins) < len(instance.resources):
+        return -np.inf  # without a twin nothing is proven
+    graph, (column,) = stage.graph, goal.columns
+    limited = [(c, most) for _, c, most in stage.limited]
+    strict = [False] * len(limited)
+    codes = instance.source.astype(np.int64) * instance.nodes + instance.target
+    if goal.kind == PEAK:
+        graph = graph.only(kept_below(graph.amounts[:, column], claim.value))
+    else:
+        limited, strict = [*limited, (column, limit_below(claim.value))], [*strict, True]
+    move = np.arange(len(graph.source))
+    own = graph.source.astype(np.int64) * graph.states + graph.target
+    steps = instance.steps.only(np.searchsorted(codes, own))
+    books: list[Book] = [TwinBook(twin, steps) for twin in twins]
+    if limited:
+        most = np.array([cap for _, cap in limited]), np.array(strict)
+        books = [SumBook(graph, move, graph.amounts[:, [c for c, _ in limited]], most), *books]
+    closed = Closed(graph, move, books)
+    state, values = claim.labels
+    values = values if len(values) else np.zeros((0, closed.width))
+    named = len(state) == 0 or (state.min() >= 0 and state.max() < instance.nodes)
+    fits = named and values.shape == (len(state), closed.width)
+    if fits and closed.is_proof((state, values), lambda states: np.zeros(len(states), dtype=bool)):
+        return claim.value
+    raise SolverError(f"{goal.name}: labels do not prove that no path is below {claim.value:.9g}")
+
+
+def _by_labels(instance: Instance, stage: Stage, goal: _Target, claim: Claim) -> float:
+    """Return the claimed bound of a goal; a `SolverError` if labels of resources do not close."""
+    assert claim.labels is not None
+    twins = [each.twin for each in instance.resources if each.twin is not None]
+    if claim.value is None or len(twins) < len(instance.resources):
+        return -np.inf  # without a twin nothing is proven
+    graph, (column,) = stage.graph, goal.columns
+    limited = [(c, most) for _, c, most in stage.limited]
+    strict = [False] * len(limited)
+    codes = instance.source.astype(np.int64) * instance.nodes + instance.target
+    if goal.kind == PEAK:
+        graph = graph.only(kept_below(graph.amounts[:, column], claim.value))
+    else:
+        limited, strict = [*limited, (column, limit_below(claim.value))], [*strict, True]
+    move = np.arange(len(graph.source))
+    own = graph.source.astype(np.int64) * graph.states + graph.target
+    steps = instance.steps.only(np.searchsorted(codes, own))
+    books: list[Book] = [TwinBook(twin, steps) for twin in twins]
+    if limited:
+        most = np.array([cap for _, cap in limited]), np.array(strict)
+        books = [SumBook(graph, move, graph.amounts[:, [c for c, _ in limited]], most), *books]
+    closed = Closed(graph, move, books)
+    state, values = claim.labels
+    values = values if len(values) else np.zeros((0, closed.width))
+    named = len(state) == 0 or (state.min() >= 0 and state.max() < instance.nodes)
+    fits = named and values.shape == (len(state), closed.width)
+    if fits and closed.is_proof((state, values), lambda states: np.zeros(len(states), dtype=bool)):
+        return claim.value
+    raise SolverError(f"{goal.name}: labels do not prove that no path is below {claim.value:.9g}")
 
 
 def _priced(stage: Stage, claim: Claim) -> list[tuple[float, int, float]]:

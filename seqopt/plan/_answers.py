@@ -108,6 +108,8 @@ def _selected(
         with answered(watch.interrupt) if formulation.watched else nullcontext():
             found = called(name, lambda: instance, Solution, solve)
     except InfeasibleError as error:
+        if instance.resources:
+            raise InfeasibleError(f"claimed by {name}, and not proven: {error}") from None
         if not instance.caps:
             raise SolverError(
                 f"formulation {name} says that no path is allowed, and some are: {error}"
@@ -173,6 +175,11 @@ def judged(instance: Instance, formulation: Formulation, found: Solution) -> Cer
 def _claims(instance: Instance, found: Solution) -> list[Claim]:
     """Return the claimed bound of each goal with its multipliers, as far as they are given."""
     kinds = [goal.kind for goal in instance.goals]
+    if instance.resources and not instance.asks_time:
+        pairs = zip(found.proofs, found.bound, strict=False)
+        if not all(each.twin for each in instance.resources):
+            return [Claim(bound) for bound in found.bound]
+        return [Claim(b, labels=(proof.states[:, 1], proof.labels)) for proof, b in pairs]
     if instance.asks_time:
         return _of_times(instance, found, kinds)
     if kinds == [TAIL]:

@@ -97,6 +97,9 @@ def confirmed(
         hint = None
         if barred(steps) is None:
             found = Look(end)(steps)
+            if found.whole and problem.paths:
+                kept = ", ".join(map(str, problem.paths))
+                return claimed(name, f"no plan keeps {kept}; leave it out", exact=exact)
             if found.whole and capped:
                 return _over_budget(steps, found, name, exact=exact)
             if found.whole:

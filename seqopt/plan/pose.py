@@ -104,7 +104,8 @@ def graph_kind(problem: Problem) -> str:
     """Return the default kind of graph of a problem."""
     if problem.orders is not None:
         return ORDERS
-    asked = problem.is_timed or problem.goals or problem.filters or problem.stands is not None
+    beside = problem.filters or problem.paths or problem.stands is not None
+    asked = problem.is_timed or problem.goals or beside
     return STATES if asked or not in_layers(problem.moves) else CANDIDATES
 
 
@@ -117,7 +118,7 @@ def usual(problem: Problem) -> str:
     """Return the name of the default formulation of a problem."""
     if problem.orders is not None:
         return "order_search"
-    if problem.is_timed:
+    if problem.is_timed or problem.paths:
         return "makespan_labels"
     if graph_kind(problem) == STATES:
         return "schedule_search"
@@ -130,8 +131,8 @@ def questions_of(problem: Problem) -> tuple[str, ...]:
     """Return the questions that a formulation of a problem must support."""
     if problem.orders is not None:
         return ("order",)
-    if problem.is_timed:
-        return ("time",)
+    if problem.is_timed or problem.paths:
+        return ("time",) * problem.is_timed + ("resource",) * bool(problem.paths)
     if not (problem.scenarios and problem.over.aim is Aim.SUM):
         return ("goals",)
     return ("tail", "instance") if graph_kind(problem) == CANDIDATES else ("tail",)
@@ -215,6 +216,7 @@ def _require_candidates(problem: Problem) -> None:
         f"aim {', '.join(map(str, problem.goals))}": of_states,
         "stands": problem.stands is not None,
         f"filter {', '.join(map(str, problem.filters))}": bool(problem.filters),
+        f"resource {', '.join(map(str, problem.paths))}": bool(problem.paths),
     }
     for name in (name for name, asked in why.items() if asked):
         raise ProblemError(
@@ -233,6 +235,7 @@ def _states(problem: Problem) -> States:
     found = build_states(*asked, problem.stands)
     check_parts(problem.filters)
     found = replace(found, resources=problem.resources, filters=problem.filters)
+    found = replace(found, paths=problem.paths)
     space = found.space
     ends = isinstance(space, FreeSpace) and space.first == space.levels
     if ends and space.ended(space.start()).all():
@@ -242,6 +245,8 @@ def _states(problem: Problem) -> States:
             "aim makespan: how long it takes to take bricks away is not modeled; leave "
             "direction=take-down out"
         )
+    if problem.paths and problem.scenarios and over.aim is Aim.SUM:
+        raise ProblemError(f"resource {problem.paths[0]}: totals over scenarios take none")
     if caps := parse_budgets(problem.budgets, of_states=True):
         found = within(found, {cap.name: cap.bound for cap in caps})
     if found.standing is not None and found.standing.curing is not None and not found.is_timed:
@@ -265,6 +270,8 @@ def _all_orders(problem: Problem) -> States:
         raise ProblemError("an order is given; pose with orders='tied' to seek one")
     if problem.is_timed:
         raise ProblemError("makespan: it is found in one order; give an order, or leave it out")
+    if problem.paths:
+        raise ProblemError(f"resource {problem.paths[0]}: it is kept in one order; give an order")
     from seqopt.graph._orders import among_orders  # noqa: PLC0415  # few problems seek an order
 
     return among_orders(_states(problem), problem.orders)

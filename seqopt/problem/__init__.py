@@ -2,7 +2,8 @@
 
 A criterion turns the responses of a step into its cost. An amount is what states or moves take, of
 which the largest or the sum over a build is to be small, or within a budget. A filter says which
-states may be passed: within limits and payloads, by rules, standing.
+states may be passed: within limits and payloads, by rules, standing. A resource is what depends on
+the whole path so far.
 
 >>> from seqopt.problem.criteria import WorstRatio
 >>> from seqopt.problem.amounts import parse_goals
@@ -15,5 +16,6 @@ states may be passed: within limits and payloads, by rules, standing.
 from seqopt.problem.amounts import Amount
 from seqopt.problem.filters import Filter, register
 from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.resources import Resource, StepArrays
 
-__all__ = ["Amount", "Criterion", "Filter", "Limit", "register"]
+__all__ = ["Amount", "Criterion", "Filter", "Limit", "Resource", "StepArrays", "register"]

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from seqopt.problem.requirements import (
     payload_limits,
     split_word,
 )
+from seqopt.problem.resources import Resource
 from seqopt.responses.quantities import TOLERANCE
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
@@ -211,27 +212,30 @@ def filters_of(problem: Any) -> tuple[Filter, ...]:
     return (*out, *map(_limit_filter, problem.limits), *problem.filters)
 
 
+Asked: TypeAlias = Limit | Filter | Resource
+
+
 def parse_limits(
-    given: Sequence[str | Limit | Filter] | str | Limit | Filter, scene: Scene, where: str = "limit"
-) -> tuple[Limit | Filter, ...]:
-    """Return limits and filters that are given as such, or in words.
+    given: Sequence[str | Asked] | str | Asked, scene: Scene, where: str = "limit"
+) -> tuple[Asked, ...]:
+    """Return limits, filters and resources that are given as such, or in words.
 
     Words are ``payload``, of the scene's robots, ``RESPONSE=VALUE``, SI units,
-    ``linear_range=SHARE``, or ``any`` to lift it, and names of filters that were registered.
+    ``linear_range=SHARE``, or ``any`` to lift it, and names of what was registered.
     ``where``: for messages.
     """
-    several = (given,) if isinstance(given, str | Limit | Filter) else given
+    several = (given,) if isinstance(given, str | Asked) else given
     if not isinstance(several, Sequence):
         return as_limits(several)
-    out: list[Limit | Filter] = []
+    out: list[Asked] = []
     for each in several:
-        if isinstance(each, Filter):
+        if isinstance(each, Filter | Resource):
             out.append(each)
         elif not isinstance(each, str):
             out += as_limits([each])
         elif each == "payload":
             out += payload_limits(scene)
-        elif "=" not in each and each in (own := registered(Filter)):
+        elif "=" not in each and each in (own := registered(Filter) | registered(Resource)):
             out.append(own[each])
         else:
             out.append(_limit_of(each, where))
@@ -258,14 +262,14 @@ def _limit_of(text: str, where: str) -> Limit:
     return Limit(name, (length_word if name == TOLERANCE else number_word)(value, said))
 
 
-def register(*parts: Amount | Filter | Part) -> None:
-    """Add amounts, filters, formats and pictures of your own, which are then asked for by name.
+def register(*parts: Amount | Filter | Resource | Part) -> None:
+    """Add amounts, filters, resources, formats and pictures, which are then asked for by name.
 
     Packages register theirs by entry points of the group ``seqopt.parts``.
 
     Parameters
     ----------
-    *parts : Amount, Filter, Format or Picture
+    *parts : Amount, Filter, Resource, Format or Picture
         Each takes the place of one of its kind that was registered by its name before.
 
     Raises
@@ -282,9 +286,9 @@ def register(*parts: Amount | Filter | Part) -> None:
     26.0
     """
     for part in parts:
-        if not isinstance(part, Amount | Filter | Part):
+        if not isinstance(part, Amount | Filter | Resource | Part):
             raise ProblemError(
-                f"{short(part)}: give an Amount or a Filter of seqopt.problem, a Format of "
+                f"{short(part)}: give an Amount, a Filter or a Resource of seqopt.problem, a Format of "
                 "seqopt.exchange, or a Picture of seqopt.report"
             )
         taken = part.reserved() if isinstance(part, Part) else (*BUILT_IN, *TAKEN)

@@ -31,6 +31,7 @@ from seqopt.problem.requirements import (
     _tolerance_beside,
     as_limits,
 )
+from seqopt.problem.resources import Resource
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
@@ -295,6 +296,8 @@ class Problem(Shown):
         ``linear_range``, plans keep the linear range wherever any does.
     filters : tuple of Filter
         What states must pass beside these.
+    paths : tuple of Resource
+        What plans must keep from the first step to the last.
     budgets : tuple of str
         Caps on totals over the build, in words.
     stands : Standing or None
@@ -333,6 +336,7 @@ class Problem(Shown):
     also: tuple[str, ...] = ()
     resources: Resources = HERE
     filters: tuple[Filter, ...] = ()
+    paths: tuple[Resource, ...] = ()
 
     def __post_init__(self) -> None:
         """Let a tolerance keep to other limits, and props to what they may bear."""
@@ -348,7 +352,7 @@ class Problem(Shown):
     def __repr__(self) -> str:
         parts = [f"{self.scene.name!r}, {self.method!r}, criterion {self.criterion.name!r}"]
         parts += map(str, self.goals)
-        for name in ("limits", "filters", "budgets", "scenarios"):
+        for name in ("limits", "filters", "paths", "budgets", "scenarios"):
             count = len(getattr(self, name))
             parts += [f"{count} {name}"] if count else []
         parts += ["every state stands"] if self.stands is not None else []
@@ -417,7 +421,9 @@ def _in_values(words: Mapping[str, Any], engine: Engine) -> dict[str, Any]:
     if "limits" in words and isinstance(network, Network):  # else it is refused later
         found = parse_limits(words["limits"], network.scene)
         filters = tuple(each for each in found if isinstance(each, Filter))
-        words = {**words, "limits": [e for e in found if e not in filters], "filters": filters}
+        paths = tuple(each for each in found if isinstance(each, Resource))
+        rest = [each for each in found if each not in (*filters, *paths)]
+        words = {**words, "limits": rest, "filters": filters, "paths": paths}
     return {name: READ[name](value) if name in READ else value for name, value in words.items()}
 
 

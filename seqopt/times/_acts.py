@@ -41,9 +41,9 @@ class Acts:
     cured: CuringStates | None = None
 
     @property
-    def source(self) -> Ints:
-        """The states before acts, (a,), ascending."""
-        return np.asarray(self.graph.source[self.move])
+    def count(self) -> int:
+        """How many columns there are."""
+        return int(self.entries.shape[1])
 
     def follow(
         self, act: Ints, end: Floats, since: Floats, placed: Floats
@@ -77,9 +77,10 @@ class Acts:
             out[:, group] = np.take_along_axis(times, order, axis=1)
         return out
 
-    def counted(self, state: Ints, values: Floats, last: int) -> Floats:
-        """Return labels with what counts of readiness, and of ages of mortar from a column on."""
-        out, columns = values.copy(), slice(1, 1 + self.entries.shape[1])
+    def counted(self, state: Ints, values: Floats) -> Floats:
+        """Return labels with what counts of readiness, and of ages of mortar after it."""
+        last = 1 + self.count
+        out, columns = values.copy(), slice(1, last)
         later = np.maximum(values[:, columns], values[:, [0]] - self.longest)
         out[:, columns] = np.where(self.entries[state] <= 0, later, 0.0)
         if self.cured is not None:  # what has its full bond could as well be older

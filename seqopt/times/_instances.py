@@ -12,9 +12,10 @@ from seqopt.errors import SolverError
 from seqopt.graph._timed import TimedGraph
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import Instance
+from seqopt.judge._label_proof import Book, Closed, SumBook, limit_below
 from seqopt.judge.arithmetic import Claim, Labels, Stage, _sum
 from seqopt.times._acts import acts_of_instance
-from seqopt.times._label_proof import Closed, Limits, limit_below
+from seqopt.times._clock import Clock
 
 
 def claimed_time(
@@ -33,9 +34,17 @@ def claimed_time(
         _require_labels(instance, claim.labels, len(columns))
         acts = acts_of_instance(timed, stage.graph, kept)
         multipliers = np.column_stack([shares[:, 0], shares[:, 1:][:, timed.kinds]])
-        limits = Limits(limit_below(claim.value), most, np.arange(1 + len(columns)) == 0)
-        closed = Closed(acts, stage.graph.amounts[:, columns], multipliers, limits)
-        if closed.is_proof(claim.labels, lambda states: np.zeros(len(states), dtype=bool)):
+        clock = Clock(acts, multipliers, limit_below(claim.value), strict=True)
+        books: list[Book] = [clock]
+        if len(columns):
+            limits = most, np.zeros(len(columns), dtype=bool)
+            amounts = stage.graph.amounts[:, columns]
+            books.append(SumBook(stage.graph, acts.move, amounts, limits))
+        closed = Closed(stage.graph, acts.move, books)
+        state, values = claim.labels
+        since = acts.sorted(acts.entries[state], values[:, 1 : 1 + acts.count])
+        values = np.column_stack([values[:, 0], since, values[:, 1 + acts.count :]])
+        if closed.is_proof((state, values), lambda states: np.zeros(len(states), dtype=bool)):
             return claim.value
         raise SolverError(f"labels do not prove that no path ends before {claim.value:.9g}")
     bounds = [_sum(stage, timed.work[kept] @ own, claim, limited) for own in shares]

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import seqopt
+from formulations.times._labels import InTime
 from seqopt.errors import SeqoptError
 from seqopt.graph.states.states import States
 from seqopt.plan.search._margin_search import bisected
@@ -262,3 +263,65 @@ def test_a_state_that_is_left_out_is_missed(space, kind, monkeypatch):
                 return
             assert found(own)[0] == pytest.approx(value, rel=1e-9)
     raise AssertionError("no state of the best plan was missed")
+
+
+# robots' readiness, the resource of makespans: what depends on the path so far
+
+
+DURATIONS = "fetch=30,place=10,approach=10,grip=5,release=5"
+
+
+@cache
+def in_time():
+    engine = seqopt.make_engine("compliance", small_arch(4).with_durations(DURATIONS))
+    return seqopt.pose(engine, HELD, ONES, "makespan")
+
+
+def with_readiness(monkeypatch, change):
+    """Whether the judge objects, or does not call it optimal, where readiness is changed."""
+    own = InTime.extend
+
+    def changed(self, arc, values):
+        return change(self, arc, own(self, arc, values))
+
+    monkeypatch.setattr(InTime, "extend", changed)
+    try:
+        plan = seqopt.solve(replace(in_time()))
+    except SeqoptError as error:
+        return "failed" not in str(error)
+    return str(plan.status) != "optimal"
+
+
+def added(_, __, values):
+    out = values.copy()
+    out[:, 0] += 1.0
+    return out
+
+
+def let_through(_, __, values):
+    """Robots that let go are ready at once."""
+    out = values.copy()
+    out[:, 1:] = 0.0
+    return out
+
+
+@pytest.mark.parametrize(
+    ("change", "seen"), [(lambda _, __, v: v, False), (added, True), (let_through, True)]
+)
+def test_a_corrupted_readiness_is_seen(change, seen, monkeypatch):
+    assert with_readiness(monkeypatch, change) is seen
+
+
+def test_readiness_of_a_state_that_is_left_out_is_missed(monkeypatch):
+    """Whatever state of the best plan: a plan as good is found, or the judge finds a better."""
+    best, met = solved(in_time()), False
+    for state in range(1, 40):
+        with monkeypatch.context() as patch:
+
+            def lost(self, arc, values, state=state):
+                gone = (self._after[arc] == state)[:, None]
+                return np.where(gone, np.inf, values)
+
+            met |= with_readiness(patch, lost)
+    assert best.status == "optimal"
+    assert met

@@ -181,7 +181,7 @@ def test_responses_that_no_state_has_are_named():
 
 
 def test_what_is_neither_is_refused():
-    with pytest.raises(ProblemError, match="give an Amount or a Filter"):
+    with pytest.raises(ProblemError, match="give an Amount, a Filter or a Resource"):
         seqopt.register("busy")
     with pytest.raises(ProblemError, match=r"did you mean regrips\?"):
         find_amount("regrip")

@@ -9,10 +9,12 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
+from seqopt.graph._explore import Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.space import Found, Moves, Space
 from seqopt.graph.states.states import States
-from seqopt.problem.amounts import MoveArrays
+from seqopt.problem.amounts import NONE, MoveArrays
+from seqopt.problem.resources import StepArrays
 from seqopt.scene.scene import Order
 from seqopt.sequence import _rule_space as free_space
 from seqopt.sequence._robot_kinds import node_numbers
@@ -262,6 +264,18 @@ class StateSpace(Space):
         held = states[:, : self.problem.space.robots].astype(np.int64)
         named = np.where(held > 0, numbers[held.clip(min=0)], 0)
         return np.column_stack([np.full(len(held), part), named])
+
+
+def seen_steps(problem: States, visited: Visited) -> StepArrays:
+    """Return the moves among visited states as resources see them."""
+    space, graph = problem.space, visited.graph
+    rows = np.concatenate([own[:, : space.robots] for *_, own in visited.states])
+    counts = [len(own) for *_, own in visited.states]
+    bricks = np.repeat([space.bricks_at(level) for level, *_ in visited.states], counts)
+    robots = [robot for kind in space.kinds for robot in kind.robots]
+    nodes = np.full((len(rows), len(problem.network.scene.robots)), NONE)
+    nodes[:, robots] = np.array([NONE, *node_numbers(problem.network)])[rows.clip(min=0)]
+    return StepArrays(bricks[graph.target], nodes[graph.source], nodes[graph.target])
 
 
 def scenario_peaks(problem: States) -> tuple[bool, ...]:

@@ -23,6 +23,7 @@ from seqopt.problem.amounts import LARGEST, NONE, STATE_RESPONSES, Amount, State
 from seqopt.problem.filters import Filter, filters_of
 from seqopt.problem.problem import WORST_PEAK, Aim, Orders, RobustAim, _goals, _require_for_curing
 from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.resources import Resource
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets, _near
 from seqopt.responses._tolerance import is_tolerance
@@ -60,7 +61,7 @@ class States(Source, Shown):
     largest. ``resources``: workers of grip sets and the cache of responses, which the proof does
     not use; ``spares``: whether the finished structure without grips costs nothing; ``filters``:
     further requirements of states; ``orders``: which orders of the bricks are searched, by default
-    the scene's own alone: values keep its scales.
+    the scene's own alone: values keep its scales; ``paths``: resources that plans must keep.
     """
 
     kind = STATES
@@ -80,6 +81,7 @@ class States(Source, Shown):
     spares: bool = False
     filters: tuple[Filter, ...] = ()
     orders: Orders | None = None
+    paths: tuple[Resource, ...] = ()
 
     def __repr__(self) -> str:
         caps = zip(self.names[len(self.aims) :], self.budgets, strict=True)
@@ -169,14 +171,14 @@ class States(Source, Shown):
     @property
     def questions(self) -> tuple[str, ...]:
         """What a formulation must answer to choose from it."""
-        if self.is_timed:
-            return ("time",)
+        if self.is_timed or self.paths:
+            return ("time",) * self.is_timed + ("resource",) * bool(self.paths)
         return ("goals",) if self.orders is None else ("order",)
 
     @property
     def default_formulation(self) -> str:
         """The name of the formulation that chooses from it if none is named."""
-        others = {"time": "makespan_labels", "order": "order_search"}
+        others = {"order": "order_search"} | dict.fromkeys(("time", "resource"), "makespan_labels")
         return others.get(self.questions[0], "schedule_search")
 
     @property
@@ -199,7 +201,7 @@ class States(Source, Shown):
 
     def settles(self, *, exact: bool) -> bool:
         """Return whether a judged exact search is optimal, up to the proven width of margins."""
-        return exact and not (self.budgets or self.totals or self.is_timed)
+        return exact and not (self.budgets or self.totals or self.is_timed or self.paths)
 
     def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
         """Return the settings of the problem for a summary; ``limits``: bounds by name."""
@@ -213,6 +215,7 @@ class States(Source, Shown):
             "scenarios": len(self.scenarios),
             "limits": limits,
             **({"filters": [*map(str, self.filters)]} if self.filters else {}),
+            **({"resources": [*map(str, self.paths)]} if self.paths else {}),
             "rules": self.rules.described(self.network.scene),
             "stands": stands,
         }

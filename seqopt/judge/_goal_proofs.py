@@ -1,8 +1,9 @@
-"""Goals of builds in time, bounded one after the other on the judge's own graph."""
+"""Goals of builds with resources, bounded one after the other on the judge's own graph."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,36 +12,33 @@ from seqopt.errors import SolverError
 from seqopt.graph.formulation import Solution
 from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import cut, potentials, tied
-from seqopt.judge._proof import Rebuilt
+from seqopt.judge._label_proof import Book, Closed, SumBook, TwinBook, kept_below, limit_below
 from seqopt.judge._states import StateEvaluator
-from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.steps import StepKind
-from seqopt.times._acts import Acts, Team, acts_of_rows
-from seqopt.times._durations import require_durations
-from seqopt.times._label_proof import Closed, Limits, kept_below, limit_below
-from seqopt.times._mortar_floors import cured_rows
+from seqopt.problem.amounts import NONE
+from seqopt.problem.resources import StepArrays
 
 
 def label_bounds(
-    evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: Solution
+    evaluator: StateEvaluator, rebuilt: Any, values: Sequence[float], found: Solution
 ) -> Callable[[Graph], tuple[float, ...]]:
     """Return what bounds the goals after those about margins, by labels, on rebuilt subgraphs.
 
-    ``values``: of all goals; ``found``: what is claimed, with labels. The function raises
-    `SolverError` if labels are given that do not prove what is claimed.
+    ``rebuilt``: states, as of `seqopt.judge._proof.Rebuilt`; ``values``: of all goals; ``found``:
+    what is claimed, with labels. The function raises `SolverError` if labels are given that do not
+    prove what is claimed.
     """
-    rows = _TimedRows(evaluator, rebuilt, values, found)
+    rows = _LabeledRows(evaluator, rebuilt, values, found)
     return lambda graph: _GoalProofs(rows, graph, values, found).bounds()
 
 
-class _TimedRows:
+class _LabeledRows:
     """The states that a better build could pass, by number, in the columns of the judge.
 
-    ``level`` (n,); ``rows`` (n, c).
+    ``level`` (n,); ``rows`` (n, c); ``timed``: the same in time, if that counts.
     """
 
     def __init__(
-        self, evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: Solution
+        self, evaluator: StateEvaluator, rebuilt: Any, values: Sequence[float], found: Solution
     ) -> None:
         self.evaluator, self._rebuilt = evaluator, rebuilt
         self._margins = values[: evaluator.margins]
@@ -49,46 +47,44 @@ class _TimedRows:
         self.rows = np.concatenate([own[:, : tables.robots] for own in rebuilt.states])
         columns = [r for kind in problem.space.kinds for r in kind.robots]
         self._columns = [columns.index(r) for r in tables.team]  # of the search
-        self.cured = cured_rows(evaluator, rebuilt, found.motions)
-        scene, own = problem.network.scene, require_durations(problem.network.scene, tables.team)
-        times = np.array([[d.fetch, d.place, d.approach, d.grip, d.release] for d in own])
-        slow = np.array([0.0 if d.speed is None else 1 / d.speed for d in own])
-        at = [scene.node_position(node) for node in tables.nodes[1:].tolist()]
-        self._team = Team(times, slow, tables.groups, np.array([(0.0,) * 3, *at]), problem.parks)
+        clocks = (goal.twin.clocks for goal in problem.goals if goal.in_time)
+        self.timed = next((make(evaluator, rebuilt, found.motions) for make in clocks), None)
 
-    def acts(self, graph: Graph) -> Acts:
-        """Return who may act in the moves of a graph of these states, and for how long."""
-        places = self.level[graph.target] > self.level[graph.source]
-        rules = self.evaluator.problem.rules
-        if isinstance(rules, Schedule):
-            kinds = [False, *(step.kind is StepKind.PLACE for step in rules.steps)]
-            places = np.array(kinds)[self.level[graph.target]]
-        return acts_of_rows(graph, self.rows.astype(np.int64), places, self._team, self.cured)
-
-    def multipliers(self, proof: LabelProof) -> Floats:
-        """Return multipliers (L, 1 + c) of the time of all and of robots, by columns."""
-        count = len(self._columns)
-        if proof.prices.ndim != 2 or proof.prices.shape[1] != 1 + count:
+    def clock(self, graph: Graph, proof: LabelProof, most: float, *, strict: bool) -> Any:
+        """Return the book of time, and which moves its arcs are."""
+        assert self.timed is not None
+        wide = proof.prices.ndim == 2 and proof.prices.shape[1] == 1 + len(self._columns)
+        if not wide:
             raise SolverError("there is no price for every robot")
-        return np.asarray(proof.prices[:, [0, *(1 + c for c in self._columns)]])
+        prices = proof.prices[:, [0, *(1 + c for c in self._columns)]]
+        return self.timed.clock(graph, prices, most, strict=strict)
 
-    def labels(self, proof: LabelProof) -> tuple[Ints, Floats]:
-        """Return labels by the numbers of their states, as far as there are such states.
+    def twins(self, graph: Graph, move: Ints) -> list[Book]:
+        """Return the books of the problem's own resources on some moves of a graph."""
+        problem, tables = self.evaluator.problem, self.evaluator.tables
+        nodes = np.full((len(self.rows), len(problem.network.scene.robots)), NONE)
+        nodes[:, list(tables.team)] = tables.nodes[self.rows.clip(min=0)]
+        bricks = np.array([tables.bricks_at(k) if k else 0 for k in range(tables.last + 1)])
+        source, target = graph.source[move], graph.target[move]
+        steps = StepArrays(bricks[self.level[target]], nodes[source], nodes[target])
+        return [TwinBook(each.twin, steps) for each in problem.paths if each.twin is not None]
+
+    def labels(self, proof: LabelProof, width: int) -> tuple[Ints, Floats]:
+        """Return labels (N, width) by the numbers of their states, as far as there are such.
 
         Entries of robots that could change places are sorted, and with them their readiness.
         """
         count, tables = len(self._columns), self.evaluator.tables
-        given = proof.states, proof.labels
-        wide = all(each.ndim == 2 and each.shape[1] >= 1 + count for each in given)
-        if not wide or len(proof.states) != len(proof.labels):
+        states, values = proof.states, proof.labels
+        if len(states) and (states.ndim != 2 or states.shape[1] < 1 + count):
             raise SolverError("labels are none of this build: they have other columns")
+        if len(states) != len(values) or values.shape[1:] != (width,):
+            return np.zeros(0, dtype=np.int64), np.zeros((0, width))
         order = [0, *(1 + c for c in self._columns)]
-        states = proof.states[:, [*order, *range(1 + count, proof.states.shape[1])]]
-        values = proof.labels[:, [*order, *range(1 + count, proof.labels.shape[1])]]
-        for group in self._team.groups:
-            columns = [1 + c for c in group]
-            sort = np.lexsort((values[:, columns], -states[:, columns]), axis=1)
-            values[:, columns] = np.take_along_axis(values[:, columns], sort, axis=1)
+        states = states[:, [*order, *range(1 + count, states.shape[1])]]
+        if self.timed is not None:
+            values = values[:, [*order, *range(1 + count, width)]]
+            values = self.timed.in_order(states[:, 1 : 1 + count], values)
         entries = tables.in_order(states[:, 1:].astype(tables.start().dtype))
         none = np.zeros(0, dtype=np.int64)
         numbers, labels = [none], [none]  # where builds begin a state may come twice
@@ -122,7 +118,7 @@ class _GoalProofs:
     """Bounds on the goals of a build in time, each where those before it are at their values."""
 
     def __init__(
-        self, rows: _TimedRows, graph: Graph, values: Sequence[float], found: Solution
+        self, rows: _LabeledRows, graph: Graph, values: Sequence[float], found: Solution
     ) -> None:
         self._rows, self._graph, self._values, self._found = rows, graph, values, found
         problem = rows.evaluator.problem
@@ -131,7 +127,8 @@ class _GoalProofs:
         self._time, self._sums = np.inf, list[tuple[int, float]]()
         for k, cap in zip(range(self._aims, len(values)), problem.budgets, strict=True):
             self._cap(k, tied(cap))
-        self._filtered = not problem.budgets and rows.cured is None
+        cures = rows.timed is not None and rows.timed.cures
+        self._filtered = not (problem.budgets or cures or problem.paths)
 
     def _cap(self, k: int, most: float) -> None:
         """Let builds take no more of a goal from now on."""
@@ -174,17 +171,17 @@ class _GoalProofs:
         else:
             columns, strict = [*columns, k], [*strict, True]
             caps.append(limit_below(claimed))
-        limits = Limits(caps[0], np.array(caps[1:]), np.array(strict))
-        acts, multipliers = self._rows.acts(graph), self._rows.multipliers(proof)
-        closed = Closed(acts, graph.amounts[:, columns], multipliers, limits)
-        labels, cured = self._rows.labels(proof), self._rows.cured
-        bricks = 0 if cured is None else len(cured.full)
-        width = 1 + acts.entries.shape[1] + len(columns) + bricks
-        if labels[1].shape[1] != width:
-            labels = labels[0][:0], np.zeros((0, width))
-        if closed.is_proof(labels, self._rows.fallen):
+        books, move = list[Book](), np.arange(len(graph.source))
+        if self._rows.timed is not None:
+            clock, move = self._rows.clock(graph, proof, caps[0], strict=strict[0])
+            books.append(clock)
+        if columns:
+            limits = np.array(caps[1:]), np.array(strict[1:])
+            books.append(SumBook(graph, move, graph.amounts[:, columns], limits))
+        closed = Closed(graph, move, [*books, *self._rows.twins(graph, move)])
+        if closed.is_proof(self._rows.labels(proof, closed.width), self._rows.fallen):
             return claimed
         if len(proof.labels):
             goal = self._rows.evaluator.problem.names[k]
             raise SolverError(f"{goal}: labels do not prove that no build is below {claimed:.9g}")
-        return min(closed.bound, claimed) if self._is_time[k] else -np.inf
+        return min(clock.bound, claimed) if self._is_time[k] else -np.inf
