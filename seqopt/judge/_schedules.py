@@ -27,7 +27,7 @@ from seqopt.judge._twin import PathTwin, exceeds, own_values, twin_of
 from seqopt.judge.certificate import Basis, Certificate
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.requirements import LINEAR_RANGE, Limit
-from seqopt.problem.resources import StepArrays, first_fault
+from seqopt.problem.resources import StepArrays, _first_fault
 from seqopt.problem.standing import Standing, _size, slack
 from seqopt.responses._props import EXCESS_COLUMN
 from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along, tolerances_along
@@ -335,7 +335,9 @@ def _check_resources(problem: States, steps: Sequence[Step]) -> None:
     every = [first, *(step.grips for step in steps)]
     nodes = np.array([[NONE if n is None else n for n in grips] for grips in every])
     bricks = np.array([step.bricks for step in steps])
-    if (wrong := first_fault(problem.paths, StepArrays(bricks, nodes[:-1], nodes[1:]))) is not None:
+    if (
+        wrong := _first_fault(problem.paths, StepArrays(bricks, nodes[:-1], nodes[1:]))
+    ) is not None:
         number = steps[wrong[1]].number
         raise SolverError(f"the resource {wrong[0]} is not kept up to step {number}")
 

@@ -17,7 +17,7 @@ from seqopt.judge._budget_proof import least_within
 from seqopt.judge._label_proof import Book, Closed, SumBook, TwinBook, kept_below, limit_below
 from seqopt.judge._twin import path_twin
 from seqopt.judge.certificate import TOLERANCE, Certificate
-from seqopt.problem.resources import first_fault
+from seqopt.problem.resources import _first_fault
 
 BELOW = 1e-9  # by how much a path must be better, over the size of the value
 ABOVE = 1e-6  # over a value: how far a claim may be above what is proven
@@ -87,7 +87,7 @@ def _walked(instance: Instance, answer: Answer) -> _Walk:
     if not instance.ends[at]:
         raise SolverError(f"the path stops at node {at}, where none may end")
     every = instance.steps if instance.resources else None
-    if every is not None and (wrong := first_fault(instance.resources, every.only(arcs))):
+    if every is not None and (wrong := _first_fault(instance.resources, every.only(arcs))):
         raise SolverError(f"the resource {wrong[0]} is not kept up to step {wrong[1] + 1}")
     ends = 0.0
     if instance.timed is not None and instance.asks_time:

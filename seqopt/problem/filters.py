@@ -288,8 +288,8 @@ def register(*parts: Amount | Filter | Resource | Part) -> None:
     for part in parts:
         if not isinstance(part, Amount | Filter | Resource | Part):
             raise ProblemError(
-                f"{short(part)}: give an Amount, a Filter or a Resource of seqopt.problem, a Format of "
-                "seqopt.exchange, or a Picture of seqopt.report"
+                f"{short(part)}: give an Amount, a Filter or a Resource of seqopt.problem, a "
+                "Format of seqopt.exchange, or a Picture of seqopt.report"
             )
         taken = part.reserved() if isinstance(part, Part) else (*BUILT_IN, *TAKEN)
         if part.name in taken:

@@ -124,7 +124,7 @@ class Resource:
         yield f"the resource {self.name} left out", replace(problem, paths=rest)
 
 
-def first_fault(resources: Sequence[Resource], steps: StepArrays) -> tuple[Resource, int] | None:
+def _first_fault(resources: Sequence[Resource], steps: StepArrays) -> tuple[Resource, int] | None:
     """Return a resource that a path does not keep, with its step from 0; None if all are kept.
 
     Each is followed by its twin, and by itself.
