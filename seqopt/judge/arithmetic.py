@@ -282,37 +282,6 @@ def _by_labels(instance: Instance, stage: Stage, goal: _Target, claim: Claim) ->
     raise SolverError(f"{goal.name}: labels do not prove that no path is below {claim.value:.9g}")
 
 
-def _by_labels(instance: Instance, stage: Stage, goal: _Target, claim: Claim) -> float:
-    """Return the claimed bound of a goal; a `SolverError` if labels of resources do not close."""
-    assert claim.labels is not None
-    twins = [each.twin for each in instance.resources if each.twin is not None]
-    if claim.value is None or len(twins) < len(instance.resources):
-        return -np.inf  # without a twin nothing is proven
-    graph, (column,) = stage.graph, goal.columns
-    limited = [(c, most) for _, c, most in stage.limited]
-    strict = [False] * len(limited)
-    codes = instance.source.astype(np.int64) * instance.nodes + instance.target
-    if goal.kind == PEAK:
-        graph = graph.only(kept_below(graph.amounts[:, column], claim.value))
-    else:
-        limited, strict = [*limited, (column, limit_below(claim.value))], [*strict, True]
-    move = np.arange(len(graph.source))
-    own = graph.source.astype(np.int64) * graph.states + graph.target
-    steps = instance.steps.only(np.searchsorted(codes, own))
-    books: list[Book] = [TwinBook(twin, steps) for twin in twins]
-    if limited:
-        most = np.array([cap for _, cap in limited]), np.array(strict)
-        books = [SumBook(graph, move, graph.amounts[:, [c for c, _ in limited]], most), *books]
-    closed = Closed(graph, move, books)
-    state, values = claim.labels
-    values = values if len(values) else np.zeros((0, closed.width))
-    named = len(state) == 0 or (state.min() >= 0 and state.max() < instance.nodes)
-    fits = named and values.shape == (len(state), closed.width)
-    if fits and closed.is_proof((state, values), lambda states: np.zeros(len(states), dtype=bool)):
-        return claim.value
-    raise SolverError(f"{goal.name}: labels do not prove that no path is below {claim.value:.9g}")
-
-
 def _priced(stage: Stage, claim: Claim) -> list[tuple[float, int, float]]:
     """Return multipliers with their columns and caps."""
     known = {name: (column, most) for name, column, most in stage.limited}
