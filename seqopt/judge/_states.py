@@ -14,6 +14,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.paths import strictly_below, tied
 from seqopt.graph.states.states import States
 from seqopt.judge._rule_moves import RuleTables, ScheduleTables, Transitions
+from seqopt.judge._step_checks import props_that_hold
 from seqopt.judge._twin import exceeds, own_values, twin_of
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.criteria import WorstRatio
@@ -21,8 +22,6 @@ from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import KnownRows, solve_sets
-from seqopt.scene._props import Prop
-from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Payload
 from seqopt.sequence.schedule import Schedule
@@ -338,19 +337,6 @@ def interchangeable(
         key = (book.reached[r, last], nodes, may, most[r], grip, arm, takes)
         groups.setdefault(key, []).append(r)
     return [tuple(group) for group in groups.values() if len(group) > 1]
-
-
-def props_that_hold(scene: Scene, bricks: int, robots: int) -> list[tuple[int, Prop]]:
-    """Return props by the numbers of their grips, with so many bricks and robots that hold."""
-    if not robots and bricks >= len(scene.build_order):
-        return []
-    kinds, first, out = scene.grip_kinds, len(scene.robots), []
-    stand = {node for brick in scene.placed[:bricks] for node in brick.nodes}
-    for i, prop in enumerate(scene.props):
-        if prop.node in stand:
-            kind = int(kinds.of_robot[first + i]) if len(kinds.turns) > 1 else 0
-            out.append((prop.node + kinds.span * kind, prop))
-    return out
 
 
 def _six_digits_do(problem: States) -> bool:

@@ -22,9 +22,9 @@ from seqopt.graph.states._visits import steps_of, steps_with, with_held
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import States
 from seqopt.judge._schedules import ordered, plan_values
-from seqopt.plan._answers import PROOF
 from seqopt.plan._guard import called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
+from seqopt.plan._paths import PROOF
 from seqopt.plan._range import INTERRUPTED, RANGE, keeping, leaves
 from seqopt.plan.pose import states_of
 from seqopt.problem.amounts import REGRIPS, STEPS, Amount

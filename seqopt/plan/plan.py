@@ -18,7 +18,7 @@ from seqopt.graph.instance import Instance
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.ranking import Objectives, objectives
 from seqopt.graph.states.states import States
-from seqopt.judge._schedules import certified
+from seqopt.judge._step_checks import certified
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan._status import ENDS, Status, bare_summary, order_facts, rests_on
 from seqopt.plan.build import ShownBuild

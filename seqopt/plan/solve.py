@@ -31,10 +31,10 @@ from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.source import ARCS, CANDIDATES, STATES, Source
 from seqopt.graph.states.states import States
-from seqopt.judge._schedules import check_shape
+from seqopt.judge._step_checks import check_shape
 from seqopt.judge.certificate import _require_anew
-from seqopt.plan._answers import Found, find_path, judged
 from seqopt.plan._guard import require_fit, require_proof, require_time
+from seqopt.plan._paths import Found, find_path, judged
 from seqopt.plan._range import best_within
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import AIMS, graph_kind, graph_of, in_layers, questions_of, usual
@@ -269,7 +269,7 @@ def _checked(steps: tuple[Step, ...], graph: Layers) -> tuple[Step, ...]:
 
 def _from_states(graph: States, formulation: Formulation, run: Run) -> Found:
     """Choose the states of a build."""
-    from seqopt.plan._answers import find_states  # noqa: PLC0415  # with their proofs
+    from seqopt.plan._states import find_states  # noqa: PLC0415  # with their proofs
 
     return find_states(graph, formulation, run)
 

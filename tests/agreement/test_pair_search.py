@@ -21,7 +21,7 @@ from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.paths import lexicographic
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.network.build import build_network
-from seqopt.plan._answers import judged
+from seqopt.plan._paths import judged
 from seqopt.plan.search._pair_search import KnownCosts
 from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solve import solve

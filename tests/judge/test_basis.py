@@ -15,7 +15,7 @@ def held(states):
 
 @pytest.fixture
 def registered(monkeypatch):
-    monkeypatch.setitem(ADDED, "held_alone", Amount("held_alone", held))
+    monkeypatch.setitem(ADDED, (Amount, "held_alone"), Amount("held_alone", held))
 
 
 def basis(plan):

@@ -12,7 +12,8 @@ import pytest
 import seqopt
 from seqopt.engines.interface import linear_limit
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError, TimeUpError
-from seqopt.judge._schedules import check_shape, judge_schedule
+from seqopt.judge._schedules import judge_schedule
+from seqopt.judge._step_checks import check_shape
 from seqopt.plan._range import NONE_KEEPS, UNKNOWN, keeping
 from seqopt.plan._status import Status
 from seqopt.plan.front import find_front

@@ -11,7 +11,8 @@ import seqopt
 from seqopt import Prop
 from seqopt.errors import InfeasibleError, SolverError, StepError
 from seqopt.judge._rule_moves import check_free
-from seqopt.judge._schedules import check_props, judge_schedule, props_that_hold
+from seqopt.judge._schedules import judge_schedule
+from seqopt.judge._step_checks import check_props, props_that_hold
 from seqopt.plan.pose import states_of
 from seqopt.responses.quantities import PROP_EXCESS
 from tests.brute_force import ONES, best_values

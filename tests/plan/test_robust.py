@@ -21,7 +21,7 @@ from seqopt.graph.formulation import Run, Watch, as_formulation
 from seqopt.graph.layers.compiled import compile_costs, compile_totals
 from seqopt.graph.layers.costs import LayeredCosts, largest_of
 from seqopt.graph.layers.layers import candidate_layers, in_scenarios
-from seqopt.plan._answers import find_path
+from seqopt.plan._paths import find_path
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.pose import graph_of, layers_of
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust

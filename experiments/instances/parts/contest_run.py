@@ -20,7 +20,7 @@ from seqopt.errors import SeqoptError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instance import Instance
 from seqopt.graph.paths import fewest_moves, reached
-from seqopt.plan._answers import _claims
+from seqopt.plan._paths import _claims
 
 OUTSIDE = ("HiGHS", "CP-SAT", "linopy")
 MOST_ARCS = 20_000  # of what outside solvers are given

@@ -37,7 +37,7 @@ from seqopt.graph.instance import PEAK, SUM, Instance, _Target
 from seqopt.graph.layers.compiled import on_paths
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.layers import Layers, possible_after, windows
-from seqopt.plan._answers import find_path
+from seqopt.plan._paths import find_path
 from seqopt.plan.search._window_search import (
     WindowSearch,
     alone_steps,

@@ -1,15 +1,13 @@
-"""Let a formulation find a path through arcs, candidates or states, and certify its answer."""
+"""Find a path through a graph, of an instance or of layers of candidates, and certify it."""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import partial
-from math import inf, isfinite
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,24 +23,16 @@ from seqopt.graph.formulation import (
     timed,
 )
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
-from seqopt.graph.states._visits import steps_in_hands
-from seqopt.graph.states.explored import barred
-from seqopt.graph.states.states import States
-from seqopt.judge._schedules import judge_schedule, ordered
 from seqopt.judge.arithmetic import Answer, Claim, OverCapError, judge_path
 from seqopt.judge.certificate import TOLERANCE, Certificate
-from seqopt.plan._guard import called, require_proof, with_numbers
-from seqopt.plan._infeasible import claimed, confirmed
-from seqopt.responses.resources import HERE
+from seqopt.plan._guard import called, with_numbers
 from seqopt.sequence.steps import Step
 from seqopt.work._clock import INTERRUPT
-from seqopt.work._workers import keep
 
 if TYPE_CHECKING:
     from seqopt.plan.search._window_search import WindowSearch
 
 PROOF = "the proof"  # what it is called where there was no time for it
-COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know what was computed
 
 
 class Found(NamedTuple):
@@ -210,70 +200,3 @@ def _of_times(instance: Instance, found: Solution, kinds: list[str]) -> list[Cla
             value = None if labels is None else found.bound[k]
             own[k] = Claim(value, shares=shares, labels=labels)
     return own
-
-
-def find_states(graph: States, formulation: Formulation, run: Run) -> Found:
-    """Find states of a build by a formulation, certified if a proof is requested.
-
-    Raises `InfeasibleError`, naming the brick at which builds stop, and the rule or limit to relax;
-    `ProblemError` if there is no such option; `SolverError` if the answer fails its check.
-    """
-    formulation.require_options(run.options)
-    if run.lazy:  # it is at any rate
-        require_proof(run.proof)
-    with keep(graph.resources.executor, graph.resources.workers):
-        return _found_states(graph, formulation, run)
-
-
-def _found_states(problem: States, formulation: Formulation, run: Run) -> Found:
-    start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
-    told = {} if run.progress is None else {"progress": run.progress}
-    limit = {"seconds": run.left} if isfinite(run.left) else {}
-    options = {**run.options, **told, **limit}
-    with run.clock.needed("finding a first plan"):
-        selection = _selected_states(formulation, (problem, twin), options, explain=run.explains)
-    selection = replace(selection, stopped=run.clock.why(selection.stopped))
-    solved = time.perf_counter()
-    if run.proof and run.progress is not None:
-        run.progress("proving that no plan is better")
-    steps = steps_in_hands(ordered(twin, selection.order).space, selection.states, selection.grips)
-    hint = dict(enumerate(selection.visited, start=twin.space.first))
-    exact = formulation.kind is FormulationKind.EXACT
-    judge = partial(judge_schedule, twin, selection, steps, hint, exact=exact)
-    selection, certificate = proven(selection, judge, run)
-    problem.certified.update(twin.certified)
-    seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
-    return Found(selection, certificate, steps, seconds)
-
-
-def _selected_states(
-    formulation: Formulation,
-    problems: tuple[States, States],
-    options: Mapping[str, Any],
-    *,
-    explain: bool,
-) -> Solution:
-    """Return the formulation's solution, converted to numbers; raise why there is none."""
-    (problem, twin), start, name = problems, time.perf_counter(), formulation.name
-    limit = float(options.get("seconds", inf))
-    solve = partial(formulation.solve, problem, **options)
-    if barred(problem) is not None:  # what every plan passes is asked before any is sought
-        raise confirmed(twin, name, limit, explain=explain)
-    judged = partial(replace, problem, resources=HERE)  # who works for a formulation may change
-    try:
-        selection = called(name, judged, Solution, solve)
-    except InfeasibleError as error:
-        left = limit - (time.perf_counter() - start)
-        why = confirmed(twin, name, left, exact=formulation.looks_at_all, explain=explain)
-        standing = problem.standing
-        if type(why) is SolverError and standing is not None and standing.curing is not None:
-            said = (
-                f"{error} in which all states stand while mortar cures, though some are once it "
-                "has; more robots may help, or mortar with some bond from 0 s on"
-            )
-            why = claimed(name, said, exact=formulation.looks_at_all)
-        raise why from None
-    for kept in [*vars(problem)]:  # whatever it left behind, but counts of what was computed
-        if kept not in (*(f.name for f in fields(problem)), *COUNTED):
-            del vars(problem)[kept]
-    return with_numbers(name, selection, len(problem.goals))
