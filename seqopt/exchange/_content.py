@@ -27,16 +27,34 @@ MOST_CORNERS = 2_000_000  # of all faces of all blocks
 
 @dataclass(frozen=True)
 class FileBlock:
-    """A block as a file has it."""
+    """A block as a file has it.
 
-    key: str  # what the file calls it
-    vertices: Floats  # (V, 3); in the file's unit of length
-    faces: Sequence[Sequence[int]]  # places among the vertices
-    support: bool = False  # whether it is fixed
-    density: float | None = None  # kg/m³
-    mass: float | None = None  # kg
-    course: float | None = None  # its place in the build; lower ones come first
-    group: str = ""  # its layer or group in the file
+    Parameters
+    ----------
+    key
+        What the file calls it.
+    vertices
+        (V, 3), in the file's unit of length.
+    faces
+        Places among the vertices, a sequence for every face.
+    support
+        Whether it is fixed.
+    density, mass
+        kg/m³ and kg, if the file says them.
+    course
+        Its place in the build; lower ones come first.
+    group
+        Its layer or group in the file.
+    """
+
+    key: str
+    vertices: Floats
+    faces: Sequence[Sequence[int]]
+    support: bool = False
+    density: float | None = None
+    mass: float | None = None
+    course: float | None = None
+    group: str = ""
 
 
 @dataclass(frozen=True)
@@ -49,15 +67,30 @@ class FileFace:
 
 @dataclass(frozen=True)
 class Content:
-    """What a file says about an assembly."""
+    """What a file says about an assembly.
+
+    Parameters
+    ----------
+    blocks, faces
+        What is built, and where blocks touch; no faces where the file has none.
+    unit, usual_unit
+        Unit of length, one of `UNITS`, if the file says it; or if the format has one, which not all
+        who write it respect.
+    up
+        Which axis the format has up, one of `UPS`.
+    law
+        Stiffnesses of joints, if the file has them.
+    said
+        What was read, left out or assumed.
+    """
 
     blocks: tuple[FileBlock, ...]
-    faces: tuple[FileFace, ...] = ()  # empty where the file has none
-    unit: str | None = None  # unit of length, one of `UNITS`, if the file says it
-    usual_unit: str | None = None  # if the format has one, which not all who write it respect
-    up: str = "z"  # which axis the format has up, one of `UPS`
-    law: JointLaw | None = None  # if the file has stiffnesses
-    said: tuple[str, ...] = ()  # what was read, left out or assumed
+    faces: tuple[FileFace, ...] = ()
+    unit: str | None = None
+    usual_unit: str | None = None
+    up: str = "z"
+    law: JointLaw | None = None
+    said: tuple[str, ...] = ()
 
     def placed(self, unit: float, up: str) -> Content:
         """Return the content in m, with z up. ``unit``: of its lengths, m; ``up``: one of `UPS`."""
