@@ -213,6 +213,7 @@ class ComplianceEngine(NamedEngine):
         self._basis, self._accuracy = basis, accuracy
         self._tree, self._uniform = grow_tree(self.network), _count_uniform(self.network)
         self._kept: dict[int, ComplianceOperator] = {}  # the one that was asked last comes last
+        self._grown: GrownExtremes | None = None  # what answers few grip sets of large structures
 
     @_failing_in_a_line
     def solve(
@@ -278,7 +279,11 @@ class ComplianceEngine(NamedEngine):
             if are_few(bricks * len(self._basis.force), len(columns)):
                 operator = self._operator(bricks, columns)
                 found, size, apart = _solve_fast_extremes(operator, columns, want, accuracy)
-            elif self._grown is not None and self._builder.growth.bricks <= bricks:
+            elif self._can_grow and self._builder.growth.bricks <= bricks:
+                if self._grown is None:
+                    from seqopt.engines.rigid._grown import GrownExtremes  # noqa: PLC0415  # large
+
+                    self._grown = GrownExtremes(self._builder)
                 self._grown.reach(bricks)
                 found, size, apart = _solve_grown_extremes(self._grown, columns, want, accuracy)
         if np.count_nonzero(apart):
@@ -289,8 +294,7 @@ class ComplianceEngine(NamedEngine):
 
     def _recalls(self, bricks: int) -> bool:
         """Return whether fields of a brick count are had from what grew for extremes."""
-        grown: GrownExtremes | None = vars(self).get("_grown")
-        return grown is not None and self._builder.growth.recalls(bricks)
+        return self._grown is not None and self._builder.growth.recalls(bricks)
 
     def _accepted(self, want: Want) -> float:
         """Return the largest error of fields that is accepted, over the largest entry of each."""
@@ -323,16 +327,11 @@ class ComplianceEngine(NamedEngine):
         """Made when the first operator is: a scene that is loose from the start has none."""
         return OperatorBuilder(self._network, self._tree, self._basis)
 
-    @cached_property
-    def _grown(self) -> GrownExtremes | None:
-        """What answers few grip sets of large structures, where loops are made for the scene."""
+    @property
+    def _can_grow(self) -> bool:
+        """Whether the compiled loops are made for the scene."""
         rests = not self._network.springs.movement.any()
-        plain = self._basis is SPACE and rests and not self._builder.moments
-        if not plain:
-            return None
-        from seqopt.engines.rigid._grown import GrownExtremes  # noqa: PLC0415  # of large scenes
-
-        return GrownExtremes(self._builder)
+        return self._basis is SPACE and rests and not self._builder.moments
 
     def _refined(
         self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want
