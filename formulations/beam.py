@@ -1,7 +1,7 @@
-r"""A beam of given width between the cascade and the exact optimum.
+r"""A beam of given width between the cascade and the exact optimum: a heuristic.
 
-Move by move it extends the ``width`` best beginnings of paths by every move and, for each state
-that these reach, keeps the cheapest way to it:
+Of a graph whose costs are known, move by move it extends the ``width`` best beginnings of paths by
+every move and, for each state that these reach, keeps the cheapest way to it:
 
 .. math::
 
@@ -11,19 +11,48 @@ that these reach, keeps the cheapest way to it:
 With a width of all candidates it is dynamic programming and exact. The greedy choice that ranks
 the shared step among the candidates of one move, as the cascade does, is kept beside it: the beam
 never does worse. Moves after which as many moves are left as before are passed over.
+
+Of the states of a free schedule it computes few responses: brick count by brick count it keeps the
+``width`` states :math:`s` of least value :math:`v` that those kept before lead to by placing a
+brick and letting go,
+
+.. math::
+
+   B_k = \text{the } w \text{ states } s \text{ next to } B_{k-1} \cup B_k
+   \text{ with the least } \; v(s),
+
+and returns the best path among them, goal by goal. Regrips are left out, but if no plan is found
+without them: then all states are looked at. The value is that of the first goal; if that is about
+moves and not about states, the states that come first are kept.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 
-from formulations.cascade import _charged, greedy
-from formulations.choice import Choice, onward
+from formulations.cascade import _charged
+from formulations.choice import Choice, greedy, onward, shortest
 from formulations.on_graph import on_graph
+from formulations.states._search import (
+    Watching,
+    after_margins,
+    best_standing,
+    best_total,
+    narrow,
+    plan_by_then,
+)
+from formulations.states._totals import StopError
 from seqopt.errors import ProblemError
+from seqopt.graph._explore import Explorer
 from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import moves_out, path_values
+from seqopt.graph.solution import Solution
+from seqopt.graph.states.explored import build_space
+from seqopt.graph.states.states import States
 from seqopt.problem.problem import Aim
 
 
@@ -32,8 +61,7 @@ def choose(graph: Graph, watch: Watch, *, width: int = 5) -> Choice:
 
     ``width``: how many beginnings are kept, from 1; else a `ProblemError`.
     """
-    if width < 1:
-        raise ProblemError(f"beam: width is {width}; give a whole number from 1")
+    _require_width(width)
     graph = onward(graph)
     found = [_beam(graph, width, watch), greedy(graph, _charged(graph, "later"))]
     met = [path for path in found if path]
@@ -66,11 +94,49 @@ def _beam(graph: Graph, width: int, watch: Watch) -> tuple[int, ...]:
     return path
 
 
-FORMULATION = on_graph(
+def _of_states(problem: States, watch: Watch, tell: Watching, *, width: int = 5) -> Solution:
+    """Return a plan through the few states of a beam; only margins of stability have a bound."""
+    _require_width(width)
+    if problem.totals:
+        plan = best_total(problem, shortest, watch, tell, width)
+        return replace(plan, bound=(-np.inf,))
+
+    def search(rest: States) -> Solution:
+        try:
+            found = narrow(rest, width, tell, every=True)
+            if found is None:
+                every = Explorer(build_space(rest), tell=tell)
+                if not every.rise():
+                    raise every.without_plan("no plan is allowed")
+                found = best_standing(every, rest.budgets)
+        except StopError as stop:
+            return plan_by_then(None, stop)
+        return replace(found, bound=(-np.inf,) * len(found.bound))
+
+    return after_margins(problem, search, tell)
+
+
+def _require_width(width: int) -> None:
+    if width < 1:
+        raise ProblemError(f"beam: width is {width}; give a whole number from 1")
+
+
+BEAM = on_graph(
     "beam",
     "a beam between cascade and exact",
     choose,
     FormulationKind.HEURISTIC,
     aim=Aim.SUM,
     alone=True,
+    search=_of_states,
 )
+PATH_BEAM = on_graph(
+    "path_beam",
+    "a beam over the states of every brick count",
+    partial(choose, width=50),
+    FormulationKind.HEURISTIC,
+    alone=True,
+    search=_of_states,
+)
+
+FORMULATION = BEAM  # the name under which environments that were installed before find it

@@ -25,13 +25,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from formulations.choice import Choice, onward
+from formulations.choice import Choice, greedy, onward
 from formulations.on_graph import on_graph
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import lexicographic, moves_along, tied
 from seqopt.problem.problem import Aim
 
 CHARGES = ("later", "earlier")
@@ -49,39 +48,9 @@ def choose(graph: Graph, watch: Watch, *, charge: str = "later") -> Choice:
     return Choice(greedy(graph, _charged(graph, charge)), stopped=watch.over)
 
 
-def greedy(graph: Graph, charged: Floats) -> tuple[int, ...]:
-    """Return the path that always takes the move which is charged least, (m,), the first of ties.
-
-    ``graph``: every move leads on to an end.
-    """
-    state, path = 0, list[int]()
-    while not graph.ends[state]:
-        moves = graph.moves_from(state)
-        state = int(graph.target[moves][np.argmin(charged[moves])])
-        path.append(state)
-    return tuple(path)
-
-
-def at_hand(graph: Graph, *ways: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the first path within the caps: of some, what is cheapest now, what is least capped.
-
-    Empty if none of these is within all caps.
-    """
-    ahead, every = onward(graph), np.ones(graph.states, dtype=bool)
-    ways += (greedy(ahead, ahead.amounts[:, 0]),)
-    ways += tuple(
-        lexicographic(graph.bare(c, every)).path for c in range(graph.goals, len(graph.peaks))
-    )
-    for path in ways:
-        taken = graph.amounts[moves_along(graph, path)][:, graph.goals :].sum(axis=0)
-        if (taken <= np.array([tied(cap) for cap in graph.caps])).all():
-            return path
-    return ()
-
-
 def _charged(graph: Graph, charge: str) -> Floats:
     """Return what moves are charged, (m,), by which of two moves answers for a shared step."""
-    if graph.alone is None:
+    if graph.alone is None or graph.peaks[0]:
         return graph.amounts[:, 0]
     if charge == "later":
         return np.asarray(graph.alone.sum(axis=1))

@@ -45,11 +45,12 @@ import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
+from formulations.choice import Choice
+from formulations.flow import ACCURACY, WholeProgram, by_integers, conserved, unit_flow
 from formulations.on_graph import on_graph
-from formulations.overlap_flow import ACCURACY, WholeProgram, by_integers, unit_flow
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import Formulation
+from seqopt.graph.formulation import Formulation, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances
 from seqopt.problem.problem import Aim
@@ -80,7 +81,10 @@ def _assigned(graph: Graph, *, apart: bool) -> _Assignment:
     level = distances(graph, np.ones(len(graph.source))).astype(np.int64)
     layered = (level[graph.target] == level[graph.source] + 1).all()
     if not (layered and (graph.ends == (level == level.max())).all()):
-        raise ProblemError("an assignment chooses a state of every level; take a flow")
+        raise ProblemError(
+            "an assignment chooses a state of every level, and paths of this graph pass more or "
+            "fewer; take overlap_mip, a flow"
+        )
     picks = cp.Variable(graph.states, boolean=True)
     ones = np.ones(graph.states)
     one_each = sparse.csr_array((ones, (level, np.arange(graph.states))))
@@ -159,7 +163,7 @@ def _epigraph(graph: Graph, *, of_layers: bool) -> WholeProgram:
     if of_layers:
         rows = _assigned(graph, apart=False).level[flow.graph.source]
     met = sparse.csr_array((flow.cost, (rows, np.arange(len(rows)))))
-    rules = [cp.Zero(flow.balance @ arcs - flow.source), cp.NonNeg(peak - met @ arcs)]
+    rules = [conserved(flow, arcs), cp.NonNeg(peak - met @ arcs)]
     return WholeProgram(cp.Problem(cp.Minimize(peak), rules), arcs, flow.path, flow.bound)
 
 
@@ -182,7 +186,15 @@ def _below(scale: float) -> Callable[[float], float]:
 def _exhibit(
     name: str, summary: str, aim: Aim, write: Callable[[Graph], WholeProgram]
 ) -> Formulation:
-    return on_graph(name, summary, by_integers(write), aim=aim)
+    """Return the formulation of a program that is written for one goal alone, of one kind."""
+
+    def choose(graph: Graph, watch: Watch) -> Choice:
+        if graph.peaks != (aim is Aim.PEAK,):
+            said = "largest cost" if aim is Aim.PEAK else "sum of costs"
+            raise ProblemError(f"{name}: it writes one {said} down alone; take overlap_mip")
+        return by_integers(write)(graph, watch)
+
+    return on_graph(name, summary, choose, aim=aim)
 
 
 ASSIGNMENT_TIGHT = _exhibit("assignment_tight", "assignment, tight links", Aim.SUM, _tight)

@@ -32,9 +32,8 @@ costs and takes; those are continued that may become better than the best path k
 
 from __future__ import annotations
 
-from formulations.choice import Choice
+from formulations.choice import Choice, shortest
 from formulations.on_graph import on_graph
-from formulations.path_dp import shortest
 from seqopt.errors import ProblemError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph.formulation import FormulationKind, Watch

@@ -13,6 +13,7 @@ alone:
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -78,18 +79,19 @@ class OnGraph(Terse):
     name: str
     choose: Choose = field(repr=False)
     takes_budgets: bool
+    search: Callable[..., Solution] | None = field(default=None, repr=False)
 
     @property
     def __signature__(self) -> inspect.Signature:
         """Its own parameters and the options of what it chooses by."""
         own = inspect.signature(type(self).__call__).parameters.values()
         mine = [p for p in own if p.name != "self" and p.kind is not inspect.Parameter.VAR_KEYWORD]
-        options = [
-            p
-            for p in inspect.signature(self.choose).parameters.values()
-            if p.kind is inspect.Parameter.KEYWORD_ONLY
-        ]
-        return inspect.Signature([*mine, *options])
+        return inspect.Signature([*mine, *self._own_options().values()])
+
+    def _own_options(self) -> dict[str, inspect.Parameter]:
+        """Return the options of what it chooses by, by name."""
+        found = inspect.signature(self.choose).parameters
+        return {n: p for n, p in found.items() if p.kind is inspect.Parameter.KEYWORD_ONLY}
 
     def __call__(
         self,
@@ -114,10 +116,13 @@ class OnGraph(Terse):
             if problem.caps and not self.takes_budgets:
                 raise ProblemError(f"formulation {self.name}: it takes no caps; take labels")
             return path_of_instance(problem, choose, watch)
+        tell = watched(problem, watch, max_memory, progress)
+        if self.search is not None:
+            own = {name: p.default for name, p in self._own_options().items()} | options
+            return self.search(problem, watch, tell, **own)
         if problem.budgets and not self.takes_budgets:
             able = "schedule_search or path_beam"
             raise ProblemError(f"formulation {self.name}: it takes no budgets; take {able}")
-        tell = watched(problem, watch, max_memory, progress)
         if problem.totals:
             return best_total(problem, choose, watch, tell)
         return after_margins(problem, lambda rest: chosen(rest, choose, watch, tell), tell)
@@ -138,6 +143,7 @@ def on_graph(  # noqa: PLR0913  # the fields of a formulation
     windowed: tuple[tuple[str, int | str], ...] | None = None,
     answers: tuple[str, ...] = PATHS,
     alone: bool = False,
+    search: Callable[..., Solution] | None = None,
 ) -> Formulation:
     """Return the formulation that chooses a path through a graph.
 
@@ -153,10 +159,13 @@ def on_graph(  # noqa: PLR0913  # the fields of a formulation
         What it promises.
     aim, takes_budgets, windowed, answers, alone : optional
         As of `seqopt.graph.formulation.Formulation`.
+    search : callable, optional
+        Chooses from states that it explores itself; takes them, a `Watch`, a callback of explorers
+        and the same options.
 
     Returns
     -------
     Formulation
     """
-    solve = OnGraph(name, choose, takes_budgets)
+    solve = OnGraph(name, choose, takes_budgets, search)
     return Formulation(name, summary, kind, aim, solve, takes_budgets, windowed, answers, alone)

@@ -28,21 +28,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from formulations.cascade import at_hand
-from formulations.choice import Choice
+from formulations.choice import Choice, shortest
 from formulations.on_graph import on_graph
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import lexicographic
 from seqopt.problem.problem import Aim
-
-
-def shortest(graph: Graph, watch: Watch) -> Choice:
-    """Return the best path; one that is at hand where time is over."""
-    if watch.over:
-        return Choice(at_hand(graph), stopped=True)
-    return Choice(*lexicographic(graph))
 
 
 def _least_peak(graph: Graph, watch: Watch) -> Choice:

@@ -19,8 +19,8 @@ import cvxpy as cp
 import numpy as np
 
 from formulations.choice import Choice
-from formulations.overlap_flow import unit_flow
-from formulations.solvers import minimize, minimize_by_highs
+from formulations.flow import conserved, unit_flow
+from formulations.solvers import minimize_by_highs
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 
@@ -38,13 +38,9 @@ def solve_program(
     scale = max(float(np.abs(flow.graph.amounts).max()), float(np.finfo(float).tiny))
     arcs = cp.Variable(len(flow.cost), boolean=whole, nonneg=None if whole else True)
     total, over = cp.Variable(), cp.Variable(len(graph.peaks), nonneg=True)
-    conserve = cp.Zero(flow.balance @ arcs - flow.source)
     above = cp.NonNeg(over + total - flow.graph.amounts.T / scale @ arcs)
     least = cp.Minimize(total + (most * np.ones(len(graph.peaks))) @ over)
-    program = cp.Problem(least, [conserve, above])
-    if whole:
-        optimum = minimize_by_highs(program, feasible=True, watch=watch)
-    else:
-        optimum = minimize(program, feasible=True, time_limit=watch.left)
+    program = cp.Problem(least, [conserved(flow, arcs), above])
+    optimum = minimize_by_highs(program, feasible=True, watch=watch)
     path = flow.path(np.asarray(arcs.value)) if np.isfinite(optimum.value) else ()
     return Choice(path, (optimum.bound * scale,), optimum.stopped), optimum.value * scale

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +16,6 @@ from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.formulation import Watch
 
 GAPS = {"mip_rel_gap": 1e-9, "mip_abs_gap": 1e-9}  # of integer programs
-HIGHS_ENDS = {"kOptimal": cp.OPTIMAL, "kInfeasible": cp.INFEASIBLE}
 EXACTLY = 1e-10  # by how much constraints may be off where ties are kept
 STOPS = ("kTimeLimit", "kInterrupt")
 
@@ -37,29 +35,6 @@ class Optimum:
     stopped: bool = False
 
 
-def minimize(program: cp.Problem, *, feasible: bool, time_limit: float = math.inf) -> Optimum:
-    """Solve a linear program by Clarabel; its variables take the values of the optimum.
-
-    ``feasible``: whether it is known to have a solution; ``time_limit``: after which it stops with
-    nothing, s. Raises `InfeasibleError` if the solver proves that nothing is within all budgets;
-    `SolverError` if it ends otherwise than with an optimum or at its limit, or calls a program
-    infeasible that is not.
-    """
-    limit = {"time_limit": time_limit} if math.isfinite(time_limit) else {}
-    try:
-        with warnings.catch_warnings():  # an inaccurate end is refused below
-            warnings.filterwarnings("ignore", "Solution may be inaccurate", UserWarning)
-            program.solve(solver=cp.CLARABEL, **limit)
-    except cp.SolverError as error:
-        raise SolverError(f"{cp.CLARABEL} failed: {error}; rescale the costs") from error
-    seconds = float(program.compilation_time or 0.0)
-    if program.status == cp.USER_LIMIT and limit:
-        return Optimum(math.inf, seconds, stopped=True)
-    _require_optimum(program.status, cp.CLARABEL, feasible=feasible)
-    value = float(program.value)
-    return Optimum(value, seconds, value)
-
-
 def minimize_by_highs(
     program: cp.Problem,
     *,
@@ -72,7 +47,9 @@ def minimize_by_highs(
 
     ``feasible``: whether it is known to have a solution; ``watch``: deadline, which records
     incumbents and bounds of integer programs, converted to its unit by ``told``; ``tolerance``: of
-    constraints, by default that of HiGHS. Raises `InfeasibleError`, `SolverError` as `minimize`.
+    constraints, by default that of HiGHS. Raises `InfeasibleError` if the solver proves that
+    nothing is within all budgets; `SolverError` if it ends otherwise than with an optimum or at its
+    limit, or calls a program infeasible that is not.
     """
     watch = watch or Watch()
     start = time.perf_counter()
@@ -97,21 +74,21 @@ def minimize_by_highs(
     if stopped and not (whole and math.isfinite(info.objective_function_value)):
         return Optimum(math.inf, seconds, bound, nodes, stopped=True)
     if not stopped:
-        _require_optimum(HIGHS_ENDS.get(status, status), cp.HIGHS, feasible=feasible)
+        _require_optimum(status, feasible=feasible)
     results = {"solution": solver.getSolution(), "info": info, "model_status": "kOptimal"}
     program.unpack_results(results | {"run_time": solver.getRunTime()}, chain, inverse)
     value = float(program.value)
     return Optimum(value, seconds, bound if whole else value, nodes, stopped)
 
 
-def _require_optimum(status: str, solver: str, *, feasible: bool) -> None:
-    """Raise an error unless a solver ended with an optimum."""
-    if status == cp.INFEASIBLE and feasible:
-        raise SolverError(f"{solver} calls a problem infeasible that is not; rescale the costs")
-    if status == cp.INFEASIBLE:
+def _require_optimum(status: str, *, feasible: bool) -> None:
+    """Raise an error unless the solver ended with an optimum."""
+    if status == "kInfeasible" and feasible:
+        raise SolverError(f"{cp.HIGHS} calls a problem infeasible that is not; rescale the costs")
+    if status == "kInfeasible":
         raise InfeasibleError("no choice is within all budgets; raise a bound")
-    if status != cp.OPTIMAL:
-        raise SolverError(f"{solver} ended with status {status!r}; rescale the costs")
+    if status != "kOptimal":
+        raise SolverError(f"{cp.HIGHS} ended with status {status!r}; rescale the costs")
 
 
 def _loaded(data: dict[str, Any], *, whole: bool) -> highspy.Highs:

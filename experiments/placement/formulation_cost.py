@@ -56,7 +56,7 @@ from experiments.placement.parts.budget_cases import CASES, COMPARED, NO_BUDGET
 from experiments.placement.parts.formulation_charts import contest_chart, shape_chart
 from experiments.placement.parts.program_size import anatomy
 from formulations.exhibits import _big_m, _epigraph, _loose, _tight
-from formulations.overlap_flow import _whole
+from formulations.flow import _whole
 from formulations.solvers import minimize_by_highs
 from seqopt import Network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine

@@ -11,7 +11,7 @@ from operator import itemgetter, le
 
 import numpy as np
 
-from formulations.choice import Choice, Choose
+from formulations.choice import Choose
 from formulations.states._totals import StopError, cheapest_by, least_total
 from seqopt._interrupts import answered
 from seqopt.arrays import Ints
@@ -19,7 +19,6 @@ from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, Seqo
 from seqopt.graph._budgets import Within, is_beyond, within_budgets
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Solution, Watch
-from seqopt.graph.graph import Graph
 from seqopt.graph.paths import (
     Best,
     _on_paths,
@@ -47,11 +46,6 @@ GROWN = 1.1  # times as much is kept before it is asked again how much memory is
 
 Watching = Callable[[Explorer], None]
 Search = Callable[[States], Solution]
-
-
-def shortest(graph: Graph, _: Watch) -> Choice:
-    """Return the path that is best in one goal after the other, by shortest paths."""
-    return Choice(*lexicographic(graph))
 
 
 def best_total(

@@ -44,16 +44,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from formulations.choice import shortest
 from formulations.labels import relaxed
 from formulations.on_graph import path_of_instance
-from formulations.states._search import (
-    Options,
-    after_margins,
-    best_total,
-    search_states,
-    shortest,
-    watched,
-)
+from formulations.states._search import Options, after_margins, best_total, search_states, watched
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
 from seqopt.graph.instance import Instance

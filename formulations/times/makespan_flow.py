@@ -21,7 +21,7 @@ from __future__ import annotations
 import cvxpy as cp
 import numpy as np
 
-from formulations.overlap_flow import unit_flow
+from formulations.flow import conserved, unit_flow
 from formulations.solvers import EXACTLY, minimize_by_highs
 from formulations.times._labels import useful
 from formulations.times._search import in_time
@@ -44,8 +44,7 @@ def _bounded(asked: Asked) -> Chosen:
     sums = [
         cp.NonNeg(cap - flow.graph.amounts[:, column] @ arcs) for column, cap in asked.caps.sums
     ]
-    conserve = cp.Zero(flow.balance @ arcs - flow.source)
-    program = cp.Problem(cp.Minimize(makespan), [conserve, shared, *sums])
+    program = cp.Problem(cp.Minimize(makespan), [conserved(flow, arcs), shared, *sums])
     try:
         found = minimize_by_highs(program, feasible=False, watch=watch, tolerance=EXACTLY)
     except InfeasibleError:

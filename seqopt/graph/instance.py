@@ -134,14 +134,12 @@ class Instance(Source, FrozenValue, Shown):
     @property
     def fitting(self) -> tuple[str, ...]:
         """The names of formulations that fit, the default first."""
-        every = formulations()
-        asked = ["time" if self.asks_time else "goals", "instance"]
-        if self.resources:
-            asked[0] = "resource"
-        found = [n for n, f in every.items() if f.fits(*asked) and not f.aim]
-        if len(self.goals) == 1 and not self.asks_time and not self.resources:
-            kind = self.goals[0].kind
-            found += [n for n, f in every.items() if f.aim and f.aim.value == kind]
+        every, kinds = formulations(), [goal.kind for goal in self.goals]
+        question = "time" if self.asks_time else "tail" if kinds == [TAIL] else "goals"
+        question = "resource" if self.resources else question
+        found = [n for n, f in every.items() if f.fits(question, "instance")]
+        if kinds[0] != PEAK:
+            found = [name for name in found if every[name].aim is not Aim.PEAK]
         if self.caps:
             found = [name for name in found if every[name].takes_budgets]
         usual = ("makespan_labels", "labels" if self.caps else "path_dp", "schedule_search")

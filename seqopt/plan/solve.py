@@ -111,7 +111,7 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
         kind = type(problem).__name__
         raise ProblemError(f"a {kind} is not a problem; give one that seqopt.pose made")
     found = as_formulation(formulation or usual(problem), *questions_of(problem))
-    kind = _kind_for(problem, found)
+    kind, found = _fitting(problem, found)
     end = time.perf_counter() + run.time_limit
 
     def best(asked: Problem) -> Plan:
@@ -130,23 +130,17 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
     return replace(best_within(problem, best, run.clock), problem=problem)
 
 
-def _kind_for(problem: Problem, formulation: Formulation) -> str:
-    """Return the kind of graph of a problem that a formulation takes, if it has its aim."""
-    kind = graph_kind(problem)
+def _fitting(problem: Problem, formulation: Formulation) -> tuple[str, Formulation]:
+    """Return the kind of graph that a formulation takes, and the formulation with the asked aim."""
+    kind, aim = graph_kind(problem), formulation.aim
     totals = problem.scenarios and problem.over.aim is Aim.SUM
     if kind == CANDIDATES and formulation.of_states and not totals:
-        return STATES
-    of_candidates = in_layers(problem.moves) and len(problem.goals) <= 1 and not problem.is_timed
-    aim = formulation.aim
+        return STATES, formulation
+    asked = {(): aim} | {(goal,): each for each, goal in AIMS.items()}
+    of_candidates = in_layers(problem.moves) and problem.goals in asked and not problem.is_timed
     if aim is None or not (kind == CANDIDATES or (kind == STATES and of_candidates)):
-        return kind
-    if problem.goals not in ((), (AIMS[aim],)):
-        asked = ", ".join(map(str, problem.goals))
-        raise ProblemError(
-            f"aim {asked}: {formulation.name} minimizes the {aim.value} of costs; "
-            "take another formulation"
-        )
-    return CANDIDATES
+        return kind, formulation
+    return CANDIDATES, replace(formulation, aim=asked[problem.goals])
 
 
 def _chosen(graph: Any, formulation: Formulation, run: Run) -> Plan:

@@ -23,7 +23,7 @@ from formulations.contact.limit_analysis import (
     _solve_cones,
     compile_equilibrium,
 )
-from formulations.solvers import GAPS, minimize, minimize_by_highs
+from formulations.solvers import GAPS, minimize_by_highs
 from seqopt.stability.limit_analysis import CAP, Case, Claim, Sense, limits
 from tests.builders import held
 
@@ -213,13 +213,12 @@ def test_the_first_attempt_is_the_first_and_has_its_authors_scaling(monkeypatch)
     assert "equilibrate_enable" not in second  # the solver's own
 
 
-@pytest.mark.parametrize("seconds", [None, 0.25])
-def test_an_optimum_is_a_value_and_the_time_to_write_it_down(monkeypatch, seconds):
+def test_an_optimum_is_a_value_and_the_time_to_write_it_down():
     x = cp.Variable()
-    monkeypatch.setattr(cp.Problem, "compilation_time", seconds, raising=False)
-    found = minimize(cp.Problem(cp.Minimize(3 - 2 * x), [x <= 1]), feasible=True)
+    found = minimize_by_highs(cp.Problem(cp.Minimize(3 - 2 * x), [x <= 1]), feasible=True)
     assert found.value == found.bound == pytest.approx(1.0, abs=1e-6)
-    assert (found.compile_seconds, found.nodes, found.stopped) == (seconds or 0.0, 0, False)
+    assert (found.nodes, found.stopped) == (0, False)
+    assert found.compile_seconds > 0
     with pytest.raises(FrozenInstanceError):
         found.value = 2.0
 

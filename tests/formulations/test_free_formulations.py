@@ -124,7 +124,9 @@ def test_limits_that_leave_no_plan_are_said(name):
 @every
 def test_what_does_not_fit_gets_one_line(name):
     for option, value in {"speed": 2, **dict.fromkeys(ALL[name].options, 0)}.items():
-        said = "speed: " if option == "speed" else "option|no plan was found yet; give more"
+        said = (
+            "speed: " if option == "speed" else "option|width is 0|no plan was found yet; give more"
+        )
         with pytest.raises((ProblemError, TimeUpError), match=said) as caught:
             solve(posed("minmax"), name, **{option: value})
         assert "\n" not in str(caught.value)

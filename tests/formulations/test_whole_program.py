@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from formulations.exhibits import _assigned, _below
-from formulations.overlap_flow import ACCURACY, OVERLAP_MIP, unit_flow
+from formulations.flow import ACCURACY, OVERLAP_MIP, unit_flow
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.formulation import Watch, exhibits
 from seqopt.graph.graph import Graph

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from formulations.overlap_flow import ACCURACY, unit_flow
+from formulations.flow import ACCURACY, unit_flow
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.paths import TIED

@@ -91,7 +91,7 @@ MODULES = {
     "formulations.labels": (*CHOSEN, "judge/test_budget_proof"),
     "formulations.on_graph": (*CHOSEN, "formulations/test_conformance"),
     "formulations.path_dp": (*CHOSEN, "formulations/test_conformance"),
-    "formulations.overlap_flow": (*CHOSEN, "plan/test_flow"),
+    "formulations.flow": (*CHOSEN, "plan/test_flow"),
     "formulations.exhibits": ("formulations/test_whole_program",),
     "formulations.rank_search": CHOSEN,
     "formulations.solvers": (*("formulations/test_whole_program", *STANDING), *CHOSEN),
