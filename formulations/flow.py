@@ -173,8 +173,9 @@ def _linear(graph: Graph, watch: Watch) -> Choice:
     """
     if graph.ends[0]:
         return Choice((), (0.0,) * len(graph.peaks))
-    goals, bounds, seconds = graph.goals, list[float](), 0.0
-    for goal in range(goals):
+    graph = graph.only(~graph.ends[graph.source])
+    bounds, seconds = list[float](), 0.0
+    for goal in range(graph.goals):
         found = (_least_peak if graph.peaks[goal] else _least_sum)(graph, goal, watch)
         graph, seconds = found.graph, seconds + found.seconds
         bounds.append(found.bound)
@@ -202,14 +203,15 @@ def _least_sum(graph: Graph, goal: int, watch: Watch) -> _Least:
     found = minimize_by_highs(program, feasible=not caps, watch=watch, tolerance=EXACTLY)
     if found.stopped:
         return _Least(graph, -np.inf, (), (), found.compile_seconds, stopped=True)
+    least = max(flow.bound(found.value), 0.0)  # a sum adds nothing below zero
     if caps:
         duals = [max(float(cap.dual_value), 0.0) for cap in caps]
         prices = tuple(flow.scale / u * d for u, d in zip(flow.units, duals, strict=True))
         path = flow.path(np.asarray(arcs.value))
-        return _Least(graph, flow.bound(found.value), path, prices, found.compile_seconds)
+        return _Least(graph, least, path, prices, found.compile_seconds)
     reduced = flow.cost + flow.balance.T @ np.asarray(balance.dual_value)
     best = flow.graph.only(reduced <= TIED * max(found.value, 1.0))
-    return _Least(best, flow.bound(found.value), (), (), found.compile_seconds)
+    return _Least(best, least, (), (), found.compile_seconds)
 
 
 def _least_peak(graph: Graph, goal: int, watch: Watch) -> _Least:
@@ -273,7 +275,8 @@ def by_integers(write: Callable[[Graph], WholeProgram]) -> Choose:
                 told=written.bound,
                 tolerance=EXACTLY,
             )
-            bounds.append(written.bound(found.bound if found.stopped else found.value))
+            bound = written.bound(found.bound if found.stopped else found.value)
+            bounds.append(bound if graph.peaks[goal] else max(bound, 0.0))
             seconds += found.compile_seconds
             if np.isfinite(found.value):
                 path = written.path(np.asarray(written.whole.value))

@@ -70,7 +70,7 @@ def minimize_by_highs(
         raise SolverError(f"{cp.HIGHS} failed: {error}; rescale the costs") from error
     info, stopped = solver.getInfo(), status in STOPS
     bound = float(info.mip_dual_bound) + offset if whole else -math.inf
-    nodes = int(info.mip_node_count)
+    nodes = max(0, int(info.mip_node_count))
     if stopped and not (whole and math.isfinite(info.objective_function_value)):
         return Optimum(math.inf, seconds, bound, nodes, stopped=True)
     if not stopped:

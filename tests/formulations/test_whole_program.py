@@ -68,8 +68,9 @@ def test_what_is_read_from_assignments():
 def test_an_assignment_needs_a_state_of_every_level():
     source, target = np.array([0, 0, 1]), np.array([1, 2, 2])
     ends = np.array([False, False, True])
-    graph = Graph(source, target, np.ones((3, 1)), (False,), ends)
     for name in ("assignment_tight", "assignment_loose", "minimax_layer", "minimax_big_m"):
+        peak = PROGRAMS[name].aim is Aim.PEAK
+        graph = Graph(source, target, np.ones((3, 1)), (peak,), ends)
         with pytest.raises(ProblemError, match="an assignment chooses a state of every level"):
             PROGRAMS[name].solve.choose(graph, Watch())
 

@@ -129,7 +129,7 @@ def test_heuristics_answer_as_on_the_scene(tmp_path, name, criterion):
 
 def test_what_does_not_fit_says_what_does(compiled):
     with pytest.raises(ProblemError, match="use path_dp"):
-        seqopt.solve(compiled("peak"), "overlap_dp")
+        seqopt.solve(compiled("sum"), "minimax")
     with pytest.raises(ProblemError, match="use makespan_labels"):
         seqopt.solve(compiled("time"), "path_dp")
 
