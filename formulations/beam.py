@@ -47,10 +47,9 @@ from formulations.states._search import (
 from formulations.states._totals import StopError
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Explorer
-from seqopt.graph.formulation import FormulationKind, Watch
+from seqopt.graph.formulation import FormulationKind, Solution, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import moves_out, path_values
-from seqopt.graph.solution import Solution
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import Aim

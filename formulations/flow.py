@@ -276,7 +276,8 @@ def by_integers(write: Callable[[Graph], WholeProgram]) -> Choose:
                 tolerance=EXACTLY,
             )
             bound = written.bound(found.bound if found.stopped else found.value)
-            bounds.append(bound if graph.peaks[goal] else max(bound, 0.0))
+            low = float(graph.amounts[:, goal].min(initial=0.0))  # no path takes less
+            bounds.append(max(bound, low))
             seconds += found.compile_seconds
             if np.isfinite(found.value):
                 path = written.path(np.asarray(written.whole.value))
