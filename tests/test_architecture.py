@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 from functools import cache
 from io import StringIO
 from pathlib import Path
@@ -255,6 +257,24 @@ def test_pages_use_what_is_public():
     assert len(private_imports("from seqopt import _a\n>>> import seqopt.a._b\nimport seqopt")) == 2
     pages = {path: path.read_text(encoding="utf-8") for path in (ROOT / "docs").rglob("*.md")}
     assert {path: found for path, page in pages.items() if (found := private_imports(page))} == {}
+
+
+LOADED = {"FreeRules()": 150, "seqopt.three_robot_loop(engine.network)": 149}  # only ever less
+PLAIN_PLAN = """
+import sys, seqopt
+from seqopt import FreeRules
+engine = seqopt.make_engine("auto", seqopt.load_scene("arch25"))
+plan = seqopt.solve(seqopt.pose(engine, {moves}, seqopt.CRITERIA["worst-ratio"]))
+assert plan.status == "optimal"
+print(sum(name.partition(".")[0] in ("seqopt", "formulations") for name in sys.modules))
+"""
+
+
+@pytest.mark.parametrize("moves", LOADED)
+def test_a_plain_certified_plan_loads_few_modules(moves):
+    program = [sys.executable, "-c", PLAIN_PLAN.format(moves=moves)]
+    done = subprocess.run(program, cwd=ROOT, check=True, capture_output=True, text=True)
+    assert 10 < int(done.stdout) <= LOADED[moves]
 
 
 def test_few_rooms():

@@ -120,7 +120,7 @@ def test_what_adds_up_equals_brute_force(aim, bricks, robots):
     assert better(problem, least) is False
 
 
-OF_ONE_AIM = {"minmax": ("overlap_lp", "overlap_mip"), "sum": ("minimax",)}  # what they refuse
+OF_ONE_AIM = {"sum": ("minimax",)}  # what they refuse
 TAKE_ORDERS = [name for name in seqopt.formulations("order") if name != "order_search"]
 
 

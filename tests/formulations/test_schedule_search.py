@@ -447,7 +447,7 @@ def test_the_short_cut_does_what_the_long_way_does():
     ("words", "said"),
     [
         ({"criterion": "equations-2-3"}, "equations-2-3: it ranks the choices of a move"),
-        ({"formulation": "overlap_mip"}, "overlap_mip: a largest cost is no sum; take"),
+        ({"formulation": "assignment_tight"}, "assignment_tight: it writes one sum of costs down"),
         ({"formulation": "pareto_zones"}, "states of a build are asked for; use .*schedule_search"),
         ({"search": Search(workers=0)}, "workers is 0; give a whole number from 1"),
         ({"rules": {"regrips": 0}}, "rules {'regrips': 0}: give a seqopt.FreeRules"),

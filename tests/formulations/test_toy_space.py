@@ -22,7 +22,7 @@ JUGS, WANTED = (5, 3), 4  # liters that jugs hold, and liters to be measured
 EVERY = formulations("goals", "instance")
 POURS = 1  # from the large jug into the small one
 SUMS = [name for name, f in EVERY.items() if f.aim is not Aim.PEAK]
-PEAKS = [name for name, f in EVERY.items() if f.aim is not Aim.SUM]
+PEAKS = [*EVERY]  # whatever their own aim is
 
 
 def poured(full):

@@ -152,3 +152,12 @@ def test_a_budget_that_no_choice_keeps_is_named(name, less, hopeless):
             answer(own, name)
     else:
         assert own.budgets[1].spent(answer(own, name).choice) == 31.0
+
+
+@pytest.mark.parametrize("name", ["overlap_lp", "overlap_mip"])
+def test_a_program_that_is_too_large_says_its_size(monkeypatch, name):
+    monkeypatch.setattr("formulations.flow.MOST_ARCS", 9)
+    assert answer(problem(), name).choice == (0, 0, 0)
+    monkeypatch.setattr("formulations.flow.MOST_ARCS", 8)
+    with pytest.raises(ProblemError, match="of 9 moves between 5 states is too large .* path_dp"):
+        answer(problem(), name)
