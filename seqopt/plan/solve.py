@@ -38,6 +38,7 @@ from seqopt.plan._paths import Found, find_path, judged
 from seqopt.plan._range import best_within
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import AIMS, graph_kind, graph_of, in_layers, questions_of, usual
+from seqopt.problem.amounts import Amount
 from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import LINEAR_RANGE
 from seqopt.scene._armed import check_postures
@@ -136,7 +137,8 @@ def _fitting(problem: Problem, formulation: Formulation) -> tuple[str, Formulati
     totals = problem.scenarios and problem.over.aim is Aim.SUM
     if kind == CANDIDATES and formulation.of_states and not totals:
         return STATES, formulation
-    asked = {(): aim} | {(goal,): each for each, goal in AIMS.items()}
+    asked: dict[tuple[Amount, ...], Aim | None] = {(goal,): each for each, goal in AIMS.items()}
+    asked[()] = aim  # its own, where none is asked
     of_candidates = in_layers(problem.moves) and problem.goals in asked and not problem.is_timed
     if aim is None or not (kind == CANDIDATES or (kind == STATES and of_candidates)):
         return kind, formulation
