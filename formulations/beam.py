@@ -137,5 +137,3 @@ PATH_BEAM = on_graph(
     alone=True,
     search=_of_states,
 )
-
-FORMULATION = BEAM  # the name under which environments that were installed before find it
