@@ -54,7 +54,6 @@ SHARED = {  # what formulations may import
     "formulations.cascade",
     "formulations.labels",
     "formulations.flow",
-    "formulations.beam",
     "formulations.states._search",
     "formulations.times._search",
     "formulations.times._labels",
