@@ -41,6 +41,7 @@ COPIES = 2.0  # of what is kept, that are needed at once while it grows
 MANY = 500_000  # grip sets, about: to look at all takes longer than a second narrow search
 WIDER = 4  # how many times as wide the second narrow search is
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
+LARGE = 20_000  # states of a cut from which on any of the best paths is enough, not the first
 NARROW = 1.005  # from a target to the incumbent, below which no other target is set
 GROWN = 1.1  # times as much is kept before it is asked again how much memory is free
 
@@ -333,12 +334,32 @@ class ThresholdSearch:
                 if all(map(le, self.incumbent.objective[1:], self.floors[1:])):
                     visited, effort = self.wide.visited(), self.wide.space.effort
                     return replace(self.incumbent, visited=visited, effort=effort)
+                if self.wide.counts:
+                    return self._fewest(self._ceiling)
                 threshold, below = below, np.inf  # later goals need the states that take as much
                 continue
             if lower == np.inf:
                 raise nothing or self.wide.without_plan("no plan is allowed")
             grown = threshold * self._growth if np.isfinite(threshold) else -np.inf
             threshold = max(lower, min(self._ceiling, grown))
+
+    def _fewest(self, value: float) -> Solution:
+        """Return the best path of fewest steps at a value of the first goal, which is proven.
+
+        Only states are visited through which a path could take as few steps (A*, level by level);
+        of those on paths of the fewest a few where there are many, unless goals follow.
+        """
+        cut, space = self.wide.visited(), self.wide.space
+        self.wide = Explorer(space, tell=self.wide.tell)
+        self.wide.threshold = value
+        while (most := self.wide.fewest_left) < np.inf:
+            every = len(space.peaks) > 2 or sum(map(len, cut)) < LARGE
+            for visit in (self.wide.dive, self.wide.rise)[every:]:
+                if visit(value, most=most):
+                    best = best_standing(self.wide)
+                    if best.objective[0] <= tied(value):
+                        return replace(best, visited=cut)
+        raise self.wide.without_plan("no plan is allowed")
 
     @property
     def _ceiling(self) -> float:

@@ -28,7 +28,10 @@ visits the states of :math:`R(t)` with the most bricks first, few at a time. Fro
 thresholds lie between bound and incumbent, at the latter once it is close. When :math:`R(z)` has no
 end, the states next to it are a cut: :math:`z` is the least worst value, and no response was
 computed beyond that cut but for the dives. Later goals need the states that take :math:`z` too;
-among these every goal is a shortest path, and what is on none is left out before the next.
+among these every goal is a shortest path, and what is on none is left out before the next. Where
+the next one is the number of steps, :math:`k(s)` to a state and at least :math:`h(s)` from there
+on, only states with :math:`k(s) + h(s) \le K` are visited, with :math:`K` rising from its lower
+bound until they reach an end (A*, Hart, Nilsson and Raphael, 1968).
 
 Responses have six digits until these do not decide. Where states must stand or be good in
 scenarios, which is expensive, a first plan is sought without that, and kept only if it is then the

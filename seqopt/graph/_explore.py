@@ -18,6 +18,8 @@ from seqopt.graph.space import Key, Moves, Space
 
 NEW, PENDING, OPEN, CLOSED = range(4)  # of a state: above the threshold, visited, not allowed
 
+ARRAYS = ("values", "mark", "exact", "floor", "spent", "to_go")  # of a part, a row for every state
+
 Valued = Callable[[Ints], tuple[Floats, Bools, float]]
 """Returns values of states, which are allowed, and above which the first goal's are floors."""
 
@@ -31,6 +33,7 @@ class Part:
         self.mark = np.zeros(0, dtype=np.int8)
         self.exact = np.zeros(0, dtype=bool)
         self.floor = np.zeros(0, dtype=bool)  # of values: whether they may be too small
+        self.spent, self.to_go = np.zeros(0), np.zeros(0)  # of steps, on the way here and at least
         self._codes = np.zeros(0, dtype=np.int64)
         self._rows = np.zeros(0, dtype=np.int32)
 
@@ -46,10 +49,11 @@ class Part:
         rows[new] = np.arange(len(self.states), len(self.states) + more)
         if more:
             self.states = np.concatenate([self.states, states[first[new]]])
-            for name in ("values", "mark", "exact", "floor"):
+            for name in ARRAYS:
                 own = getattr(self, name)
                 grown = np.concatenate([own, np.zeros((more, *own.shape[1:]), own.dtype)])
                 setattr(self, name, grown)
+            self.spent[-more:] = np.inf
             self._codes = np.insert(self._codes, at[new], distinct[new])
             self._rows = np.insert(self._rows, at[new], rows[new])
         return rows[back]
@@ -57,7 +61,7 @@ class Part:
     def copy(self) -> Part:
         """Return a part that grows by itself."""
         out = copy(self)
-        for name in ("values", "mark", "exact", "floor"):
+        for name in ARRAYS:
             setattr(out, name, getattr(self, name).copy())
         return out
 
@@ -126,6 +130,8 @@ class Explorer:
         The last level on which a state is visited.
     level : int
         The level that was visited last.
+    counts : bool
+        Whether the space counts steps, as the second goal.
     passes : int
         How often the threshold rose.
     nbytes : int
@@ -139,7 +145,7 @@ class Explorer:
         tell: Callable[[Explorer], object] = lambda _: None,
         enough: float = -np.inf,
     ) -> None:
-        self.space, self._width, self._tell, self._enough = space, width, tell, enough
+        self.space, self._width, self.tell, self._enough = space, width, tell, enough
         self._draws = np.random.default_rng(0)
         key, states = space.start()
         self._parts: list[dict[Key, Part]] = [{} for _ in range(space.levels + 1)]
@@ -150,7 +156,10 @@ class Explorer:
         part = self._part(*self._start)
         part.add(space.codes(key, states), states)
         part.mark[0] = PENDING
-        self.threshold, self.below = -np.inf, np.inf
+        to_go = space.to_go(key, states)
+        self.counts = to_go is not None
+        part.spent[0], part.to_go[0] = 0.0, 0.0 if to_go is None else to_go[0]
+        self.threshold, self.below, self.most = -np.inf, np.inf, np.inf
         self.reached = self.level = space.first
         self.passes = self.nbytes = 0
 
@@ -159,29 +168,31 @@ class Explorer:
         """By goal, whether the largest amount on a path counts."""
         return self.space.peaks
 
-    def rise(self, threshold: float = np.inf, below: float = np.inf) -> bool:
+    def rise(self, threshold: float = np.inf, below: float = np.inf, most: float = np.inf) -> bool:
         """Visit the states up to a threshold; return whether a build may end in one of them.
 
         ``below``: only states of which the first goal takes less than this, to 1e-9 of it, are
-        visited: the cut that proves that nothing is better.
+        visited: the cut that proves that nothing is better; ``most``: only states on paths of at
+        least no more steps than this, where the space counts them. It rises from pass to pass by
+        `fewest_left`: then the steps to a state that is visited are the fewest.
         """
-        self._begin_pass(threshold, below)
+        self._begin_pass(threshold, below, most)
         for level, parts in enumerate(self._parts):
             self.level = level
             for key, part in list(parts.items()):
                 fresh = self._visit(level, key, part)
                 self._go_on(level, key, part, fresh)
                 if len(fresh):
-                    self._tell(self)
+                    self.tell(self)
         return self.whole
 
-    def dive(self, threshold: float = np.inf, below: float = np.inf) -> bool:
+    def dive(self, threshold: float = np.inf, below: float = np.inf, most: float = np.inf) -> bool:
         """Visit states up to a threshold, the highest level first, until one may end a build.
 
         Few are visited at a time while that leads on, more and more where it does not; after some
         turns it gives up, since whole levels are visited in larger batches.
         """
-        self._begin_pass(threshold, below)
+        self._begin_pass(threshold, below, most)
         level, deepest, few = self.space.levels, -1, FEW
         turns = TURNS * self.space.levels
         while not self.whole and turns:
@@ -199,14 +210,14 @@ class Explorer:
             self.level = level
             self._open(level, key, part, fresh)
             self._go_on(level, key, part, fresh)
-            self._tell(self)
+            self.tell(self)
             few = FEW if level > deepest else 4 * few
             deepest = max(deepest, level)
             level = min(level + 1, self.space.levels)
         return self.whole
 
-    def _begin_pass(self, threshold: float, below: float) -> None:
-        self.threshold, self.below = max(self.threshold, threshold), below
+    def _begin_pass(self, threshold: float, below: float, most: float) -> None:
+        self.threshold, self.below, self.most = max(self.threshold, threshold), below, most
         self.passes += 1
 
     def copy(self) -> Explorer:
@@ -237,6 +248,16 @@ class Explorer:
         every = (part for parts in self._parts for part in parts.values())
         least = (p.values[p.mark == PENDING, 0].min(initial=np.inf) for p in every)
         return float(min(least, default=np.inf))
+
+    @property
+    def fewest_left(self) -> float:
+        """Fewest steps of paths through a state that was left out for its steps; or infinite."""
+        least = np.inf
+        for part in (part for parts in self._parts for part in parts.values()):
+            open_ = (part.mark == PENDING) & (part.values[:, 0] <= self._most)
+            open_ |= part.mark == NEW
+            least = min(least, (part.spent + part.to_go)[open_].min(initial=np.inf))
+        return float(least)
 
     @property
     def complete(self) -> bool:
@@ -278,7 +299,7 @@ class Explorer:
         self.reached = max(self.reached, level)
         if level:
             moves = self.space.within(key, part.states[fresh])
-            self._keep((level, key, key), fresh, moves, part)
+            self._keep((level, key, key), (part, fresh), moves, part)
 
     def _eligible(self, key: Key, part: Part) -> Ints:
         """Return the states that are to be visited, all new ones being valued."""
@@ -287,9 +308,10 @@ class Explorer:
             return *self.space.values(key, states, rough=True, most=self._most), self._most
 
         while True:
-            part.value(np.flatnonzero(part.mark == NEW), valued)
+            few = part.spent + part.to_go <= self.most if self.counts else True
+            part.value(np.flatnonzero((part.mark == NEW) & few), valued)
             first, below = part.values[:, 0], self.below
-            inside = (part.mark == PENDING) & (first <= self._most)
+            inside = (part.mark == PENDING) & (first <= self._most) & few
             if np.isfinite(below):
                 inside &= first < strictly_below(below)
             fresh = np.flatnonzero(inside)
@@ -344,11 +366,19 @@ class Explorer:
         if level == self.space.levels or not len(fresh):
             return
         for following, moves in self.space.onward(key, part.states[fresh]):
-            self._keep((level, key, following), fresh, moves, self._part(level + 1, following))
+            after = self._part(level + 1, following)
+            self._keep((level, key, following), (part, fresh), moves, after)
 
-    def _keep(self, which: tuple[int, Key, Key], fresh: Ints, moves: Moves, to: Part) -> None:
-        before = len(to.states)
+    def _keep(
+        self, which: tuple[int, Key, Key], begin: tuple[Part, Ints], moves: Moves, to: Part
+    ) -> None:
+        """Keep the moves from some states of a part to another one."""
+        (part, fresh), before = begin, len(to.states)
         rows = to.add(self.space.codes(which[2], moves.states), moves.states)
+        if self.counts:
+            new = slice(before, None)
+            to.to_go[new] = self.space.to_go(which[2], to.states[new])
+            np.minimum.at(to.spent, rows, part.spent[fresh[moves.source]] + 1.0)
         self._moves[which].append((fresh[moves.source].astype(np.int32), rows, moves.taken))
         self.nbytes += 2 * rows.nbytes + moves.taken.nbytes
         self.nbytes += (len(to.states) - before) * self._each

@@ -269,6 +269,9 @@ class OrderSpace(Space):
     def amounts(self, values: Floats, taken: Floats) -> Floats:
         return values if self._up.totals else move_amounts(self._up, values, taken)
 
+    def to_go(self, part: Part, states: Ints) -> Floats | None:
+        return self._of(part).to_go(len(part[0]), states)
+
     def ended(self, part: Part, states: Ints) -> Bools:
         return self._of(part).ended(len(part[0]), states)
 

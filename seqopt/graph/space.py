@@ -162,6 +162,24 @@ class Space(Protocol):
         """
         return values
 
+    def to_go(self, part: Key, states: Ints) -> Floats | None:
+        """Return lower bounds of the second goal from states to an end; None if it is no count.
+
+        It is a count if every move takes one of it; no move may lower the bound by more.
+
+        Parameters
+        ----------
+        part : hashable
+            Of which the states are.
+        states : (n, c) int
+            A state a row.
+
+        Returns
+        -------
+        (n,) float or None
+        """
+        return None
+
     @property
     def complete(self) -> bool:
         """Whether these are all feasible moves."""

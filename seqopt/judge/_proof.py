@@ -33,6 +33,7 @@ from seqopt.judge._budget_proof import is_beyond
 from seqopt.judge._goal_proofs import label_bounds
 from seqopt.judge._rule_moves import RuleTables, Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator, ask
+from seqopt.judge._twin import twin_of
 from seqopt.judge.arithmetic import budget_bounds
 from seqopt.network.build import build_network
 from seqopt.scene._armed import can_hold
@@ -218,13 +219,14 @@ class Rebuilt:
         self._peaks = tuple(goal.is_peak for goal in evaluator.problem.goals)
         self.parts, self.states = [part], [start]  # the start passes whatever it takes
         self.levels, self.evaluators = [level], [evaluator]
-        self._ends, self._count = [np.zeros(1, dtype=bool)], 1
+        self._ends, self._count, self._spent = [np.zeros(1, dtype=bool)], 1, np.zeros(1)
         none = np.zeros(0, dtype=np.int64)
         self._moves = [(none, none, np.zeros((0, len(self._peaks))))]
         self._coming: dict[int, dict[Any, list[tuple[Ints, Transitions]]]] = {}
         for own in self._hint:
             self._coming[own] = {own: []}
-        first = Reachable(none, start, np.zeros(0), [*evaluator.tables.successors(level, start)])
+        onward = [*evaluator.tables.successors(level, start)]
+        first = Reachable(none, start, np.zeros(0), onward, self._spent)
         self._go_on(part, level, first, 0)
         for level in space.levels:
             for part, coming in self._coming.pop(level, {}).items():
@@ -247,7 +249,13 @@ class Rebuilt:
             for source, move in coming
         ]
         entries = [none, self._hint.get(level, none), *(move.states for _, move in coming)]
-        found = evaluator.reachable(level, np.concatenate(entries), self._asked)
+        if np.isfinite(self._asked.steps):
+            spent = [np.full(len(entries[1]), np.inf), *(self._spent[s] + 1 for s, _ in coming)]
+            given = np.concatenate(entries), np.concatenate(spent)
+            found = evaluator.reachable_in(level, *given, self._asked)
+        else:
+            found = evaluator.reachable(level, np.concatenate(entries), self._asked)
+        self._spent = np.concatenate([self._spent, found.spent])
         within = [(m.source + self._count, m) for m in found.onward if m.level == level]
         order = np.argsort(found.codes, kind="stable")
         for source, move in [*coming, *within]:
@@ -307,8 +315,9 @@ class Proof:
         if not self._leaves_room(values, least):
             self.states = 1  # a cut before the end alone
             return least
-        if self._is_cut(values, least):
-            return tuple(values)
+        found = self._by_cut(values, least)
+        if found is not None:
+            return found
         bounds = partial(lexicographic_bounds, values=values)
         out = self._where_states_stand(self.rebuilt(Filter(values)), values, bounds)
         if self._leaves_room(values, out):
@@ -325,14 +334,28 @@ class Proof:
             return True
         return self._reaches_no_end((value,))
 
-    def _is_cut(self, values: Sequence[float], least: Sequence[float]) -> bool:
-        """Return whether states strictly below a worst value reach no end, which proves all bounds.
+    def _by_cut(self, values: Sequence[float], least: Sequence[float]) -> tuple[float, ...] | None:
+        """Return the bounds that follow if states strictly below a worst value reach no end.
 
-        Goals after it must take no more than every plan does, by what is known of all.
+        Goals after it take no more than every plan does, by what is known of all; or the next one
+        counts steps, and only states on paths of fewer steps are looked at, of as many where more
+        goals follow. None where that proves too little.
         """
-        first, margins = self.evaluator.problem.goals[0], self.evaluator.margins
-        closed = not self._leaves_room(values[1:], least[1:])
-        return first.is_peak and not margins and closed and self._reaches_no_end(values)
+        evaluator = self.evaluator
+        goals, closed = evaluator.problem.goals, not self._leaves_room(values[1:], least[1:])
+        twin = twin_of(goals[1]) if len(goals) > 1 else None
+        counts = twin is not None and twin.to_go is not None and not evaluator.demands(())
+        if not goals[0].is_peak or evaluator.margins or not (closed or counts):
+            return None
+        if not self._reaches_no_end(values):
+            return None
+        if closed:
+            return tuple(values)
+        below, steps = self.states, round(values[1]) - (len(values) == 2)
+        graph = self.rebuilt(Filter(values, steps=steps)).graph()
+        self.states = below + int(reached(graph).sum())
+        out = (values[0], *lexicographic_bounds(graph, values)[1:])
+        return None if self._leaves_room(values, out) else out
 
     def _reaches_no_end(self, values: Sequence[float]) -> bool:
         graph = self.rebuilt(Filter(values, strict=True)).graph()

@@ -257,19 +257,21 @@ class RuleTables(_Tables):
         if self._rules.how_it_ends is not Ending.HELD:
             yield self.last, np.zeros((1, self.robots), dtype=np.int64)
 
-    def least_steps(self) -> int:
-        """Return how many steps a build has at least.
+    def steps_to_go(self, level: int, states: Ints) -> Floats:
+        """Return how many steps builds have at least from states (n, c) on, (n,).
 
         Each brick is placed by a robot that is free, so that others let go before, one in a step,
         of all that it is not holding at the end: there they let go together, one by one or never.
         Each brick is removed by a robot that took hold of it in a step, or holds it at first.
         """
-        ending, placed = self._rules.how_it_ends, self.last - self.first
-        held = int(np.count_nonzero(self.start()[:, : self.robots] > 0))
+        ending, placed = self._rules.how_it_ends, float(self.last - level)
+        held = np.count_nonzero(states[:, : self.robots] > 0, axis=1)
         if self._top:
-            return max(placed, 2 * placed - held)
-        kept = min(self.robots, placed + held) if ending is not Ending.ONE_BY_ONE else 0
-        return 2 * placed + held - kept + (ending is Ending.RELEASED)
+            return np.asarray(np.maximum(placed, 2 * placed - held))
+        every = placed + held
+        kept = 0 if ending is Ending.ONE_BY_ONE else np.minimum(self.robots, every)
+        last = (every > 0) & (ending is Ending.RELEASED)
+        return np.asarray(placed + every - kept + last)
 
     def keep(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, from 1 brick."""
@@ -408,9 +410,9 @@ class ScheduleTables(_Tables):
             if all(hold is None or hold.move is None for hold in own):
                 yield level, np.array([[0 if h is None else self._wanted(h)[0] for h in own]])
 
-    def least_steps(self) -> int:
-        """Return how many steps a build has."""
-        return self.last
+    def steps_to_go(self, level: int, states: Ints) -> Floats:
+        """Return how many steps builds have from states (n, c) on, (n,)."""
+        return np.full(len(states), float(self.last - level))
 
     def ends(self, level: int, states: Ints) -> Bools:
         """Return which states (n, robots) end the build: all after the last step."""

@@ -105,26 +105,29 @@ class Filter(NamedTuple):
     ``values``: of goals; the first that is about no margin bounds states, if it is about a worst
     step; ``margins``: of first goals, with which states must stand, as demanded; None does not
     ask; ``exact``: whether all values have all digits, or those that decide about these;
-    ``strict``: whether states must be below that value, not at most at it.
+    ``strict``: whether states must be below that value, not at most at it; ``steps``: of paths
+    through a state, counted to it and at least from there.
     """
 
     values: Sequence[float] = ()
     margins: Sequence[float] | None = None
     exact: bool = False
     strict: bool = False
+    steps: float = np.inf
 
 
 class Reachable(NamedTuple):
     """States of a part that pass a filter.
 
     ``codes`` (n,); ``states`` (n, c); ``values`` (n, g): of goals; ``onward``: transitions from
-    them, by their rows.
+    them, by their rows; ``spent`` (n,): the fewest steps to each, where they are limited.
     """
 
     codes: Ints
     states: Ints
     values: Floats
     onward: list[Transitions]
+    spent: Floats
 
 
 class StateEvaluator:
@@ -162,8 +165,8 @@ class StateEvaluator:
             last = self.valued(tables.last, end, Filter(exact=True))[0][0]
         out = np.where([goal.is_peak for goal in goals], last, -np.inf)
         for k, twin in enumerate(map(twin_of, goals)):
-            if twin is not None and twin.least is not None:
-                out[k] = twin.least(tables)
+            if twin is not None and twin.to_go is not None:
+                out[k] = twin.to_go(tables, tables.first, tables.start())[0]
         return tuple(out.tolist())
 
     def bars(self, margins: Sequence[float]) -> bool:
@@ -174,7 +177,8 @@ class StateEvaluator:
     def reachable(self, level: int, entries: Ints, asked: Filter) -> Reachable:
         """Return the states that pass and are reached from entries (n, c) on the same level."""
         seen, count, fresh = np.zeros(0, dtype=np.int64), 0, entries
-        parts = [Reachable(seen, entries[:0], np.zeros((0, len(self.problem.goals))), [])]
+        none = np.zeros((0, len(self.problem.goals)))
+        parts = [Reachable(seen, entries[:0], none, [], np.zeros(0))]
         while len(fresh):
             own, at = np.unique(self.tables.codes(fresh), return_index=True)
             new = ~np.isin(own, seen, assume_unique=True)
@@ -184,11 +188,59 @@ class StateEvaluator:
                 move._replace(source=move.source + count)
                 for move in self.tables.successors(level, rows[ok])
             ]
-            parts.append(Reachable(own[new][ok], rows[ok], values[ok], onward))
+            parts.append(Reachable(own[new][ok], rows[ok], values[ok], onward, np.zeros(0)))
             count += int(ok.sum())
             fresh = np.concatenate([entries[:0], *(m.states for m in onward if m.level == level)])
         codes, rows, values = map(np.concatenate, zip(*(part[:3] for part in parts), strict=True))
-        return Reachable(codes, rows, values, [move for part in parts for move in part.onward])
+        onward = [move for part in parts for move in part.onward]
+        return Reachable(codes, rows, values, onward, np.zeros(len(codes)))
+
+    def reachable_in(self, level: int, entries: Ints, spent: Floats, asked: Filter) -> Reachable:
+        """Return the same of states on paths of few enough steps; ``spent`` (n,): to entries.
+
+        Those to which the fewest steps lead come first, so that no state is looked at twice.
+        """
+        goal = next(goal for goal in self.problem.goals if not goal.is_peak)
+        twin, onward = twin_of(goal), list[Transitions]()
+        assert twin is not None
+        assert twin.to_go is not None  # as is required where steps are limited
+        codes, states, values = self.tables.codes(entries[:0]), entries[:0], np.zeros((0, 0))
+        steps, ok, left = np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
+        fresh = entries
+        while True:
+            own = self.tables.codes(fresh)
+            first = np.lexsort((spent, own))
+            first = first[np.unique(own[first], return_index=True)[1]]
+            few = spent[first] + twin.to_go(self.tables, level, fresh[first]) <= asked.steps
+            first = first[few]
+            order = np.argsort(codes, kind="stable")
+            at = np.searchsorted(codes, own[first], sorter=order).clip(max=len(codes) - 1)
+            known = np.zeros(len(first), dtype=bool)
+            if len(codes):
+                known = codes[order[at]] == own[first]
+                rows = order[at[known]]
+                steps[rows] = np.minimum(steps[rows], spent[first[known]])
+            new = first[~known]
+            found, passes = self.valued(level, fresh[new], asked)
+            codes, states = np.concatenate([codes, own[new]]), np.concatenate([states, fresh[new]])
+            values = np.concatenate([values.reshape(-1, found.shape[1]), found])
+            steps, ok = np.concatenate([steps, spent[new]]), np.concatenate([ok, passes])
+            left = np.concatenate([left, passes])
+            if not left.any():
+                break
+            rows = np.flatnonzero(left & (steps == steps[left].min()))
+            left[rows] = False
+            moves = [
+                move._replace(source=rows[move.source])
+                for move in self.tables.successors(level, states[rows])
+            ]
+            onward += moves
+            within = [move for move in moves if move.level == level]
+            fresh = np.concatenate([entries[:0], *(move.states for move in within)])
+            spent = np.concatenate([steps[:0], *(steps[move.source] + 1 for move in within)])
+        number = np.cumsum(ok) - 1
+        onward = [move._replace(source=number[move.source]) for move in onward]
+        return Reachable(codes[ok], states[ok], values[ok], onward, steps[ok])
 
     def valued(self, level: int, states: Ints, asked: Filter) -> tuple[Floats, Bools]:
         """Return values of goals in states (n, g), and which states pass a filter (n,)."""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seqopt._registry import registered
-from seqopt.arrays import Bools, Floats
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph._timed import TimedGraph
 from seqopt.network.network import Network
@@ -29,12 +29,13 @@ ROUNDED = 1e-9  # by which a response may be over a limit, over its size
 class Twin(NamedTuple):
     """How an amount of states or moves is computed once more.
 
-    ``values``: of the same arrays as the amount's own function; ``least``: a lower bound of all
-    builds, from what rules or a schedule allow.
+    ``values``: of the same arrays as the amount's own function; ``to_go``: of a count, of which
+    every move takes one: takes the tables of what rules or a schedule allow, a level and states,
+    returns lower bounds from there to an end.
     """
 
     values: Callable[[Any], Floats]
-    least: Callable[[Any], float] | None = None
+    to_go: Callable[[Any, int, Ints], Floats] | None = None
 
 
 class PathTwin(NamedTuple):
@@ -87,7 +88,7 @@ def _gone(moves: MoveArrays) -> Floats:
 TWINS = {
     "minmax": Twin(_criterion),
     "sum": Twin(_criterion),
-    "steps": Twin(_count, lambda tables: float(tables.least_steps())),
+    "steps": Twin(_count, lambda tables, level, states: tables.steps_to_go(level, states)),
     "regrips": Twin(_taken),
     "travel": Twin(_gone),
 }

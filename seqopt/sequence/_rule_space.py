@@ -159,11 +159,16 @@ class FreeSpace(StateRows):
 
     @property
     def fewest_steps(self) -> int:
-        """Lower bound of the number of steps: all but one grip per robot are released singly."""
-        placed = self.levels - self.first
+        """Lower bound of the number of steps of a build."""
+        return int(self.steps_to_go(self.first, self.start())[0])
+
+    def steps_to_go(self, level: int, states: Ints) -> Floats:
+        """Return lower bounds of steps to an end: all but a grip per robot are released singly."""
+        placed = self.levels - level
+        grips = placed + self.grips(states)
         if self.rules.how_it_ends is Ending.ONE_BY_ONE:
-            return 2 * placed + self.held_first
-        return placed + max(0, placed + self.held_first - self.robots) + self.ends_bare
+            return placed + grips.astype(float)
+        return placed + np.maximum(0.0, grips - self.robots) + (self.ends_bare & (grips > 0))
 
     def within(
         self, level: int, states: Ints, *, regrips: bool = True
@@ -374,11 +379,10 @@ class _TakeDownSpace(FreeSpace):
         """Return how many bricks stand on a level."""
         return 1 + self._span[0] - level
 
-    @property
-    def fewest_steps(self) -> int:
-        """Lower bound of the number of steps: bricks are gripped before removal, or initially."""
-        removed = self.levels - 1
-        return removed + max(0, removed - self.held_first)
+    def steps_to_go(self, level: int, states: Ints) -> Floats:
+        """Return lower bounds of steps to an end: bricks are gripped before removal."""
+        removed = self.levels - level
+        return removed + np.maximum(0.0, removed - self.grips(states))
 
     def within(
         self, level: int, states: Ints, *, regrips: bool = True
@@ -465,6 +469,10 @@ class ScheduleSpace(StateRows):
     def fewest_steps(self) -> int:
         """Number of steps, equal for all builds."""
         return self.levels
+
+    def steps_to_go(self, level: int, states: Ints) -> Floats:
+        """Return the number of steps to the end, (n,)."""
+        return np.full(len(states), float(self.levels - level))
 
     def bricks_at(self, level: int) -> int:
         """Return the brick count after a number of steps."""

@@ -14,8 +14,8 @@ from scipy.sparse.csgraph import breadth_first_order
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph import Explorer, Graph, lexicographic
 from seqopt.graph._budgets import is_beyond, within_budgets
-from seqopt.graph._explore import Moves
 from seqopt.graph.paths import _sum_bound, distances, least_peak, lexicographic_bounds, reached
+from seqopt.graph.space import Moves, Space
 from seqopt.judge.arithmetic import budget_bounds
 from tests.random_graphs import graphs, simple_paths, values_of
 
@@ -142,7 +142,7 @@ def test_amounts_that_pay_without_end_are_refused():
 
 
 @dataclass(frozen=True)
-class Ladder:
+class Ladder(Space):
     """Places 0 to 3 on every level, with values from a table; steps sideways and straight on."""
 
     table: np.ndarray

@@ -14,13 +14,13 @@ from seqopt.engines.interface import Want
 from seqopt.graph import Explorer
 from seqopt.graph._orders import OrderSpace, among_orders, whole_bound
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.paths import keep_best, least_peak
+from seqopt.graph.paths import distances, keep_best, least_peak, lexicographic_bounds, reached
 from seqopt.graph.states.explored import explore, floors_of_goals
 from seqopt.graph.states.states import build_states
 from seqopt.judge import _budget_proof as budget_proof
 from seqopt.judge._budget_proof import least_within
 from seqopt.judge._proof import Proof, TooManyPartsError
-from seqopt.judge._states import StateEvaluator
+from seqopt.judge._states import Filter, StateEvaluator
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
@@ -86,6 +86,44 @@ def test_what_all_plans_have_in_common_bounds_every_path(ending, robots, regrips
     fewest = keep_best(graph, 1)[1]
     assert fewest == floors[1] or (regrips == 0 and fewest > floors[1])
     assert np.isfinite(floors[0]) == (ending is not Ending.HELD)
+
+
+@pytest.mark.parametrize("direction", ["build", "take-down"])
+@pytest.mark.parametrize("ending", list(Ending))
+def test_no_step_lowers_the_steps_to_go_by_more_than_one(direction, ending):
+    """So a path through a state has at least as many steps as are counted to it and from there."""
+    if direction == "take-down" and ending is not Ending.HELD:
+        ending = Ending.RELEASED  # nobody holds in the end, however builds end
+    rules = FreeRules(ending=ending, least_grips=1, direction=direction)
+    problem = posed("minmax,steps", count=4, rules=rules)
+    space, tables = problem.space, StateEvaluator(problem).tables
+    graph, states = explore(problem).graph()
+    left = [space.steps_to_go(level, rows) for level, _, rows in states]
+    again = [tables.steps_to_go(level, rows) for level, _, rows in states]
+    bound = np.concatenate(left)
+    assert bound.tolist() == np.concatenate(again).tolist()
+    fewest = distances(graph, graph.amounts[:, 1], back=True)
+    assert (bound <= fewest).all()  # infinite where no end is reached
+    assert (bound[graph.source] <= 1 + bound[graph.target]).all()
+    assert bound[0] == fewest[0]
+    assert (bound == fewest).mean() > 0.05
+
+
+def test_fewer_steps_are_proven_by_states_on_paths_of_fewer_steps():
+    """A plan of more steps, or a bound that is too high, is refused by them as by all states."""
+    problem = posed("minmax,steps", count=6)
+    peak, steps = solve(problem, "schedule_search", proof=False).selection.objective
+    proof, every = Proof(problem), Proof(problem)
+    assert proof.bounds((peak, steps)) == (peak, steps)
+    graph = every.rebuilt(Filter((peak, steps))).graph()
+    assert lexicographic_bounds(graph, (peak, steps)) == (peak, steps)
+    few = every.rebuilt(Filter((peak, steps), steps=steps - 1)).graph()
+    assert len(few.source) < len(graph.source)
+    assert not few.ends[reached(few)].any()
+    as_many = every.rebuilt(Filter((peak, steps), steps=steps)).graph()
+    assert lexicographic_bounds(as_many, (peak, steps))[1] == steps
+    for more in (1, 2, 3):
+        assert Proof(problem).bounds((peak, steps + more))[1] <= steps
 
 
 def test_a_proof_by_the_end_alone_is_not_given_to_a_worse_plan():

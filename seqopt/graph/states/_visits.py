@@ -13,7 +13,7 @@ from seqopt.graph._explore import Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.space import Found, Moves, Space
 from seqopt.graph.states.states import States
-from seqopt.problem.amounts import NONE, MoveArrays
+from seqopt.problem.amounts import NONE, STEPS, MoveArrays
 from seqopt.problem.resources import StepArrays
 from seqopt.scene.scene import Order
 from seqopt.sequence import _rule_space as free_space
@@ -236,6 +236,11 @@ class StateSpace(Space):
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
         return values if self.problem.totals else move_amounts(self.problem, values, taken)
+
+    def to_go(self, part: int, states: Ints) -> Floats | None:
+        if self.problem.goals[1:2] != (STEPS,) or self.problem.demands or self.problem.budgets:
+            return None
+        return self.problem.space.steps_to_go(part, states)
 
     def ended(self, part: int, states: Ints) -> Bools:
         return self.problem.space.ended(states)
