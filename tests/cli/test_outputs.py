@@ -77,15 +77,15 @@ def test_a_failure_makes_no_folder(capsys, tmp_path):
 def test_what_a_line_says_is_not_asked_again_for_the_page(monkeypatch, tmp_path):
     """Tolerances and verdicts of states, and what robots do, are found once for line and page."""
     asked, tasks = Counter(), []
-    misfits, verdicts = _tolerance._misfits_of, _builds._one_by_one
+    misfits, verdicts = _tolerance._misfits_of, _builds.each_by_workers
 
     def each(engine, keys):
         asked.update(("off", bricks, held) for _, bricks, held in keys)
         return misfits(engine, keys)
 
-    def proven(parts, steps, mortar, tell=None, crew=None):
-        asked.update((mortar, step.bricks, step.grips) for step in steps)
-        return verdicts(parts, steps, mortar, tell, crew)
+    def proven(parts, find, steps, crew):
+        asked.update((find.keywords["mortar"], step.bricks, step.grips) for step in steps)
+        return verdicts(parts, find, steps, crew)
 
     for module in ("_cli.outputs", "report.page"):
         monkeypatch.setattr(
@@ -93,7 +93,7 @@ def test_what_a_line_says_is_not_asked_again_for_the_page(monkeypatch, tmp_path)
         )
     monkeypatch.setattr("seqopt.exchange._tasks.tasks_csv", lambda _: tasks.append(1) or "")
     monkeypatch.setattr(_tolerance, "_misfits_of", each)
-    monkeypatch.setattr(_builds, "_one_by_one", proven)
+    monkeypatch.setattr(_builds, "each_by_workers", proven)
     asked_for = ["optimize", "chain:bricks=7", "--schedule", "free", "--out", str(tmp_path / "out")]
     assert main([*asked_for, "--quiet"]) == 0
     assert {kind for kind, *_ in asked} == {"off", DRY, EPOXY}
