@@ -7,8 +7,8 @@ and a step from state :math:`s` to :math:`s'` extends it,
 
 Of two labels of one state the first *dominates* the other one if whatever may follow that may
 follow it: by default where none of its values is larger, so :math:`f` must not fall in :math:`z`.
-When robots are free, how old mortar is, sums within budgets and the postures of arms that hold are
-resources (`seqopt.graph._labels`). A further one is registered (`seqopt.register`) and named as a
+When robots are free, how old mortar is and sums within budgets are carried by labels in the same
+way (`seqopt.graph._labels`). A further resource is registered (`seqopt.register`) and named as a
 limit.
 """
 
