@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from seqopt.contact.mortar import _with_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import SeqoptError
 from seqopt.network.build import build_network
@@ -19,18 +18,12 @@ from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability._builds import BuildVerdicts
-from seqopt.stability._load_factor import LoadFactor, load_factor_table
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import FailureMap
 from seqopt.work.progress import Tell
 from seqopt.workflow import optimize
 
-AXIS_WORDS = {
-    "friction": "friction",
-    "tilt": "tilt, degrees",
-    "bricks placed": "bricks placed, at most",
-    "bricks": "number of bricks",
-}
+AXIS_WORDS = {"friction": "friction", "tilt": "tilt, degrees"}
 SHOWN = {
     "first_step": "first step",
     "bond_needed_Pa": "bond for all steps, kPa",
@@ -90,31 +83,6 @@ def failure_page(engine: Engine, builds: Builds, found: FailureMap) -> str:
     return report_page(engine, shown, sentence, [(caption, _cases_shown(found, axis))])
 
 
-def load_page(
-    engine: Engine,
-    name: str,
-    steps: Sequence[Step],
-    found: Mapping[str, Sequence[LoadFactor]],
-    summaries: Mapping[str, str],
-) -> str:
-    """Return the page of a build with the mechanism of every step at its load factor.
-
-    ``found``: load factors of the steps; ``summaries``: in a line; both by mortar.
-    """
-    builds, tables, responses = [], [], analyze(engine, steps)
-    caption = "How much load every step bears: the largest multiple, weights as they are"
-    for mortar, each in found.items():
-        how = _with_mortar(mortar)
-        motions = np.zeros((len(steps), len(engine.network.inner), 6))
-        for i, (step, one) in enumerate(zip(steps, each, strict=True)):
-            motions[i, : step.bricks] = one.motion
-        builds.append(Build(f"{name}, {how}", steps, responses, falls=motions))
-        tables.append((f"{caption}, {how}", load_factor_table(steps, each)))
-    words = "; ".join(f"{_with_mortar(mortar)}: {text}" for mortar, text in summaries.items())
-    sentence = f"{engine.network.scene.name}, {name}: {words}. A step can be shown as it gives way."
-    return report_page(engine, builds, sentence, tables)
-
-
 def _cases_shown(found: FailureMap, axis: str) -> pd.DataFrame:
     """Return the cases of a map in display units, unknown numbers left empty."""
     table = found.cases.assign(bond_needed_Pa=found.cases["bond_needed_Pa"] / 1e3)
@@ -162,13 +130,12 @@ def failure_blocks(scene: Scene, found: FailureMap, wrapped: Callable[[str], str
     heads = "".join(f"{value:8.3g}" for value in values)
     lines = [f"{scene.name}: steps that fall, by {axis}", f"{'':{_NAME}}{'steps':>5}{heads}"]
     for (build, holds), rows in found.cases.groupby(["build", "holds"], sort=False):
-        steps, counts = rows["steps"].unique(), dict.fromkeys(values, "")
+        counts = dict.fromkeys(values, "")
         for case in rows.to_dict("records"):
-            of = f"/{case['steps']}" if len(steps) > 1 else ""  # where numbers of steps differ
             open_ = f" ({case['undecided']}?)" if case["undecided"] else ""
-            counts[case["value"]] = f"{case['fall']}{of}{open_}"
+            counts[case["value"]] = f"{case['fall']}{open_}"
         cells = "".join(f"{count:>8}" for count in counts.values())
-        lines.append(f"{f'{build}, {holds}':{_NAME}}{steps[0] if len(steps) == 1 else '':5}{cells}")
+        lines.append(f"{f'{build}, {holds}':{_NAME}}{rows['steps'].iloc[0]:5}{cells}")
     cures = [f"What falls first, {axis} {found.usual:.3g}, and what would cure it"]
     at = (found.cases["value"] == found.usual) & (found.cases["fall"] > 0)
     for case in found.cases[at].to_dict(orient="records"):

@@ -34,12 +34,7 @@ from seqopt.work.progress import Tell, with_progress
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-AXES = {
-    "friction": (0.2, 0.3, DRY.friction, 0.6, 0.8),
-    "tilt": (0.0, 1.0, 2.0, 4.0, 8.0),
-    "bricks placed": (),  # fifths of all
-}
-_FIFTHS = np.arange(1, 6) / 5
+AXES = {"friction": (0.2, 0.3, DRY.friction, 0.6, 0.8), "tilt": (0.0, 1.0, 2.0, 4.0, 8.0)}
 _TILTED = 8  # directions, evenly spread
 _SURE = 1e-3  # share by which more is taken than a step is proven to need
 _TRIED = 24  # nodes where one more grip is tried, the fastest ones first
@@ -54,7 +49,7 @@ class FailureMap:
     ----------
     cases : pandas.DataFrame
         A row for every ``build``, what ``holds`` and ``value`` of the ``axis`` (friction, tilt in
-        degrees, bricks placed at most, or of how many bricks it is built): how many ``steps`` there
+        degrees): how many ``steps`` there
         are, ``fall`` and are ``undecided``; of the ``first_step`` that falls the ``bricks`` placed,
         ``brick`` and ``joint`` that fail first and the ``motion`` there; the ``bond_needed_Pa`` and
         the ``friction_needed`` with which all steps stand, inf if none is enough; and
@@ -65,7 +60,7 @@ class FailureMap:
         By build, how its steps fall with the first of what holds, at the ``usual`` value; zero
         for those that stand.
     usual : float
-        The value nearest to the default: the friction of `DRY`, no tilt, or all bricks.
+        The value nearest to the default: the friction of `DRY`, or no tilt.
     """
 
     cases: pd.DataFrame
@@ -89,23 +84,17 @@ class FailureMap:
 
 @dataclass(frozen=True)
 class _Case:
-    """A build with a mortar, and scenes turned so that gravity pulls as it does in the case.
-
-    ``whole``: of which this is the beginning, if it is of one.
-    """
+    """A build with a mortar, and scenes turned so that gravity pulls as it does in the case."""
 
     build: str
     steps: Sequence[Step]
     holds: str
     mortar: Mortar
     turned: tuple[PartialAssemblies, ...]
-    whole: _Case | None = None
 
     @cached_property
     def found(self) -> tuple[Stability, ...]:
         """What is proven of every step: that of the first scene in which it is worst."""
-        if self.whole is not None:
-            return self.whole.found[: len(self.steps)]
         each = [[*each_verdict(parts, self.steps, self.mortar)] for parts in self.turned]
         worst = (Verdict.FALLS, Verdict.UNDECIDED, Verdict.STANDS)
         pairs = zip(*each, strict=True)
@@ -136,7 +125,7 @@ def failure_map(
     holds : sequence of str, optional
         What is in the joints: ``dry``, ``bond=PASCAL`` or ``epoxy``.
     axis : str, optional
-        ``friction``, ``tilt`` (degrees, to eight sides), or ``bricks placed`` (at most so many).
+        ``friction``, or ``tilt`` (degrees, to eight sides).
     values : sequence of float, optional
         On the axis.
     progress : callable, optional
@@ -160,7 +149,7 @@ def failure_map(
     >>> found.cases[["value", "steps", "fall"]].to_numpy().tolist()
     [[0.1, 17.0, 13.0], [0.5, 17.0, 4.0]]
     """
-    values, usual = _values(scene, axis, values)
+    values, usual = _values(axis, values)
     asked = [*_cases(scene, builds, holds, axis, values)]
     told = with_progress("mapping failures", asked, progress)
     rows = [_row(case, axis, value) for value, case in told]
@@ -175,47 +164,10 @@ def failure_map(
     return FailureMap(pd.DataFrame(rows), steps, motions, usual)
 
 
-def _brick_map(
-    scenes: Mapping[int, tuple[Scene, Mapping[str, Sequence[Step]]]],
-    usual: int,
-    holds: Sequence[str] = ("dry", "epoxy"),
-    progress: Tell | None = None,
-) -> FailureMap:
-    """Return a failure map over the number of bricks of a form.
-
-    Parameters
-    ----------
-    scenes : mapping of int to (Scene, mapping of str to sequence of Step)
-        By how many bricks they have, with their builds; a build may be missing in some.
-    usual : int
-        Of which of them it is shown how steps fall.
-    holds, progress
-        As of `failure_map`.
-
-    Returns
-    -------
-    FailureMap
-    """
-    found = {
-        bricks: failure_map(scene, builds, holds, "bricks placed", [bricks], progress)
-        for bricks, (scene, builds) in scenes.items()
-    }
-    tables = list[pd.DataFrame]()
-    for name in ("cases", "steps"):
-        whole = pd.concat([getattr(each, name) for each in found.values()]).assign(axis="bricks")
-        groups = [rows for _, rows in whole.groupby(["build", "holds"], sort=False)]
-        tables.append(pd.concat(groups, ignore_index=True))
-    return FailureMap(tables[0], tables[1], found[usual].motions, usual)
-
-
-def _values(scene: Scene, axis: str, values: Sequence[float]) -> tuple[Sequence[float], float]:
+def _values(axis: str, values: Sequence[float]) -> tuple[Sequence[float], float]:
     """Return the values on an axis, by default the usual ones, and the one of `FailureMap`."""
     if axis not in AXES:
         raise SceneError(f"axis {axis!r}: give one of {', '.join(AXES)}")
-    if axis == "bricks placed":
-        count = len(scene.bricks)
-        values = values or sorted({*np.ceil(_FIFTHS * count).astype(int).tolist()})
-        return values, max(values)
     values, least = values or AXES[axis], DRY.friction if axis == "friction" else 0.0
     return values, min(values, key=lambda value: abs(value - least))
 
@@ -245,14 +197,9 @@ def _cases(
     for name, steps in builds.items():
         for held in holds:
             mortar = find_mortar(held)
-            whole = _Case(name, steps, held, mortar, upright)
             for value in values:
-                if axis == "bricks placed":
-                    first = [step for step in steps if step.bricks <= value]
-                    yield value, replace(whole, steps=first, whole=whole)
-                else:
-                    own = replace(mortar, friction=value) if axis == "friction" else mortar
-                    yield value, _Case(name, steps, held, own, turned[value])
+                own = replace(mortar, friction=value) if axis == "friction" else mortar
+                yield value, _Case(name, steps, held, own, turned[value])
 
 
 def _parts(scene: Scene) -> PartialAssemblies:

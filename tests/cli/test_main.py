@@ -103,25 +103,6 @@ def test_analyze_writes_the_columns_of_table_a1(capsys, tmp_path, engine, engine
         assert (table[column] - values[column]).abs().max() <= close
 
 
-def test_a_staged_analysis_carries_what_is_locked_in(capsys, tmp_path, engine25):
-    tables = {}
-    for way in ("fitted", "planned"):
-        path, fields = tmp_path / f"{way}.csv", tmp_path / f"{way}.npz"
-        words = ("--staged", way, "--out", str(path), "--fields", str(fields))
-        assert run(capsys, "analyze", "--method", "cantilever", *words)[0] == 0
-        tables[way] = pd.read_csv(path)
-        last = np.load(fields)["step49_displacement"]
-        largest = 1e6 * np.linalg.norm(last, axis=1).max()
-        assert tables[way]["D_max_1e-3mm"].iloc[-1] == pytest.approx(largest, rel=1e-4)
-    once = analyze(engine25, cantilever(engine25.network))
-    fitted, planned = tables["fitted"], tables["planned"]
-    assert fitted["F_max_N"].max() == planned["F_max_N"].max() < 0.8 * once["F_max_N"].max()
-    assert fitted["D_max_1e-3mm"].max() > planned["D_max_1e-3mm"].max()
-    words = ("analyze", "--method", "cantilever", "--staged", "fitted", "--engine", "frame")
-    status, _, err = run(capsys, *words)
-    assert (status, "--engine compliance" in err) == (2, True)
-
-
 def test_analyze_prints_without_out(capsys):
     status, out, _ = run(capsys, "analyze", "--method", "published")
     assert status == 0

@@ -63,7 +63,7 @@ def test_it_says_its_version(capsys):
         ("optimize --robust worst-peak --vary stifness=2 --out x", "stiffness"),
         ("compare --order reversd", "reversed"),
         ("pareto chain:bricks=7 --aim D_max --pick D_mx --out x", "D_max"),
-        ("pareto chain:bricks=7 --aim D_max --pick D_max --under sequentil --out x", "sequential"),
+        ("pareto chain:bricks=7 --aim D_max --pick D_max --under D_mx=1 --out x", "D_max"),
         ("pareto chain:bricks=7 --round D_mx=1 --out x", "D_max"),
         ("import a.obj --unit mmm --out x", "mm"),
         ("export best --format cvs --out x", "csv"),

@@ -217,7 +217,6 @@ FREE = ("optimize", "--schedule", "free", "--aim", "steps")
     "words",
     [
         ("analyze", "--method", "sequential"),
-        ("analyze", "--method", "sequential", "--staged", "fitted"),
         pytest.param(("compare",), marks=pytest.mark.slow),
         LOOP,
         FREE,

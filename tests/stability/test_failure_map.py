@@ -10,16 +10,15 @@ import pytest
 import seqopt
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
+from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
 from seqopt.report._failures import cure_words, usual_builds
-from seqopt.scene._counts import scene_of_bricks
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._prover import Prover
 from seqopt.stability._screens import Screen
 from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
-from seqopt.stability.failure_map import _brick_map, failure_map
+from seqopt.stability.failure_map import failure_map
 
 FRICTIONS = (0.15, 0.45)
 
@@ -143,41 +142,6 @@ def test_wrong_words(network, builds):
 def test_what_is_not_proven_is_not_called_impossible(bond, said):
     case = {"bond_needed_Pa": bond, "friction_needed": np.inf, "grip_node": None}
     assert cure_words(case) == said
-
-
-def test_what_is_placed_is_mapped_along_a_build(network, builds, found):
-    """Steps of at most so many bricks; with all, the cases are those of the whole build."""
-    along = failure_map(network.scene, builds, ["dry"], "bricks placed")
-    assert sorted(along.cases["value"].unique()) == [2, 4, 6, 8, 9]
-    assert along.usual == 9
-    verdicts = {name: step_verdicts(network, steps, DRY) for name, steps in builds.items()}
-    for case in along.cases.to_dict(orient="records"):
-        pairs = zip(builds[case["build"]], verdicts[case["build"]], strict=True)
-        part = [verdict for step, verdict in pairs if step.bricks <= case["value"]]
-        assert (case["steps"], case["fall"]) == (len(part), part.count(Verdict.FALLS))
-    assert along.cases["fall"].sum() > 0
-
-
-def test_other_numbers_of_bricks_are_mapped_side_by_side():
-    """Every number has its own scene and builds; one of them may be without a build."""
-    scenes = {}
-    for bricks in (8, 12):
-        scene = scene_of_bricks("arch:span=1,rise=0.4,pattern=VLR", bricks)
-        own = seqopt.build_network(scene)
-        scenes[bricks] = scene, {"sequential": seqopt.sequential(own)}
-    scenes[8][1]["cantilever"] = seqopt.cantilever(seqopt.build_network(scenes[8][0]))
-    found = _brick_map(scenes, 12, ["dry", "epoxy"])
-    cases = found.cases
-    assert cases["build"].tolist() == ["sequential"] * 4 + ["cantilever"] * 2
-    assert cases["value"].tolist() == [8, 12, 8, 12, 8, 8]
-    for case in cases.to_dict(orient="records"):
-        scene, builds = scenes[case["value"]]
-        mortar = find_mortar(case["holds"])
-        own = falls(seqopt.build_network(scene), builds[case["build"]], mortar)
-        assert (case["steps"], case["fall"]) == (len(own), sum(own))
-    assert found.motions["sequential"].shape == (len(scenes[12][1]["sequential"]), 12, 6)
-    figure = found.plot()
-    assert [text.get_text() for text in figure.axes[0].texts].count("0 of 15") == 2
 
 
 @pytest.mark.slow

@@ -21,12 +21,11 @@ from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import Engine, Fields, Level, OpeningEngine, Want
-from seqopt.engines.registry import USUAL, provenance, recipe_of
+from seqopt.engines.registry import provenance, recipe_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
 from seqopt.problem.requirements import _prop_faults, length_word, overloads
 from seqopt.responses._enough import Enough, what_was_enough
-from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
 from seqopt.responses.quantities import _plain, _steps_in_words, length_text
 from seqopt.responses.table import (
@@ -60,10 +59,6 @@ class Analyze(options.Strict, options.Computed, options.Fixed):
     PLAN_DIR [--out FILE] [other options]
 
     How are responses computed?
-    staged : CHOICE
-        carry what each step locks in on to the next, instead of analyzing every step from scratch:
-        bricks come without stress, fitted to the deformed structure or set down where they are
-        planned, and grips close where they find their nodes
     tolerance : LENGTH
         also find how far every grip may be from where it should be before a robot carries more than
         its payload, in the worst direction: a column tolerance_mm; of a length, such as 0.4mm, also
@@ -85,7 +80,6 @@ class Analyze(options.Strict, options.Computed, options.Fixed):
     seqopt analyze arch25 --method sequential --json
     """
 
-    staged: str | None = options.word(None, choices=[way.value for way in Placing])
     tolerance: str | None = options.word(None, const="")
     fields: options.File | None = None
     time_limit: float = options.word(inf, zero=True)
@@ -116,15 +110,14 @@ def run(asked: Analyze) -> Answer:
     computed = [step for step in steps[:reached] if step.number not in faults]
     tolerances = partial(_with_tolerances, asked, engine, computed, table)
     table, off = clock.spare("tolerances", tolerances, (table, tuple[str, ...]()))
-    staged = None if asked.staged is None else staged_fields(network, computed, asked.staged)
-    departures = partial(within.departures, table, staged)
+    departures = partial(within.departures, table)
     outside: tuple[Departure, ...] = clock.spare(RANGE, departures, ())
     whole = _with_faults(scene, table, steps, faults) if faults else table
     said = outputs.put_table(asked.path, whole, _counted(whole, faults))
     if archived is not None:
         write_bytes(archived, archive(network, answers))
         said["written"] = (*said.get("written", ()), archived)
-    found = partial(what_was_enough, within, {"": table}, staged=staged is not None)
+    found = partial(what_was_enough, within, {"": table})
     enough = clock.spare("which model is enough", found, None)
     facts = {"units": UNITS, "steps": whole, **provenance(engine)}
     facts |= {"enough": None if enough is None else enough.facts()}
@@ -258,7 +251,7 @@ _Answered = tuple[Step, Fields | SeqoptError]
 def _step_answers(
     asked: Analyze, within: LinearRange, steps: Sequence[Step]
 ) -> Iterator[_Answered]:
-    """Return steps with fields or errors, from scratch or as staged construction."""
+    """Return steps with fields or errors."""
     each, engine = with_progress("steps", steps, asked.tell), within.engine
 
     def answer(step: Step) -> Fields | SeqoptError:
@@ -267,14 +260,7 @@ def _step_answers(
         except (MechanismError, SolverError) as error:
             return error
 
-    if asked.staged is None:
-        return ((step, answer(step)) for step in each)
-    if asked.engine not in (None, USUAL):
-        raise SceneError(
-            f"--engine {asked.engine}: --staged goes with exactly rigid bricks alone; "
-            "give --engine compliance"
-        )
-    return zip(each, staged_fields(engine.network, steps, asked.staged), strict=True)
+    return ((step, answer(step)) for step in each)
 
 
 def _in_time(answers: Iterator[_Answered], clock: Clock) -> Iterator[_Answered]:

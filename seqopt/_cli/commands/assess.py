@@ -1,4 +1,4 @@
-"""The command ``assess``: does every step stand, with what margins, and how much load it bears."""
+"""The command ``assess``: does every step stand, and with what margins."""
 
 from __future__ import annotations
 
@@ -7,21 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-import numpy as np
-import pandas as pd
-
 from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._files import csv_text
-from seqopt._showing import PAGE
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar
-from seqopt.engines.registry import USUAL, make_engine, versions
+from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.responses.quantities import _steps_in_words
 from seqopt.sequence.steps import Step
-from seqopt.stability._load_factor import format_load_factors, load_factor_table, load_factors
 from seqopt.stability._step_verdicts import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import Verdict
 from seqopt.work.progress import with_progress
@@ -35,21 +29,17 @@ class Assess(options.Fixed):
         bond=STRENGTH (Pa) (default: dry, then epoxy, which alone decides the exit status)
 
     What is asked beside verdicts?
-    One of: --margins with --steps, --load-factor, and --map with --holds.
+    Either --margins with --steps, or --map with --holds.
 
     margins : NAMES
         margins beside the verdicts: {margins} or all, with commas between them; each takes several
         times as long (default: none; with --steps: all)
     steps : FROM:TO
         steps of which margins are found, as 40:60 (default: all)
-    load_factor :
-        find the largest multiple of the scene's loads (forces on bricks and wind, weights as they
-        are) with which every step stands, and how it gives way then; --out is a folder
     map : AXIS
-        map where builds fail, over what holds their joints and over friction, tilt (degrees) or
-        bricks, with values of your own as tilt=0,2,5; of the fixed methods, a loop and a free
-        schedule, or of --method or --plan alone; bricks: of how many a scene in words is built,
-        else how many are placed
+        map where builds fail, over what holds their joints and over friction or tilt (degrees),
+        with values of your own as tilt=0,2,5; of the fixed methods, a loop and a free schedule, or
+        of --method or --plan alone
     holds : NAMES
         with --map: what holds the joints, of dry, bond=STRENGTH (Pa) and epoxy, with commas between
         them (default: dry,epoxy)
@@ -68,7 +58,6 @@ class Assess(options.Fixed):
     mortar: Mortar | str | None = None
     margins: options.Words | None = None
     steps: str | None = None
-    load_factor: bool = False
     map: str | None = None
     holds: options.Words | None = None
     workers: int = options.word(1, most=options.MOST_WORKERS)
@@ -109,54 +98,12 @@ class AssessWords(Assess):
     cohesion: float | None = options.word(None, zero=True)
 
 
-def answer_load_factor(asked: AssessWords) -> Answer:
-    """Return the load factor of every step of a sequence."""
-    scene = inputs.find_scene(asked)
-    outputs.require_out(asked)
-    network, mortars = build_network(scene), _mortars(asked)
-    (title, steps, taken), each, tables = inputs.find_steps(asked, network), {}, []
-    for name, mortar in mortars.items():
-        found = each[name] = load_factors(network, steps, mortar, asked.tell)
-        tables.append(load_factor_table(steps, found).assign(mortar=name))
-    table = pd.concat(tables, ignore_index=True)[["mortar", *tables[0].columns[:-1]]]
-    said = {name: format_load_factors(steps, found) for name, found in each.items()}
-
-    def files() -> dict[str, bytes | str]:
-        from seqopt.report._failures import load_page  # noqa: PLC0415  # only where files are written
-
-        engine = make_engine(USUAL, network, None)
-        page = load_page(engine, title, steps, each, said)
-        return {"load_factors.csv": csv_text(table), PAGE: page}
-
-    written = outputs.write_outputs(asked, files)
-    where = outputs.written_to(asked.path, what="how steps give way")
-    lines = [f"{_with_mortar(name)}: {text}" for name, text in said.items()]
-    last = tables[-1]  # the mortar that the build counts on
-    failing = (last["load_factor"] < 1) | (last["unloaded"] != Verdict.STANDS.value)
-    unsure = table["step"][table["load_factor"].isna() & (table["load_N"] > 0)]
-    unproven = f"seqopt: solver failed: {_steps_in_words([*dict.fromkeys(unsure)])}: not proven"
-    status = Status.DOES_NOT_HOLD if np.any(failing) else Status.DONE
-    return Answer(
-        {"versions": versions, "steps": table},
-        scene=scene,
-        text="\n".join([*lines, where]) if written else "",
-        data="" if written else csv_text(table),
-        written=written,
-        value=table,
-        notes=(*taken, *remarks.settlement_notes(scene)),
-        failures=(unproven,) if len(unsure) else (),
-        status=Status.FAILED if len(unsure) else status,
-    )
-
-
 def run(asked: AssessWords) -> Answer:
     """Assess every step of a sequence, or map builds; write tables for any verdict."""
     if asked.map is not None:
         from seqopt._cli.commands.mapping import answer_map  # noqa: PLC0415  # for maps only
 
         return answer_map(asked, asked.map, str(asked.holds or "dry,epoxy").split(","))
-    if asked.load_factor:
-        return answer_load_factor(asked)
     outputs.keep_apart(asked, asked.path)
     scene, mortars = inputs.find_scene(asked), _mortars(asked)
     network = build_network(scene)

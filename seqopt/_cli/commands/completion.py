@@ -23,8 +23,7 @@ from seqopt.scene.scene import ORDERS
 from seqopt.scene.scene_file import KINDS, builtin_scenes
 from seqopt.sequence.rules import FREE, RULES
 from seqopt.sequence.three_robots import SCHEDULES
-from seqopt.sequence.two_robots import METHODS
-from seqopt.study.published import CRITERIA, PUBLISHED
+from seqopt.study.published import CRITERIA
 
 AIMS = ("minmax", "sum", "steps", "regrips", "travel", "bond", "friction", "tilt")
 SHORT = re.compile(r"[:;(]|, (?:as|if|or) ")  # where what matters of a help text ends
@@ -92,7 +91,6 @@ def _names() -> dict[str, list[str]]:
         "limits": ["payload", *responses],
         "order": [*ORDERS, "search"],
         "stands": ["dry", "epoxy", "bond="],
-        "under": [*METHODS, PUBLISHED],
         "robust": ["worst-peak", "worst-total", "cvar="],
         "vary": ["stiffness=", "density=", "position="],
         "budgets": ["travel=", "steps_over:", "robot_use:"],

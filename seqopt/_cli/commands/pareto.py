@@ -19,7 +19,6 @@ from seqopt._files import csv_text, write_folder
 from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
-from seqopt.errors import ProblemError, TimeUpError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence
 from seqopt.plan.front import Front, find_front, pick
@@ -28,7 +27,7 @@ from seqopt.problem.amounts import judged_by
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import _said_limits
 from seqopt.report._pages import front_page, plan_page
-from seqopt.report.comparison import _worst_of, fixed_methods, shown_table
+from seqopt.report.comparison import fixed_methods, shown_table
 from seqopt.report.page import task_texts
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import Departure, LinearRange, _analyze_builds, builds_in_words
@@ -87,8 +86,7 @@ class ParetoWords(Pareto, options.Posed):
     pick : NAME
         also write a folder, pick, of the plan with the least of a column
     under : BOUND
-        for --pick: only plans below it: NAME=VALUE (SI units), or a method that is to be beaten in
-        everything: sequential, cantilever, published
+        for --pick: only plans below it, as F_largest=250 (SI units)
 
     What must hold?
     --friction and --tilt go with --stands.
@@ -177,7 +175,7 @@ def answered(asked: ParetoWords, found: Found) -> Answer:
     front, free, clock = found.value, states_of(found.problem), found.clock
     scene = free.engine.network.scene
     files: Mapping[str, bytes | str] = {}
-    if asked.path is not None or any("=" not in text for text in asked.under):
+    if asked.path is not None:
         _ = found.methods
     _ = found.departures
     if asked.path is not None:
@@ -217,9 +215,9 @@ def answered(asked: ParetoWords, found: Found) -> Answer:
 
 def _chosen(asked: ParetoWords, name: str, found: Found) -> tuple[int, dict[str, object], str]:
     """Return the index of the picked plan, its point, and its description."""
-    if asked.under and not found.methods and found.clock.left_out:
-        raise TimeUpError(f"--pick {name}: --under was not looked at; give more")
-    chosen = pick(found.value.table, name, _under(asked.under, found))
+    known = [str(column) for column in found.value.table.columns]
+    bounds = grammar.parse_numbers("--under", asked.under, known)
+    chosen = pick(found.value.table, name, bounds)
     row = shown_table(found.value.table).iloc[chosen]
     values = {str(name): value for name, value in row.items()}
     return chosen, {"point": chosen + 1, **values}, values_text(values)
@@ -314,22 +312,3 @@ def _numbered(front: Front) -> pd.DataFrame:
     """Return the table of a Pareto set, its points counted from 1."""
     table = shown_table(front.table)
     return table.set_axis(pd.RangeIndex(1, len(table) + 1, name="point"))
-
-
-def _under(texts: Sequence[str], found: Found) -> dict[str, float]:
-    """Parse bounds: RESPONSE=VALUE, or the name of a method, whose values are the bounds."""
-    out: dict[str, float] = {}
-    for text in texts:
-        methods = {} if "=" in text else found.methods
-        if "=" not in text and text not in methods:
-            known = ", ".join(methods)
-            why = f"no such method{did_you_mean(text, methods)}"
-            raise ProblemError(f"--under {text}: {why}; give {known}, or a bound as F_largest=250")
-        bounds = (
-            _worst_of(methods[text])
-            if text in methods
-            else grammar.parse_numbers("--under", [text])
-        )
-        for name, value in bounds.items():
-            out[name] = min(value, out.get(name, value))
-    return out
