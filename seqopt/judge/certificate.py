@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from itertools import chain
@@ -21,13 +21,16 @@ from seqopt.responses.quantities import CHOSEN_BY
 SAME = 1e-5  # over its largest, that a response may differ: ten times what a screen may err
 
 
+_Met = Mapping[int, Mapping[str, float]]  # responses, by step
+
+
 def _require_anew(
-    problem: Layers, choice: Sequence[int], met: Sequence[tuple[Layers, Sequence[int]]] = ()
+    problem: Layers, choice: Sequence[int], met: Callable[[], _Met] | None = None
 ) -> None:
     """Raise an error if a choice leads to other responses than its problem has from a cache.
 
-    ``choice``: a candidate for every move; ``met`` (sequence of (Layers, sequence of int)): where
-    its own responses are not computed: problems with all of its steps, and the choices in these.
+    ``choice``: a candidate for every move; ``met``: returns the responses that it meets, by step,
+    where those of all choices are not computed.
     Raises `FileError` if a response of a step is another one when it is computed anew.
     """
     evaluation, cache = problem.evaluation, problem.evaluation.resources.cache
@@ -41,9 +44,7 @@ def _require_anew(
     engine = remade(packed(problem.engine))
     anew = Evaluation(engine, replace(schedule, moves=chosen), evaluation.wanted)
     found = dict(_met(anew, [0] * len(chosen)))
-    kept: dict[int, Mapping[str, float]] = {}
-    for part, mine in met or [(problem, choice)]:
-        kept |= _met(part.evaluation, mine)
+    kept = dict(_met(evaluation, choice)) if met is None else met()
     sizes = _sizes(engine.network, [*kept.values(), *found.values()])
     for step, responses in found.items():
         for name, value in responses.items():

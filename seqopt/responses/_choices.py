@@ -145,6 +145,11 @@ class Evaluation(Terse):
                 start = time.perf_counter()
         self._kept[:] = [_Found(tuple(steps), models, seconds + time.perf_counter() - start)]
 
+    @property
+    def is_kept(self) -> bool:
+        """Whether the responses of all choices are computed, and cached."""
+        return bool(self._kept) and not self.streams
+
     @cached_property
     def _kept(self) -> list[_Found]:
         """The evaluation, after computing all levels."""

@@ -14,7 +14,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from seqopt._showing import Shown
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, engine_for, recipe_for
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
@@ -36,6 +36,7 @@ from seqopt.problem.requirements import (
     pickled,
     robots_of,
 )
+from seqopt.responses._blocks import work
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, robot_response
@@ -76,17 +77,6 @@ def windows(
             grips = tuple(takes.get(grip, grip) for grip in step.grips)
             steps.append(replace(step, grips=grips))
     return replace(schedule, steps=tuple(steps), moves=tuple(moves))
-
-
-def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
-    """Return which candidates (C_k,) of a move are other nodes than the one before it.
-
-    Responses do not tell where all candidates are impossible: then nothing is known of any.
-    """
-    candidates = np.array(schedule.moves[move].candidates)
-    if (move - 1, move) not in schedule.steps_of:
-        return np.ones(len(candidates), dtype=bool)
-    return np.asarray(candidates != schedule.moves[move - 1].candidates[before])
 
 
 @dataclass(frozen=True, repr=False)
@@ -361,12 +351,12 @@ class Layers(Source, Shown):
 
         ``move``, ``before``: a move, and the candidate chosen for the move before it. Result: in
         order, with responses (C_k,); those of steps shared with the move before are of that choice.
-        Computed again if the responses of all choices are not kept.
+        Solved alone where the responses of all choices are not known.
         """
-        if self.evaluation.streams:
+        if not self.evaluation.is_kept:
             own = windows(self.schedule, [(move, before)], alone=True)
-            alone = self.evaluation.resources.alone()
-            solved = replace(self.evaluation, schedule=own, resources=alone).steps
+            quiet = replace(self.evaluation.resources, progress=None)
+            solved = replace(self.evaluation, schedule=own, resources=quiet).steps
             moves = {step.number: step.moves for step in self.schedule.steps}
             return tuple(replace(each, moves=moves[each.step.number]) for each in solved)
         found = []
@@ -375,6 +365,23 @@ class Layers(Source, Shown):
             responses = {name: values[row] for name, values in choices.responses.items()}
             found.append(replace(choices, responses=responses))
         return tuple(found)
+
+    def possible_after(self, move: int, before: int) -> Floats:
+        """Return zero (C_k,) for candidates that are other nodes than the one before, or infinity.
+
+        Responses do not tell where all candidates are impossible: then nothing is known of any.
+        """
+        candidates = np.array(self.candidates[move])
+        if (move - 1, move) not in self.schedule.steps_of:
+            return np.zeros(len(candidates))
+        return np.where(candidates == self.candidates[move - 1][before], np.inf, 0.0)
+
+    @property
+    def window_work(self) -> float:
+        """Estimated work of a search move by move, without unit."""
+        moves = self.schedule.moves
+        steps = (step for step in self.schedule.steps if step.moves)
+        return sum(work(len(moves[s.moves[-1]].candidates), s.bricks) for s in steps)
 
     @cached_property
     def _decided(self) -> Mapping[int, Sequence[StepChoices]]:

@@ -1,0 +1,112 @@
+"""Candidates of one move after the choice before it: a decision at a time, and no others solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from seqopt.arrays import Floats, Terse
+from seqopt.engines.interface import Fields, Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import NothingFoundError, TimeUpError
+from seqopt.graph.formulation import Watch
+from seqopt.graph.layers.layers import Layers
+from seqopt.problem.problem import Aim
+from seqopt.responses._choices import StepChoices
+from seqopt.responses.table import step_fields
+from seqopt.sequence.schedule import OpenGrip
+from seqopt.sequence.steps import Step
+from seqopt.work._workers import keep
+
+
+@dataclass(frozen=True, repr=False)
+class Windows(Terse):
+    """The steps that every move decides, after the choice before it; solved when first asked for.
+
+    ``choice``: the chosen candidate of every move so far; ``fields``: by number, of steps that an
+    engine had at hand on the way.
+    """
+
+    problem: Layers
+    choice: list[int] = field(default_factory=list)
+    fields: dict[int, Fields] = field(default_factory=dict, compare=False)
+    _rows: dict[int, tuple[StepChoices, ...]] = field(default_factory=dict, compare=False)
+
+    def row(self, move: int) -> tuple[StepChoices, ...]:
+        """Return the steps that a move decides, with responses of its candidates, (C_k,)."""
+        if move not in self._rows:
+            before = self.choice[move - 1] if move else 0
+            self._rows[move] = self.problem.window_choices(move, before)
+        return self._rows[move]
+
+    def costs(self, move: int, aim: Aim = Aim.SUM) -> Floats:
+        """Return what the candidates of a move cost after the choices before it, (C_k,)."""
+        costs = self.problem.possible_after(move, self.choice[move - 1] if move else 0)
+        for choices in self.row(move):
+            costs = aim.join(costs, self.problem.step_costs(choices))
+        return costs
+
+    def met(self) -> Mapping[int, Mapping[str, float]]:
+        """Return the responses that the choice meets, by step."""
+        return {
+            each.step.number: {name: float(v[now]) for name, v in each.responses.items()}
+            for move, now in enumerate(self.choice)
+            for each in self.row(move)
+        }
+
+    def so_far(self) -> str:
+        """Return what is chosen, in a few words."""
+        if not self.choice:
+            return "no move was chosen yet"
+        moves = self.problem.schedule.moves
+        chosen = " ".join(str(move.candidates[i]) for move, i in zip(moves, self.choice))
+        return f"{len(self.choice)} of {len(moves)} moves were chosen, at nodes {chosen}"
+
+
+def walk_windows(problem: Layers, watch: Watch) -> Windows:
+    """Choose what costs least, one move after the other (equation 1 of Bruun et al.).
+
+    Raises `NothingFoundError` if a move has no candidate left after the choices before it, while
+    others may have led on; `TimeUpError` if time is over before the last move is chosen;
+    `KeyboardInterrupt`, with the nodes that were chosen so far as its text.
+    """
+    few = replace(problem.evaluation, more_work=problem.window_work)
+    found = Windows(replace(problem, evaluation=few))
+    noted = 0
+    try:
+        with keep(few.resources.executor, few.resources.workers):
+            for k, move in enumerate(problem.schedule.moves):
+                if watch.over:
+                    raise TimeUpError(f"{watch.seconds:.3g} s: {found.so_far()}; give more")
+                costs = found.costs(k)
+                if not np.isfinite(costs).any():
+                    raise NothingFoundError(
+                        f"move {k + 1}, step {move.step}: {move.robot} has no allowed grip after "
+                        "the choices before it; relax a limit, or let a formulation look at all "
+                        "choices"
+                    )
+                found.choice.append(int(np.argmin(costs)))
+                noted = _note_fields(found, noted)
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(found.so_far()) from stop
+    return found
+
+
+def _note_fields(found: Windows, noted: int) -> int:
+    """Keep all fields of steps that are chosen, where an engine has them at hand; count these."""
+    problem, choice = found.problem, found.choice
+    engine, moves = problem.engine, problem.schedule.moves
+    for step in problem.schedule.steps[noted:]:
+        if any(move >= len(choice) for move in step.moves):
+            break
+        noted += 1
+        if isinstance(engine, ComplianceEngine) and engine._recalls(step.bricks):
+            nodes = (
+                moves[g.move].candidates[choice[g.move]] if isinstance(g, OpenGrip) else g
+                for g in step.grips
+            )
+            known = Step(step.number, step.kind, step.bricks, tuple(nodes))
+            found.fields[step.number] = step_fields(engine, known, Want.ALL)
+    return noted
