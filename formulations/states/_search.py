@@ -31,8 +31,8 @@ from seqopt.graph.paths import (
 )
 from seqopt.graph.space import Space
 from seqopt.graph.states.explored import build_space, explore, floors_of_goals
+from seqopt.graph.states.margins import best_margin
 from seqopt.graph.states.states import States
-from seqopt.plan.search._margin_search import best_margin
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Stage, Tell
 

@@ -18,7 +18,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -30,9 +31,11 @@ from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, Instance, _Target
 from seqopt.graph.layers.compiled import on_paths
-from seqopt.graph.layers.layers import Layers
+from seqopt.graph.layers.costs import Joined
+from seqopt.graph.layers.layers import Layers, windows
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
+from seqopt.sequence.schedule import Schedule
 
 EQUAL = 1e-9  # of a value: two that differ by less are one, found in another order
 
@@ -127,9 +130,8 @@ class PairBounds:
 
 
 class LazyProof(NamedTuple):
-    """The graph with floors, a choice as nodes of it, its cost and bound, and models solved."""
+    """What pairs are known to cost, why the search ended early, and how many models were solved."""
 
-    instance: Instance
     bounds: PairBounds
     stopped: str
     models: int
@@ -152,8 +154,7 @@ def prove_lazily(problem: Layers, formulation: Formulation, watch: Watch) -> Laz
             raise TimeUpError("no choice was found yet; give more")
         raise InfeasibleError("no choice is allowed; relax a limit or widen a reach")
     stopped = ("interrupt" if watch.interrupted else "time") if search.open else ""
-    instance, _ = search.bounds.compiled(unknown=True)
-    return LazyProof(instance, search.bounds, stopped, search.models)
+    return LazyProof(search.bounds, stopped, search.models)
 
 
 def _floor(problem: Layers, formulation: Formulation) -> float:
@@ -179,7 +180,9 @@ class _Search:
         self._problem, self._aim, schedule = problem, aim, problem.schedule
         self._each = isinstance(problem.criterion, WeightedSum | WorstRatio)  # pair by pair
         alone = tuple(step for step in schedule.steps if len(step.moves) == 1)
-        first = problem.posed_anew(problem.evaluation.schedule_of(alone))
+        work = replace(problem.evaluation, more_work=problem.window_work)  # in many small parts
+        self._few = replace(problem, evaluation=work)
+        first = _posed_anew(self._few, replace(schedule, steps=alone))
         single = list(aim.costs(first).single)
         self.models = first.evaluation.models
         for cost in problem.given_costs.tolist():
@@ -227,12 +230,18 @@ class _Search:
             if self._each:  # what one costs does not depend on the others
                 able &= self.bounds.single[k] < best
             wanted.append(np.flatnonzero(able) if self._each else np.arange(len(able)))
-        for n, costs in enumerate(problem.rows_of(asked, wanted, self._aim)):
-            (k, before), some = asked[n], wanted[n]
+        posed = _posed_anew(self._few, windows(problem.schedule, asked, wanted))
+        joined = Joined([*map(len, wanted)], self._aim.join)
+        for choices in chain.from_iterable(posed.evaluation.levels()):
+            joined.add(choices.moves, posed.step_costs(choices))
+            self.models += len(wanted[choices.moves[0]])
+        for n, ((k, before), some) in enumerate(zip(asked, wanted, strict=True)):
             row = np.full(len(self.bounds.single[k]), np.nan)
-            row[some] = costs
-            self.bounds.rows[k, before] = np.where(
-                np.isinf(problem.possible_after(k, before)), np.inf, row
-            )
-            shared = problem.schedule.steps_of.get((k - 1, k), ())
-            self.models += len(some) * len(shared)
+            row[some] = joined.single(n)
+            never = np.isinf(problem.possible_after(k, before))
+            self.bounds.rows[k, before] = np.where(never, np.inf, row)
+
+
+def _posed_anew(problem: Layers, schedule: Schedule) -> Layers:
+    """Return the problem of another schedule, everything else being the same."""
+    return replace(problem, evaluation=replace(problem.evaluation, schedule=schedule))

@@ -61,7 +61,9 @@ class Windows(Terse):
         if not self.choice:
             return "no move was chosen yet"
         moves = self.problem.schedule.moves
-        chosen = " ".join(str(move.candidates[i]) for move, i in zip(moves, self.choice))
+        chosen = " ".join(
+            str(move.candidates[i]) for move, i in zip(moves, self.choice, strict=False)
+        )
         return f"{len(self.choice)} of {len(moves)} moves were chosen, at nodes {chosen}"
 
 

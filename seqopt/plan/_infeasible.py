@@ -18,11 +18,11 @@ from seqopt.graph._orders import TooManySetsError
 from seqopt.graph.instance import Instance, _Cap
 from seqopt.graph.paths import distances, least_sum, tied
 from seqopt.graph.states.explored import barred
+from seqopt.graph.states.margins import STEPS, WORST, with_margin
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import is_kept, least_within
 from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.plan._remedies import LateError, Look, Remedies, stops_of
-from seqopt.plan.search._margin_search import STEPS, WORST, with_margin
 from seqopt.problem.amounts import Amount
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none

@@ -30,7 +30,7 @@ from seqopt.sequence.steps import Step
 from seqopt.work._clock import INTERRUPT
 
 if TYPE_CHECKING:
-    from seqopt.plan.search._window_search import WindowSearch
+    from seqopt.graph.windows import Windows
 
 PROOF = "the proof"  # what it is called where there was no time for it
 
@@ -45,7 +45,7 @@ class Found(NamedTuple):
     certificate: Certificate | None
     steps: tuple[Step, ...]
     seconds: dict[str, float]
-    search: WindowSearch | None = None
+    search: Windows | None = None
     looked_at: int | None = None
 
 

@@ -11,17 +11,13 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.ranking import move_costs, rank_of
-from seqopt.plan.search._window_search import WindowSearch
+from seqopt.graph.windows import Windows
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices
 
 
 def chosen_table(
-    problem: Layers,
-    choice: tuple[int, ...],
-    aim: Aim,
-    search: WindowSearch | None,
-    grips: pd.DataFrame,
+    problem: Layers, choice: tuple[int, ...], aim: Aim, search: Windows | None, grips: pd.DataFrame
 ) -> pd.DataFrame:
     """Return the choice and its costs, move by move, as of `seqopt.plan.plan.Plan.table`.
 
@@ -75,16 +71,14 @@ def choice_table(problem: Layers, choices: StepChoices) -> pd.DataFrame:
     return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
 
 
-def alternatives(
-    problem: Layers, choice: tuple[int, ...], search: WindowSearch | None
-) -> pd.DataFrame:
+def alternatives(problem: Layers, choice: tuple[int, ...], search: Windows | None) -> pd.DataFrame:
     """Return responses and cost of every evaluated choice, as of `Plan.alternatives`.
 
     ``search``: the models evaluated along the choice, if not all were.
     """
     parts = []
-    for posed, choices, before in _looked_at(problem, choice, search):
-        table = choice_table(posed, choices)
+    for choices, before in _looked_at(problem, choice, search):
+        table = choice_table(problem, choices)
         columns = ["node", "second_node"] if before is None else ["second_node"]
         columns = columns[: table.index.nlevels]
         nodes = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
@@ -96,14 +90,13 @@ def alternatives(
 
 
 def _looked_at(
-    problem: Layers, choice: tuple[int, ...], search: WindowSearch | None
-) -> Iterator[tuple[Layers, StepChoices, int | None]]:
-    """Yield the evaluated steps with their layers and, if the earlier move is fixed, its node."""
-    if search is not None or not problem.evaluation.streams:
-        explored = (problem,) if search is None else search.explored
-        yield from ((posed, each, None) for posed in explored for each in posed.evaluation.steps)
+    problem: Layers, choice: tuple[int, ...], search: Windows | None
+) -> Iterator[tuple[StepChoices, int | None]]:
+    """Yield the evaluated steps and, if the earlier move is fixed, its node."""
+    if search is None and not problem.evaluation.streams:
+        yield from ((each, None) for each in problem.evaluation.steps)
         return
-    nodes, before = problem.nodes(choice), (0, *choice)
+    nodes, found = problem.nodes(choice), search or Windows(problem, [*choice])
     for k in range(len(problem.schedule.moves)):
-        for choices in problem.window_choices(k, before[k]):
-            yield problem, choices, nodes[k - 1] if len(choices.moves) == 2 else None
+        for choices in found.row(k):
+            yield choices, nodes[k - 1] if len(choices.moves) == 2 else None

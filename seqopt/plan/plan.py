@@ -42,7 +42,7 @@ from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
 
 if TYPE_CHECKING:
-    from seqopt.plan.search._window_search import WindowSearch
+    from seqopt.graph.windows import Windows
 
 
 @dataclass(frozen=True, repr=False)
@@ -65,7 +65,7 @@ class Plan(ShownBuild):
         The steps of the build, checked; none of costs that are given without steps.
     seconds : mapping of str to float
         By stage, s: respond, rank, compile (preparing a program for a solver), solve, verify.
-    search : WindowSearch or None
+    search : Windows or None
         The models solved by a search without proof; None if all were solved.
     looked_at : int or None
         How many models a lazy search solved; None if all were solved.
@@ -94,7 +94,7 @@ class Plan(ShownBuild):
     certificate: Certificate | None
     steps: tuple[Step, ...]
     seconds: Mapping[str, float] = field(compare=False, hash=False)
-    search: WindowSearch | None = None
+    search: Windows | None = None
     looked_at: int | None = None
     arms: Any = None
     moved: Moved | None = None
@@ -260,11 +260,6 @@ class Plan(ShownBuild):
     @property
     def _begin(self) -> Site | None:
         return self.graph.begin
-
-    @property
-    def explored(self) -> tuple[Layers, ...]:
-        """The layers whose responses were computed: all, or those that a search needed."""
-        return (self.layers,) if self.search is None else self.search.explored
 
     @property
     def models(self) -> int:

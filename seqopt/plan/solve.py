@@ -31,6 +31,7 @@ from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.source import ARCS, CANDIDATES, STATES, Source
 from seqopt.graph.states.states import States
+from seqopt.graph.windows import Windows, walk_windows
 from seqopt.judge._step_checks import check_shape
 from seqopt.judge.certificate import _require_anew
 from seqopt.plan._guard import require_fit, require_proof, require_time
@@ -215,18 +216,14 @@ def _by_windows(graph: Layers, formulation: Formulation, run: Run) -> Found:
         )
     if graph.scenes:
         raise ProblemError("the costs of all choices are needed; ask for the proof")
-    from seqopt.plan.search._window_search import search_windows  # noqa: PLC0415  # few ask for it
-
     seconds: dict[str, float] = {}
     with timed(seconds, "search"):
-        found = search_windows(graph, Watch(run.left), fields=True)
-    respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
+        found = walk_windows(graph, Watch(run.left))
     with timed(seconds, "verify"):
         steps = _checked(graph.steps(found.choice), graph)
         _require_anew(graph, found.choice, found.met)
-    stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
     chosen = Solution(graph.rows(found.choice), (np.nan,), (-np.inf,))
-    return Found(chosen, None, steps, stages, found)
+    return Found(chosen, None, steps, seconds, found)
 
 
 def _by_pairs(graph: Layers, formulation: Formulation, run: Run) -> Found:
@@ -235,17 +232,26 @@ def _by_pairs(graph: Layers, formulation: Formulation, run: Run) -> Found:
         raise ProblemError("the costs of all choices are needed; leave out lazy")
     if run.options:
         raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
-    from seqopt.plan.search._pair_search import search_pairs  # noqa: PLC0415  # few ask for it
+    from seqopt.graph.lazy_pairs import prove_lazily  # noqa: PLC0415  # few ask for it
 
-    seconds: dict[str, float] = {}
+    seconds, watch = dict[str, float](), Watch(run.left, run.progress)
     with timed(seconds, "search"):
-        found = search_pairs(graph, formulation, Watch(run.left, run.progress))
-    along, choice = found.along, found.along.choice
+        found = prove_lazily(graph, formulation, watch)
+        solved, nodes = found.bounds.compiled(unknown=False)
+        path = find_path(solved, formulation, Run(proof=False)).selection
+        passed = nodes[[node for (node,) in path.states]]
+        floors, nodes = found.bounds.compiled(unknown=True)
     with timed(seconds, "verify"):
-        certificate = judged(found.instance, formulation, found.selection)
-        steps = _checked(graph.steps(choice), graph)
-        _require_anew(graph, choice, along.met)
-    chosen = replace(found.selection, states=graph.rows(choice))
+        states = tuple((node,) for node in np.searchsorted(nodes, passed).tolist())
+        bound = (min(path.objective[0], watch.bound),)
+        own = {"bound": bound, "stopped": found.stopped, "trace": watch.trace}
+        claimed = replace(path, states=states, **own)
+        certificate = judged(floors, formulation, claimed)
+        firsts = np.cumsum([1, *map(len, graph.candidates[:-1])])
+        along = Windows(graph, (passed - firsts).tolist())
+        steps = _checked(graph.steps(along.choice), graph)
+        _require_anew(graph, along.choice, along.met)
+    chosen = replace(claimed, states=graph.rows(along.choice))
     return Found(chosen, certificate, steps, seconds, along, found.models)
 
 

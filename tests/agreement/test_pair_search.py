@@ -18,12 +18,12 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import End, Solution, find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.lazy_pairs import PairBounds
 from seqopt.graph.paths import lexicographic
+from seqopt.graph.windows import walk_windows
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.network.build import build_network
 from seqopt.plan._paths import judged
-from seqopt.plan.search._pair_search import KnownCosts
-from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, StepCost
 from seqopt.problem.problem import Aim
@@ -109,7 +109,7 @@ def test_under_a_limit(engine25):
 def test_where_choices_move_by_move_end_others_are_found(engine25, name):
     limits = [Limit("T_max", 65.0)]
     with pytest.raises(SolverError, match="no allowed grip after the choices before it"):
-        search_windows(posed(engine25, WEIGHTED, limits))
+        walk_windows(posed(engine25, WEIGHTED, limits), Watch())
     lazy = solve(posed(engine25, WEIGHTED, limits), name, lazy=True)
     whole = solve(posed(engine25, WEIGHTED, limits), name)
     assert lazy.certificate.objective == pytest.approx(whole.certificate.objective, rel=1e-9)
@@ -159,35 +159,51 @@ def test_what_some_pairs_prove(problem, data, aim):
     first = np.zeros((1, sums.sizes[0]))
     costs = LayeredCosts(single, (first, *(shared + lift for shared in sums.shared[1:])))
     best = costs.least(aim)
-    none = tuple(np.zeros(0, dtype=np.int64) for _ in single[1:])
-    nothing = KnownCosts(
-        single, none, tuple(np.zeros((0, len(own))) for own in single[1:]), 0.0, aim
-    )
-    rows = [
-        (k, before, row)
+    rows = {
+        (k, before): row
         for k, shared in enumerate(costs.shared)
         for before, row in enumerate(shared)
         if k
-    ]
-    some = []
-    for k, before, row in rows:
+    }
+    some = {}
+    for key, row in rows.items():
         if data.draw(st.booleans()):
             drawn = data.draw(st.lists(st.booleans(), min_size=len(row), max_size=len(row)))
-            some.append((k, before, np.where(drawn, row, np.nan)))
-    part, everything = nothing.learned(some), nothing.learned(rows)
+            some[key] = np.where(drawn, row, np.nan)
+    part, everything = (PairBounds([*single], 0.0, aim, own) for own in (some, rows))
     close = {"rel": 1e-9, "abs": 1e-9}
-    assert part.bound <= best + 1e-9 * abs(best) or np.isinf(best)
-    assert part.best >= best - 1e-9 * abs(best) or np.isinf(part.best)
-    for move in range(1, len(single)):
-        assert (part.promise(move) >= part.bound * (1 - 1e-9)).all()
-        assert np.isinf(part.promise(move)[part.before[move - 1]]).all()
-    assert everything.bound == pytest.approx(best, **close)
-    assert everything.best == pytest.approx(best, **close)
-    assert everything.proven == np.isfinite(best)
+    (bound, path), known = part.best(0.0), part.best(np.inf)[0]
+    assert bound <= best + 1e-9 * abs(best) or np.isinf(best)
+    assert known >= best - 1e-9 * abs(best) or np.isinf(known)
+    assert [everything.best(other)[0] for other in (0.0, np.inf)] == [
+        pytest.approx(best, **close)
+    ] * 2
     if np.isinf(best):
         return
-    for known, unknown, least in ((part, True, part.bound), (everything, False, best)):
-        instance, _ = known.compiled(unknown=unknown)
+    if aim is Aim.PEAK:
+        path = part.fewest_open(bound + 1e-9)
+    value = aim.value_of(
+        LayeredCosts(
+            tuple(single),
+            (
+                first,
+                *(
+                    np.vstack(
+                        [
+                            np.nan_to_num(some.get((k, i), 0.0 * row), nan=0.0, posinf=np.inf)
+                            for i, row in enumerate(shared)
+                        ]
+                    )
+                    for k, shared in enumerate(costs.shared)
+                    if k
+                ),
+            ),
+        ),
+        path,
+    )
+    assert value == pytest.approx(bound, **close)
+    for own, unknown, least in ((part, True, bound), (everything, False, best)):
+        instance, _ = own.compiled(unknown=unknown)
         assert lexicographic(instance.graph) == (ANY, (pytest.approx(least, **close),))
     plan = answer(Costs(costs), "overlap_dp" if aim is Aim.SUM else "minimax")
     assert plan.certificate.objective == pytest.approx(best, **close)
@@ -197,8 +213,8 @@ def test_what_some_pairs_prove(problem, data, aim):
 def test_the_judge_holds_a_plan_against_the_graph_with_floors(aim, best, bound):
     """The first move costs 2, the second 1 or 1.5, a pair that is known 3, others at least 1."""
     single = np.full(2, 2.0), np.array([1.0, 1.5])
-    part = KnownCosts(single, (np.array([0]),), (np.array([[3.0, np.nan]]),), 1.0, aim)
-    assert (part.best, part.bound) == (best, bound)
+    part = PairBounds([*single], 1.0, aim, {(1, 0): np.array([3.0, np.nan])})
+    assert (part.best(np.inf)[0], part.best(1.0)[0]) == (best, bound)
     instance, nodes = part.compiled(unknown=True)
     path = tuple((node,) for node in np.searchsorted(nodes, [1, 3]).tolist())
     good = Solution(path, (best,), (bound,), stopped="time")

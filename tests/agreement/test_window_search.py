@@ -12,8 +12,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError, TimeUpError
 from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.windows import walk_windows
 from seqopt.network.build import build_network
-from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
 from seqopt.responses._choices import window_models
@@ -82,9 +82,12 @@ def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
 def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, response, bound):
     schedule, limits = three_robot_loop(engine25.network), [Limit(response, bound)]
     problem = candidate_layers(engine25, schedule, EQUATIONS, limits)
-    found = search_windows(problem)
-    assert found.choice == solve(problem, "cascade").choice
-    assert found.choice != search_windows(candidate_layers(engine25, schedule, EQUATIONS)).choice
+    found = walk_windows(problem, Watch())
+    assert tuple(found.choice) == solve(problem, "cascade").choice
+    assert (
+        found.choice
+        != walk_windows(candidate_layers(engine25, schedule, EQUATIONS), Watch()).choice
+    )
 
 
 @given(scene=arches(min_bricks=4, max_bricks=7).map(far_reaching))
@@ -92,8 +95,8 @@ def test_on_any_chain_it_chooses_as_the_cascade_does(scene):
     engine = ComplianceEngine(build_network(scene))
     schedule = three_robot_loop(engine.network)
     problem = candidate_layers(engine, schedule, WEIGHTED)
-    found = search_windows(problem)
-    assert found.choice == solve(problem, "cascade").choice
+    found = walk_windows(problem, Watch())
+    assert tuple(found.choice) == solve(problem, "cascade").choice
 
 
 def test_a_time_limit_ends_it_and_says_what_was_chosen(engine25):
@@ -104,4 +107,4 @@ def test_a_time_limit_ends_it_and_says_what_was_chosen(engine25):
     with pytest.raises(TimeUpError, match=r"^.* s: no move was chosen yet; give more"):
         solve(problem, "cascade", proof=False, time_limit=0.0)
     with pytest.raises(SolverError, match=r"[1-9] of 22 moves were chosen, at nodes 4"):
-        search_windows(problem, Ticking(time_limit=8.0))
+        walk_windows(problem, Ticking(time_limit=8.0))

@@ -9,8 +9,9 @@ from experiments.harness.scenes import half_circle
 from seqopt.engines.rigid._extremes import can_compile
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SolverError
+from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.layers import candidate_layers, windows
-from seqopt.plan.search._window_search import search_windows
+from seqopt.graph.windows import walk_windows
 from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
 from seqopt.responses import _choices
@@ -22,21 +23,22 @@ from seqopt.study.published import EQUATIONS, WEIGHTED
 def test_a_dead_end_that_the_cascade_foresees(engine25):
     schedule, limits = three_robot_loop(engine25.network), [Limit("T_max", 64.0)]
     with pytest.raises(SolverError, match="move 8, step 31: rob2 has no allowed grip after"):
-        search_windows(candidate_layers(engine25, schedule, EQUATIONS, limits))
+        walk_windows(candidate_layers(engine25, schedule, EQUATIONS, limits), Watch())
     plan = solve(candidate_layers(engine25, schedule, EQUATIONS, limits), "cascade")
     assert len(plan.nodes) == len(schedule.moves)
 
 
 def test_a_window_depends_on_the_choices_before_it(engine25):
     schedule = three_robot_loop(engine25.network)
-    found = search_windows(candidate_layers(engine25, schedule, EQUATIONS))
+    found = walk_windows(candidate_layers(engine25, schedule, EQUATIONS), Watch())
     before = found.choice[8]
     own, other = (
-        candidate_layers(engine25, windows(schedule, [(9, c)]), EQUATIONS).sums.single[0]
+        candidate_layers(engine25, windows(schedule, [(9, c)], alone=True), EQUATIONS)
         for c in (before, 1 if before == 0 else 0)
     )
-    assert own.tolist() == found.shared[9].sums.single[0].tolist()
-    assert other.tolist() != own.tolist()
+    own, other = (each.sums.single[0].tolist() for each in (own, other))
+    assert own == pytest.approx(found.costs(9).tolist())
+    assert other != own
 
 
 def test_the_table_says_what_the_next_one_costs(engine25):
@@ -71,7 +73,9 @@ def test_the_search_answers_steps_on_its_way(monkeypatch):
 def test_a_dead_end_is_named(engine25):
     schedule = three_robot_loop(engine25.network)
     with pytest.raises(SolverError, match="move 1, step 3: rob3 has no allowed grip"):
-        search_windows(candidate_layers(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)]))
+        walk_windows(
+            candidate_layers(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)]), Watch()
+        )
 
 
 @pytest.mark.parametrize(

@@ -1,1 +1,0 @@
-"""Searches that compute only what they need, and questions beyond one optimum."""
