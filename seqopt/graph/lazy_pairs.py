@@ -33,9 +33,9 @@ from seqopt.graph.instance import PEAK, SUM, Instance, _Target
 from seqopt.graph.layers.compiled import on_paths
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.layers import Layers, windows
+from seqopt.graph.windows import alone_steps, posed_anew
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
-from seqopt.sequence.schedule import Schedule
 
 EQUAL = 1e-9  # of a value: two that differ by less are one, found in another order
 
@@ -179,10 +179,9 @@ class _Search:
         aim, floor = formulation.aim or Aim.SUM, _floor(problem, formulation)
         self._problem, self._aim, schedule = problem, aim, problem.schedule
         self._each = isinstance(problem.criterion, WeightedSum | WorstRatio)  # pair by pair
-        alone = tuple(step for step in schedule.steps if len(step.moves) == 1)
-        work = replace(problem.evaluation, more_work=problem.window_work)  # in many small parts
-        self._few = replace(problem, evaluation=work)
-        first = _posed_anew(self._few, replace(schedule, steps=alone))
+        first = alone_steps(problem)
+        work = replace(problem.evaluation, more_work=first.evaluation.work)
+        self._few = replace(problem, evaluation=work)  # of which little is asked at a time
         single = list(aim.costs(first).single)
         self.models = first.evaluation.models
         for cost in problem.given_costs.tolist():
@@ -198,8 +197,6 @@ class _Search:
         """Solve the pairs of what costs least, move after move; a dead end leaves the rest open."""
         at = int(self.bounds.single[0].argmin())
         for k in range(1, len(self.bounds.single)):
-            if watch.over:
-                break
             if (k, at) not in self.bounds.rows:
                 self.solve([(k, at)])
             costs = self._aim.join(self.bounds.rows[k, at], self.bounds.single[k])
@@ -230,7 +227,7 @@ class _Search:
             if self._each:  # what one costs does not depend on the others
                 able &= self.bounds.single[k] < best
             wanted.append(np.flatnonzero(able) if self._each else np.arange(len(able)))
-        posed = _posed_anew(self._few, windows(problem.schedule, asked, wanted))
+        posed = posed_anew(self._few, windows(problem.schedule, asked, wanted))
         joined = Joined([*map(len, wanted)], self._aim.join)
         for choices in chain.from_iterable(posed.evaluation.levels()):
             joined.add(choices.moves, posed.step_costs(choices))
@@ -240,8 +237,3 @@ class _Search:
             row[some] = joined.single(n)
             never = np.isinf(problem.possible_after(k, before))
             self.bounds.rows[k, before] = np.where(never, np.inf, row)
-
-
-def _posed_anew(problem: Layers, schedule: Schedule) -> Layers:
-    """Return the problem of another schedule, everything else being the same."""
-    return replace(problem, evaluation=replace(problem.evaluation, schedule=schedule))

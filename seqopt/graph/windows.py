@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,15 +12,14 @@ import numpy as np
 from seqopt.arrays import Floats, Terse
 from seqopt.engines.interface import Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import NothingFoundError, TimeUpError
+from seqopt.errors import MemoryShortError, NothingFoundError, TimeUpError
 from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices
 from seqopt.responses.table import step_fields
-from seqopt.sequence.schedule import OpenGrip
+from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step
-from seqopt.work._workers import keep
 
 
 @dataclass(frozen=True, repr=False)
@@ -26,20 +27,20 @@ class Windows(Terse):
     """The steps that every move decides, after the choice before it; solved when first asked for.
 
     ``choice``: the chosen candidate of every move so far; ``fields``: by number, of steps that an
-    engine had at hand on the way.
+    engine had at hand on the way; ``rows``: by move, the steps that are solved.
     """
 
     problem: Layers
     choice: list[int] = field(default_factory=list)
     fields: dict[int, Fields] = field(default_factory=dict, compare=False)
-    _rows: dict[int, tuple[StepChoices, ...]] = field(default_factory=dict, compare=False)
+    rows: dict[int, tuple[StepChoices, ...]] = field(default_factory=dict, compare=False)
 
     def row(self, move: int) -> tuple[StepChoices, ...]:
         """Return the steps that a move decides, with responses of its candidates, (C_k,)."""
-        if move not in self._rows:
+        if move not in self.rows:
             before = self.choice[move - 1] if move else 0
-            self._rows[move] = self.problem.window_choices(move, before)
-        return self._rows[move]
+            self.rows[move] = self.problem.window_choices(move, before)
+        return self.rows[move]
 
     def costs(self, move: int, aim: Aim = Aim.SUM) -> Floats:
         """Return what the candidates of a move cost after the choices before it, (C_k,)."""
@@ -61,10 +62,8 @@ class Windows(Terse):
         if not self.choice:
             return "no move was chosen yet"
         moves = self.problem.schedule.moves
-        chosen = " ".join(
-            str(move.candidates[i]) for move, i in zip(moves, self.choice, strict=False)
-        )
-        return f"{len(self.choice)} of {len(moves)} moves were chosen, at nodes {chosen}"
+        nodes = (str(moves[k].candidates[i]) for k, i in enumerate(self.choice))
+        return f"{len(self.choice)} of {len(moves)} moves were chosen, at nodes {' '.join(nodes)}"
 
 
 def walk_windows(problem: Layers, watch: Watch) -> Windows:
@@ -72,17 +71,19 @@ def walk_windows(problem: Layers, watch: Watch) -> Windows:
 
     Raises `NothingFoundError` if a move has no candidate left after the choices before it, while
     others may have led on; `TimeUpError` if time is over before the last move is chosen;
-    `KeyboardInterrupt`, with the nodes that were chosen so far as its text.
+    `MemoryShortError`, `WorkerError` as `Evaluation.levels`; `KeyboardInterrupt`, with the nodes
+    that were chosen so far as its text.
     """
-    few = replace(problem.evaluation, more_work=problem.window_work)
-    found = Windows(replace(problem, evaluation=few))
-    noted = 0
+    alone = alone_steps(problem)
+    few = replace(problem.evaluation, more_work=alone.evaluation.work)
+    found, noted = Windows(replace(problem, evaluation=few)), 0
     try:
-        with keep(few.resources.executor, few.resources.workers):
-            for k, move in enumerate(problem.schedule.moves):
+        with closing(_decided(found.problem, alone, found.choice)) as rows:
+            for k, row in enumerate(rows):
                 if watch.over:
                     raise TimeUpError(f"{watch.seconds:.3g} s: {found.so_far()}; give more")
-                costs = found.costs(k)
+                found.rows[k] = row
+                move, costs = problem.schedule.moves[k], found.costs(k)
                 if not np.isfinite(costs).any():
                     raise NothingFoundError(
                         f"move {k + 1}, step {move.step}: {move.robot} has no allowed grip after "
@@ -94,6 +95,46 @@ def walk_windows(problem: Layers, watch: Watch) -> Windows:
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(found.so_far()) from stop
     return found
+
+
+def _decided(
+    problem: Layers, alone: Layers, choice: Sequence[int]
+) -> Iterator[tuple[StepChoices, ...]]:
+    """Yield the steps that moves decide, one move after the other, by ascending brick counts.
+
+    ``choice``: grows between two moves. Sets that several moves meet are solved once.
+    """
+    if alone.evaluation.streams:
+        raise MemoryShortError(
+            "the responses of steps with one open grip do not fit into the memory that may be "
+            "used; take near candidates only, or raise max_memory"
+        )
+    steps_of, own = problem.schedule.steps_of, defaultdict[int, list[StepChoices]](list)
+    known, last = 0, problem.schedule.steps[-1].bricks
+    with closing(alone.evaluation.levels()) as levels:
+        for k in range(len(problem.schedule.moves)):
+            shared = tuple[StepChoices, ...]()
+            for moves in ((k - 1, k), (k,)):
+                most = max((step.bricks for step in steps_of.get(moves, ())), default=0)
+                while known < most:
+                    found = next(levels, ())
+                    known = found[-1].step.bricks if found else last + 1
+                    for each in found:
+                        own[each.moves[0]].append(each)
+                if moves[0] < k and k:
+                    shared = problem.window_choices(k, choice[-1], alone=False)
+            yield tuple(sorted((*shared, *own.pop(k, ())), key=lambda each: each.step.number))
+
+
+def alone_steps(problem: Layers) -> Layers:
+    """Return the problem of the steps in which one move is open."""
+    steps = tuple(step for step in problem.schedule.steps if len(step.moves) == 1)
+    return posed_anew(problem, replace(problem.schedule, steps=steps))
+
+
+def posed_anew(problem: Layers, schedule: Schedule) -> Layers:
+    """Return the problem of another schedule, everything else being the same."""
+    return replace(problem, evaluation=replace(problem.evaluation, schedule=schedule))
 
 
 def _note_fields(found: Windows, noted: int) -> int:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.formulation import End, Solution, find_formulation
+from seqopt.graph.formulation import End, Solution, Watch, find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.lazy_pairs import PairBounds
@@ -120,10 +120,12 @@ def test_where_choices_move_by_move_end_others_are_found(engine25, name):
         solve(posed(engine25, WEIGHTED, [Limit("T_max", 60.0)]), name, lazy=True)
 
 
-@pytest.mark.parametrize("name", ["overlap_dp", "minimax"])
-def test_stopped_before_it_has_a_choice_and_a_bound(engine25, name):
-    stopped = solve(posed(engine25, WEIGHTED), name, lazy=True, time_limit=0)
-    best = solve(posed(engine25, WEIGHTED), name).certificate.objective
+@pytest.mark.parametrize(
+    ("name", "criterion"), [("overlap_dp", WEIGHTED), ("minimax", CONDITIONAL)]
+)
+def test_stopped_before_it_has_a_choice_and_a_bound(engine25, name, criterion):
+    stopped = solve(posed(engine25, criterion), name, lazy=True, time_limit=0)
+    best = solve(posed(engine25, criterion), name).certificate.objective
     found = stopped.certificate
     assert stopped.ended is End.STOPPED
     assert found.bound <= best < found.objective
@@ -182,25 +184,13 @@ def test_what_some_pairs_prove(problem, data, aim):
         return
     if aim is Aim.PEAK:
         path = part.fewest_open(bound + 1e-9)
-    value = aim.value_of(
-        LayeredCosts(
-            tuple(single),
-            (
-                first,
-                *(
-                    np.vstack(
-                        [
-                            np.nan_to_num(some.get((k, i), 0.0 * row), nan=0.0, posinf=np.inf)
-                            for i, row in enumerate(shared)
-                        ]
-                    )
-                    for k, shared in enumerate(costs.shared)
-                    if k
-                ),
-            ),
-        ),
-        path,
-    )
+    floors = [
+        [some.get((k, i), np.full(len(row), np.nan)) for i, row in enumerate(shared)]
+        for k, shared in enumerate(costs.shared)
+        if k
+    ]
+    lower = tuple(np.where(np.isnan(own), 0.0, own) for own in map(np.array, floors))
+    value = aim.value_of(LayeredCosts(single, (first, *lower)), path)
     assert value == pytest.approx(bound, **close)
     for own, unknown, least in ((part, True, bound), (everything, False, best)):
         instance, _ = own.compiled(unknown=unknown)

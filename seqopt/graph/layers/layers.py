@@ -36,7 +36,6 @@ from seqopt.problem.requirements import (
     pickled,
     robots_of,
 )
-from seqopt.responses._blocks import work
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, robot_response
@@ -346,16 +345,19 @@ class Layers(Source, Shown):
         ranked = self._sums[1] if aim is Aim.SUM else self._peaks[1]
         return {"respond": self.evaluation.seconds, "rank": ranked}
 
-    def window_choices(self, move: int, before: int) -> tuple[StepChoices, ...]:
+    def window_choices(
+        self, move: int, before: int, *, alone: bool = True
+    ) -> tuple[StepChoices, ...]:
         """Return the steps that a move decides, for its candidates alone.
 
-        ``move``, ``before``: a move, and the candidate chosen for the move before it. Result: in
-        order, with responses (C_k,); those of steps shared with the move before are of that choice.
-        Solved alone where the responses of all choices are not known.
+        ``move``, ``before``: a move, and the candidate chosen for the move before it; ``alone``:
+        whether those in which it alone is open are among them. Result: in order, with responses
+        (C_k,); those of steps shared with the move before are of that choice. Solved alone where
+        the responses of all choices are not known.
         """
         if not self.evaluation.is_kept:
-            own = windows(self.schedule, [(move, before)], alone=True)
-            quiet = replace(self.evaluation.resources, progress=None)
+            own = windows(self.schedule, [(move, before)], alone=alone)
+            quiet = self.evaluation.resources.alone()
             solved = replace(self.evaluation, schedule=own, resources=quiet).steps
             moves = {step.number: step.moves for step in self.schedule.steps}
             return tuple(replace(each, moves=moves[each.step.number]) for each in solved)
@@ -375,13 +377,6 @@ class Layers(Source, Shown):
         if (move - 1, move) not in self.schedule.steps_of:
             return np.zeros(len(candidates))
         return np.where(candidates == self.candidates[move - 1][before], np.inf, 0.0)
-
-    @property
-    def window_work(self) -> float:
-        """Estimated work of a search move by move, without unit."""
-        moves = self.schedule.moves
-        steps = (step for step in self.schedule.steps if step.moves)
-        return sum(work(len(moves[s.moves[-1]].candidates), s.bricks) for s in steps)
 
     @cached_property
     def _decided(self) -> Mapping[int, Sequence[StepChoices]]:
