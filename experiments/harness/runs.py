@@ -5,7 +5,7 @@ over them. ``gap`` is how far the choice lies above the reference's optimum of t
 ``error`` is the largest difference of the engine's responses from the reference's, over the largest
 of each kind in its state. Times are medians of repeats, one run before several does not count.
 Stages before the choice are shared by all formulations. One more row is the search that solves only
-the models it meets and proves nothing (`seqopt.graph.windows`).
+the models it meets and proves nothing (`seqopt.graph._windows`).
 
 Command: ``python -m experiments.harness.runs SCENE ENGINE CRITERION REPEATS`` prints rows as JSON.
 """

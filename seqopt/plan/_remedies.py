@@ -20,8 +20,8 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.paths import least_peak
+from seqopt.graph.states._margins import STEPS, StandingLook, bisected
 from seqopt.graph.states.explored import barred, explore
-from seqopt.graph.states.margins import STEPS, StandingLook, bisected
 from seqopt.graph.states.states import States
 from seqopt.plan._softer import HARD, ground_moves, softer_grips, whole_load
 from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst

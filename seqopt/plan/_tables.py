@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
+from seqopt.graph._windows import Windows
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.ranking import move_costs, rank_of
-from seqopt.graph.windows import Windows
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from seqopt.errors import ProblemError, SolverError, StepError
+from seqopt.graph._windows import Windows, walk_windows
 from seqopt.graph.formulation import (
     End,
     Formulation,
@@ -31,7 +32,6 @@ from seqopt.graph.layers.compiled import compile_layers
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.source import ARCS, CANDIDATES, STATES, Source
 from seqopt.graph.states.states import States
-from seqopt.graph.windows import Windows, walk_windows
 from seqopt.judge._step_checks import check_shape
 from seqopt.judge.certificate import _require_anew
 from seqopt.plan._guard import require_fit, require_proof, require_time
@@ -232,7 +232,7 @@ def _by_pairs(graph: Layers, formulation: Formulation, run: Run) -> Found:
         raise ProblemError("the costs of all choices are needed; leave out lazy")
     if run.options:
         raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
-    from seqopt.graph.lazy_pairs import prove_lazily  # noqa: PLC0415  # few ask for it
+    from seqopt.graph._lazy_pairs import prove_lazily  # noqa: PLC0415  # few ask for it
 
     seconds, watch = dict[str, float](), Watch(run.left, run.progress)
     with timed(seconds, "search"):
@@ -244,8 +244,8 @@ def _by_pairs(graph: Layers, formulation: Formulation, run: Run) -> Found:
     with timed(seconds, "verify"):
         states = tuple((node,) for node in np.searchsorted(nodes, passed).tolist())
         bound = (min(path.objective[0], watch.bound),)
-        own = {"bound": bound, "stopped": found.stopped, "trace": watch.trace}
-        claimed = replace(path, states=states, **own)
+        claimed = replace(path, states=states, bound=bound, trace=watch.trace)
+        claimed = replace(claimed, stopped=found.stopped)
         certificate = judged(floors, formulation, claimed)
         firsts = np.cumsum([1, *map(len, graph.candidates[:-1])])
         along = Windows(graph, (passed - firsts).tolist())

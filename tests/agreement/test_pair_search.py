@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph._lazy_pairs import PairBounds
+from seqopt.graph._windows import walk_windows
 from seqopt.graph.formulation import End, Solution, Watch, find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.lazy_pairs import PairBounds
 from seqopt.graph.paths import lexicographic
-from seqopt.graph.windows import walk_windows
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.network.build import build_network
 from seqopt.plan._paths import judged

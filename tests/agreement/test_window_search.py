@@ -10,9 +10,9 @@ from hypothesis import given
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError, TimeUpError
+from seqopt.graph._windows import walk_windows
 from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.windows import walk_windows
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit

@@ -9,9 +9,9 @@ from experiments.harness.scenes import half_circle
 from seqopt.engines.rigid._extremes import can_compile
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SolverError
+from seqopt.graph._windows import walk_windows
 from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.layers import candidate_layers, windows
-from seqopt.graph.windows import walk_windows
 from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
 from seqopt.responses import _choices

@@ -67,7 +67,7 @@ PROOFS = {
     ),
     "seqopt.judge._rule_moves": ("judge/test_free_proof", "judge/test_proofs"),
     "seqopt.graph._orders": ("formulations/test_order_search",),
-    "seqopt.graph.lazy_pairs": ("agreement/test_pair_search",),
+    "seqopt.graph._lazy_pairs": ("agreement/test_pair_search",),
 }  # what says that nothing is better, or that there is nothing
 MODULES = {
     "seqopt.engines.rigid.compliance": (

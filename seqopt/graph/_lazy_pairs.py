@@ -27,13 +27,13 @@ import numpy as np
 from seqopt._interrupts import answered
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
+from seqopt.graph._windows import alone_steps, posed_anew
 from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, Instance, _Target
 from seqopt.graph.layers.compiled import on_paths
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.layers import Layers, windows
-from seqopt.graph.windows import alone_steps, posed_anew
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 
@@ -99,7 +99,7 @@ def walk_windows(problem: Layers, watch: Watch) -> Windows:
 
 def _decided(
     problem: Layers, alone: Layers, choice: Sequence[int]
-) -> Iterator[tuple[StepChoices, ...]]:
+) -> Generator[tuple[StepChoices, ...], None, None]:
     """Yield the steps that moves decide, one move after the other, by ascending brick counts.
 
     ``choice``: grows between two moves. Sets that several moves meet are solved once.
