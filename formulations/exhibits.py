@@ -78,8 +78,9 @@ def _assigned(graph: Graph, *, apart: bool) -> _Assignment:
 
     ``apart``: whether pairs that no arc joins are excluded by a constraint each.
     """
-    level = distances(graph, np.ones(len(graph.source))).astype(np.int64)
-    layered = (level[graph.target] == level[graph.source] + 1).all()
+    distance = distances(graph, np.ones(len(graph.source)))
+    level = np.nan_to_num(distance, posinf=-1).astype(np.int64)
+    layered = (level >= 0).all() and (level[graph.target] == level[graph.source] + 1).all()
     if not (layered and (graph.ends == (level == level.max())).all()):
         raise ProblemError(
             "an assignment chooses a state of every level, and paths of this graph pass more or "

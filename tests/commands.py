@@ -5,14 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from experiments.harness.claim import HOME, modules
+from experiments.harness.results import HOME
 from seqopt._cli.main import main
 
 
-def run(name, *arguments):
+def run_experiment(name, *arguments):
     """Return what an experiment prints."""
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-m", modules()[name], *arguments],
+        [sys.executable, "-W", "error", "-m", "experiments", name, *arguments],
         cwd=HOME.parent,
         capture_output=True,
         text=True,

@@ -14,7 +14,7 @@ from tokenize import COMMENT, DEDENT, ENDMARKER, INDENT, NEWLINE, NL, generate_t
 import networkx as nx
 import pytest
 
-from experiments.harness.claim import claims
+from experiments.harness.claim import modules as claims
 from seqopt._cli.arguments import COMMANDS
 from seqopt._registry import OFFERS, VIEWS
 
@@ -407,7 +407,7 @@ def crossed(modules: nx.DiGraph, makers: set[str]) -> list[str]:
 
 def test_claims_stand_apart_from_their_parts():
     """Nothing imports a claim; parts serve their own topic; the harness knows no topic."""
-    modules, makers = graph("experiments"), {claim.module for claim in claims().values()}
+    modules, makers = graph("experiments"), {module for module, _ in claims().values()}
     assert crossed(modules, makers) == []
     for path in sources("experiments"):
         text = ast.get_docstring(parsed(path)) or ""
@@ -423,21 +423,9 @@ def test_claims_stand_apart_from_their_parts():
     ],
 )
 def test_an_experiment_that_reaches_across_is_seen(a, b):
-    modules, makers = graph("experiments"), {claim.module for claim in claims().values()}
+    modules, makers = graph("experiments"), {module for module, _ in claims().values()}
     modules.add_edge(a, b)
     assert crossed(modules, makers) == [f"{a} imports {b}"]
-
-
-def test_claims_that_read_the_clock_declare_it():
-    modules = graph("experiments")
-    clocks = {
-        dotted(path)
-        for path in sources("experiments")
-        if "time" in imports(path) or ".seconds" in path.read_text(encoding="utf-8")
-    }
-    for name, claim in claims().items():
-        reads = clocks & {claim.module, *nx.descendants(modules, claim.module)}
-        assert claim.takes_time or not reads, name
 
 
 def test_experiments_take_few_parameters():

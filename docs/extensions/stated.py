@@ -9,94 +9,58 @@ import pandas as pd
 
 from experiments.harness.results import markdown, stored, two
 from experiments.instances.parts.tables import instance_tables
+from experiments.placement.formulations import CUT, QUESTIONS, ratios
 from experiments.placement.parts.speed_points import speed_tables
-from seqopt.graph.formulation import formulations
 
 INSTANCES = ("instance_library", "instance_contest", "instance_large")
-UNNEEDED = "not needed without budgets"
-FREE = {
-    "overlap_dp": "the least sum (the default)",
-    "minimax": "the least worst step",
-    "cascade": "the paper's scheme; without the proof it needs few models",
-    "rank_search": "comparison: looking at the next moves",
-    "beam": "comparison: keeping several choices",
-    **dict.fromkeys(("lagrangian", "labels", "overlap_lp", "overlap_mip"), UNNEEDED),
-}
-CAPPED = {
-    "labels": "the best choice, proven (the default with budgets)",
-    "lagrangian": "bound, prices and a good choice if there are too many labels",
-    "overlap_lp": "to check the prices; its choice need not keep the budgets",
-    "overlap_mip": "to check `labels` by a program that shares nothing with it",
-}
-
-
-def shapes_table(table: pd.DataFrame) -> str:
-    """Return a row per integer program: its size, what it proves relaxed, and how it ended."""
-    head = ["program", "rows", "columns", "nonzeros", "binaries", "relaxation", "optimum"]
-    rows = []
-    for row in table.to_dict("records"):
-        end = f"{two(row['seconds'])} s"
-        if not row["proven"]:
-            end += f", between {row['bound']:.1f} and {row['value']:.1f}"
-        digits = ".1f" if row["aim"] == "sum" else ".3f"
-        values = (f"{abs(round(row[name], 3)):{digits}}" for name in ("relaxed", "optimum"))
-        sizes = (f"{row[name]:,}" for name in head[1:5])
-        rows.append([f"`{row['formulation']}`", *sizes, *values, f"{row['nodes']:,}", end])
-    return markdown([*head, "nodes", "time"], rows)
-
-
-def _contest(table: pd.DataFrame, when: dict[str, str]) -> str:
-    kinds = {name: each.kind.value for name, each in formulations("costs").items()}
-    counts = sorted(table["bricks"].unique())
-    head = ["formulation", "use it for", "kind", "largest gap"]
-    head += [*(f"{n} bricks" for n in counts), "memory"]
-    rows = []
-    for name, use in when.items():
-        own = table[table["formulation"] == name]
-        by = [own[own["bricks"] == count] for count in counts]
-        most = 100 * own["proven_gap"].max()  # as the certificate proves it
-        gap = "none" if most < 1e-4 else f"{two(most)} %"
-        cells = [f"[`{name}`](programs.md#{name})", use, kinds[name], gap]
-        rows.append([*cells, *map(_choosing, by), f"{two(own['memory_MB'].max())} MB"])
-    return markdown(head, rows)
-
-
-def _choosing(own: pd.DataFrame) -> str:
-    """Return the median time to choose, and in how many problems no end was reached."""
-    if own.empty:
-        return "–"
-    notes = {
-        "stopped": int((own["end"] == "stopped").sum()),
-        "without a choice": int(own["end"].isin(["no choice", "died"]).sum()),
-    }
-    said = [f"{count} of {len(own)} {what}" for what, count in notes.items() if count]
-    return f"{two(own['solve'].median())} s" + (f" ({', '.join(said)})" if said else "")
-
-
-KEY = ["bricks", "criterion", "case"]
-LARGE = 100  # bricks
 PROVEN, UNPROVEN = "overlap_dp", "rank_search, no proof"
 
 
 def stated() -> dict[str, str]:
     """Return every figure and table by the name that stands for it."""
-    contest, runs = stored("budget_proofs"), stored("runs")
+    runs, every = stored("runs"), stored("formulations")
     return (
-        {"free_table": _contest(contest[contest["budgets"] == 0], FREE)}
-        | {"budget_table": _contest(contest[contest["budgets"] > 0], CAPPED)}
-        | _solvers(contest)
-        | _budgets(contest)
+        {"questions_table": _questions(every), "refused_table": _refused(every)}
         | _engines(runs)
         | _taken(stored("speed_points"))
         | _heuristics(runs, stored("heuristic_gaps"))
-        | _shapes(stored("program_shapes"))
         | _outside(stored("outside_assemblies"))
         | _composing(stored("composing"))
         | {"vault_loads_table": _vault_loads(stored("vault_loads"))}
-        | {"free_formulations_table": _on_graphs(stored("free_formulations"))}
         | {"classical_table": _classical(stored("classical"))}
         | {"makespan_table": _makespans(stored("makespan"), stored("makespan_large"))}
         | instance_tables(*map(stored, INSTANCES))
+    )
+
+
+def _questions(rows: pd.DataFrame) -> str:
+    """Return a row per question: how far it is proven, by what soonest, and by integers."""
+    at = 25  # bricks
+    rows = rows.assign(times=ratios(rows))
+    out = []
+    for question in QUESTIONS:
+        own = rows[(rows["question"] == question) & rows["value"].notna()]
+        proven = own[own["proven"].astype(bool)]
+        large = proven[proven["bricks"] == proven["bricks"].max()].sort_values("seconds")
+        exact = large[large["kind"] == "exact"].iloc[0]
+        program = own[(own["formulation"] == "overlap_mip") & (own["bricks"] == at)].iloc[0]
+        took = f"{two(program['times'])}{'' if program['proven'] else ', stopped'}"
+        cells = [str(exact["bricks"]), f"`{exact['formulation']}`", two(exact["seconds"]) + " s"]
+        out.append([question, *cells, f"{exact['models']:,.0f}", str(len(large)), took])
+    head = ["question", "proven up to", "soonest exact one", "time", "models", "prove it"]
+    return markdown([*head, f"integer program, {at} bricks"], out)
+
+
+def _refused(rows: pd.DataFrame) -> str:
+    """Return a row per formulation that answers none of the questions, with its reason."""
+    able = {*rows["formulation"][rows["value"].notna()], CUT}
+    told = rows[~rows["formulation"].isin(able)].groupby("formulation")["said"].last()
+    return markdown(
+        ["formulation", "why not"],
+        [
+            [f"`{name}`", said.partition(": ")[2] or said.partition(";")[0]]
+            for name, said in told.items()
+        ],
     )
 
 
@@ -116,21 +80,6 @@ def _composing(table: pd.DataFrame) -> dict[str, str]:
     schedules, words = (", ".join(table[name].unique()) for name in ("schedule", "with"))
     told = {"composing_schedules": schedules, "composing_words": words}
     return {**told, "composing_cells": str(len(table))}
-
-
-def _on_graphs(table: pd.DataFrame) -> str:
-    """Return a row per formulation and aim: times, gaps where a minute ended, or what ended it."""
-    counts = sorted(table["bricks"].unique())
-    gap = (100 * table["gap"]).map(two).radd(", gap ").add(" %").where(table["gap"] >= 1e-6, "")
-    gap = gap.where(np.isfinite(table["gap"]), ", no bound")
-    took = table["seconds"].map(two) + " s" + gap
-    table = table.assign(cell=took.where(table["value"].notna(), table["status"]))
-    rows = []
-    for name, own in table.groupby("formulation", sort=False):
-        for aim, part in own.groupby("aim", sort=False):
-            cells = part.set_index("bricks")["cell"].reindex(counts, fill_value="not asked")
-            rows.append([f"`{name}`", part["kind"].iloc[0], str(aim), *cells])
-    return markdown(["formulation", "kind", "aim", *(f"{n} bricks" for n in counts)], rows)
 
 
 def _makespans(*tables: pd.DataFrame) -> str:
@@ -171,51 +120,6 @@ def _outside(table: pd.DataFrame) -> dict[str, str]:
         "outside_plans": str(counts["plan"]),
         "outside_lacks": str(counts["lacks"]),
         "outside_found": f"{table['found'].median():.4g}",
-    }
-
-
-def _shapes(table: pd.DataFrame) -> dict[str, str]:
-    seconds = table.set_index("formulation")["seconds"]
-    return {
-        "shapes_table": shapes_table(table),
-        "arc_s": two(seconds["minimax_arc"]),
-        "big_m_s": two(seconds["minimax_big_m"]),
-    }
-
-
-def _solvers(contest: pd.DataFrame) -> dict[str, str]:
-    free = contest[contest["budgets"] == 0].set_index(["formulation", *KEY])["solve"].sort_index()
-    out = {}
-    for name in ("lp", "mip"):
-        times = (free[f"overlap_{name}"] / free["overlap_dp"]).groupby(level="bricks").median()
-        out |= {f"{name}_times_{n}": two(value) for n, value in times.iloc[[0, -1]].items()}
-    return out
-
-
-def _budgets(contest: pd.DataFrame) -> dict[str, str]:
-    """Return how labels do, and how long HiGHS takes where it finishes, over them."""
-    capped = contest[contest["budgets"] > 0]
-    by = {name: rows.set_index(KEY) for name, rows in capped.groupby("formulation")}
-    own, other, priced = (by[name] for name in ("labels", "overlap_mip", "lagrangian"))
-    every = (other["solve"] / own["solve"]).dropna()  # at least, where it was stopped
-    finished = other[other["end"] == "done"]
-    times, large = every[finished.index], every.xs(LARGE, level="bricks")
-    bound = 100 * (1 - priced["bound"] / own["objective"])
-    return {
-        "capped_problems": str(len(own)),
-        "labels_stopped": str(int((own["end"] == "stopped").sum()) or "none"),
-        "labels_left": two(100 * own["proven_gap"].max()),
-        "highs_problems": str(len(other)),
-        "highs_finished": str(len(finished)),
-        "highs_least": two(times.min()),
-        "highs_median": two(times.median()),
-        "highs_most": two(times.max()),
-        "highs_large": str(len(large)),
-        "highs_large_finished": str(int((other.loc[LARGE, "end"] == "done").sum()) or "none"),
-        "highs_large_least": two(large.min()),
-        "highs_memory": two(other["memory_MB"].max() / 1024),
-        "lagrangian_below": two(bound.max()),
-        "lagrangian_gap": two(100 * priced["proven_gap"].max()),
     }
 
 

@@ -18,7 +18,7 @@ a profile has ``p = 1``. What else bounds ``k_r`` is in `calibration_spread`, ho
 column comes about in `calibration_readings`, both of `experiments.calibration.parts`.
 
 Inputs: ``arch_tests.csv``, ``arch_stiffness.csv`` in ``seqopt/data/paper``. Command: ``python -m
-experiments.calibration.calibration [--quick]``.
+experiments calibration [--quick]``.
 """
 
 from itertools import product
@@ -159,12 +159,4 @@ def picture() -> Figure:
     return chart(bed_rows, fits, region=region, levels=levels, outs=outs, profiles=curves)
 
 
-CLAIM = Claim(
-    experiment,
-    digits=4,
-    quick="no readings, nothing written",
-    pictures={"calibration.png": picture},
-)
-
-if __name__ == "__main__":
-    CLAIM.main()
+CLAIM = Claim(experiment, digits=4, quick="no readings", pictures={"calibration.png": picture})

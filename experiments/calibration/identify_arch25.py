@@ -27,7 +27,7 @@ new fit on the fitted tables is larger than the shipped one by more than the yar
 0.05. What the new fit gives on Table B.1 is shown and not judged.
 
 Inputs: the tables that ship with the package. Command: ``python -m
-experiments.calibration.identify_arch25 [--quick] [--full] [--write] [--variants]``. Only
+experiments identify_arch25 [--quick] [--full] [--write] [--variants]``. Only
 ``--write`` puts the new scene in the place of ``seqopt/data/scenes/arch25.json`` and its numbers in
 ``identify_arch25.csv``. ``--variants`` repeats the first stage with other sets of numbers.
 """
@@ -183,13 +183,14 @@ def repeat(options: Options) -> tuple[Floats, Sequence[Free]]:
 def experiment(options: Options) -> Finding | None:
     if options.variants:
         table = compare_variants(target([printed_steps(name) for name in arch.FITTED]), 40)
-        save_table(table, "identify_arch25_variants", 4)
+        if options.store:
+            save_table(table, "identify_arch25_variants", 4)
         return None
     numbers, groups = repeat(options)
     scene, fitted = scene_of(numbers, groups), arch.report(numbers, groups)
     table = arch.beside_shipped(fitted, scene)
     print(table.to_string(index=False, float_format="%.4g", na_rep=""))
-    if options.write and not options.quick:
+    if options.write and options.store:
         save_scene(scene, SCENE)
         fitted.to_csv(arch.NUMBERS, index=False, float_format="%.6g", lineterminator="\n")
     good = arch.holds(table, quick=options.quick)
@@ -199,13 +200,10 @@ def experiment(options: Options) -> Finding | None:
 CLAIM = Claim(
     experiment,
     digits={"identify_arch25_refit": 4},
-    quick="two evaluations, nothing written",
+    quick="two evaluations",
     options=(
         Option("--full", "two starts, 40 evaluations"),
         Option("--write", "put the result in the product"),
         Option("--variants", "other sets of numbers"),
     ),
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

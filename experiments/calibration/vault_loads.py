@@ -11,7 +11,7 @@ to press sideways. The stiffness under the load is that of the calibration withi
 the scene instead of the compliance operator. The claim fails if any of this does not come out.
 
 Inputs: ``arch_tests.csv`` in ``seqopt/data/paper``. Command: ``python -m
-experiments.calibration.vault_loads [--quick]``.
+experiments vault_loads [--quick]``.
 """
 
 from dataclasses import replace
@@ -22,7 +22,7 @@ import pandas as pd
 from experiments.calibration.parts import barrel_vaults as barrel
 from experiments.calibration.parts.barrel_vaults import BED, LAWS, Vault, vaults
 from experiments.calibration.parts.vault_thrust import UNIT, borne, loaded_vault
-from experiments.harness.claim import Claim, Finding, Options, told
+from experiments.harness.claim import Claim, Finding, Options
 from seqopt import DRY
 from seqopt.contact.faces import step_assembly
 from seqopt.engines.interface import Want
@@ -71,8 +71,8 @@ def experiment(options: Options) -> Finding:
     print(table.to_string(index=False, float_format="%.4g"))
     gap = max(map(stiffness_gap, tests))
     print(f"stiffness by a load of the scene and by the operator: {gap:.1e} apart")
-    good = told(holds(table)) and gap < 1e-9
-    return Finding(good, tables={} if options.quick else {"vault_loads": table})
+    parts = holds(table) | {"loads of the scene and the operator agree": gap < 1e-9}
+    return Finding(parts, tables={"vault_loads": table})
 
 
 def holds(table: pd.DataFrame) -> dict[str, bool]:
@@ -92,7 +92,4 @@ def holds(table: pd.DataFrame) -> dict[str, bool]:
     }
 
 
-CLAIM = Claim(experiment, quick="two vaults, nothing written", digits=8)
-
-if __name__ == "__main__":
-    CLAIM.main()
+CLAIM = Claim(experiment, quick="two vaults", digits=8)

@@ -8,7 +8,7 @@ forces may exist that nothing brings about. The claim fails if a step rests that
 stand, or if none that is proven to stand becomes unstable; steps that were not followed to an end
 count for neither. One arch and two methods: how many steps differ elsewhere is not said.
 
-Inputs: the shipped scene. Command: ``python -m experiments.discrete.contact_steps [--quick]``.
+Inputs: the shipped scene. Command: ``python -m experiments contact_steps [--quick]``.
 """
 
 from collections.abc import Sequence
@@ -125,9 +125,6 @@ def experiment(options: Options) -> Finding:
 CLAIM = Claim(
     experiment,
     digits=4,
-    quick="ten steps, nothing written",
+    quick="ten steps",
     pictures={"contact_steps.png": drawn(chart, "contact_steps")},
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

@@ -25,7 +25,7 @@ the clock where two processes work. Errors are those against the refined mixed s
 steps of the plan, and at random sets of three grips as they are screened. Exponents are fitted over
 100 bricks and more; of memory what the smallest run takes is taken off, libraries above all.
 
-Inputs: the shipped scenes; seed 0. Command: ``python -m experiments.engines.engine_speed [--quick]
+Inputs: the shipped scenes; seed 0. Command: ``python -m experiments engine_speed [--quick]
 [--only PART]``.
 """
 
@@ -37,7 +37,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.harness.charts import subplots
-from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
+from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import apart, drawn, exponents_by
 from experiments.harness.scenes import arch25, grip_sets
 from experiments.harness.timing import best
@@ -126,7 +126,7 @@ def speed(options: Options) -> Finding:
     table = growth([2, 10, 25] if quick else [2, 5, 10, 25, 50, 100, 200, 500, 1000], 3)
     print(table.to_string(index=False, float_format="%.3g"))
     named = pd.Series(figures, name="value").rename_axis("").reset_index()
-    return on_this_run(holds=holds(figures), engine_growth=table, engine_speed=named)
+    return Finding(holds(figures), tables={"engine_growth": table, "engine_speed": named})
 
 
 def holds(figures: Mapping[str, float]) -> bool:
@@ -194,7 +194,7 @@ def grown(options: Options) -> Finding:
     print(table.to_string(index=False, float_format="%.3g"))
     print("exponents of time", exponents(table, "seconds"))
     print("of memory", exponents(table, "memory_MB", table["memory_MB"].min()))
-    return on_this_run(holds=growth_holds(table), engine_growth_runs=table)
+    return Finding(growth_holds(table), tables={"engine_growth_runs": table})
 
 
 def growth_holds(table: pd.DataFrame) -> bool:
@@ -206,13 +206,16 @@ def growth_holds(table: pd.DataFrame) -> bool:
     return bool(table["seconds"].notna().all() and small and fast and exact)
 
 
+def experiment(options: Options) -> Finding:
+    found = [speed(options), grown(options)]
+    tables = {name: table for one in found for name, table in one.tables.items()}
+    return Finding(all(one.holds for one in found), tables=tables)
+
+
 CLAIM = Claim(
-    {"speed": speed, "growth": grown},
+    experiment,
     digits=4,
-    quick="small sizes, nothing written",
-    times=Times.JUDGED,
+    quick="small sizes",
+    timed=True,
     pictures={"growth.png": drawn(growth_chart, "engine_growth_runs")},
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

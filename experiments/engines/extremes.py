@@ -16,7 +16,7 @@ least arithmetic is what `experiments.peers.peers` says: operations at the rate 
 and here nothing that is written.
 
 Inputs: the shipped scenes; seed 0; numba: nothing is stored where it is missing. Command:
-``OPENBLAS_NUM_THREADS=1 python -m experiments.engines.extremes [--quick]``.
+``OPENBLAS_NUM_THREADS=1 python -m experiments extremes [--quick]``.
 """
 
 import time
@@ -27,7 +27,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.engines.parts.plain_loop import PlainLoop, compiled
-from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
+from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.scenes import grip_sets
 from experiments.harness.timing import best
 from seqopt import build_network, load_scene
@@ -114,14 +114,11 @@ def experiment(options: Options) -> Finding:
     if "cpp_us" in table:
         table["times_cpp"] = table["compiled_us"] / table["cpp_us"]
     print(table.to_string(index=False, float_format="%.3g"))
-    return on_this_run(holds=holds(table), extremes=table)
+    return Finding(holds(table), tables={"extremes": table})
 
 
 def holds(table: pd.DataFrame) -> bool:
     return bool((table["times_fields"] >= FASTER).all() and table["difference"].max() <= CLOSE)
 
 
-CLAIM = Claim(experiment, digits=4, quick="one case, nothing written", times=Times.JUDGED)
-
-if __name__ == "__main__":
-    CLAIM.main()
+CLAIM = Claim(experiment, digits=4, quick="one case", timed=True)

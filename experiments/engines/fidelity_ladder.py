@@ -15,7 +15,7 @@ difference of the inner nodes' displacements over the largest displacement, in t
 are medians of rounds in one process on one core, ratios those within rounds.
 
 Inputs: the shipped scene; seed 0. Command: ``OPENBLAS_NUM_THREADS=1 python -m
-experiments.engines.fidelity_ladder [--quick]``.
+experiments fidelity_ladder [--quick]``.
 """
 
 import time
@@ -29,7 +29,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.harness.charts import note, subplots
-from experiments.harness.claim import Claim, Finding, Options, Times
+from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn, two
 from experiments.harness.scenes import arch25, grip_sets
 from experiments.harness.timing import best
@@ -228,10 +228,6 @@ def experiment(options: Options) -> Finding:
 CLAIM = Claim(
     experiment,
     digits=3,
-    quick="few cases, nothing written",
-    times=Times.SHOWN,
+    quick="few cases",
     pictures={"fidelity_ladder.png": drawn(chart, "fidelity_ladder")},
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

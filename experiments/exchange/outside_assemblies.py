@@ -15,7 +15,7 @@ is left open; and no step falls of those with faces.
 
 Inputs: the samples in the wheel of compas_cra, and with ``--files DIR`` clones of the repositories
 named in `COMMITS`; rows of files that are not there stay as they are stored. Command: ``python -m
-experiments.exchange.outside_assemblies [--quick] [--files DIR]``.
+experiments outside_assemblies [--quick] [--files DIR]``.
 """
 
 import contextlib
@@ -259,22 +259,17 @@ def experiment(options: Options) -> Finding:
         with tempfile.TemporaryDirectory() as folder:
             rows.append(row_of(outside, path, Path(folder)))
         print(f"{outside.name:60} {rows[-1]['outcome']}: {rows[-1]['said']}", flush=True)
-        if not options.quick:
+        if options.store:
             store(pd.DataFrame(rows))  # file by file: a run that ends early keeps what it found
-    if not options.quick:
-        CLAIM.redraw(say=False)
-    table = pd.DataFrame(rows) if options.quick else pd.read_csv(STORE)
+    table = pd.read_csv(STORE) if options.store else pd.DataFrame(rows)
     plans = int((table["outcome"] == PLAN).sum())
     return Finding(holds(table, 1 if options.quick else LEAST), f": {plans} of {len(table)} plans")
 
 
 CLAIM = Claim(
     experiment,
-    quick="three samples, nothing written",
+    quick="three samples",
     options=(Option("--files", "folder of clones of the repositories named", ""),),
     needs=(Extra("compas_cra", "pip install 'seqopt[witness]'"),),
     pictures={"outside_assemblies.png": chart},
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

@@ -12,7 +12,7 @@ are of the processor, reading and writing of files included. The best paths are 
 ``known.json``, a better one that was known before stays.
 
 Inputs: ``experiments/instances/library``. Command: ``python -m
-experiments.instances.instance_contest [--quick] [--only-of NAME,NAME]``.
+experiments instance_contest [--quick] [--only-of NAME,NAME]``.
 """
 
 import json
@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from experiments.harness.claim import Claim, Extra, Finding, Option, Options, Times, on_this_run
+from experiments.harness.claim import Claim, Extra, Finding, Option, Options
 from experiments.harness.results import drawn, stored
 from experiments.instances.parts.contest_chart import chart
 from experiments.instances.parts.contest_run import OUTSIDE, run, solvers
@@ -63,13 +63,13 @@ def experiment(options: Options) -> Finding:
             rows.append({key: row[key] for key in COLUMNS})
             print(*rows[-1].values(), flush=True)
             _keep(best, row)
-    if not options.quick:
+    if options.store:
         KNOWN.write_text(_lines(best), "utf-8")
     listed = [_listed(name, best[name]) for name in names if name in best]
     found = {"instance_contest": pd.DataFrame(rows), "instance_library": pd.DataFrame(listed)}
     if not options.quick:
         found = {table: _joined(own, table, names) for table, own in found.items()}
-    return on_this_run(holds=holds(*found.values()), **found)
+    return Finding(holds(*found.values()), tables=found)
 
 
 def _joined(rows: pd.DataFrame, name: str, names: Sequence[str]) -> pd.DataFrame:
@@ -149,13 +149,9 @@ def _listed(name: str, found: dict) -> dict[str, object]:
 
 CLAIM = Claim(
     experiment,
-    quick="three instances, our formulations alone, nothing written",
-    times=Times.SHOWN,
+    quick="three instances, our formulations alone",
     options=(Option("--only-of", "these instances alone, as free-7,wall-6; others stay", ""),),
     needs=(Extra("ortools", "pip install 'seqopt[instances]'"),),
     pictures={"instance_contest.png": drawn(chart, "instance_contest", "instance_library")},
     digits=9,
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

@@ -18,7 +18,7 @@ Medians of rounds. Bounds are the products alone, same shapes, dense in ready me
 Then one placement problem by general tools.
 
 Inputs: the shipped scene; seed 0; PyNiteFEA, openseespy and pyconmech: nothing is stored if one is
-missing. Command: ``OPENBLAS_NUM_THREADS=1 python -m experiments.peers.peers [--quick]``.
+missing. Command: ``OPENBLAS_NUM_THREADS=1 python -m experiments peers [--quick]``.
 """
 
 import time
@@ -31,7 +31,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.harness.charts import note, subplots
-from experiments.harness.claim import Claim, Finding, Options, Times
+from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import stored
 from experiments.harness.scenes import arch25
 from experiments.harness.timing import best
@@ -281,12 +281,5 @@ def picture() -> Figure:
 
 
 CLAIM = Claim(
-    experiment,
-    digits=4,
-    quick="loops and paths, nothing written",
-    times=Times.JUDGED,
-    pictures={"peers.png": picture},
+    experiment, digits=4, quick="loops and paths", timed=True, pictures={"peers.png": picture}
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

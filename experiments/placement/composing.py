@@ -4,7 +4,7 @@ Method: the command line is run for every pair of a schedule and something that 
 arch of seven bricks. Every plan has a value, which is stored; where there is none, the line is that
 says why. Whether values are right is tested elsewhere, against every plan of small builds.
 
-Inputs: none. Command: ``python -m experiments.placement.composing [--quick]``.
+Inputs: none. Command: ``python -m experiments composing [--quick]``.
 """
 
 import io
@@ -113,7 +113,4 @@ def holds(table: pd.DataFrame) -> bool:
     return bool(table["value"].notna().all())
 
 
-CLAIM = Claim(experiment, quick="two columns, nothing written")
-
-if __name__ == "__main__":
-    CLAIM.main()
+CLAIM = Claim(experiment, quick="two columns")

@@ -19,7 +19,7 @@ The claim rests on how uncertain each is taken to be: at the same relative size 
 many grips as stiffness does or more (within 10 % weights move 15 % of them under equations 2 and 3,
 stiffness 9 %). Single draws spread widely about the means. And one arch is one arch.
 
-Inputs: the shipped scene. Command: ``python -m experiments.placement.decision_sensitivity
+Inputs: the shipped scene. Command: ``python -m experiments decision_sensitivity
 [--quick]``.
 """
 
@@ -229,9 +229,6 @@ def experiment(options: Options) -> Finding:
 CLAIM = Claim(
     experiment,
     digits=6,
-    quick="few scenarios, nothing written",
+    quick="few scenarios",
     pictures={"decision_sensitivity.png": drawn(chart, "decision_sensitivity")},
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

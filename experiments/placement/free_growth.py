@@ -11,14 +11,14 @@ three robots and further mobile ones. Every run has a process of its own on one 
 core are counted, and the largest memory of the process. Exponents are fitted over 25 bricks and
 more, where a plan is proven.
 
-Inputs: the shipped scenes. Command: ``python -m experiments.placement.free_growth [--quick]``.
+Inputs: the shipped scenes. Command: ``python -m experiments free_growth [--quick]``.
 """
 
 import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.harness.charts import note, subplots, ticks
-from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
+from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import apart, drawn, exponents_by
 from seqopt.report._style import GRAY, dress, look, plain, styled
 
@@ -83,16 +83,12 @@ def experiment(options: Options) -> Finding:
     print(table.to_string(index=False, float_format="%.4g"))
     for column in ("states", "models", "seconds"):
         print("exponents of", column, exponents(table, column))
-    return on_this_run(holds=holds(table), free_growth=table)
+    return Finding(holds(table), tables={"free_growth": table})
 
 
 CLAIM = Claim(
     experiment,
     digits=4,
-    quick="small arches, nothing written",
-    times=Times.SHOWN,
+    quick="small arches",
     pictures={"free_growth.png": drawn(chart, "free_growth")},
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

@@ -10,7 +10,7 @@ the free plan is not equal in both aims, or if one has no proof. Then one robot 
 step of the free plan: the claim fails if there is neither a plan nor a reason that names what would
 help.
 
-Inputs: the shipped scene. Command: ``python -m experiments.placement.replanning [--quick]``.
+Inputs: the shipped scene. Command: ``python -m experiments replanning [--quick]``.
 """
 
 import time
@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 import seqopt
-from experiments.harness.claim import Claim, Finding, Options, Times, told
+from experiments.harness.claim import Claim, Finding, Options
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.judge._rule_moves import check_free
 from seqopt.plan.pose import states_of
@@ -119,21 +119,19 @@ def losses(engine: seqopt.Engine, every: int) -> Iterator[dict[str, object]]:
         }
 
 
-def holds(rest: pd.DataFrame, loss: pd.DataFrame) -> bool:
-    """Print whether each part of the claim holds; return whether all do."""
+def holds(rest: pd.DataFrame, loss: pd.DataFrame) -> dict[str, bool]:
+    """Return whether each part of the claim holds."""
     free = rest[rest["plan"] == "free"]
     better = rest["anew"] <= rest["planned"] * (1 + SAME)
     named = loss["plan"] | loss["said"].str.contains("becomes possible|extend a reach")
     equal = np.isclose(free["anew"], free["planned"], rtol=SAME).all()
     equal &= (free["anew_steps"] == free["planned_steps"]).all()
-    return told(
-        {
-            "no rest that is planned anew is worse": bool(better.all()),
-            "from the free plan it is as good": bool(equal),
-            "all are proven": bool((rest["status"] == "optimal").all()),
-            "a robot lost: a plan, or a reason that names what would help": bool(named.all()),
-        }
-    )
+    return {
+        "no rest that is planned anew is worse": bool(better.all()),
+        "from the free plan it is as good": bool(equal),
+        "all are proven": bool((rest["status"] == "optimal").all()),
+        "a robot lost: a plan, or a reason that names what would help": bool(named.all()),
+    }
 
 
 def experiment(options: Options) -> Finding:
@@ -151,7 +149,4 @@ def experiment(options: Options) -> Finding:
     return Finding(holds(rest, loss), tables=tables)
 
 
-CLAIM = Claim(experiment, digits=6, quick="some steps, nothing written", times=Times.SHOWN)
-
-if __name__ == "__main__":
-    CLAIM.main()
+CLAIM = Claim(experiment, digits=6, quick="some steps")

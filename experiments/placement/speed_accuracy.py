@@ -18,7 +18,7 @@ for the reference arch, a barrel vault and a wall, a minute for each engine and 
 processor time (`experiments.placement.parts.speed_points`). There is no randomness.
 
 Inputs: `arch25`, and arches of its shape with 7 to 49 bricks. Command: ``python -m
-experiments.placement.speed_accuracy [--quick] [--fresh]``.
+experiments speed_accuracy [--quick] [--fresh]``.
 """
 
 import platform
@@ -27,10 +27,9 @@ from importlib.metadata import version
 from itertools import product
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
-from experiments.harness.claim import Claim, Finding, Option, Options, Times, on_this_run, told
+from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.results import RESULTS, apart, drawn
 from experiments.harness.runs import NO_PROOF, REFERENCE, contenders
 from experiments.placement.parts import speed_charts as charts
@@ -165,9 +164,8 @@ def _arch25(ratios: pd.Series) -> float:
 
 def experiment(options: Options) -> Finding:
     load = STORE.exists() and not options.quick and not options.fresh
-    RESULTS.mkdir(exist_ok=True)
     stored = pd.read_csv(STORE) if load else pd.DataFrame()
-    runs = collect(specs(quick=options.quick), stored, None if options.quick else STORE)
+    runs = collect(specs(quick=options.quick), stored, STORE if options.store else None)
     table = summarize(runs)
     print(table.to_string(index=False, float_format="%.4g"))
     points = _points(quick=options.quick, load=load)
@@ -178,9 +176,9 @@ def experiment(options: Options) -> Finding:
         ratios = pd.DataFrame(apart(module, way, limit=LIMIT) for way in ways)
         ratios = ratios.assign(version=version("seqopt"))
     print(ratios.to_string(index=False, float_format="%.4g"))
-    good = told(holds(runs) | free_pays(ratios) | corner_reached(points))
+    good = holds(runs) | free_pays(ratios) | corner_reached(points)
     found = {"speed_accuracy": table, "worst_ratios": ratios, "speed_points": points}
-    return on_this_run(holds=good, **found)
+    return Finding(good, tables=found)
 
 
 def _points(*, quick: bool, load: bool) -> pd.DataFrame:
@@ -223,8 +221,8 @@ def _soonest(table: SpeedTable, engine: str = "") -> float:
 CLAIM = Claim(
     experiment,
     digits={"speed_accuracy": 4, "worst_ratios": 6, "speed_points": 4},
-    quick="one small arch, nothing written",
-    times=Times.JUDGED,
+    quick="one small arch",
+    timed=True,
     pictures={
         "speed_accuracy.png": drawn(charts.headline, "speed_points"),
         "worst_step.png": drawn(charts.worst_step_chart, "runs", "worst_ratios"),
@@ -232,7 +230,3 @@ CLAIM = Claim(
     },
     options=(Option("--fresh", "repeat runs that are stored"),),
 )
-
-if __name__ == "__main__":
-    np.seterr(all="raise", under="ignore")
-    CLAIM.main()

@@ -16,7 +16,7 @@ and the staged choice is better by staged responses; and if every step is in equ
 The bounds were set after a first look at the methods. Both are models: mortar that creeps or
 shrinks, and robots that give way, lie between them; joints that would part are taken as bonded.
 
-Inputs: the shipped scene and plan. Command: ``python -m experiments.placement.staged_construction
+Inputs: the shipped scene and plan. Command: ``python -m experiments staged_construction
 [--quick]``.
 """
 
@@ -26,7 +26,7 @@ from typing import TypeVar
 import numpy as np
 import pandas as pd
 
-from experiments.harness.claim import Claim, Finding, Options, told
+from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.scenes import arch25, method_steps
 from seqopt import Network, Step, three_robot_loop
 from seqopt.engines.interface import Fields
@@ -195,12 +195,7 @@ def experiment(options: Options) -> Finding:
     print(summary(table).to_string(float_format="%.4g"))
     print(chosen.to_string(index=False, float_format="%.4g"))
     tables = {"staged_construction": table, "staged_choice": chosen}
-    return Finding(told(holds(table, chosen)), tables=tables)
+    return Finding(holds(table, chosen), tables=tables)
 
 
-CLAIM = Claim(
-    experiment, digits=5, quick="few methods, and few candidates of the loop; nothing written"
-)
-
-if __name__ == "__main__":
-    CLAIM.main()
+CLAIM = Claim(experiment, digits=5, quick="few methods, and few candidates of the loop")

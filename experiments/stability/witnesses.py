@@ -32,7 +32,7 @@ little bond, than in the shelves, which stand by RBE's own constraints. CRA fail
 too, and decides one arch by its density alone, which scales every force alike.
 
 Inputs: compas_cra, ``pip install "seqopt[witness]"``; LMGC90 (compas_lmgc90) in this or another
-Python. Command: ``python -m experiments.stability.witnesses [--quick] [--lmgc90 PYTHON]``.
+Python. Command: ``python -m experiments witnesses [--quick] [--lmgc90 PYTHON]``.
 """
 
 import sys
@@ -42,7 +42,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from experiments.harness.claim import Claim, Extra, Finding, Option, Options, Times, none_of
+from experiments.harness.claim import Claim, Extra, Finding, Option, Options
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.stability.parts import witness_cra
 from experiments.stability.parts.blocks import ring, stack
@@ -234,19 +234,15 @@ def experiment(options: Options) -> Finding:
     ratio = None if quick else times.loc[times["case"] == LARGEST, "ratio"].max()
     found = faults(table, witnesses, ratio)
     if python:  # rows of a witness are not given up because it is not there
-        return Finding(none_of(found), tables={"witnesses": table})
+        return Finding(dict.fromkeys(found, False), tables={"witnesses": table})
     alone = ", by one witness: LMGC90 was not asked or is not installed; nothing stored"
-    return Finding(none_of(found), alone)
+    return Finding(dict.fromkeys(found, False), alone)
 
 
 CLAIM = Claim(
     experiment,
     digits=3,
-    quick="few cases, nothing written",
-    times=Times.SHOWN,
+    quick="few cases",
     options=(Option("--lmgc90", "a Python with compas_lmgc90", sys.executable),),
     needs=(Extra("compas_cra", 'pip install "seqopt[witness]"'),),
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

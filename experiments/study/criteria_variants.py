@@ -12,7 +12,7 @@ A further rule was picked among 3.2 million and not cross-validated. It is an ob
 part of the verdict: after the crown, compression explains the published choices better than
 displacement. It is set beside itself with displacement in 32 settings.
 
-Inputs: the shipped scene and plan. Command: ``python -m experiments.study.criteria_variants
+Inputs: the shipped scene and plan. Command: ``python -m experiments criteria_variants
 [--quick]``.
 """
 
@@ -218,9 +218,6 @@ def experiment(options: Options) -> Finding:
 
 CLAIM = Claim(
     experiment,
-    quick="few variants, nothing written",
+    quick="few variants",
     pictures={"criteria_variants.png": drawn(chart, "criteria_variants", "criteria_compression")},
 )
-
-if __name__ == "__main__":
-    CLAIM.main()

@@ -1,16 +1,25 @@
-"""Claims: every experiment at reduced size ends with its verdict."""
+"""Claims: how they are declared, listed and run; each at reduced size ends with its verdict."""
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
+import time
+
+import pandas as pd
 import pytest
 
-from experiments.harness.claim import Times, claims
+from experiments.__main__ import main, run
+from experiments.harness import claim as harness
+from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, find_claim, modules
+from experiments.harness.results import RESULTS
+from experiments.placement import formulations
 from tests.builders import ROOT
-from tests.commands import run
+from tests.commands import run_experiment
 
 ALWAYS = "frame_contrast"  # one that takes a second runs among the quick tests too
-
-LONG = ("identify_arch25", "dry_map", "speed_accuracy")  # parts of the last: test_harness
+LONG = ("identify_arch25", "dry_map", "speed_accuracy")  # parts of the last: test_speed_accuracy
 
 
 def marks(name):
@@ -20,23 +29,199 @@ def marks(name):
     return [pytest.mark.slow, pytest.mark.long] if name in LONG else pytest.mark.slow
 
 
-def printed_by(name, capsys):
-    """What a quick run prints, as a user runs it where that is soon done, else in this process."""
-    if name == ALWAYS:
-        return run(name, "--quick")
-    claims()[name].main(["--quick"])
-    return capsys.readouterr().out
+def written():
+    """When stored files were written."""
+    files = [*RESULTS.glob("*"), *(ROOT / "docs").rglob("*.[pm][nd]*")]
+    return {path: path.stat().st_mtime_ns for path in files}
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=marks(n)) for n in claims()])
-def test_a_quick_run_ends_with_a_verdict(name, capsys):
-    claim = claims()[name]
+@pytest.mark.parametrize("name", [pytest.param(n, marks=marks(n)) for n in modules()])
+def test_a_quick_run_ends_with_a_verdict_and_stores_nothing(name, capsys):
+    claim = find_claim(name)
     for extra in claim.needs:
         pytest.importorskip(extra.module)
-    before = sorted((ROOT / "experiments" / "results").glob("*"))
-    times = [path.stat().st_mtime_ns for path in before]
-    verdict = printed_by(name, capsys).splitlines()[-1]
+    before = written()
+    if name == ALWAYS:  # as a user runs it
+        printed = run_experiment(name, "--quick", "--store")
+    else:
+        claim.main(["--quick", "--store"])
+        printed = capsys.readouterr().out
+    verdict = printed.splitlines()[-1]
     assert verdict.startswith("verdict: the claim")
-    if claim.times is not Times.JUDGED:  # else it depends on the machine
+    if not claim.timed:  # else it depends on the machine
         assert "the claim holds" in verdict
-    assert [path.stat().st_mtime_ns for path in before] == times  # a quick run writes nothing
+    assert written() == before
+
+
+def test_listing_takes_no_import_of_an_experiment():
+    command = "import sys; from experiments.__main__ import main; main([]); print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", command], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    *lines, loaded = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == [*modules()]
+    assert {"engine_speed", "dry_map", "formulations"} <= {*modules()}
+    assert "seqopt" not in loaded.split()
+
+
+def test_every_claim_is_found_by_its_plain_name_and_starts_its_module():
+    for name, (module, text) in modules().items():
+        assert find_claim(name).name == name == module.rpartition(".")[2]
+        assert text.endswith(".")
+
+
+def test_no_claims_are_an_error_and_not_an_empty_list(tmp_path, monkeypatch, capsys):
+    (tmp_path / "parts.py").write_text('"""What makes no claim."""')
+    with pytest.raises(ClaimError, match="no experiments found in"):
+        modules(tmp_path)
+    monkeypatch.setattr("experiments.__main__.modules", lambda: modules(tmp_path))
+    for arguments in ([], ["all", "--quick"]):
+        assert main(arguments) == 1
+        assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_two_experiments_of_one_name_are_an_error(tmp_path):
+    for folder in ("engines", "discrete"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "speed.py").write_text('"""Claim: it is fast."""')
+    with pytest.raises(ClaimError, match="two experiments are named speed"):
+        modules(tmp_path)
+
+
+def test_a_module_that_claims_and_declares_nothing_is_an_error(monkeypatch, capsys):
+    helper = "experiments.harness.scenes"
+    monkeypatch.setattr(harness, "modules", lambda: {"scenes": (helper, "")})
+    with pytest.raises(ClaimError, match=f"{helper} declares no CLAIM"):
+        find_claim("scenes")
+    assert main(["perrs"]) == 1
+    assert "perrs: there is no such experiment; give one of scenes" in capsys.readouterr().err
+
+
+def stand_in(finding, **words):
+    """A claim that finds what is given."""
+
+    def experiment(options):
+        return finding
+
+    experiment.__module__ = "experiments.figures"
+    return Claim(experiment, quick="little", **words)
+
+
+@pytest.mark.parametrize(
+    ("finding", "words", "line"),
+    [
+        (Finding(holds=True), {}, "the claim holds"),
+        (Finding(holds=False, note=": 79 numbers"), {}, "the claim does not hold: 79 numbers"),
+        (Finding(holds=False), {"timed": True}, "the claim does not hold on this run"),
+        (Finding(holds=True), {"timed": True}, "the claim holds"),
+        (Finding({"near": True, "far": False}), {}, "the claim does not hold"),
+        (Finding({"near": True}), {}, "the claim holds"),
+        (Finding({}), {}, "the claim holds"),  # nothing speaks against it
+    ],
+)
+def test_the_last_line_and_the_exit_status_are_the_verdict(capsys, finding, words, line):
+    assert stand_in(finding, **words).main() == ("not hold" in line)
+    *parts, last = capsys.readouterr().out.splitlines()
+    assert last == f"verdict: {line}"
+    if isinstance(finding.holds, dict):
+        assert parts == [f"{'yes' if v else 'NO'}: {k}" for k, v in finding.holds.items()]
+
+
+def test_tables_and_verdicts_are_stored_when_asked(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.harness.results.RESULTS", tmp_path)
+    monkeypatch.setattr(harness, "VERDICTS", tmp_path / "verdicts.csv")
+    known = pd.DataFrame({"verdict": ["holds", "holds"], "seconds": 2.0}, ["gone", "peers"])
+    known.rename_axis("experiment").to_csv(tmp_path / "verdicts.csv")
+    claim = stand_in(Finding(holds=False, tables={"rows": pd.DataFrame({"x": [1 / 3]})}), digits=2)
+    for arguments in ([], ["--quick"], ["--quick", "--store"]):
+        claim.main(arguments)
+        assert not (tmp_path / "rows.csv").exists()
+    claim.main(["--store"])
+    assert (tmp_path / "rows.csv").read_text() == "x\n0.33\n"
+    after = pd.read_csv(tmp_path / "verdicts.csv")
+    assert after["experiment"].tolist() == ["figures", "peers"]
+    assert after["verdict"].tolist() == ["does not hold", "holds"]
+
+
+def test_options_are_switches_or_texts():
+    options = (Option("--fresh", ""), Option("--python", "", "python3"))
+    claim = stand_in(None, options=options)
+    assert vars(claim.parse([])) == {
+        **dict.fromkeys(("quick", "store", "redraw", "fresh"), False),
+        "python": "python3",
+    }
+    assert claim.parse(["--quick", "--fresh", "--python", "x"]).python == "x"
+    assert claim.main() == 0  # which asks for something else than a verdict
+
+
+def test_a_missing_extra_ends_with_its_own_status(capsys):
+    claim = stand_in(None, needs=(Extra("no_such_module", "pip install it"),))
+    assert claim.main() == 2
+    assert capsys.readouterr().out == "no_such_module is not installed: pip install it\n"
+
+
+@pytest.mark.parametrize(
+    ("printed", "status", "verdict"),
+    [
+        ("verdict: the claim holds", 0, "holds"),
+        ("verdict: the claim holds: all pictures drawn", 0, "holds: all pictures drawn"),
+        ("verdict: the claim does not hold on this run", 1, "does not hold on this run"),
+        ("no verdict", 0, "failed: no verdict"),
+        ("verdict: the claim holds", 3, "failed: verdict: the claim holds"),
+        ("pip install extra", 2, "left out: pip install extra"),
+    ],
+)
+def test_a_verdict_is_the_last_line_of_a_run_that_ended_well(monkeypatch, printed, status, verdict):
+    done = subprocess.CompletedProcess([], status, f"table\n{printed}\n", "")
+    monkeypatch.setattr("experiments.__main__.subprocess.run", lambda *_, **__: done)
+    assert run("figures") == verdict
+
+
+@pytest.mark.parametrize(
+    ("verdict", "status"),
+    [("holds", 0), ("holds: by one", 0), ("left out: pip", 0), ("does not hold", 1)],
+)
+def test_the_exit_status_of_all_says_whether_all_hold(monkeypatch, capsys, verdict, status):
+    asked = []
+    monkeypatch.setattr("experiments.__main__.run", lambda *words: asked.append(words) or verdict)
+    assert main(["all", "--quick"]) == status
+    assert asked == [(name, "--quick") for name in modules()]
+    assert len(capsys.readouterr().out.splitlines()) == len(modules())
+
+
+def test_commands_that_are_written_down_exist():
+    """In the documentation and in the experiments' own texts."""
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+    pages += (ROOT / "experiments").rglob("*.py")
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    named = {*re.findall(r"python -m\s+experiments (\w+)", text)}
+    assert named - {"all", "NAME"} == {*modules()}
+    for module in re.findall(r"-m\s+(experiments(?:\.\w+)+)", text):
+        assert (ROOT / module.replace(".", "/")).with_suffix(".py").exists(), module
+
+
+ROW = (formulations.FREE, 7, "flow_lp", 0.0)
+
+
+def test_a_formulation_is_limited_in_memory_and_ended_in_time():
+    """A process of its own: what breaks its limits is a row, and other rows are as without it."""
+    assert formulations.alone(*ROW)["ended"] == "optimal"
+    assert formulations.alone(*ROW, memory=2**28)["ended"] in ("out of memory", "killed")
+    assert formulations.alone(*ROW, most=0.01)["ended"] in ("out of time", "killed")
+
+
+def test_rows_that_are_stored_are_not_asked_again():
+    """Nor is what was refused or stopped on a smaller arch; nothing is begun after the end."""
+    known = pd.DataFrame(
+        [("free, sum", 7, "beam", "feasible"), ("free, sum", 7, "minimax", "refused")],
+        columns=[*formulations.KEY, "ended"],
+    )
+    again, larger = ({*formulations.cells(bricks, known)} for bricks in (7, 13))
+    assert ("free, sum", 7, "beam") not in again
+    assert ("free, sum", 7, "labels") in again
+    assert ("free, sum", 13, "minimax") not in larger
+    assert ("free, sum", 13, "beam") in larger
+    assert {cell for cell in larger if cell[2] == formulations.CUT} == {
+        (formulations.FREE, 13, formulations.CUT)
+    }
+    assert [*formulations.measured([ROW], time.monotonic() - 1, apart=False)] == []

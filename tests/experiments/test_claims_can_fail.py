@@ -10,7 +10,6 @@ import pandas as pd
 import pytest
 
 from experiments import figures
-from experiments.__main__ import STORE
 from experiments.calibration import calibration, vault_loads
 from experiments.calibration.parts import arch_numbers, calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
@@ -30,8 +29,7 @@ from experiments.peers import peers
 from experiments.placement import (
     composing,
     decision_sensitivity,
-    formulation_cost,
-    free_formulations,
+    formulations,
     free_growth,
     heuristic_gaps,
     replanning,
@@ -47,7 +45,7 @@ from seqopt.study.published import printed
 
 STUDY = printed("de_validation").set_index("bricks")["error_percent"]
 NUMBERED = [item for item in ITEMS if item.has_numbers]
-COSTS, TOOLS = stored("formulation_cost"), stored("peers")
+TOOLS = stored("peers")
 
 
 class Check(NamedTuple):
@@ -125,20 +123,23 @@ CHECKS = {
         ("fidelity_ladder",),
         *("error", 1e-7, {"level": "rigid", "case": "arch25, epoxy"}),
     ),
-    "formulation_cost costs": Check(
-        lambda chains, arch: formulation_cost.costs_hold(chains, arch.iloc[0]),
-        (COSTS.iloc[:-1], COSTS.iloc[[-1]]),
-        *("overlap_lp", 5e-4, {"bricks": 6}),
-    ),
-    "formulation_cost proofs": Check(
-        formulation_cost.proofs_hold,
-        ("budget_proofs",),
-        *("proven_gap", 2e-3, {"formulation": "labels", "bricks": 49, "case": "all three"}),
-    ),
-    "formulation_cost shapes": Check(
-        formulation_cost.shapes_hold,
-        ("program_shapes",),
-        *("relaxed", 640.0, {"formulation": "assignment_loose"}),
+    **{
+        f"formulations {part}": Check(
+            lambda table, part=part: all(formulations.holds(table).values()),
+            ("formulations",),
+            *(column, value, {"bricks": 13, "formulation": name, "question": question}),
+        )
+        for part, column, value, name, question in (
+            ("values", "value", 1.0, "flow_lp", formulations.FREE),
+            ("plans", "value", 0.1, "beam", formulations.FREE),
+            ("bounds", "bound", 300.0, "overlap_lp", formulations.BUDGET),
+            ("models", "models", 1, "best_first", formulations.FREE),
+        )
+    },
+    "formulations programs": Check(
+        lambda table: all(formulations.holds(table).values()),
+        ("formulations",),
+        *("seconds", 1e-3, {"bricks": 25, "formulation": "overlap_mip"}),
     ),
     "frame_contrast": Check(
         lambda table: frame_contrast.holds(table, 1e-11),
@@ -146,7 +147,7 @@ CHECKS = {
         *("displacement", 1e-5, {"contrast": 1e7}),
     ),
     "soft_grips": Check(
-        lambda table: soft_grips.holds(table, 1.0),
+        lambda table: all(soft_grips.holds(table, 1.0).values()),
         ("soft_grips",),
         *("D_max", 200.0, {"build": "cantilever", "stiffness": 1e6}),
     ),
@@ -186,16 +187,6 @@ CHECKS = {
         ("composing",),
         *("value", np.nan, {"schedule": "free", "with": "overlap_dp"}),
     ),
-    "free_formulations": Check(
-        free_formulations.holds,
-        ("free_formulations",),
-        *("value", 0.83, {"bricks": 25, "formulation": "path_beam", "aim": "minmax,steps"}),
-    ),
-    "free_formulations loop": Check(
-        free_formulations.loop_holds,
-        ("loop_formulations",),
-        *("value", 1.1, {"bricks": 25, "formulation": "minimax"}),
-    ),
     "paper_counterparts": Check(
         lambda table: not paper_counterparts.faults(NUMBERED, table),
         ("paper_counterparts",),
@@ -210,7 +201,7 @@ CHECKS = {
         *("ratio_lowest", 15.0, {"tool": "SciPy bars, banded"}),
     ),
     "replanning": Check(
-        replanning.holds,
+        lambda *tables: all(replanning.holds(*tables).values()),
         ("replanning", "replanning_losses"),
         *("anew", 0.8, {"plan": "free", "step": 10}),
     ),
@@ -277,8 +268,3 @@ def test_pictures_of_another_scene_are_seen():
 
 def test_every_claim_is_checked_here():
     assert {name.split()[0] for name in CHECKS} | {"figures"} == set(claims())
-
-
-def test_stored_verdicts_quote_the_claims():
-    table = pd.read_csv(STORE, index_col=0)
-    assert table["claim"].to_dict() == {name: claim.text for name, claim in claims().items()}

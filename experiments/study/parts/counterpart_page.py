@@ -21,7 +21,7 @@ from experiments.study.parts.counterpart_items import (
 INTRODUCTION = """\
 ## Every figure and table
 
-`python -m experiments.study.paper_counterparts` computes every figure and table that has numbers,
+`python -m experiments paper_counterparts` computes every figure and table that has numbers,
 draws them beside the printed ones, and writes this part of the page; all values are in
 `experiments/results/paper_counterparts.csv`. The error is the difference beyond rounding, relative
 to the printed value or to 1. An item *agrees* if every value is within 5 % of print, *agrees in
