@@ -206,7 +206,7 @@ ROW = (formulations.FREE, 7, "flow_lp", 0.0)
 def test_a_formulation_is_limited_in_memory_and_ended_in_time():
     """A process of its own: what breaks its limits is a row, and other rows are as without it."""
     assert formulations.alone(*ROW)["ended"] == "optimal"
-    assert formulations.alone(*ROW, memory=2**28)["ended"] in ("out of memory", "killed")
+    assert formulations.alone(*ROW, memory=2**28)["ended"] not in formulations.PLANS
     assert formulations.alone(*ROW, most=0.01)["ended"] in ("out of time", "killed")
 
 
