@@ -111,15 +111,10 @@ def test_the_largest_fall_is_between_the_arches_where_print_falls():
     assert text.endswith("more than 7.0: pads, width, 10 mm, a")
 
 
-def test_stored_rows_are_called_stored_and_missing_ones_are_named(
-    monkeypatch, tmp_path, engine25, step
-):
-    monkeypatch.setattr(discrete_arches, "RESULTS", tmp_path)
-    empty, source = witness_rows(engine25, [step], None)
-    assert (len(empty), source) == (0, "no rows are stored")
-    assert len(missing(empty, [step])) == 4
-    row = {"bricks": 17, "pads": "width", "spread": "even"}
-    monkeypatch.setattr(discrete_arches, "witness", lambda *_: pd.DataFrame([row]))
+def test_stored_rows_are_called_stored_and_missing_ones_are_named(monkeypatch, engine25, step):
+    row = pd.DataFrame([{"bricks": 17, "pads": "width", "spread": "even"}])
+    monkeypatch.setattr(discrete_arches, "stored", lambda _: row)
+    monkeypatch.setattr(discrete_arches, "witness", lambda *_: row)
     assert witness_rows(engine25, [step], "some python")[1] == "asked now"
     table, source = witness_rows(engine25, [step], None)
     assert source.startswith("stored rows")
@@ -128,6 +123,7 @@ def test_stored_rows_are_called_stored_and_missing_ones_are_named(
         "17 bricks, pads thickness, corners",
         "17 bricks, pads thickness, even",
     ]
+    assert len(missing(row[:0], [step])) == 4
 
 
 def test_the_stored_witness_rows_stand_beside_the_engine_as_it_is(engine25, step):

@@ -172,17 +172,13 @@ def test_a_wrong_verdict_ends_in_does_not_hold(monkeypatch, capsys):
     monkeypatch.setattr(witnesses, "trials", lambda *, quick: few)
     monkeypatch.setattr(witnesses, "race", lambda trials, rounds: pd.DataFrame({"ratio": [9.0]}))
     monkeypatch.setattr(witnesses, "ours", lambda trial: (Verdict.STANDS, 0.0))
-    monkeypatch.setattr("sys.argv", ["witnesses", "--quick"])
-    witnesses.CLAIM.main()
+    assert witnesses.CLAIM.main(["--quick"]) == 1
     assert capsys.readouterr().out.splitlines()[-1].startswith("verdict: the claim does not hold")
 
 
 def test_a_missing_witness_is_named(monkeypatch, capsys):
     monkeypatch.setattr("experiments.harness.claim.find_spec", lambda name: None)
-    monkeypatch.setattr("sys.argv", ["witnesses", "--quick"])
-    with pytest.raises(SystemExit) as ended:
-        witnesses.CLAIM.main()
-    assert ended.value.code == 2
+    assert witnesses.CLAIM.main(["--quick"]) == 2
     assert capsys.readouterr().out == (
         'compas_cra is not installed: pip install "seqopt[witness]"\n'
     )
