@@ -419,7 +419,7 @@ def test_claims_stand_apart_from_their_parts():
     [
         ("experiments.engines.fidelity_ladder", "experiments.engines.engine_speed"),
         ("experiments.engines.fidelity_ladder", "experiments.peers.parts.chain"),
-        ("experiments.harness.runs", "experiments.peers.parts.chain"),
+        ("experiments.harness.scenes", "experiments.peers.parts.chain"),
     ],
 )
 def test_an_experiment_that_reaches_across_is_seen(a, b):

@@ -8,8 +8,9 @@ if each plan is proven optimal and keeps the postures of its arms, no other plan
 better; no robot exceeds its payload; every step stands, the wall dry, the vault with epoxy; every
 arm holds some time, and has joint values in every task but that of picking.
 
-Inputs: the generators, and the models in compas_fab. What is written: the folders of
-``docs/examples/four_arms``, each with scene, plan, tasks and film, and the picture of both.
+Inputs: the wall's generator, the stored scene of the vault, the models in compas_fab. With
+``--store`` the folders of ``docs/examples/four_arms`` are written, each with scene, plan, tasks and
+film, and the picture of both.
 Command: ``python -m experiments four_arms [--quick] [--films]``.
 """
 
@@ -25,7 +26,6 @@ from matplotlib.figure import Figure
 import seqopt
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, Options
-from experiments.harness.herringbone import VaultShape, herringbone_vault
 from experiments.harness.results import FIGURES
 from seqopt._cli.main import main
 from seqopt.arms._model import PosedArm, idle_arm
@@ -36,7 +36,7 @@ from seqopt.report._robots import Arms, Cell
 from seqopt.report._style import styled
 from seqopt.report.draw import _draw_robots, draw_bricks
 from seqopt.scene.arm import Arm
-from seqopt.scene.library import ArchForm, WallShape, arch, wall
+from seqopt.scene.library import WallShape, wall
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
@@ -44,7 +44,6 @@ from seqopt.sequence.steps import Step
 EXAMPLES = FIGURES.parent / "examples" / "four_arms"
 ABB = "compas_fab:data/robot_library/abb_irb4600_40_255/urdf/robot_description.urdf"
 PAYLOAD = 390.0  # N
-BRICK = (0.246, 0.116, 0.053)  # m; that of the vault of Bruun et al.
 FILES = ("plan.csv", "plan.json", "tasks.json", "tasks.csv")
 SHOWN = {"wall": (8, 19, 28), "vault": (12, 22, 46)}  # steps in the picture
 
@@ -71,8 +70,7 @@ def wall_scene(columns: int = 4, courses: int = 4) -> Scene:
 
 
 def vault_scene() -> Scene:
-    form = ArchForm(span=1.7, rise=0.65, bricks=13, pattern="VLR", dimensions=BRICK, gap=0.013)
-    scene = herringbone_vault(arch(form), VaultShape(bricks=21, skew=0.3))
+    scene = seqopt.load_scene(EXAMPLES / "vault" / "scene.json")
     return armed(scene, west=0.0, east=1.7, aside=1.5, tool=0.3)
 
 

@@ -39,7 +39,7 @@ from matplotlib.figure import Figure
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.results import RESULTS, drawn, stored
-from experiments.harness.runs import scene_named
+from experiments.harness.scenes import scene_named
 from seqopt import CRITERIA, FreeRules, Search, build_network, make_engine, optimize
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph.formulation import exhibits, formulations

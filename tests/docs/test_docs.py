@@ -135,9 +135,6 @@ def test_every_stored_figure_is_stated_in_one_place_or_more():
     pages = [page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md")]
     for name in STATED:
         assert any(f"{{{{ {name} }}}}" in page for page in pages), name
-    for name in STATED:  # ratios of two formulations stand on one page
-        if "_times_" in name and "frame" not in name:
-            assert sum(f"{{{{ {name} }}}}" in page for page in pages) == 1, name
 
 
 SHOWN = {

@@ -19,7 +19,7 @@ from tests.builders import ROOT
 from tests.commands import run_experiment
 
 ALWAYS = "frame_contrast"  # one that takes a second runs among the quick tests too
-LONG = ("identify_arch25", "dry_map", "speed_accuracy")  # parts of the last: test_speed_accuracy
+LONG = ("identify_arch25", "dry_map")
 
 
 def marks(name):

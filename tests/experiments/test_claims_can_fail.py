@@ -211,19 +211,9 @@ CHECKS = {
         *("unseen_robust", 2.0, {"aim": "worst-peak", "scenarios": 30}),
     ),
     "speed_accuracy": Check(
-        lambda table: all(speed_accuracy.holds(table).values()),
-        ("runs",),
-        *("total", 9.0, {"engine": "rigid bricks", "formulation": "overlap_dp"}),
-    ),
-    "speed_accuracy corner": Check(
-        lambda points: all(speed_accuracy.corner_reached(points).values()),
+        lambda points: all(speed_accuracy.holds(points).values()),
         ("speed_points",),
         *("seconds", 0.01, {"engine": "frame"}),
-    ),
-    "speed_accuracy free": Check(
-        lambda ratios: all(speed_accuracy.free_pays(ratios).values()),
-        ("worst_ratios",),
-        *("worst_ratio", 1.0, {"way": "free, 3 robots"}),
     ),
     "staged_construction": Check(
         lambda *tables: all(staged_construction.holds(*tables).values()),

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import seqopt
-from experiments.harness.runs import scene_named
+from experiments.harness.scenes import scene_named
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.responses.resources import Resources

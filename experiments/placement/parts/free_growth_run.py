@@ -10,7 +10,7 @@ import sys
 import time
 
 import seqopt
-from experiments.harness.runs import scene_named
+from experiments.harness.scenes import scene_named
 from seqopt.sequence.rules import with_robots
 
 ROOM = 1.7e9  # bytes
