@@ -45,7 +45,6 @@ from seqopt.study.published import printed
 
 STUDY = printed("de_validation").set_index("bricks")["error_percent"]
 NUMBERED = [item for item in ITEMS if item.has_numbers]
-TOOLS = stored("peers")
 
 
 class Check(NamedTuple):
@@ -196,8 +195,8 @@ CHECKS = {
         parallel.holds, ("parallel",), *("times_as_fast_by_cpu", 1.5, {"way": "two processes"})
     ),
     "peers": Check(
-        peers.judge,
-        tuple(TOOLS[TOOLS["part"] == part] for part in ("models", "placement")),
+        lambda table: all(peers.holds(table).values()),
+        ("peers",),
         *("ratio_lowest", 15.0, {"tool": "SciPy bars, banded"}),
     ),
     "replanning": Check(
