@@ -1,16 +1,21 @@
 """Extension points of the core: offers of outer rooms, found by name and loaded on demand.
 
-A room with another amount, filter or picture adds a line here. The core works without any of them.
-Plug-ins add amounts, filters, formats and pictures by entry points of the group ``seqopt.parts``,
-users by `seqopt.register`.
+A room with another amount, filter, picture or command adds a line here. The core works without any
+of them. Plug-ins add amounts, filters, formats, pictures and commands by entry points of the group
+``seqopt.parts``, users by `seqopt.register`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container
+import warnings
+from collections.abc import Callable, Container
+from dataclasses import dataclass, field
 from importlib import import_module
-from importlib.metadata import entry_points
-from typing import Any
+from typing import Any, TypeVar
+
+from seqopt.errors import PluginWarning, message_of, plugins
+
+_Kind = TypeVar("_Kind")
 
 VIEWS = {
     "Shown.html": "seqopt.report._notebook:card",
@@ -48,13 +53,91 @@ ADDED: dict[tuple[type, str], Any] = {}
 
 
 class Part:
-    """Base of what outer rooms take from packages and users by name: formats, pictures."""
+    """Base of what is taken from packages and users by name: formats, pictures, commands."""
 
     name: str
 
     def reserved(self) -> Container[str]:
         """Return names that are always there."""
         raise NotImplementedError
+
+
+@dataclass(frozen=True, repr=False)
+class Command(Part):
+    """A command of the command line: a function, whose parameters are its options.
+
+    Parameters
+    ----------
+    name : str
+        The word for it.
+    function : callable or str
+        Its docstring is the help, its annotations and defaults say how options are read. It returns
+        a text, a table or an `Answer`. ``"module:function"`` is loaded on demand.
+    about : str, optional
+        A line in the list of all commands; by default the first line of the docstring.
+
+    Examples
+    --------
+    >>> Command("weigh", lambda scene="arch25": f"{scene} weighs a lot")
+    Command('weigh')
+    """
+
+    name: str
+    function: Callable[..., Any] | str = field(compare=False)
+    about: str = field(default="", compare=False)
+
+    def __repr__(self) -> str:
+        return f"Command({self.name!r})"
+
+    def reserved(self) -> Container[str]:
+        """Return the names of the commands that are always there."""
+        return COMMANDS
+
+    @property
+    def line(self) -> str:
+        """What it is for, in a line."""
+        return self.about or (self.load().__doc__ or "").strip().partition("\n")[0]
+
+    def load(self) -> Callable[..., Any]:
+        """Return the function."""
+        if callable(self.function):
+            return self.function
+        home, name = self.function.split(":")
+        found: Callable[..., Any] = getattr(import_module(home), name)
+        return found
+
+
+COMMANDS = {
+    name: Command(name, f"seqopt._cli.commands.{home}:run", about)
+    for name, home, about in (
+        ("compare", "compare", "show all ways to build a scene side by side"),
+        ("optimize", "optimize", "choose where robots hold, and write the plan"),
+        ("replan", "replan", "plan the rest of a build after a change"),
+        ("pareto", "pareto", "find all plans that no other one beats in every aim"),
+        ("analyze", "analyze", "compute forces and displacements in every step"),
+        ("times", "times", "say how long a build takes, and who does what when"),
+        ("assess", "assess", "prove which steps stand, and with what margins"),
+        ("report", "report", "make a page that shows plans step by step"),
+        ("reach", "reach", "say which arms reach which nodes, and how"),
+        ("scene", "scene", "check, describe, export or list scenes"),
+        ("import", "importing", "make a scene of an assembly of COMPAS, a mesh or a table"),
+        ("export", "exporting", "write a plan in a format of others"),
+        ("instance", "instance", "write the graph of a problem, for any solver"),
+        ("judge", "judge", "check a bare solution of an instance, and a bound"),
+        ("completion", "completion", "let the shell complete words of seqopt"),
+    )
+}
+"""The commands that are always there, by name."""
+
+
+def every_command() -> dict[str, Command]:
+    """Return all commands by name: those that are always there, and those that are registered."""
+    return {**COMMANDS, **registered(Command)}
+
+
+def find_command(name: str) -> Command:
+    """Return a command by name; those of plug-ins are only looked for if there is no other."""
+    return COMMANDS.get(name) or registered(Command)[name]
 
 
 def offered(name: str) -> Any:
@@ -75,9 +158,14 @@ def view(kind: type, way: str) -> Any:
     return getattr(import_module(home), name)
 
 
-def registered(kind: type) -> dict[str, Any]:
+def registered(kind: type[_Kind]) -> dict[str, _Kind]:
     """Return the parts of a kind that rooms, plug-ins and users registered, by name."""
-    points = entry_points(group="seqopt.parts")
-    every = [(name, offered(name)) for name in PARTS] + [(p.name, p.load()) for p in points]
+    every = [] if issubclass(kind, Part) else [(name, offered(name)) for name in PARTS]
+    for name, entry in plugins("seqopt.parts").items():
+        try:
+            every.append((name, entry.load()))
+        except Exception as error:  # it is code of others
+            said = f"plug-in {entry.value}: {message_of(error)}; it is left out"
+            warnings.warn(said, PluginWarning, stacklevel=2)
     every += [(name, part) for (_, name), part in ADDED.items()]
     return {name: part for name, part in every if isinstance(part, kind)}

@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import pandas as pd
 
-from seqopt._cli.arguments import COMMANDS
+from seqopt._cli.answer import Answer, Result
 from seqopt._cli.commands.analyze import Analyze
 from seqopt._cli.commands.assess import Assess
 from seqopt._cli.commands.compare import Compare
@@ -32,8 +32,9 @@ from seqopt._cli.commands.replan import Replan
 from seqopt._cli.commands.report import Report
 from seqopt._cli.commands.times import Times
 from seqopt._cli.options import Asked
-from seqopt._cli.signatures import given, page_of
+from seqopt._cli.signatures import signature_of
 from seqopt._cli.watcher import Watcher
+from seqopt._registry import COMMANDS, Command
 from seqopt.graph.instance import Instance
 from seqopt.instances.answers import judge_instance as judge
 from seqopt.plan.front import Front
@@ -42,6 +43,8 @@ from seqopt.report.comparison import Comparison
 from seqopt.workflow import optimize
 
 __all__ = [
+    "Answer",
+    "Command",
     "analyze",
     "assess",
     "compare",
@@ -66,31 +69,40 @@ _T = TypeVar("_T")
 
 
 def _function(
-    asked: Callable[_P, Asked], returns: type[_T], about: str, example: str
+    asked: Callable[_P, Asked],
+    returns: type[_T],
+    about: str,
+    example: str,
+    beside: Sequence[str] = (),
 ) -> Callable[_P, _T]:
     """Return a command as a Python function; ``asked``: the class of its options.
 
-    ``about``: description of its result.
+    ``about``: description of its result; ``beside``: options that it takes, but does not show,
+    beside those for which Python has values.
     """
     name = asked.__name__.lower()
-    command = COMMANDS[name]
-    page = page_of(command.asked)
-    places = {each: number for number, each in enumerate([*page.options, "progress"])}
-    known = inspect.signature(asked).parameters.values()
-    ordered = sorted(known, key=lambda each: (each.kind, places[each.name]))
-    taken = inspect.Signature(ordered, return_annotation=returns)
+    command = signature_of(COMMANDS[name].load())
+    places = {each: number for number, each in enumerate([*command.options, "progress"])}
+    known = [each for each in inspect.signature(asked).parameters.values() if each.name in places]
+    known.sort(key=lambda each: (each.kind, places[each.name]))
+    hidden = {each.name for each in command.options.values() if each.more.get("shell")} | {*beside}
+    shown = [each for each in known if each.name not in hidden]
+    taken = inspect.Signature(known)
 
     def function(*args: _P.args, **kwargs: _P.kwargs) -> _T:
         values = taken.bind(*args, **kwargs).arguments
-        with Watcher(shows=values.get("progress") is None) as shown:
-            found: _T = _value(command.load(), given(command.asked, {"progress": shown} | values))
+        with Watcher(shows=values.get("progress") is None) as watcher:
+            found: _T = _value(command.call({"progress": watcher} | values), values.get("out"))
             return found
 
     function.__name__ = function.__qualname__ = name
-    function.__signature__ = taken  # type: ignore[attr-defined]
-    lines = [*page.lines[""], "", "Parameters", "----------"]
-    for each in ordered:
-        help_text = page.options.get(each.name, ("", "", ""))[2].partition("; ")[0]
+    function.__signature__ = inspect.Signature(shown, return_annotation=returns)  # type: ignore[attr-defined]
+    lines = [*command.lines[""], "", "Parameters", "----------"]
+    for each in shown:
+        option = command.options.get(each.name)
+        help_text = (
+            "" if option is None else option.help.replace(": {choices}", "").partition("; ")[0]
+        )
         told = OTHERWISE.get(each.name, f"{help_text[:1].upper()}{help_text[1:]}")
         told = FLAG.sub(lambda flag: f"``{flag[1].replace('-', '_')}``", told)
         needed = "" if each.default is each.empty else ", optional"
@@ -103,19 +115,16 @@ def _function(
     return function
 
 
-def _value(command: Any, asked: Any) -> Any:
-    """Return the result of a command, and write its output if requested."""
-    if not hasattr(command, "find"):
-        answer = command.run(asked)
-        found = answer.value
-        found = pd.DataFrame(found) if isinstance(found, list) else found
-        if isinstance(found, pd.DataFrame):
-            found.attrs |= {"notes": [*answer.notes], "failures": [*answer.failures]}
-        return found
-    found = command.find(asked)
-    if asked.out is not None:
-        command.answered(asked, found)
-    return getattr(found, "value", found)
+def _value(result: Any, out: object) -> Any:
+    """Return what a command found, and write its output if requested."""
+    if isinstance(result, Result):
+        if out is not None:
+            result.answer()
+        return result.value
+    found = pd.DataFrame(result.value) if isinstance(result.value, list) else result.value
+    if isinstance(found, pd.DataFrame):
+        found.attrs |= {"notes": [*result.notes], "failures": [*result.failures]}
+    return found
 
 
 compare = _function(
@@ -185,6 +194,7 @@ replan = _function(
     >>> replan(plan, at=2, lost=["rob3"], rules="least_grips=1").steps[0].number
     3
     """,
+    beside=("cache", "mortar", "stability", "curing"),
 )
 instance = _function(
     _Instance,
@@ -194,6 +204,7 @@ instance = _function(
     >>> instance("wall:columns=2,courses=2", schedule="free", aim="minmax").name
     'wall 2 x 2'
     """,
+    beside=("grips", "props", "payload", "stability", "time_limit", "curing"),
 )
 export = _function(
     Export,

@@ -15,8 +15,7 @@ import networkx as nx
 import pytest
 
 from experiments.harness.claim import modules as claims
-from seqopt._cli.arguments import COMMANDS
-from seqopt._registry import OFFERS, VIEWS
+from seqopt._registry import COMMANDS, OFFERS, VIEWS
 
 ROOT = Path(__file__).resolve().parent.parent
 pytestmark = pytest.mark.xdist_group("architecture")  # one worker reads every file, once
@@ -175,14 +174,14 @@ def hidden_arrows(files: list[Path]) -> list[str]:
     return out
 
 
-def test_rooms_are_looked_up_in_four_places_only():
+def test_rooms_are_looked_up_in_three_places_only():
     """The door opens every room, a page its own; values find what draws them.
 
     Commands are in their own room, and the start of one puts off libraries of others.
     """
-    known = ["_cli.arguments", "_cli.main", "_later", "_registry"]
+    known = ["_cli.main", "_later", "_registry"]
     assert hidden_arrows(sources("seqopt")) == ["seqopt", *(f"seqopt.{each}" for each in known)]
-    commands = {f"seqopt._cli.commands.{c.where.partition(':')[0]}" for c in COMMANDS.values()}
+    commands = {str(each.function).partition(":")[0] for each in COMMANDS.values()}
     assert commands <= set(graph("seqopt"))
     assert {room(module) for module in (*OFFERS.values(), *VIEWS.values())} <= OUTER
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from importlib.metadata import version
@@ -16,6 +16,7 @@ from seqopt.errors import (
     InfeasibleError,
     MechanismError,
     NothingFoundError,
+    ProblemError,
     SeqoptError,
     SolverError,
     TimeUpError,
@@ -97,6 +98,28 @@ class Answer:
             "exit_status": self.status,
         }
         return plain(said)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result:
+    """What a command found, for Python, and its answer, made and written where it is asked for."""
+
+    value: Any
+    answer: Callable[[], Answer]
+
+
+def answer_of(result: Any) -> Answer:
+    """Return the answer of what a command returns: an answer, a result, a table or a text."""
+    if isinstance(result, Result):
+        return result.answer()
+    if hasattr(result, "to_csv"):
+        return Answer({"rows": result}, data=result.to_csv(index=False), value=result)
+    if isinstance(result, str | None):
+        return Answer({"text": result or ""}, text=result or "", value=result)
+    if not isinstance(result, Answer):
+        said = f"it returns {type(result).__name__}; return a text, a table or an Answer"
+        raise ProblemError(f"the command cannot be answered: {said}")
+    return result
 
 
 def scene_facts(scene: Any) -> dict[str, object]:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import argparse
 import re
 from argparse import SUPPRESS
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.metadata import version
-from types import ModuleType
 from typing import Any, NoReturn
 
 from seqopt._cli.answer import Status
 from seqopt._cli.terminal import columns, complain, show
+from seqopt._registry import COMMANDS, every_command, find_command
 from seqopt.errors import did_you_mean
 
 EXAMPLES = """Three examples:
@@ -33,6 +32,7 @@ LINES = 40  # of a screen
 ALL = "--help-all"
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
+PRINTED = ("quiet", "json", "strict")  # what concerns the printed answer alone
 MISSING = "the following arguments are required"
 
 
@@ -73,47 +73,6 @@ def _first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> 
 
 def _layout(prog: str) -> argparse.HelpFormatter:
     return argparse.RawDescriptionHelpFormatter(prog, width=columns())
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Command:
-    """A command: a short description, and the class of `seqopt._cli.commands` with its options.
-
-    Its module, which has ``run`` as well, is loaded on demand.
-    """
-
-    about: str
-    where: str
-
-    def load(self) -> ModuleType:
-        """Return the module."""
-        return import_module(f"seqopt._cli.commands.{self.where.partition(':')[0]}")
-
-    @property
-    def asked(self) -> Any:
-        """The class of its options."""
-        return getattr(self.load(), self.where.partition(":")[2])
-
-
-COMMANDS = {
-    "compare": _Command("show all ways to build a scene side by side", "compare:Compare"),
-    "optimize": _Command("choose where robots hold, and write the plan", "optimize:Optimize"),
-    "replan": _Command("plan the rest of a build after a change", "replan:ReplanWords"),
-    "pareto": _Command("find all plans that no other one beats in every aim", "pareto:ParetoWords"),
-    "analyze": _Command("compute forces and displacements in every step", "analyze:Analyze"),
-    "times": _Command("say how long a build takes, and who does what when", "times:Times"),
-    "assess": _Command("prove which steps stand, and with what margins", "assess:AssessWords"),
-    "report": _Command("make a page that shows plans step by step", "report:ReportWords"),
-    "reach": _Command("say which arms reach which nodes, and how", "reach:Reach"),
-    "scene": _Command("check, describe, export or list scenes", "scene:SceneAsked"),
-    "import": _Command(
-        "make a scene of an assembly of COMPAS, a mesh or a table", "importing:Import"
-    ),
-    "export": _Command("write a plan in a format of others", "exporting:Export"),
-    "instance": _Command("write the graph of a problem, for any solver", "instance:InstanceWords"),
-    "judge": _Command("check a bare solution of an instance, and a bound", "judge:Judge"),
-    "completion": _Command("let the shell complete words of seqopt", "completion:Completion"),
-}
 
 
 class _Parser(argparse.ArgumentParser):
@@ -172,39 +131,43 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
     commands = whole.add_subparsers(
         required=True, title="commands", metavar="COMMAND", dest="command"
     )
-    for name, command in COMMANDS.items():
-        added = commands.add_parser(name, help=command.about, formatter_class=_layout)
+    for name, command in (COMMANDS if asked in COMMANDS else every_command()).items():
+        added = commands.add_parser(name, help=command.line, formatter_class=_layout)
         added.color = False
         if asked in (None, name):
-            from seqopt._cli.signatures import fill  # noqa: PLC0415  # of which help needs nothing
+            from seqopt._cli.signatures import signature_of  # noqa: PLC0415  # help needs none of it
 
             all_help = "show every option of the command, and exit"
             added.add_argument(ALL, const=_Parser.format_help, help=all_help, **how)
-            fill(added, command.asked)
+            signature_of(command.load()).fill(added)
         if asked == name:
             whole.asked, whole.spoken = name, tuple(added._option_string_actions)
     return whole
 
 
 @dataclass(frozen=True)
-class Printed:
-    """Output format of an answer, and whether violations set the exit status."""
+class Request:
+    """A command with the values of its options, and how its answer is printed."""
 
+    name: str
+    values: Mapping[str, Any]
     quiet: bool = False
     json: bool = False
     strict: bool = False
 
+    def result(self, progress: Any = None) -> Any:
+        """Run the command and return its result; ``progress``: told how far it is."""
+        from seqopt._cli.signatures import signature_of  # noqa: PLC0415  # help needs none of it
 
-def request(words: Sequence[str], tell: Any = None) -> tuple[str, Any, Printed]:
+        function = find_command(self.name).load()
+        return signature_of(function).call({**self.values, "progress": progress})
+
+
+def request(words: Sequence[str]) -> Request:
     """Parse words into a command and its options; a wrong word ends the program."""
-    options = vars(parser(named_command(words)).parse_args(words))
-    from seqopt._cli.signatures import given  # noqa: PLC0415  # of which help needs nothing
-
-    name = options.pop("command")
-    kind = COMMANDS[name].asked
-    told = {each: options.pop(each) for each in ("quiet", "json", "strict") if each in options}
-    more = {"made_by": words} if hasattr(kind, "made_by") else {}
-    return name, given(kind, options | more | {"progress": tell}), Printed(**told)
+    values = vars(parser(named_command(words)).parse_args(words))
+    printed = {name: values.pop(name) for name in PRINTED if name in values}
+    return Request(values.pop("command"), {**values, "made_by": words}, **printed)
 
 
 def first_screen(command: argparse.ArgumentParser) -> str:

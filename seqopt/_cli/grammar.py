@@ -8,7 +8,7 @@ from dataclasses import replace
 from math import radians
 from typing import Any
 
-from seqopt._cli.options import Chosen, Cured, Number, Numbers, Ranks, Tilted, Words
+from seqopt._cli.options import Chosen, Cured, Number, Numbers, Ranks, Stands, Words
 from seqopt.contact.curing import _find_curing
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
@@ -135,7 +135,7 @@ def parse_mortar(text: str | Mortar, where: str) -> Mortar:
         raise ProblemError(f"{where} {text}{hint}: {known}") from error
 
 
-def parse_standing(asked: Tilted) -> Standing | None:
+def parse_standing(asked: Stands) -> Standing | None:
     """Return the stability requirement of the options, None if there is none."""
     if isinstance(asked.stands, Standing):  # of Python
         return asked.stands

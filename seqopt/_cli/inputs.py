@@ -56,7 +56,7 @@ def is_folder(path: Path) -> bool:
     return (path / "scene.json").is_file() and (path / "plan.csv").is_file()
 
 
-def given_scene(asked: options.Scened) -> Scene:
+def given_scene(asked: options.Built) -> Scene:
     """Return the scene of the options, also from a plan or its folder."""
     scene = asked.scene
     if isinstance(scene, ShownBuild):
@@ -178,7 +178,7 @@ def find_place(text: int | str | None, name: str, scene: Scene) -> tuple[Scene, 
         raise StepError(f"--{name} {text}: {error}") from None
 
 
-def kept_place(asked: options.Posed, keep: str, scene: Scene, begin: Place) -> tuple[Scene, Place]:
+def kept_place(asked: options.Moves, keep: str, scene: Scene, begin: Place) -> tuple[Scene, Place]:
     """Return where a take-down ends by --keep, and the scene in an order that begins with these."""
     where = f"--keep {keep}"
     if asked.to is not None:
@@ -295,7 +295,7 @@ def posture_trouble(asked: options.Postures, scene: Scene) -> str:
 
 def find_prover(asked: options.Judged, network: Network) -> BuildProver:
     """Return the prover of stability, with the mortars that a command shows."""
-    demanded = grammar.parse_standing(asked) if isinstance(asked, options.Tilted) else None
+    demanded = grammar.parse_standing(asked) if isinstance(asked, options.Stands) else None
     own = getattr(asked, "stands", None) or asked.mortar or "epoxy"
     mortar = grammar.parse_mortar(own, "--mortar") if demanded is None else demanded.mortar
     name = own if isinstance(own, str) else _mortar_name(mortar)

@@ -7,13 +7,13 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from importlib import import_module
 from types import ModuleType
 
-from seqopt._cli.answer import Answer, Status, print_answer, status_of
-from seqopt._cli.arguments import COMMANDS, EXAMPLES, named_command, request
+from seqopt._cli.answer import Status, answer_of, print_answer, status_of
+from seqopt._cli.arguments import EXAMPLES, named_command, request
 from seqopt._cli.terminal import flush, quiet_numbers, show, silence
+from seqopt._registry import COMMANDS
 from seqopt.errors import SeqoptError
 
 
@@ -76,12 +76,12 @@ def _run(words: Sequence[str]) -> int:
         show(EXAMPLES)
         return Status.DONE
     try:
-        name, asked, printed = request(words)
+        asked = request(words)
     except SystemExit as stop:  # the parser has said why, or printed its help
         return int(stop.code or 0)
     from seqopt._cli.watcher import Watcher  # noqa: PLC0415  # of which help needs nothing
 
-    with quiet_numbers(quiet=printed.quiet), Watcher(shows=not printed.quiet) as tell:
-        answer: Answer = COMMANDS[name].load().run(replace(asked, progress=tell))
-    answer = answer.strictly() if printed.strict else answer
-    return print_answer(answer, name, quiet=printed.quiet, as_json=printed.json)
+    with quiet_numbers(quiet=asked.quiet), Watcher(shows=not asked.quiet) as tell:
+        answer = answer_of(asked.result(tell))
+    answer = answer.strictly() if asked.strict else answer
+    return print_answer(answer, asked.name, quiet=asked.quiet, as_json=asked.json)

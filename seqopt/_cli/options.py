@@ -1,9 +1,9 @@
-"""Options of commands: frozen values, whose docstrings are the help of the command line.
+"""Options that several commands share: frozen values that a function takes spread.
 
 A class names its question first; then every option that it has, the word for its value, and the
-help. `seqopt._cli.arguments` makes parsers of them, `seqopt.doors` functions of Python: a field is
-annotated with what these take, and is in words once `seqopt._cli.signatures.given` has read it.
-Options that are described but have no field concern the output alone.
+help. `seqopt._cli.signatures` makes parsers of them, `seqopt.doors` functions of Python: a field is
+annotated with what these take, and is in words once it was parsed. Options that are described but
+have no field concern the output alone.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ def word(default: Any = MISSING, **how: Any) -> Any:
     """Return a field of which a parser knows more: ``choices``, ``flag``, ``const``.
 
     ``const``: what it is where no value follows; ``zero``: whether a number may be zero, ``least``
-    and ``most``: bounds of a whole one; ``advice``: beside what is wrong with it. What has no
-    default must be given. The field of an argument without dashes is no keyword, so that type
-    checkers see it as functions have it.
+    and ``most``: bounds of a whole one; ``advice``: beside what is wrong with it; ``shell``:
+    whether Python has a value in its place. What has no default must be given. The field of an
+    argument without dashes is no keyword, so that type checkers see it as functions have it.
     """
     return field(metadata=how) if default is MISSING else field(default=default, metadata=how)
 
@@ -117,7 +117,7 @@ class Written(Asked):
         return None if self.out is None else Path(self.out)
 
 
-class Scened(Asked):
+class Built(Asked):
     """What is built, and by whom?
 
     scene : SCENE
@@ -127,15 +127,6 @@ class Scened(Asked):
         in which order bricks are placed, if not in the scene's own: reversed, ends (from all ground
         ends at once), sides (course by course, from both ends of each to its middle), or the names
         of all bricks, as 1..12,25..13
-    """
-
-    scene: BuiltFrom = field(default="arch25", kw_only=False, metadata={"place": True})
-    order: Bricks | None = None
-
-
-class Built(Scened):
-    """What is built, and by whom?
-
     grips : STIFFNESS
         how stiff the grips of all robots are, if not as the scene says: rigid, or N/m, as 1e6, or
         three along its axes, as 1e6x1e6x5e5; turning=N m/rad after a comma keeps held bricks from
@@ -150,6 +141,8 @@ class Built(Scened):
         as rob1=250
     """
 
+    scene: BuiltFrom = field(default="arch25", kw_only=False, metadata={"place": True})
+    order: Bricks | None = None
     grips: Number | None = None
     props: Bricks | None = None
     payload: float | Numbers = ()
@@ -204,21 +197,13 @@ class Fixed(Written, Postures, Team, Built):
     plan: ShownBuild | File | None = None
 
 
-class Judging(Asked):
+class Ranks(Asked):
     """What counts as best?
 
     criterion : NAME
         what a step costs: equations-2-3 (of Bruun et al.), worst-ratio (over the least worst of
         fixed methods), or responses to rank with weights, as T_max,M_sup=2,F_move; all names:
         {criteria} (default: equations-2-3; with --aim, --stands or --schedule free worst-ratio)
-    """
-
-    criterion: Criterion | str | None = word(None, flag="--criteria")
-
-
-class Ranks(Judging):
-    """What counts as best?
-
     crown : BRICKS
         for criteria of ranks: how many bricks are placed at the crown of an arch, or none (default:
         derived from the scene)
@@ -227,8 +212,9 @@ class Ranks(Judging):
         together, or only the pairs with the node chosen before (default: pairs)
     """
 
-    crown: Number | None = None
-    ranked: str | None = word(None, choices=[each.value for each in Ranked])
+    criterion: Criterion | str | None = word(None, flag="--criteria")
+    crown: Number | None = word(None, shell=True)
+    ranked: str | None = word(None, choices=[each.value for each in Ranked], shell=True)
 
 
 class Stands(Asked):
@@ -236,25 +222,18 @@ class Stands(Asked):
 
     stands : MORTAR
         every state must be proven to stand, robots within payload: dry, epoxy or bond=STRENGTH (Pa)
-    """
-
-    stands: Stability | None = None
-
-
-class Tilted(Stands):
-    """What must hold?
-
     friction : F
         with --stands: coefficient of friction
     tilt : DEG
         with --stands: tilt that every state must survive
     """
 
-    friction: float | None = word(None, zero=True)
-    tilt: float | None = word(None, zero=True)
+    stands: Stability | None = None
+    friction: float | None = word(None, zero=True, shell=True)
+    tilt: float | None = word(None, zero=True, shell=True)
 
 
-class Cured(Tilted):
+class Cured(Stands):
     """What must hold?
 
     curing : WORDS
@@ -266,7 +245,7 @@ class Cured(Tilted):
     curing: Words = ()
 
 
-class Engined(Asked):
+class Computed(Asked):
     """How are responses computed?
 
     engine : CHOICE
@@ -274,19 +253,12 @@ class Engined(Asked):
         the same with three unknowns per brick, where all lies in a plane; frame: stiff bars, a slow
         independent check; discrete: joints that open and slip; auto: the cheapest of planar,
         compliance and discrete that is enough
-    """
-
-    engine: str | None = word(None, choices=(*ENGINES,))
-
-
-class Computed(Engined):
-    """How are responses computed?
-
     mortar : MORTAR
         what holds the joints, in verdicts and in the engines auto and discrete: epoxy, that of
         Bruun et al. (default), dry, nothing, or bond=STRENGTH (Pa)
     """
 
+    engine: str | None = word(None, choices=(*ENGINES,))
     mortar: Mortar | str | None = None
 
 
@@ -301,7 +273,7 @@ class Judged(Computed):
     stability: bool = True
 
 
-class Ruled(Asked):
+class Aimed(Asked):
     """Which steps may a build have?
 
     rules : NAME=VALUE
@@ -316,15 +288,8 @@ class Ruled(Asked):
         what no step may exceed: payload (of every robot), or RESPONSE=VALUE in SI units, as
         F_largest=300; also where no grip is open. Plans keep the linear range wherever one does:
         linear_range=any lifts that, 0.5 asks for half of it in every step
-    """
 
-    rules: Rules = word((), flag="--rule")
-    limits: Limits = word((), flag="--limit")
-
-
-class Aimed(Asked):
-    """What counts as best?
-
+    What counts as best?
     aim : NAME,NAME
         what is to be as small as possible, the most important first: minmax (the worst step), sum,
         steps, regrips, travel, makespan (time), a response, as T_max, and others; these are bond,
@@ -335,6 +300,8 @@ class Aimed(Asked):
     """
 
     aim: Words | None = None
+    rules: Rules = word((), flag="--rule")
+    limits: Limits = word((), flag="--limit")
 
 
 class Limited(Asked):
@@ -349,51 +316,16 @@ class Limited(Asked):
     time_limit: float = word(inf, zero=True)
 
 
-class Moves(Computed, Aimed, Stands, Ruled, Team, Scened):
-    """Which steps may a build have?
-
-    schedule : NAME|FILE
-        free: any robot may release, hold or place next, or a sequence with open grips: {schedules}
-        (of all robots), or a CSV file of steps; open grips are marked ? in it (default: the loop of
-        three robots, or of two where there is no third)
-    """
-
-    schedule: str | Path | None = None
-
-
-class Choice(Judging, Timed, Moves):
-    """What must hold?
-
-    budgets : BUDGET
-        cap on a total over the build, with the formulations labels, lagrangian, overlap_mip and
-        overlap_lp: travel=0.8 (of what the optimum without budgets travels), travel=3.5m,
-        steps_over:F_largest=250:10 (at most 10 steps over 250 N), robot_use:rob1=100:5 (at most 5
-        in which rob1 carries over 100 N); with --aim or --schedule free: steps=N, regrips=N,
-        travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE
-
-    Who chooses and proves, and how long?
-    formulation : NAME
-        which mathematical program chooses: {formulations} (default: overlap_dp, which is exact and
-        the fastest, labels with --budget, minimax with --robust worst-peak, scenario_search with
-        other aims over scenarios; schedule_search with --aim, --stands or --schedule free,
-        makespan_labels where a makespan counts, order_search with --order search)
-    candidates : RULE
-        look at fewer nodes per move: near:12 for those at most 12 joints from the newest bricks,
-        within:1.5 for those at most 1.5 m from them; makes any formulation a heuristic (free: of
-        grips on bricks that stand; what is proven holds among these)
-    """
-
-    budgets: Words = word((), flag="--budget")
-    formulation: str | None = None
-    candidates: str | None = None
-
-
-class Posed(Judged, Tilted, Built, Moves):
+class Moves(Judged, Aimed, Stands, Team, Built):
     """Which steps may a build have?
 
     --rule and --direction go with --schedule free alone, --keep with --direction take-down and not
     with --to.
 
+    schedule : NAME|FILE
+        free: any robot may release, hold or place next, or a sequence with open grips: {schedules}
+        (of all robots), or a CSV file of steps; open grips are marked ? in it (default: the loop of
+        three robots, or of two where there is no third)
     begin : PLAN:STEP|STATE|N
         where the build begins: after a step of a plan (its folder or CSV file); in a state of a
         JSON file (bricks that stand, by names or how many, grips by robot, ages of bricks in s
@@ -407,13 +339,14 @@ class Posed(Judged, Tilted, Built, Moves):
         with --direction take-down: bricks that stay, as 1..12
     """
 
-    begin: str | None = word(None, flag="--from")
-    to: int | str | None = None
-    direction: str | None = None
-    keep: Bricks | None = None
+    schedule: str | Path | None = None
+    begin: str | None = word(None, flag="--from", shell=True)
+    to: int | str | None = word(None, shell=True)
+    direction: str | None = word(None, shell=True)
+    keep: Bricks | None = word(None, shell=True)
 
 
-class Chosen(Ranks, Choice):
+class Chosen(Ranks, Timed, Moves):
     """In which scenarios is it good?
 
     --scenarios, --unseen, --seed and --vary go with --robust alone.
@@ -435,7 +368,24 @@ class Chosen(Ranks, Choice):
         joint, up to so many m); these are the defaults; grips=2 (of grips that are not rigid, by a
         factor up to it)
 
+    What must hold?
+    budgets : BUDGET
+        cap on a total over the build, with the formulations labels, lagrangian, overlap_mip and
+        overlap_lp: travel=0.8 (of what the optimum without budgets travels), travel=3.5m,
+        steps_over:F_largest=250:10 (at most 10 steps over 250 N), robot_use:rob1=100:5 (at most 5
+        in which rob1 carries over 100 N); with --aim or --schedule free: steps=N, regrips=N,
+        travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE
+
     Who chooses and proves, and how long?
+    formulation : NAME
+        which mathematical program chooses: {formulations} (default: overlap_dp, which is exact and
+        the fastest, labels with --budget, minimax with --robust worst-peak, scenario_search with
+        other aims over scenarios; schedule_search with --aim, --stands or --schedule free,
+        makespan_labels where a makespan counts, order_search with --order search)
+    candidates : RULE
+        look at fewer nodes per move: near:12 for those at most 12 joints from the newest bricks,
+        within:1.5 for those at most 1.5 m from them; makes any formulation a heuristic (free: of
+        grips on bricks that stand; what is proven holds among these)
     workers : N
         processes to share the work among; pays from about ten seconds (default: {default})
     cache : DIR
@@ -445,11 +395,14 @@ class Chosen(Ranks, Choice):
         of a free schedule states and moves, with a bound where it ends
     """
 
-    robust: str | None = None
-    scenarios: int | None = word(None, most=MOST)
-    unseen: int | None = word(None, most=MOST)
-    seed: int = word(0, least=0, most=MOST)
-    vary: Numbers = ()
-    workers: int = word(1, most=MOST_WORKERS)
-    cache: File | None = None
-    max_memory: str | None = None
+    robust: str | None = word(None, shell=True)
+    scenarios: int | None = word(None, most=MOST, shell=True)
+    unseen: int | None = word(None, most=MOST, shell=True)
+    seed: int = word(0, least=0, most=MOST, shell=True)
+    vary: Numbers = word((), shell=True)
+    budgets: Words = word((), flag="--budget")
+    formulation: str | None = None
+    candidates: str | None = None
+    workers: int = word(1, most=MOST_WORKERS, shell=True)
+    cache: File | None = word(None, shell=True)
+    max_memory: str | None = word(None, shell=True)

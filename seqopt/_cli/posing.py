@@ -54,7 +54,7 @@ class PosedProblem:
     unseen: Scenarios | None = None
 
 
-def pose_problem(asked: options.Posed, change: Change | None = None) -> PosedProblem:
+def pose_problem(asked: options.Moves, change: Change | None = None) -> PosedProblem:
     """Return the problem of the command ``optimize`` or ``pareto``.
 
     ``change``: applied to scene and start. Raises `ProblemError` or `StepError` that names an
@@ -107,7 +107,7 @@ def _aged(scene: Scene, begin: inputs.Place, standing: Standing | None) -> input
 
 
 def _ends(
-    asked: options.Posed, scene: Scene, standing: Standing | None, change: Change | None
+    asked: options.Moves, scene: Scene, standing: Standing | None, change: Change | None
 ) -> tuple[Scene, inputs.Place, inputs.Place, int | options.Words | None]:
     """Return scene after the changes, start, end, and participating robots of a build."""
     scene, begin = inputs.find_place(asked.begin, "from", scene)
@@ -123,7 +123,7 @@ def _ends(
     return scene, begin, end, robots
 
 
-def _require_known(asked: options.Posed, choice: options.Chosen, *, of_states: bool) -> None:
+def _require_known(asked: options.Moves, choice: options.Chosen, *, of_states: bool) -> None:
     """Raise a `ProblemError` for options that states, or candidates, do not support."""
     down, free = Direction.TAKE_DOWN.value, asked.schedule == FREE
     for name in ALONE:

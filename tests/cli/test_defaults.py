@@ -11,9 +11,9 @@ import pytest
 
 import seqopt
 from seqopt import doors
-from seqopt._cli.arguments import COMMANDS
 from seqopt._cli.main import main
-from seqopt._cli.signatures import page_of
+from seqopt._cli.signatures import signature_of
+from seqopt._registry import COMMANDS
 from seqopt.scene.scene_file import save_scene
 from seqopt.work.progress import Stage
 from tests.builders import anywhere, small_arch
@@ -154,8 +154,9 @@ def test_replan_in_python_is_the_command(capsys, arch, tmp_path):
 
 def test_every_command_has_a_function_of_python():
     """Those that describe a scene, read one or look a move up have values that do the same."""
-    assert {*doors.__all__} == COMMANDS.keys() - {"next", "scene", "import", "completion"}
-    for name in doors.__all__:
+    functions = {*doors.__all__} - {"Answer", "Command"}
+    assert functions == COMMANDS.keys() - {"scene", "import", "completion"}
+    for name in functions:
         taken = inspect.signature(getattr(doors, name)).parameters.values()
         assert all(each.kind is not each.VAR_KEYWORD for each in taken), name
         assert len(taken) <= 20, name
@@ -163,15 +164,14 @@ def test_every_command_has_a_function_of_python():
 
 def test_what_functions_take_is_written_once():
     """Names, types and defaults are those of what a command is asked, and so are descriptions."""
-    for name in {*doors.__all__} - {"judge", "optimize"}:
-        kind = COMMANDS[name].asked
-        described, known = page_of(kind).options, inspect.signature(kind).parameters
+    for name in {*doors.__all__} - {"judge", "optimize", "Answer", "Command"}:
+        known = signature_of(COMMANDS[name].load()).options
         for each in inspect.signature(getattr(doors, name)).parameters.values():
-            assert (each.annotation, each.default) == (
-                known[each.name].annotation,
-                known[each.name].default,
-            )
-            assert each.name in described or each.name == "progress", (name, each.name)
+            if each.name != "progress":
+                option = known[each.name]
+                assert each.annotation == option.kind
+                assert each.default in (option.default, inspect.Parameter.empty)
+                assert not option.more.get("shell"), (name, each.name)
 
 
 def test_a_page_of_a_plan_is_named_by_its_scene(arch, tmp_path, monkeypatch):

@@ -12,8 +12,9 @@ import pytest
 
 import seqopt
 from seqopt._cli import outputs
+from seqopt._cli.answer import answer_of
 from seqopt._cli.arguments import request
-from seqopt._cli.commands import analyze, optimize, pareto, replan
+from seqopt._cli.commands import analyze, replan
 from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
 from seqopt.graph.formulation import End
@@ -29,7 +30,7 @@ FREE = ("optimize", WALL, "--schedule", "free", "--aim", "minmax,steps")
 LOOP = ("optimize", WALL, "--formulation", "overlap_dp")
 
 
-def ended(command, words, when, how=KeyboardInterrupt):
+def ended(words, when, how=KeyboardInterrupt):
     """Run a command that is ended as it says that it begins with something; return its answer.
 
     As ``how``: an interrupt, or the end of the time, which comes between two instructions too.
@@ -41,8 +42,7 @@ def ended(command, words, when, how=KeyboardInterrupt):
         if when in told[-1] and sum(when in each for each in told) == 1:
             raise how
 
-    _, asked, _ = request([*map(str, words)], tell)
-    answer = command.run(asked)
+    answer = answer_of(request([*map(str, words)]).result(tell))
     assert any(when in each for each in told)
     return answer
 
@@ -52,7 +52,7 @@ def ended(command, words, when, how=KeyboardInterrupt):
 def test_verdicts_that_are_ended_are_left_out(tmp_path, capsys, monkeypatch, words, how, status):
     monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
     out = tmp_path / "out"
-    answer = ended(optimize, [*words, "--out", out], "proving what stands", how)
+    answer = ended([*words, "--out", out], "proving what stands", how)
     assert answer.status == status
     why = "interrupted" if status else "time is over"
     assert f"stability: not proven; {why}" in answer.notes
@@ -171,7 +171,7 @@ def test_a_pareto_set_that_is_ended_has_its_points(tmp_path, monkeypatch, how, s
     monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
     words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
     out = tmp_path / "out"
-    answer = ended(pareto, [*words, "--out", out], "drawing and writing the page", how)
+    answer = ended([*words, "--out", out], "drawing and writing the page", how)
     assert answer.status == status
     assert {p.name for p in out.iterdir()} == {
         *("pareto.csv", "plans.csv", "summary.json", "scene.json")
@@ -183,12 +183,12 @@ def test_a_pareto_set_that_is_ended_has_its_points(tmp_path, monkeypatch, how, s
 
 def test_an_interrupted_search_of_a_pareto_set_has_the_status_of_interrupts():
     words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
-    answer = ended(pareto, words, "1 plans found")
+    answer = ended(words, "1 plans found")
     assert answer.status == 130
     assert not answer.facts["complete"]
     assert len(answer.facts["points"]) == 1
     with pytest.raises(KeyboardInterrupt):  # nothing is there that could be lost
-        ended(pareto, words, "0 plans found")
+        ended(words, "0 plans found")
 
 
 def test_a_pareto_set_whose_proof_is_ended_is_not_complete(monkeypatch):

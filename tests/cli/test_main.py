@@ -15,7 +15,6 @@ import pandas as pd
 import pytest
 
 from seqopt._cli.arguments import request
-from seqopt._cli.commands import analyze as analyze_command
 from seqopt._cli.main import main
 from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import save_scene
@@ -141,8 +140,7 @@ def ends_in_step(number, how=TimeoutError):
 def test_a_time_limit_of_analyze_leaves_the_rows_so_far(tmp_path):
     path, fields = tmp_path / "rows.csv", tmp_path / "fields.npz"
     words = ["analyze", "--method", "cantilever", "--out", str(path), "--fields", str(fields)]
-    _, asked, _ = request([*words, "--time-limit", "1e9"], ends_in_step(4))
-    answer = analyze_command.run(asked)
+    answer = request([*words, "--time-limit", "1e9"]).result(ends_in_step(4))
     assert answer.status == 4
     assert answer.failures == (
         "seqopt: error: --time-limit 1e+09: 3 of 49 steps computed; give more seconds",
@@ -158,8 +156,7 @@ def test_an_interrupt_of_analyze_leaves_the_rows_so_far(tmp_path):
     path = tmp_path / "rows.csv"
     words = ["analyze", "wall:columns=2,courses=2", "--method", "sequential", "--out", str(path)]
     tell = ends_in_step(3, KeyboardInterrupt)
-    _, asked, _ = request([*words, "--engine", "auto", "--mortar", "dry"], tell)
-    answer = analyze_command.run(asked)
+    answer = request([*words, "--engine", "auto", "--mortar", "dry"]).result(tell)
     assert answer.status == 130
     (said,) = answer.failures
     assert said.startswith("seqopt: interrupted; 2 of ")

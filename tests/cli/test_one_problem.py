@@ -8,7 +8,13 @@ import seqopt
 from seqopt._cli import posing
 from seqopt._cli.commands.optimize import Optimize
 from seqopt._cli.posing import pose_problem
-from seqopt._cli.signatures import given
+from seqopt._cli.signatures import signature_of
+
+
+def posed(asked: Optimize):
+    """Return the problem of the options of optimize."""
+    return pose_problem(asked).problem
+
 
 FREE, SCENE = {"schedule": "free"}, "chain:bricks=7"
 QUESTIONS = [
@@ -25,7 +31,7 @@ QUESTIONS = [
 
 @pytest.mark.parametrize("words", QUESTIONS, ids=str)
 def test_both_pose_the_same_problem(words):
-    asked = pose_problem(given(Optimize, {"scene": SCENE, **words})).problem
+    asked = signature_of(posed).call({"scene": SCENE, **words})
     values = {**words, "robots": words["robots"].split(",")} if "robots" in words else words
     found = seqopt.optimize(SCENE, **values).problem
     assert repr(asked) == repr(found)
@@ -34,9 +40,9 @@ def test_both_pose_the_same_problem(words):
 
 
 def test_another_question_is_another_problem():
-    asked = [pose_problem(given(Optimize, {"scene": SCENE, **each})) for each in (FREE, {})]
-    assert asked[0].problem.criterion != asked[1].problem.criterion
-    assert asked[0].problem.goals != asked[1].problem.goals
+    asked = [signature_of(posed).call({"scene": SCENE, **each}) for each in (FREE, {})]
+    assert asked[0].criterion != asked[1].criterion
+    assert asked[0].goals != asked[1].goals
 
 
 def test_the_command_line_leaves_posing_to_what_python_calls():

@@ -6,7 +6,8 @@ import argparse
 
 import pytest
 
-from seqopt._cli.arguments import COMMANDS, parser
+from seqopt._cli.arguments import parser
+from seqopt._registry import COMMANDS
 from seqopt.scene.scene_file import save_scene
 from tests.builders import small_arch
 from tests.commands import command

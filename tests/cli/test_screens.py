@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from seqopt._cli import arguments
-from seqopt._cli.arguments import COMMANDS, LINES, first_screen, parser
+from seqopt._cli.arguments import LINES, first_screen, parser
 from seqopt._cli.main import main
 from seqopt._cli.options import Asked, word
-from seqopt._cli.signatures import fill, given, page_of
+from seqopt._cli.signatures import signature_of
+from seqopt._registry import COMMANDS
 from seqopt.errors import ProblemError
 
 WRITTEN = "What is written and printed?"
@@ -56,7 +57,7 @@ def test_help_fits_one_screen_and_shows_examples(printed, name):
     assert max(map(len, out.splitlines())) <= 80
     assert all(text.count("(") == text.count(")") for text in out.split("\n\n"))
     if name:
-        for example in page_of(COMMANDS[name].asked).lines["Examples"]:
+        for example in signature_of(COMMANDS[name].load()).lines["Examples"]:
             assert f"\n  {example}\n" in out
 
 
@@ -83,7 +84,7 @@ def test_the_screen_has_what_must_be_given_and_what_examples_use(printed, name):
             assert action.option_strings[0] in shown
     used = {
         word
-        for example in page_of(COMMANDS[name].asked).lines["Examples"]
+        for example in signature_of(COMMANDS[name].load()).lines["Examples"]
         for word in example.split()
     }
     assert {word for word in used if word in flags(command)} <= {*shown}
@@ -117,7 +118,7 @@ class Reasoned(Asked):
     often: tuple[str, ...] = ()
 
 
-class Excused(Reasoned):
+def excuse(reasoned: Reasoned, *, loud: bool = False, excuse: Path | None = None):
     """Give an excuse.
 
     How?
@@ -132,16 +133,14 @@ class Excused(Reasoned):
     --------
     seqopt excuse --loud
     """
-
-    loud: bool = False
-    excuse: Path | None = None
+    return reasoned, loud, excuse
 
 
 @pytest.fixture
 def excused():
-    """The parser of a command that is made of classes."""
+    """The parser of a command that takes values spread, and others."""
     command = argparse.ArgumentParser()
-    fill(command, Excused)
+    signature_of(excuse).fill(command)
     return command
 
 
@@ -172,22 +171,23 @@ def test_fields_say_how_options_are_read(excused, capsys):
 
 
 def test_values_of_python_are_the_same_words():
-    found = given(Excused, {"needed": "a", "often": 2, "excuse": "x", "reason": [1, 2.5]})
-    assert (found.often, found.excuse, found.reason) == (("2",), Path("x"), "1,2.5")
-    assert given(Excused, {"needed": "a", "often": [1, 2]}).often == ("1", "2")
+    call = signature_of(excuse).call
+    found, _, path = call({"needed": "a", "often": 2, "excuse": "x", "reason": [1, 2.5]})
+    assert (found.often, path, found.reason) == (("2",), Path("x"), "1,2.5")
+    assert call({"needed": "a", "often": [1, 2]})[0].often == ("1", "2")
     with pytest.raises(ProblemError, match=r"^needed 'c' does not exist; give a, b$"):
-        given(Excused, {"needed": "c"})
+        call({"needed": "c"})
 
 
 def test_numbers_are_read_where_they_are_given():
     """In words and in Python, at once: no command meets one that is wrong."""
-    kind = COMMANDS["assess"].asked
+    options = signature_of(COMMANDS["assess"].load()).options
     for words in ({"workers": "2", "friction": "0"}, {"workers": 2, "friction": 0.0}):
-        found = given(kind, words)
-        assert (found.workers, found.friction) == (2, 0.0)
+        found = [options[name].parse(value) for name, value in words.items()]
+        assert found == [2, 0.0]
     for wrong in ({"workers": 0}, {"workers": "two"}, {"friction": "x"}, {"cohesion": -1}):
         with pytest.raises(ProblemError, match=r"^--(workers|friction|cohesion)"):
-            given(kind, wrong)
+            [options[name].parse(value) for name, value in wrong.items()]
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,7 @@ class Ends:
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(0.1)
 
-def wait(options):
+def wait():
     Ends()
     time.sleep(20)
 
@@ -133,7 +133,7 @@ sys.exit(run())
     ],
 )
 def test_what_ends_a_command_is_one_line(capsys, monkeypatch, error, status, said):
-    def fails(options):
+    def fails():
         raise error
 
     monkeypatch.setattr("seqopt._cli.commands.scene.run", fails)
@@ -150,10 +150,10 @@ import sys
 import seqopt._cli.commands.judge
 from seqopt.__main__ import run
 
-def fails(options):
+def fails(path):
     raise KeyError(chr(27) + "[2J")
 
-seqopt._cli.commands.judge.run = fails
+seqopt._cli.commands.judge.read_instance = fails
 sys.argv = ["seqopt", "judge", "a", "b"]
 sys.exit(run())
 """

@@ -9,10 +9,11 @@ import sys
 import pytest
 
 import seqopt
-from seqopt._cli.arguments import COMMANDS, EXAMPLES, parser
+from seqopt._cli.arguments import EXAMPLES, parser
 from seqopt._cli.commands.completion import _commands
 from seqopt._cli.main import main
-from seqopt._cli.signatures import page_of
+from seqopt._cli.signatures import signature_of
+from seqopt._registry import COMMANDS
 from tests.builders import ROOT
 
 
@@ -97,7 +98,7 @@ def test_a_missing_argument_is_named_where_nothing_is_mistyped(capsys):
 
 def test_every_example_of_help_can_be_parsed():
     for name, command in COMMANDS.items():
-        examples = page_of(command.asked).lines["Examples"]
+        examples = signature_of(command.load()).lines["Examples"]
         assert len(examples) >= 1
         for example in examples:
             if name != "completion":  # whose examples are lines of a shell

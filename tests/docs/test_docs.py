@@ -12,7 +12,7 @@ import pytest
 
 from experiments.harness.results import RESULTS, markdown, stored, two
 from experiments.placement.formulations import CUT, QUESTIONS
-from seqopt._cli.arguments import COMMANDS
+from seqopt._registry import COMMANDS
 from seqopt.graph.formulation import exhibits, formulations
 from tests.browser import PLAIN, browsed, browses
 from tests.builders import ROOT

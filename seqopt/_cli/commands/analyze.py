@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -48,17 +48,8 @@ UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 
 class Analyze(options.Strict, options.Computed, options.Fixed):
-    """Compute how the structure responds in every step of one sequence, and write a table.
+    """How are responses computed?
 
-    It has the columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in
-    0.001 mm.
-
-    Usage
-    [SCENE] [--method NAME] [--out FILE] [other options]
-    [SCENE] --plan FILE [--out FILE] [other options]
-    PLAN_DIR [--out FILE] [other options]
-
-    How are responses computed?
     tolerance : LENGTH
         also find how far every grip may be from where it should be before a robot carries more than
         its payload, in the worst direction: a column tolerance_mm; of a length, such as 0.4mm, also
@@ -72,12 +63,6 @@ class Analyze(options.Strict, options.Computed, options.Fixed):
     time_limit : SECONDS
         limit of the whole command, with what is said of the steps: those that were computed by then
         are written, and what there was no time for is named
-
-    Examples
-    --------
-    seqopt analyze arch25 --method cantilever --out cantilever.csv
-    seqopt analyze my.json --plan plan.csv --out responses.csv
-    seqopt analyze arch25 --method sequential --json
     """
 
     tolerance: str | None = options.word(None, const="")
@@ -86,7 +71,22 @@ class Analyze(options.Strict, options.Computed, options.Fixed):
 
 
 def run(asked: Analyze) -> Answer:
-    """Analyze every step of a sequence."""
+    """Compute how the structure responds in every step of one sequence, and write a table.
+
+    It has the columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in
+    0.001 mm.
+
+    Usage
+    [SCENE] [--method NAME] [--out FILE] [other options]
+    [SCENE] --plan FILE [--out FILE] [other options]
+    PLAN_DIR [--out FILE] [other options]
+
+    Examples
+    --------
+    seqopt analyze arch25 --method cantilever --out cantilever.csv
+    seqopt analyze my.json --plan plan.csv --out responses.csv
+    seqopt analyze arch25 --method sequential --json
+    """
     archived = None if asked.fields is None else Path(asked.fields)
     outputs.keep_apart(asked, asked.path, archived)
     clock, faults = Clock(asked.time_limit), dict[int, SeqoptError]()
@@ -95,36 +95,52 @@ def run(asked: Analyze) -> Answer:
         find_postures(scene, asked.cache, asked.tell)
         network = build_network(scene)
         engine, named = inputs.find_engine(asked, network), inputs.find_steps(asked, network)
-    network, within, steps = engine.network, LinearRange(engine), named.steps
-    solved = _solved(engine, _in_time(_step_answers(asked, within, steps), clock), faults)
+    within, steps = LinearRange(engine), named.steps
+    solved = _solved(within, steps, asked, clock, faults)
     answers = solved if archived is None else list(solved)
-    table = response_table(network, answers)
+    table = response_table(engine.network, answers)
     reached = len(table) + len(faults)
     late, ended = _late(asked, reached, len(steps), engine, clock)
     failures, status = (*_faults_said(faults, reached), *late), _status_of(faults, ended)
-    answer = Answer({}, scene=scene, notes=named.notes, failures=failures, status=status)
+    computed, off = [s for s in steps[:reached] if s.number not in faults], tuple[str, ...]()
+    if computed and asked.tolerance is not None:
+        tolerances = partial(_with_tolerances, asked.tolerance, engine, computed, table)
+        table, off = clock.spare("tolerances", tolerances, (table, off))
+    whole = _with_faults(scene, table, steps, faults) if faults or table.empty else table
+    said = outputs.put_table(asked.path, whole, _counted(whole, faults)) if len(whole) else {}
+    answer = Answer({"steps": whole}, scene=scene, value=whole, **said)
+    notes = (*named.notes, *off)
+    answer = replace(answer, notes=notes, failures=failures, status=status)
     if table.empty:
-        none = _with_faults(scene, table, steps, faults)
-        said = outputs.put_table(asked.path, none, _counted(none, faults)) if faults else {}
-        return replace(answer, facts={"steps": none}, value=none, **said)
-    computed = [step for step in steps[:reached] if step.number not in faults]
-    tolerances = partial(_with_tolerances, asked, engine, computed, table)
-    table, off = clock.spare("tolerances", tolerances, (table, tuple[str, ...]()))
+        return answer
+    if archived is not None:
+        write_bytes(archived, archive(engine.network, answers))
+        answer = replace(answer, written=(*answer.written, archived))
+    return _explained(asked, answer, within, steps, table, clock)
+
+
+def _explained(
+    asked: Analyze,
+    answer: Answer,
+    within: LinearRange,
+    steps: Sequence[Step],
+    table: pd.DataFrame,
+    clock: Clock,
+) -> Answer:
+    """Return an answer with what there is time to say of the steps that were computed."""
+    engine, scene = within.engine, answer.scene
     departures = partial(within.departures, table)
     outside: tuple[Departure, ...] = clock.spare(RANGE, departures, ())
-    whole = _with_faults(scene, table, steps, faults) if faults else table
-    said = outputs.put_table(asked.path, whole, _counted(whole, faults))
-    if archived is not None:
-        write_bytes(archived, archive(network, answers))
-        said["written"] = (*said.get("written", ()), archived)
     found = partial(what_was_enough, within, {"": table})
     enough = clock.spare("which model is enough", found, None)
-    facts = {"units": UNITS, "steps": whole, **provenance(engine)}
+    facts = {"units": UNITS, **answer.facts, **provenance(engine)}
     facts |= {"enough": None if enough is None else enough.facts()}
-    notes = (*named.notes, *off, *_notes(asked, within, steps, table, enough))
-    answer = replace(answer, facts=facts, value=whole, notes=notes, **said)
-    answer = remarks.in_time(answer, clock, INTERRUPTED)
-    over, cannot = remarks.exceeded(scene, table), arm_faults(scene, computed)
+    notes = (*answer.notes, *_notes(asked, within, steps, table, enough))
+    answer = remarks.in_time(replace(answer, facts=facts, notes=notes), clock, INTERRUPTED)
+    over, cannot = (
+        remarks.exceeded(scene, table),
+        arm_faults(scene, [s for s in steps if s.number in {*table["step"]}]),
+    )
     return remarks.held_to(answer, over, outside, unreached=cannot)
 
 
@@ -146,14 +162,34 @@ def _notes(
 
 
 def _solved(
-    engine: Engine, answers: Iterable[_Answered], faults: dict[int, SeqoptError]
+    within: LinearRange,
+    steps: Sequence[Step],
+    asked: Analyze,
+    clock: Clock,
+    faults: dict[int, SeqoptError],
 ) -> Iterator[tuple[Step, Fields]]:
-    """Yield solved steps with fields; errors of the others go to ``faults``, by step number."""
-    for step, found in answers:
-        if isinstance(found, Fields):
-            yield step, found
+    """Yield solved steps with fields until the time limit or an interrupt.
+
+    Errors of the others go to ``faults``, by step number.
+    """
+    told = with_progress("steps", steps, asked.tell)
+    while True:
+        try:
+            with ending(clock.left):
+                step = next(told, None)
+                if step is None:
+                    return
+                fields = within.seen(step, step_fields(within.engine, step, Want.ALL))
+        except TimeoutError:
+            return
+        except KeyboardInterrupt:
+            clock.interrupted = True
+            return
+        except (MechanismError, SolverError) as error:
+            assert step is not None
+            faults[step.number] = _fault(within.engine, step, error)
         else:
-            faults[step.number] = _fault(engine, step, found)
+            yield step, fields
 
 
 def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:
@@ -207,18 +243,16 @@ def _status_of(faults: Mapping[int, SeqoptError], ended: Status) -> Status:
 
 
 def _with_tolerances(
-    asked: Analyze, engine: Engine, steps: Sequence[Step], table: pd.DataFrame
+    length: str, engine: Engine, steps: Sequence[Step], table: pd.DataFrame
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Return a table with the tolerances of grips that --tolerance requests, and notes on them."""
-    if asked.tolerance is None:
-        return table, ()
+    """Return a table with tolerances of grips, and a note; ``length``: how far off they may be."""
     table = with_tolerances(engine, steps, table)
     off, numbers = 1e-3 * table[COLUMN].to_numpy(float), table["step"].astype(int)
     at = int(off.argmin())
     said = f"tolerance: grips may be {length_text(float(off[at]))} off (step {numbers.iloc[at]})"
-    if not asked.tolerance:
+    if not length:
         return table, (said,)
-    wanted = length_word(asked.tolerance, f"--tolerance {asked.tolerance}")
+    wanted = length_word(length, f"--tolerance {length}")
     short = numbers[off < wanted].tolist()
     if not short:
         return table, (f"{said}, no less than {length_text(wanted)}",)
@@ -243,37 +277,3 @@ def _late(
         return (f"seqopt: interrupted; {so_far}",), Status.INTERRUPTED
     said = f"seqopt: error: --time-limit {asked.time_limit:g}: {so_far}; give more seconds"
     return (said,), Status.FAILED
-
-
-_Answered = tuple[Step, Fields | SeqoptError]
-
-
-def _step_answers(
-    asked: Analyze, within: LinearRange, steps: Sequence[Step]
-) -> Iterator[_Answered]:
-    """Return steps with fields or errors."""
-    each, engine = with_progress("steps", steps, asked.tell), within.engine
-
-    def answer(step: Step) -> Fields | SeqoptError:
-        try:
-            return within.seen(step, step_fields(engine, step, Want.ALL))
-        except (MechanismError, SolverError) as error:
-            return error
-
-    return ((step, answer(step)) for step in each)
-
-
-def _in_time(answers: Iterator[_Answered], clock: Clock) -> Iterator[_Answered]:
-    """Yield answers until the time limit or an interrupt."""
-    while True:
-        try:
-            with ending(clock.left):
-                answer = next(answers, None)
-        except TimeoutError:
-            return
-        except KeyboardInterrupt:
-            clock.interrupted = True
-            return
-        if answer is None:
-            return
-        yield answer

@@ -24,9 +24,17 @@ from seqopt.work.progress import with_progress
 class Assess(options.Fixed):
     """What must hold?
 
+    With --map, --holds says what is in the joints.
+
     mortar : MORTAR
         what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing), or
         bond=STRENGTH (Pa) (default: dry, then epoxy, which alone decides the exit status)
+    friction : F
+        coefficient of friction, in place of the mortar's own
+    tensile_strength : PA
+        what a joint holds in tension, Pa, in place of the mortar's own
+    cohesion : PA
+        what a joint holds in shear without any pressure, Pa, in place of the mortar's own
 
     What is asked beside verdicts?
     Either --margins with --steps, or --map with --holds.
@@ -61,9 +69,12 @@ class Assess(options.Fixed):
     map: str | None = None
     holds: options.Words | None = None
     workers: int = options.word(1, most=options.MOST_WORKERS)
+    friction: float | None = options.word(None, zero=True, shell=True)
+    tensile_strength: float | None = options.word(None, zero=True, shell=True)
+    cohesion: float | None = options.word(None, zero=True, shell=True)
 
 
-class AssessWords(Assess):
+def run(asked: Assess) -> Answer:
     """Prove of every step of a sequence that it stands, or that it does not.
 
     Bricks are rigid, and their joints may open and slide. Say which brick and joint fail first; on
@@ -75,16 +86,6 @@ class AssessWords(Assess):
     PLAN_DIR [--out FILE] [other options]
     [SCENE] --map AXIS [--out DIR] [other options]
 
-    What must hold?
-    With --map, --holds says what is in the joints.
-
-    friction : F
-        coefficient of friction, in place of the mortar's own
-    tensile_strength : PA
-        what a joint holds in tension, Pa, in place of the mortar's own
-    cohesion : PA
-        what a joint holds in shear without any pressure, Pa, in place of the mortar's own
-
     Examples
     --------
     seqopt assess arch25 --method cantilever --out stands.csv
@@ -92,14 +93,6 @@ class AssessWords(Assess):
     seqopt assess arch25 --method sequential --steps 40:49
     seqopt assess arch:span=2,rise=0.8 --map friction --out map
     """
-
-    friction: float | None = options.word(None, zero=True)
-    tensile_strength: float | None = options.word(None, zero=True)
-    cohesion: float | None = options.word(None, zero=True)
-
-
-def run(asked: AssessWords) -> Answer:
-    """Assess every step of a sequence, or map builds; write tables for any verdict."""
     if asked.map is not None:
         from seqopt._cli.commands.mapping import answer_map  # noqa: PLC0415  # for maps only
 
@@ -117,33 +110,32 @@ def run(asked: AssessWords) -> Answer:
             raise
         total = len(mortars) * len(steps)
         early = (f"seqopt: interrupted; {len(rows)} of {total} verdicts were found",)
+    notes = (*taken, *remarks.settlement_notes(scene), *remarks.carrying_notes(scene, steps))
+    answer = replace(_answer(asked, mortars, rows), scene=scene, notes=notes)
+    if not early:
+        return answer
+    return replace(answer, failures=(*answer.failures, *early), status=Status.INTERRUPTED)
+
+
+def _answer(asked: Assess, mortars: Mapping[str, Mortar], rows: Sequence[dict[str, Any]]) -> Answer:
+    """Write the verdicts, a row each, and return their answer."""
     each = {name: [row for row in rows if row["mortar"] == name] for name in mortars}
     lines = [f"{_with_mortar(name)}: {format_rows(own)}" for name, own in each.items() if own]
-    answer = outputs.put_table(asked.path, rows, "\n".join(lines) + ";")
     found = {name: Counter(row["verdict"] for row in own) for name, own in each.items()}
     counts = {name: {v.value: own[v.value] for v in Verdict} for name, own in found.items()}
-    undecided = [row["step"] for row in rows if row["verdict"] == Verdict.UNDECIDED.value]
-    unsure = _steps_in_words([*dict.fromkeys(undecided)])
-    said = f"{unsure}: undecided; this says nothing about them"
-    falls = counts[[*mortars][-1]][Verdict.FALLS.value]
-    status = Status.DOES_NOT_HOLD if falls else Status.DONE
-    return Answer(
-        scene=scene,
-        facts={
-            "mortar": {name: asdict(mortar) for name, mortar in mortars.items()},
-            "versions": versions,
-            "verdicts": counts,
-            "steps": rows,
-        },
-        **answer,
-        value=rows,
-        notes=(*taken, *remarks.settlement_notes(scene), *remarks.carrying_notes(scene, steps)),
-        failures=(*([f"seqopt: solver failed: {said}"] if undecided else []), *early),
-        status=Status.INTERRUPTED if early else Status.FAILED if undecided else status,
-    )
+    facts: dict[str, Any] = {"mortar": {name: asdict(mortar) for name, mortar in mortars.items()}}
+    facts |= {"versions": versions, "verdicts": counts, "steps": rows}
+    falls = counts[[*mortars][-1]][Verdict.FALLS.value]  # of the mortar that decides
+    status, failures = Status.DOES_NOT_HOLD if falls else Status.DONE, tuple[str, ...]()
+    if undecided := [row["step"] for row in rows if row["verdict"] == Verdict.UNDECIDED.value]:
+        unsure = _steps_in_words([*dict.fromkeys(undecided)])
+        failures = (f"seqopt: solver failed: {unsure}: undecided; this says nothing about them",)
+        status = Status.FAILED
+    said = outputs.put_table(asked.path, rows, "\n".join(lines) + ";")
+    return Answer(facts, **said, value=rows, failures=failures, status=status)
 
 
-def _mortars(asked: AssessWords) -> dict[str, Mortar]:
+def _mortars(asked: Assess) -> dict[str, Mortar]:
     """Return mortars by name: the one requested, or dry joints and epoxy.
 
     The last one decides the exit status. Options replace its properties, and the friction of dry
@@ -160,7 +152,7 @@ def _mortars(asked: AssessWords) -> dict[str, Mortar]:
 
 
 def _verdicts(
-    asked: AssessWords, network: Network, steps: Sequence[Step], mortars: Mapping[str, Mortar]
+    asked: Assess, network: Network, steps: Sequence[Step], mortars: Mapping[str, Mortar]
 ) -> Iterator[dict[str, Any]]:
     """Yield the rows of all steps, mortar by mortar."""
     margins, at = _margins(asked, steps)
@@ -171,7 +163,7 @@ def _verdicts(
             yield {"mortar": name, **stability_row(step, result)}
 
 
-def _margins(asked: AssessWords, steps: Sequence[Step]) -> tuple[tuple[str, ...], range]:
+def _margins(asked: Assess, steps: Sequence[Step]) -> tuple[tuple[str, ...], range]:
     """Return the requested margins, and the numbers of their steps."""
     margins = find_margins(asked.margins or ("all" if asked.steps else ()))
     if asked.steps is None:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import NamedTuple
 
 import pandas as pd
 
 from seqopt._cli import grammar, inputs, options, outputs, remarks
-from seqopt._cli.answer import Answer
+from seqopt._cli.answer import Answer, Result
 from seqopt._cli.terminal import columns, wrapped
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
@@ -36,6 +35,19 @@ class Compare(
     options.Team,
     options.Built,
 ):
+    """What is built, and by whom?
+
+    out : DIR
+        write tables, figures and a page with all builds
+    speed : SECONDS
+        also chart speed against accuracy: the loop by every engine and formulation, each within so
+        many seconds (10); errors are those beside the engine that --engine names
+    """
+
+    speed: float = options.word(0.0, const="10", advice="; give seconds, and the scene before it")
+
+
+def run(asked: Compare) -> Result:
     """Build a scene in every way that seqopt knows, on paper, and show all side by side.
 
     These are the fixed sequences, a loop of robots whose grips each formulation chooses, and the
@@ -45,13 +57,6 @@ class Compare(
     Usage
     [SCENE] [--out DIR] [other options]
 
-    What is built, and by whom?
-    out : DIR
-        write tables, figures and a page with all builds
-    speed : SECONDS
-        also chart speed against accuracy: the loop by every engine and formulation, each within so
-        many seconds (10); errors are those beside the engine that --engine names
-
     Examples
     --------
     seqopt compare
@@ -60,26 +65,6 @@ class Compare(
     seqopt compare arch25 --grips 1e6
     seqopt compare arch25 --speed 20 --out speed
     """
-
-    speed: float = options.word(0.0, const="10", advice="; give seconds, and the scene before it")
-
-
-def run(asked: Compare) -> Answer:
-    """Compare all ways to build a scene."""
-    return answered(asked, find(asked))
-
-
-class Found(NamedTuple):
-    """A comparison with its reference methods."""
-
-    engine: Engine
-    criterion: Criterion
-    prover: BuildProver
-    value: Comparison
-
-
-def find(asked: Compare) -> Found:
-    """Compare all ways to build a scene."""
     scene = inputs.find_scene(asked)
     find_postures(scene, asked.cache, asked.tell)
     engine = inputs.find_engine(asked, build_network(scene))
@@ -89,12 +74,13 @@ def find(asked: Compare) -> Found:
     prover = inputs.find_prover(asked, engine.network)
     robots = grammar.parse_robots(asked.robots)
     result = compare(engine, criterion, asked.tell, robots, prover, asked.speed)
-    return Found(engine, criterion, prover, result)
+    return Result(result, lambda: _answer(asked, engine, criterion, prover, result))
 
 
-def answered(asked: Compare, found: Found) -> Answer:
+def _answer(
+    asked: Compare, engine: Engine, criterion: Criterion, prover: BuildProver, result: Comparison
+) -> Answer:
     """Write a comparison, and return its answer."""
-    engine, criterion, prover, result = found
     scene = engine.network.scene
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
     about = {"criteria": criteria, **provenance(engine)}

@@ -10,13 +10,13 @@ import argparse
 import re
 from collections.abc import Iterable, Iterator
 from hashlib import sha256
-from typing import Any
+from typing import Any, Literal
 
 import shtab
 
-from seqopt._cli import options
 from seqopt._cli.answer import Answer
-from seqopt._cli.arguments import COMMANDS, parser
+from seqopt._cli.arguments import parser
+from seqopt._registry import every_command
 from seqopt.graph.formulation import formulation_names
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.scene.scene import ORDERS
@@ -29,7 +29,7 @@ AIMS = ("minmax", "sum", "steps", "regrips", "travel", "bond", "friction", "tilt
 SHORT = re.compile(r"[:;(]|, (?:as|if|or) ")  # where what matters of a help text ends
 
 
-class Completion(options.Asked):
+def run(shell: Literal["bash", "zsh", "fish"]) -> Answer:
     """Print a script with which the shell completes words of seqopt.
 
     It completes commands, options, files, and the names of scenes, formulations, criteria, engines,
@@ -45,14 +45,8 @@ class Completion(options.Asked):
     eval "$(seqopt completion zsh)"       in ~/.zshrc, after compinit
     seqopt completion fish > ~/.config/fish/completions/seqopt.fish
     """
-
-    shell: str = options.word(place=True, choices=("bash", "zsh", "fish"))
-
-
-def run(asked: Completion) -> Answer:
-    """Return the completion script of a shell."""
-    script = shtab.complete(_completed(parser()), asked.shell)
-    return Answer(facts={"shell": asked.shell, "script": script}, data=script + "\n")
+    script = shtab.complete(_completed(parser()), shell)
+    return Answer(facts={"shell": shell, "script": script}, data=script + "\n")
 
 
 def _completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
@@ -64,8 +58,9 @@ def _completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
     }
     folder = shtab.DIRECTORY
     paths: dict[Any, object] = {"DIR": folder, "PLAN_DIR": folder, "FILE": shtab.FILE}
+    about = {name: each.line for name, each in every_command().items()}
     for command in _commands(whole):
-        command.description = COMMANDS[command.prog.split()[-1]].about
+        command.description = about[command.prog.split()[-1]]
         for action in command._actions:
             if found := known.get(action.dest, paths.get(action.metavar)):
                 action.complete = found  # type: ignore[attr-defined]

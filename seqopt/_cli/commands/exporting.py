@@ -14,16 +14,12 @@ from seqopt.exchange.exports import export_plan, read_folder
 
 
 class Export(options.Postures, options.Written):
-    """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
+    """Which plan, and in which format?
 
-    It says which block is absent, placed or held in which step, what each robot does and where, or
-    is the assembly with its plan.
-
-    Which plan, and in which format?
     folder : PLAN_DIR|SCENE
         folder of a plan; of a scene, in its place, the usual steps are taken
     format : NAME
-        what to write: {choices} (default: {default})
+        what to write (default: {default}): {choices}
     source : FILE
         with compas_assembly: the assembly that was imported, to write the plan into
     distance : M
@@ -33,21 +29,25 @@ class Export(options.Postures, options.Written):
     What is written and printed?
     out : FILE
         file to write (default: standard output)
+    """
+
+    folder: options.BuiltFrom = field(kw_only=False, metadata={"place": True})
+    format: str = field(default="csv", kw_only=False, metadata={"choices": writable})
+    source: options.File | None = None
+    distance: float | None = None
+
+
+def run(asked: Export) -> Answer:
+    """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
+
+    It says which block is absent, placed or held in which step, what each robot does and where, or
+    is the assembly with its plan.
 
     Examples
     --------
     seqopt export best --format csv --out blocks.csv
     seqopt export best --format tasks --distance 0.15 --out tasks.json
     """
-
-    folder: options.BuiltFrom = field(kw_only=False, metadata={"place": True})
-    format: str = field(default="csv", kw_only=False, metadata={"choices": writable()})
-    source: options.File | None = None
-    distance: float | None = None
-
-
-def run(asked: Export) -> Answer:
-    """Write the plan of a folder in a format of others."""
     folder, taken = inputs.plan_folder(asked, asked.folder)
     read = [folder / name for name in ("scene.json", "plan.csv")]
     source = None if asked.source is None else Path(asked.source)

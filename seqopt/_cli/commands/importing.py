@@ -19,15 +19,8 @@ MOST_ROBOTS = 100
 
 
 class Import(options.Asked):
-    """Read an assembly of others, say what was assumed, and write it as a scene.
+    """What is read and written?
 
-    It is a file of Rhino, an assembly of COMPAS, meshes in a file or a folder, a table of boxes or
-    a frame.
-
-    Usage
-    FILE|FOLDER --out SCENE.json [--unit UNIT] [other options]
-
-    What is read and written?
     file : FILE
         what to read, or a folder of meshes with a block in each
     out : FILE
@@ -59,17 +52,11 @@ class Import(options.Asked):
         look for faces although the file has some
     accept_overlaps :
         import blocks that interpenetrate by more than faces tolerate
-
-    Examples
-    --------
-    seqopt import wall.obj --unit m --density 2400 --out wall.json
-    seqopt import boxes.csv --unit mm --supports 0,1 --out house.json
-    seqopt import blocks --unit m --density 2400 --supports 0 --out dome.json
     """
 
     file: Path = options.word(place=True)
     out: Path = options.word()
-    format: str | None = options.word(None, choices=readable())
+    format: str | None = options.word(None, choices=readable)
     name: str | None = None
     unit: str | None = options.word(None, choices=UNITS)
     up: str | None = options.word(None, choices=UPS)
@@ -83,7 +70,20 @@ class Import(options.Asked):
 
 
 def run(asked: Import) -> Answer:
-    """Read an assembly of others, and write it as a scene."""
+    """Read an assembly of others, say what was assumed, and write it as a scene.
+
+    It is a file of Rhino, an assembly of COMPAS, meshes in a file or a folder, a table of boxes or
+    a frame.
+
+    Usage
+    FILE|FOLDER --out SCENE.json [--unit UNIT] [other options]
+
+    Examples
+    --------
+    seqopt import wall.obj --unit m --density 2400 --out wall.json
+    seqopt import boxes.csv --unit mm --supports 0,1 --out house.json
+    seqopt import blocks --unit m --density 2400 --supports 0 --out dome.json
+    """
     require_apart([asked.out], [asked.file])
     asked.tell("reading the file")
     scene = import_scene(asked.file, asked.format, _given(asked))

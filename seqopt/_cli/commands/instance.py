@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import replace
 from math import inf
+from pathlib import Path
 
-from seqopt._cli import inputs, options, outputs
-from seqopt._cli.answer import Answer
+from seqopt._cli import inputs, outputs
+from seqopt._cli.answer import Answer, Result
 from seqopt._cli.commands.optimize import Optimize
 from seqopt._cli.posing import pose_problem
 from seqopt.errors import ProblemError
@@ -22,7 +22,7 @@ from seqopt.work._clock import Clock
 SAID = ("--quiet", "--json")
 
 
-class Instance(options.Written, options.Choice):
+class Instance(Optimize):
     """What is written and printed?
 
     out : FILE
@@ -37,9 +37,10 @@ class Instance(options.Written, options.Choice):
 
     name: str | None = None
     below: float = inf
+    made_by: Sequence[str] = ()  # words of the shell
 
 
-class InstanceWords(Instance, Optimize):
+def run(asked: Instance) -> Result:
     """Write the graph of a problem: its nodes and arcs, what they take, what is small and capped.
 
     Whoever reads it needs no scene. The options are those of optimize; what concerns the search
@@ -54,23 +55,6 @@ class InstanceWords(Instance, Optimize):
     seqopt instance arch25 --budget travel=0.8 --out arch25.mps
     seqopt instance chain:bricks=7 --schedule free --aim minmax,steps --out chain7
     """
-
-    made_by: Sequence[str] = ()  # words of the shell
-
-
-def run(asked: InstanceWords) -> Answer:
-    """Write the instance of a problem."""
-    if asked.path is not None:
-        return answered(asked, find(asked))
-    path = inputs.file_name(inputs.given_scene(asked).name, ".npz")
-    asked = replace(asked, out=path)
-    answer = answered(asked, find(asked))
-    note = f"file: {path}; --out names another, or a folder for every format"
-    return replace(answer, notes=(note, *answer.notes))
-
-
-def find(asked: InstanceWords) -> Graph:
-    """Return the instance of a problem, by default named after its file."""
     path = asked.path
     if path and path.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
@@ -81,22 +65,27 @@ def find(asked: InstanceWords) -> Graph:
     asked.tell("computing all that arcs take")
     aim = None if named is None else named.aim
     facts = {"made_by": _made_by(asked.made_by)} if asked.made_by else {}
-    name = asked.name or (problem.scene.name if path is None else path.stem)
+    usual = inputs.file_name(problem.scene.name, ".npz")
+    name = asked.name or (
+        path.stem if path else usual.stem if asked.made_by else problem.scene.name
+    )
     with clock.needed("writing down the graph"):
-        return compile_instance(problem, name=name, aim=aim, below=asked.below, facts=facts)
+        found = compile_instance(problem, name=name, aim=aim, below=asked.below, facts=facts)
+    return Result(found, lambda: _answer(asked, found, path or usual))
 
 
-def answered(asked: InstanceWords, found: Graph) -> Answer:
+def _answer(asked: Instance, found: Graph, path: Path) -> Answer:
     """Write an instance, to a path that is no input, and return its answer."""
-    path = asked.path
-    assert path is not None
     asked.tell("writing the instance")
     outputs.keep_apart(asked, path)
     save_instance(found, path)
     limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(found).limited)
     lines = [f"{found!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]
     lines += [f"written to {path}; seqopt judge {path} SOLUTION checks an answer"]
-    return Answer(facts=found.facts_of(), text="\n".join(lines), written=(path,))
+    notes = (
+        () if asked.path else (f"file: {path}; --out names another, or a folder for every format",)
+    )
+    return Answer(facts=found.facts_of(), text="\n".join(lines), written=(path,), notes=notes)
 
 
 def _made_by(words: Sequence[str]) -> str:

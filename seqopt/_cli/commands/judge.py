@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path
 
-from seqopt._cli import options
 from seqopt._cli.answer import Answer, Status
 from seqopt.errors import SolverError
 from seqopt.graph.instance import Instance
@@ -14,7 +14,7 @@ from seqopt.instances.answers import judge_instance
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 
-class Judge(options.Asked):
+def run(instance: Path, solution: Path, *, bound: Path | None = None) -> Answer:
     """Check a path through an instance, and bounds on all others, with arithmetic alone.
 
     No scene is needed. What is claimed without proof is called claimed. The exit status is 1 if
@@ -35,27 +35,16 @@ class Judge(options.Asked):
     seqopt judge arch25.npz mine.txt
     seqopt judge arch25.npz mine.json --bound potentials.json
     """
-
-    instance: Path = options.word(place=True)
-    solution: Path = options.word(place=True)
-    bound: Path | None = None
-
-
-def run(asked: Judge) -> Answer:
-    """Check a solution and its bounds, and return the certificate."""
-    instance = read_instance(asked.instance)
-    bounds = () if asked.bound is None else asked.bound
+    graph = read_instance(instance)
     try:
-        proof = judge_instance(instance, asked.solution, bounds)
+        proof = judge_instance(graph, solution, () if bound is None else bound)
     except SolverError as error:
-        facts = {**instance.facts_of(), "holds": False, "why": str(error)}
-        failed = f"seqopt: {asked.solution}: {error}"
-        return Answer(
-            facts=facts, text="it does not hold", failures=(failed,), status=Status.DOES_NOT_HOLD
-        )
-    names = [goal.name for goal in instance.goals]
+        facts = {**graph.facts_of(), "holds": False, "why": str(error)}
+        failed = (f"seqopt: {solution}: {error}",)
+        return Answer(facts, "it does not hold", failures=failed, status=Status.DOES_NOT_HOLD)
+    names = [goal.name for goal in graph.goals]
     facts = {
-        **instance.facts_of(),
+        **graph.facts_of(),
         "holds": True,
         "values": dict(zip(names, proof.values, strict=True)),
         "bounds": dict(zip(names, proof.bounds, strict=True)),
@@ -63,23 +52,23 @@ def run(asked: Judge) -> Answer:
         "claimed_gap": _known_gap(proof.claimed_gap),
         "spent": dict(proof.spent),
     }
-    return Answer(facts=facts, text="\n".join(_said(instance, proof)))
+    return Answer(facts, "\n".join(_lines(graph, proof)))
 
 
-def _said(instance: Instance, proof: Certificate) -> list[str]:
-    """Describe value, bound and gap, goal by goal."""
-    lines = [f"{instance.name}: the path leads from node 0 to an end"]
-    lines[0] += " within all caps" if instance.caps else ""
+def _lines(instance: Instance, proof: Certificate) -> Iterator[str]:
+    """Yield value, bound and gap, goal by goal."""
+    within = " within all caps" if instance.caps else ""
+    yield f"{instance.name}: the path leads from node 0 to an end{within}"
     caps = {cap.name: cap.most for cap in instance.caps}
-    lines += [f"  {name}: {v:.9g} of {caps[name]:.9g}" for name, v in proof.spent.items()]
+    yield from (f"  {name}: {v:.9g} of {caps[name]:.9g}" for name, v in proof.spent.items())
     for goal, value, bound in zip(instance.goals, proof.values, proof.bounds, strict=True):
         left = (value - bound) / (abs(value) or 1.0)
-        what = "no path takes less" if left <= TOLERANCE else f"gap {100 * left:.3g} %"
         if not isfinite(bound):
             said = "nothing is proven"
+        elif left <= TOLERANCE:
+            said = "proven: no path takes less"
         else:
-            said = f"proven: {what}" if left <= TOLERANCE else f"proven {bound:.9g}, {what}"
-        lines.append(f"  {goal.name}: {value:.9g}; {said}")
+            said = f"proven {bound:.9g}, gap {100 * left:.3g} %"
+        yield f"  {goal.name}: {value:.9g}; {said}"
     if proof.claimed_gap < proof.gap - TOLERANCE:
-        lines.append(f"  claimed without proof: gap {100 * _known_gap(proof.claimed_gap):.3g} %")
-    return lines
+        yield f"  claimed without proof: gap {100 * _known_gap(proof.claimed_gap):.3g} %"

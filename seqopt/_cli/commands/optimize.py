@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from seqopt._cli import grammar, inputs, options, outputs, remarks
-from seqopt._cli.answer import Answer
+from seqopt._cli.answer import Answer, Result
 from seqopt._cli.posing import Change, PosedProblem, pose_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
@@ -44,20 +44,9 @@ INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 VERDICTS, UNSEEN = "which steps stand", "its values in unseen scenarios"
 
 
-class Optimize(
-    options.Written, options.Strict, options.Limited, options.Cured, options.Chosen, options.Posed
-):
-    """Choose where robots hold, over all steps of a sequence, by one formulation.
+class Optimize(options.Written, options.Strict, options.Limited, options.Cured, options.Chosen):
+    """What counts as best?
 
-    With --schedule free, choose every step. The answer is checked from the problem's own data, and
-    plan, selection, responses, summary and a page for the browser are written.
-
-    Usage
-    [SCENE] [--formulation NAME] [--out DIR] [other options]
-    [SCENE] --schedule free [--out DIR] [other options]
-    [SCENE] --robust AIM [--out DIR] [other options]
-
-    What counts as best?
     With --aim, --stands, --order search or --schedule free states of the build are chosen:
     --ranked and criteria of ranks do not go with these.
 
@@ -84,19 +73,12 @@ class Optimize(
     tables : plan|all
         which tables are written: those of the plan, or all, with every choice of every open step
         beside: megabytes (default: plan)
-
-    Examples
-    --------
-    seqopt optimize arch25 --out best
-    seqopt optimize arch25 --schedule free --aim minmax,steps --out free
-    seqopt optimize wall:columns=4,courses=3 --schedule free --stands dry
-    seqopt optimize my.json --criteria worst-ratio --limit payload --out mine
     """
 
-    option: options.Words = ()
-    proof: bool = True
-    lazy: bool = False
-    tables: str = options.word("plan", choices=("plan", "all"))
+    option: options.Words = options.word((), shell=True)
+    proof: bool = options.word(default=True, shell=True)
+    lazy: bool = options.word(default=False, shell=True)
+    tables: str = options.word("plan", choices=("plan", "all"), shell=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -179,11 +161,26 @@ class Found:
         return out | {"unseen": {**unseen.settings, "worst": worst}}
 
 
-def run(asked: Optimize) -> Answer:
-    """Choose every open grip of a build, or every step, and write the plan."""
+def run(asked: Optimize) -> Result:
+    """Choose where robots hold, over all steps of a sequence, by one formulation.
+
+    With --schedule free, choose every step. The answer is checked from the problem's own data, and
+    plan, selection, responses, summary and a page for the browser are written.
+
+    Usage
+    [SCENE] [--formulation NAME] [--out DIR] [other options]
+    [SCENE] --schedule free [--out DIR] [other options]
+    [SCENE] --robust AIM [--out DIR] [other options]
+
+    Examples
+    --------
+    seqopt optimize arch25 --out best
+    seqopt optimize arch25 --schedule free --aim minmax,steps --out free
+    seqopt optimize wall:columns=4,courses=3 --schedule free --stands dry
+    seqopt optimize my.json --criteria worst-ratio --limit payload --out mine
+    """
     found = find(asked)
-    with found.proving():
-        return answered(asked, found)
+    return Result(found.plan, lambda: answered(asked, found))
 
 
 def find(asked: Optimize, change: Change | None = None) -> Found:
@@ -221,11 +218,14 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
 def answered(asked: Optimize, found: Found) -> Answer:
     """Write a plan, and return its answer, without the parts that exceed the time limit."""
     made: dict[str, bytes | str] = {}
-    if found.analyzed and found.summary and asked.path is not None:  # what says most comes first
-        tables = partial(outputs.plan_files, found.plan, choices=asked.tables == "all")
-        made = found.clock.spare("its tables", tables, made)
-    _ = found.verdicts, found.trial
-    return _answer(asked, found, outputs.write_outputs(asked, lambda: _files(found, made)))
+    with found.proving():
+        if (
+            found.analyzed and found.summary and asked.path is not None
+        ):  # what says most comes first
+            tables = partial(outputs.plan_files, found.plan, choices=asked.tables == "all")
+            made = found.clock.spare("its tables", tables, made)
+        _ = found.verdicts, found.trial
+        return _answer(asked, found, outputs.write_outputs(asked, lambda: _files(found, made)))
 
 
 def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes | str]:

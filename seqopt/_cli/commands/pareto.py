@@ -13,7 +13,7 @@ from pathlib import Path
 import pandas as pd
 
 from seqopt._cli import grammar, inputs, options, outputs, remarks
-from seqopt._cli.answer import Answer
+from seqopt._cli.answer import Answer, Result
 from seqopt._cli.posing import pose_problem
 from seqopt._files import csv_text, write_folder
 from seqopt._showing import PAGE
@@ -45,7 +45,7 @@ MOST_ROWS = 30  # of a table on the terminal
 FOUR = "F_largest,M_sup,T_max,D_max"
 
 
-class Pareto(options.Written, options.Judged, options.Built, options.Moves):
+class Pareto(options.Written, options.Moves):
     """Which steps may a build have?
 
     schedule : NAME|FILE
@@ -53,6 +53,13 @@ class Pareto(options.Written, options.Judged, options.Built, options.Moves):
         {schedules}, or a CSV file
 
     What counts as best?
+    --under goes with --pick.
+
+    pick : NAME
+        also write a folder, pick, of the plan with the least of a column
+    under : BOUND
+        for --pick: only plans below it, as F_largest=250 (SI units)
+
     aim : NAME,NAME
         what is to be small: responses and, of the free schedule, steps and regrips (default:
         {default})
@@ -63,44 +70,17 @@ class Pareto(options.Written, options.Judged, options.Built, options.Moves):
     seconds : S
         limit of the whole command, with its proof, verdicts and page: what it has no time for is
         left out and named; the points that were found by then are there
+
+    What must hold?
+    --friction and --tilt go with --stands.
     """
 
     schedule: str | Path | None = FREE
     aim: options.Words | None = FOUR
     rounding: options.Numbers = options.word((), flag="--round")
     seconds: float = options.word(inf, zero=True)
-
-
-class ParetoWords(Pareto, options.Posed):
-    """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
-
-    No other plan beats it in all aims at once (the Pareto set). Check each, and write a table, the
-    plans, a chart and a page for the browser.
-
-    Usage
-    [SCENE] [--out DIR] [--aim NAME,NAME] [other options]
-
-    What counts as best?
-    --under goes with --pick.
-
-    pick : NAME
-        also write a folder, pick, of the plan with the least of a column
-    under : BOUND
-        for --pick: only plans below it, as F_largest=250 (SI units)
-
-    What must hold?
-    --friction and --tilt go with --stands.
-
-    Examples
-    --------
-    seqopt pareto arch25 --out front
-    seqopt pareto arch25 --pick D_max --under F_largest=250 --out front
-    seqopt pareto arch25 --aim D_max,steps --seconds 60 --out front
-    seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front
-    """
-
-    pick: str | None = None
-    under: options.Words = ()
+    pick: str | None = options.word(None, shell=True)
+    under: options.Words = options.word((), shell=True)
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,9 +90,24 @@ class _Picked(GivenSequence):
     result: str = ""
 
 
-def run(asked: ParetoWords) -> Answer:
-    """Find all non-dominated plans, and write them."""
-    return answered(asked, find(asked))
+def run(asked: Pareto) -> Result:
+    """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
+
+    No other plan beats it in all aims at once (the Pareto set). Check each, and write a table, the
+    plans, a chart and a page for the browser.
+
+    Usage
+    [SCENE] [--out DIR] [--aim NAME,NAME] [other options]
+
+    Examples
+    --------
+    seqopt pareto arch25 --out front
+    seqopt pareto arch25 --pick D_max --under F_largest=250 --out front
+    seqopt pareto arch25 --aim D_max,steps --seconds 60 --out front
+    seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front
+    """
+    found = _find(asked)
+    return Result(found.value, lambda: _answer(asked, found))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,7 +151,7 @@ class Found:
         return {**counts, "seconds": dict(front.seconds)}
 
 
-def find(asked: ParetoWords) -> Found:
+def _find(asked: Pareto) -> Found:
     """Find all non-dominated plans."""
     outputs.require_out(asked)
     clock = Clock(asked.seconds)
@@ -170,7 +165,7 @@ def find(asked: ParetoWords) -> Found:
     return Found(problem, front, clock, partial(inputs.find_prover, asked))
 
 
-def answered(asked: ParetoWords, found: Found) -> Answer:
+def _answer(asked: Pareto, found: Found) -> Answer:
     """Write a Pareto set, and return its answer, without the parts that exceed the time limit."""
     front, free, clock = found.value, states_of(found.problem), found.clock
     scene = free.engine.network.scene
@@ -213,7 +208,7 @@ def answered(asked: ParetoWords, found: Found) -> Answer:
     return remarks.kept_range(answer, front.beyond or None)
 
 
-def _chosen(asked: ParetoWords, name: str, found: Found) -> tuple[int, dict[str, object], str]:
+def _chosen(asked: Pareto, name: str, found: Found) -> tuple[int, dict[str, object], str]:
     """Return the index of the picked plan, its point, and its description."""
     known = [str(column) for column in found.value.table.columns]
     bounds = grammar.parse_numbers("--under", asked.under, known)
@@ -257,7 +252,7 @@ def _write_picked(
     write_folder(folder, files)
 
 
-def _front_files(asked: ParetoWords, found: Found) -> dict[str, bytes | str]:
+def _front_files(asked: Pareto, found: Found) -> dict[str, bytes | str]:
     """Return the files of a Pareto set by name."""
     front, problem = found.value, found.problem
     engine, free = problem.engine, states_of(problem)

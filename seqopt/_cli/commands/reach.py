@@ -20,24 +20,24 @@ from seqopt.scene.scene import Scene
 
 
 class Reach(options.Written, options.Postures, options.Built):
+    """What is written and printed?
+
+    out : DIR
+        folder to write reach.csv, postures.csv and a picture to
+    """
+
+
+def run(asked: Reach) -> Answer:
     """Say which robots reach which nodes.
 
     Of those with arms, with how many postures, and up to how many bricks. Robots have arms in the
     scene file; the extra arms computes postures.
-
-    What is written and printed?
-    out : DIR
-        folder to write reach.csv, postures.csv and a picture to
 
     Examples
     --------
     seqopt reach my.json --out reach
     seqopt reach my.json --cache postures --json
     """
-
-
-def run(asked: Reach) -> Answer:
-    """Return the reached nodes and postures of arms, and write tables on request."""
     scene = inputs.find_scene(asked)
     outputs.require_out(asked)
     find_postures(scene, asked.cache, asked.tell)

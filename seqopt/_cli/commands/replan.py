@@ -8,17 +8,16 @@ from contextlib import suppress
 from dataclasses import field, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from seqopt._cli import inputs, options, outputs
-from seqopt._cli.answer import Answer
+from seqopt._cli.answer import Answer, Result
 from seqopt._cli.commands import optimize
 from seqopt._cli.terminal import wrapped
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
 from seqopt.exchange.exports import read_folder
 from seqopt.exchange.imports import read_measured
-from seqopt.plan.plan import Plan
 from seqopt.plan.replan import compared, without
 from seqopt.responses._tolerance import is_tolerance, values_text
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
@@ -31,14 +30,15 @@ from seqopt.study.published import CRITERIA
 
 
 class Replan(
+    options.Strict,
     options.Written,
-    options.Engined,
-    options.Aimed,
+    options.Postures,
+    options.Judged,
     options.Limited,
-    options.Judging,
-    options.Stands,
+    options.Ranks,
+    options.Cured,
     options.Timed,
-    options.Ruled,
+    options.Aimed,
 ):
     """Which plan, and where does it stand?
 
@@ -72,6 +72,9 @@ class Replan(
     What is written and printed?
     out : DIR
         folder to write the new plan to
+
+    What must hold?
+    --friction, --tilt and --curing go with --stands.
     """
 
     plan: options.BuiltFrom = field(default="arch25", kw_only=False, metadata={"place": True})
@@ -85,9 +88,7 @@ class Replan(
     to: int | str | None = None
 
 
-class ReplanWords(
-    options.Strict, options.Postures, options.Judged, options.Cured, options.Ranks, Replan
-):
+def run(asked: Replan) -> Result:
     """Plan the rest of a build from one of its steps, after something has changed.
 
     A robot is lost, carries less or is new, a brick is missing. Any robot may release, hold or
@@ -96,40 +97,12 @@ class ReplanWords(
     Usage
     PLAN_DIR [--at STEP] [changes] [--out DIR] [other options]
 
-    What must hold?
-    --friction, --tilt and --curing go with --stands.
-
     Examples
     --------
     seqopt replan free --at 12 --lost rob3 --rule least_grips=1
     seqopt replan free --at 12 --payload rob1=250 --out weaker
     seqopt replan free --at 12 --robots 4 --missing 9
     """
-
-
-def run(asked: ReplanWords) -> Answer:
-    """Plan the rest of a build, and return the changes."""
-    found = find(asked)
-    with found.new.proving():
-        return answered(asked, found)
-
-
-class Found(NamedTuple):
-    """The folder of a plan, the request to ``optimize``, and its result."""
-
-    folder: Path
-    base: optimize.Optimize
-    new: optimize.Found
-    notes: tuple[str, ...]
-
-    @property
-    def value(self) -> Plan:
-        """The plan of the rest."""
-        return self.new.plan
-
-
-def find(asked: ReplanWords) -> Found:
-    """Plan the rest of a build; return it with the request to ``optimize``."""
     for name, text in (("at", asked.at), ("robots", asked.robots or "0")):
         if not str(text).isdecimal():
             raise StepError(f"--{name} {text}: give a number")
@@ -137,7 +110,7 @@ def find(asked: ReplanWords) -> Found:
     folder, notes = inputs.plan_folder(asked, asked.plan, free=True)
     base, change = _as_optimize(asked, folder), partial(_changed, asked)
     try:
-        return Found(folder, base, optimize.find(base, change), notes)
+        new = optimize.find(base, change)
     except InfeasibleError as error:
         more, scene = "", load_scene(folder / "scene.json")
         count = max(len(scene.robots), int(asked.robots or 0)) + 1
@@ -147,10 +120,15 @@ def find(asked: ReplanWords) -> Found:
             more = f"; or with one more robot that reaches every node: {another.result}"
         raise InfeasibleError(f"{error}{more}") from None
 
+    def answer() -> Answer:
+        found = _answer(asked, folder, base, new)
+        return replace(found, notes=(*notes, *found.notes))
 
-def answered(asked: ReplanWords, found: Found) -> Answer:
+    return Result(new.plan, answer)
+
+
+def _answer(asked: Replan, folder: Path, base: optimize.Optimize, new: optimize.Found) -> Answer:
     """Write the new plan, and return its changes."""
-    folder, base, new, notes = found
     scene, steps = read_folder(folder)
     old = [step for step in steps if step.number > int(asked.at)]
 
@@ -166,7 +144,6 @@ def answered(asked: ReplanWords, found: Found) -> Answer:
 
     facts = new.clock.spare("what the new plan changes", differs, None)
     answer = optimize.answered(base, new)
-    answer = replace(answer, notes=(*notes, *answer.notes))
     if facts is None:
         return answer
     return replace(
@@ -176,7 +153,7 @@ def answered(asked: ReplanWords, found: Found) -> Answer:
     )
 
 
-def _as_optimize(asked: ReplanWords, folder: Path) -> optimize.Optimize:
+def _as_optimize(asked: Replan, folder: Path) -> optimize.Optimize:
     """Return the request to ``optimize`` that continues from the step."""
     shared = {each.name for each in fields(asked)} & {e.name for e in fields(optimize.Optimize)}
     given = {name: getattr(asked, name) for name in shared}
@@ -222,9 +199,7 @@ def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
     }
 
 
-def _changed(
-    asked: ReplanWords, scene: Scene, begin: inputs.Place
-) -> tuple[Scene, inputs.Place, str]:
+def _changed(asked: Replan, scene: Scene, begin: inputs.Place) -> tuple[Scene, inputs.Place, str]:
     """Return scene and place after the changes, and the names of participating robots."""
     assert begin.site is not None
     missing = options.listed(asked.missing)

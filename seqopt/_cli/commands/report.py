@@ -16,7 +16,7 @@ from seqopt.report._pages import folder_builds, folder_page
 from seqopt.stability._builds import BuildProver
 
 
-class Report(options.Postures, options.Judged, options.Written):
+class Report(options.Written, options.Postures, options.Judged, options.Built):
     """What is built, and by whom?
 
     folder : DIR
@@ -35,9 +35,10 @@ class Report(options.Postures, options.Judged, options.Written):
     folder: options.BuiltFrom = field(kw_only=False, metadata={"place": True})
     film: options.File | None = None
     figures: options.File | None = None
+    scene: options.BuiltFrom = options.word("arch25", place=True)
 
 
-class ReportWords(Report, options.Built):
+def run(asked: Report) -> Answer:
     """Write a page with a step viewer of the plans in a folder.
 
     It shows the structure in three dimensions, who holds what, axial forces, displacements, and
@@ -51,55 +52,43 @@ class ReportWords(Report, options.Built):
     seqopt report best --figures pictures
     seqopt report best --film build.gif
     """
-
-    scene: options.BuiltFrom = options.word("arch25", place=True)
-
-
-def run(asked: ReportWords) -> Answer:
-    """Write the page of the plans in a folder."""
     film, figures = (None if p is None else Path(p) for p in (asked.film, asked.figures))
     draws: Any = None if film is None else display(ShownBuild, "animate")
     if film is not None:
         draws.require(film)
     folder, taken = inputs.plan_folder(asked, asked.folder)
-    named = isinstance(asked.folder, str | Path)
-    own = folder / "scene.json"
-    if own.is_file():  # plans go with the scene that stands beside them
-        asked = replace(asked, scene=own)
+    if (folder / "scene.json").is_file():  # plans go with the scene that stands beside them
+        asked = replace(asked, scene=folder / "scene.json")
     scene = inputs.find_scene(asked)
-    path = asked.path
-    if path is None and named and folder == Path(str(asked.folder)):
-        path = folder / PAGE
-    elif path is None:
-        path = inputs.file_name(str(asked.folder) if named else scene.name, ".html")
+    path = asked.path or _page(asked, folder, scene.name)
     outputs.keep_apart(asked, path, film)
-    written: tuple[Path, ...] = (path,)
     if figures is not None:
         require_folder(figures)
-        written += () if outputs.figure_notes() else (figures,)
     trouble = inputs.posture_trouble(asked, scene)
     asked.tell("analyzing plans and writing the page")
     engine = inputs.find_engine(asked, build_network(scene))
     prover = inputs.find_prover(asked, engine.network)
     write_text(path, folder_page(engine, folder, prover))
-    if film is not None:
-        asked.tell("drawing the film")
-        first = folder_builds(engine, folder, BuildProver(engine.network, {}))[0]
-        written += (draws(engine, first.steps).save(film),)
-    if figures is not None and figures in written:
+    written, left = [path], outputs.figure_notes(figures)
+    if figures is not None and not left:
         from seqopt.report.charts import plan_figures  # noqa: PLC0415  # needs an extra
 
         asked.tell("drawing figures")
         write_folder(figures, plan_figures(engine, folder_builds(engine, folder, prover)))
-    return Answer(
-        {},
-        scene=scene,
-        text=f"written to {' and '.join(map(str, written))}",
-        written=written,
-        value=written,
-        notes=(
-            *taken,
-            *([f"arms: drawn without postures; {trouble}"] if trouble else ()),
-            *outputs.figure_notes(figures),
-        ),
-    )
+        written.append(figures)
+    if film is not None:
+        asked.tell("drawing the film")
+        first = folder_builds(engine, folder, BuildProver(engine.network, {}))[0]
+        written.append(draws(engine, first.steps).save(film))
+    text = f"written to {' and '.join(map(str, written))}"
+    drawn = (f"arms: drawn without postures; {trouble}",) if trouble else ()
+    notes = (*taken, *drawn, *left)
+    return Answer({}, text, scene=scene, written=(*written,), value=(*written,), notes=notes)
+
+
+def _page(asked: Report, folder: Path, name: str) -> Path:
+    """Return where the page goes by default: into the folder, or beside a scene."""
+    if not isinstance(asked.folder, str | Path):
+        return inputs.file_name(name, ".html")
+    own = folder == Path(asked.folder)
+    return folder / PAGE if own else inputs.file_name(asked.folder, ".html")

@@ -22,11 +22,8 @@ from seqopt.work.progress import with_progress
 
 
 class SceneAsked(options.Postures, options.Built):
-    """Check a scene, say what is in it, and write it as a JSON file if asked.
+    """What is built, and by whom?
 
-    Or list all built-in scenes and the words that make others.
-
-    What is built, and by whom?
     list :
         name all built-in scenes, and the words that make others
     export : FILE
@@ -34,13 +31,6 @@ class SceneAsked(options.Postures, options.Built):
     view :
         write a page for the browser: bricks by name in their order, nodes at which robots can hold,
         ground, bases and reaches
-
-    Examples
-    --------
-    seqopt scene --list
-    seqopt scene arch:span=2,rise=0.8
-    seqopt scene arch25 --export my.json
-    seqopt scene my.json --view
     """
 
     list: bool = False
@@ -49,7 +39,17 @@ class SceneAsked(options.Postures, options.Built):
 
 
 def run(asked: SceneAsked) -> Answer:
-    """Describe a scene and export it, or list all that there are."""
+    """Check a scene, say what is in it, and write it as a JSON file if asked.
+
+    Or list all built-in scenes and the words that make others.
+
+    Examples
+    --------
+    seqopt scene --list
+    seqopt scene arch:span=2,rise=0.8
+    seqopt scene arch25 --export my.json
+    seqopt scene my.json --view
+    """
     if asked.list:
         return _list(asked)
     outputs.keep_apart(asked, asked.export)

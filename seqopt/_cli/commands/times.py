@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -28,17 +30,8 @@ USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
 class Times(options.Cured, options.Timed, options.Fixed):
-    """Say how long a build takes and who does what when.
+    """Which steps may a build have?
 
-    A robot that holds nothing prepares what it does next while others hold and act; actions come
-    one after the other, in the order of the steps.
-
-    Usage
-    [SCENE] [--method NAME] [--out DIR] [other options]
-    [SCENE] --plan FILE [--out DIR] [other options]
-    PLAN_DIR [--out DIR] [other options]
-
-    Which steps may a build have?
     reassign :
         give the same grips, in the same order, to the robots with which the build ends first,
         within their reach and payload
@@ -54,11 +47,6 @@ class Times(options.Cured, options.Timed, options.Fixed):
     What is written and printed?
     out : DIR
         folder to write plan.csv, times.csv and a chart to
-
-    Examples
-    --------
-    seqopt times timed.json --method cantilever --durations rob3:slower=2.5
-    seqopt times my.json --plan plan.csv --reassign --out faster
     """
 
     reassign: bool = False
@@ -66,17 +54,54 @@ class Times(options.Cured, options.Timed, options.Fixed):
 
 
 def run(asked: Times) -> Answer:
-    """Return the makespan of a build, and write its schedule on request."""
+    """Say how long a build takes and who does what when.
+
+    A robot that holds nothing prepares what it does next while others hold and act; actions come
+    one after the other, in the order of the steps.
+
+    Usage
+    [SCENE] [--method NAME] [--out DIR] [other options]
+    [SCENE] --plan FILE [--out DIR] [other options]
+    PLAN_DIR [--out DIR] [other options]
+
+    Examples
+    --------
+    seqopt times timed.json --method cantilever --durations rob3:slower=2.5
+    seqopt times my.json --plan plan.csv --reassign --out faster
+    """
     outputs.require_out(asked, "plan.csv", "times.csv")
-    scene, taken = inputs.find_scene(asked), list[str]()
+    scene, taken = inputs.find_scene(asked), tuple[str, ...]()
     if not (asked.durations or has_durations(scene)):
         asked = replace(asked, durations=(USUAL_SECONDS,))
-        taken.append(f"durations: not known, taken as {USUAL_SECONDS}; --durations says others")
+        taken = (f"durations: not known, taken as {USUAL_SECONDS}; --durations says others",)
     scene = inputs.in_seconds(asked, scene)
-    network = build_network(scene)
-    named = inputs.find_steps(asked, network)
+    named = inputs.find_steps(asked, network := build_network(scene))
     build, given, least = _build(asked, network, named.steps)
     timed, aged = build.times(), _aged(asked, build)
+    written, where = _write(asked, build, aged)
+    timed.attrs["robots"] = busy = busy_table(scene, build.steps, build._waits)
+    lines = [*total_lines(scene.name, len(build.steps), given, least)]
+    lines += [*remarks.waits_said(build), *spent_lines(busy)]
+    if aged is not None:
+        lines += softer_lines(scene, build.responses(), aged, remarks.exceeded(scene, aged))
+    lines.append(where)
+    trouble = inputs.posture_trouble(asked, scene)
+    cannot = (f"not checked; {trouble}",) if trouble else arm_faults(scene, build.steps)
+    notes = (*taken, *named.notes, *remarks.carrying_notes(scene, build.steps))
+    notes += (*_idle_note(scene, "robots", build.steps), *(f"arms: {each}" for each in cannot))
+    facts: dict[str, Any] = {"makespan_s": given, "reassigned_s": least}
+    facts |= {"robots": busy, "steps": timed}
+    facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
+    answer = Answer(
+        facts, "\n".join(map(wrapped, lines)), notes=(*notes, *outputs.figure_notes(written))
+    )
+    return replace(answer, scene=scene, written=written, value=timed)
+
+
+def _write(
+    asked: Times, build: GivenSequence, aged: pd.DataFrame | None
+) -> tuple[tuple[Path, ...], str]:
+    """Write the tables and the chart of a build, if requested, and say where."""
     tables = {"plan.csv": build.responses, "times.csv": build.times}
     tables |= {} if aged is None else {"aged.csv": lambda: aged}
 
@@ -84,32 +109,9 @@ def run(asked: Times) -> Answer:
         texts = {name: csv_text(table()) for name, table in tables.items()}
         return {**texts, **outputs.time_files(build)}
 
-    written = outputs.write_outputs(asked, files)
-    busy = busy_table(scene, build.steps, build._waits)
-    timed.attrs["robots"] = busy
-    if build.standing is not None:
-        check_cured(network, build.steps, build.standing, timed["start_s"].tolist())
-    total = total_lines(scene.name, len(build.steps), given, least)
-    lines = [*total, *remarks.waits_said(build), *spent_lines(busy)]
-    if aged is not None:
-        lines += softer_lines(scene, build.responses(), aged, remarks.exceeded(scene, aged))
-    kept = f"written to {asked.path}: {', '.join(tables)}"
-    lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
-    trouble = inputs.posture_trouble(asked, scene)
-    cannot = (f"not checked; {trouble}",) if trouble else arm_faults(scene, build.steps)
-    notes = (*taken, *named.notes, *remarks.carrying_notes(scene, build.steps))
-    notes += (*_idle_note(scene, "robots", build.steps),)
-    facts: dict[str, object] = {"makespan_s": given, "reassigned_s": least}
-    facts |= {"robots": busy, "steps": timed}
-    facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
-    return Answer(
-        facts,
-        scene=scene,
-        text="\n".join(map(wrapped, lines)),
-        written=written,
-        value=timed,
-        notes=(*notes, *(f"arms: {each}" for each in cannot), *outputs.figure_notes(written)),
-    )
+    if written := outputs.write_outputs(asked, files):
+        return written, f"written to {asked.path}: {', '.join(tables)}"
+    return (), "--out DIR writes when every step happens, and a chart of it"
 
 
 def _build(
@@ -127,10 +129,13 @@ def _build(
             raise
         where = "--durations" if "durations" in str(error) else "--curing"
         raise ProblemError(f"{where}: {error}") from None
-    if not asked.reassign:
-        return build, given, None
-    build = GivenSequence(build.engine, build.reassigned(), standing=standing)
-    return build, given, build.times()["end_s"].iloc[-1]
+    least = None
+    if asked.reassign:
+        build = GivenSequence(build.engine, build.reassigned(), standing=standing)
+        least = build.times()["end_s"].iloc[-1]
+    if standing is not None:
+        check_cured(network, build.steps, standing, build.times()["start_s"].tolist())
+    return build, given, least
 
 
 def _aged(asked: Times, build: GivenSequence) -> pd.DataFrame | None:
