@@ -9,14 +9,10 @@ a unit force there means; to 1e-12 where these do not nearly cancel, as on long 
 Method: random sets of three grips on `arch25` with 17 and with 25 bricks, a chain of 99 and the
 vault with 100 and with 337. Fields and compiled loops take turns in one process on one core, whole
 calls of the engine with all checks, as seconds of the processor; the least of rounds. Beside them
-batches of a hundred sets by both, and single calls for fields; and, where a C++ compiler is there,
-the loop that one would write in that language, without all checks
-(`experiments.engines.parts.plain_loop`): ``times_cpp`` is what a whole call takes beside it. The
-least arithmetic is what `experiments.peers.peers` says: operations at the rate of a dense product,
-and here nothing that is written.
+batches of a hundred sets by both, and single calls for fields.
 
-Inputs: the shipped scenes; seed 0; numba: nothing is stored where it is missing. Command:
-``OPENBLAS_NUM_THREADS=1 python -m experiments extremes [--quick]``.
+Inputs: the shipped scenes; seed 0; numba. Command: ``OPENBLAS_NUM_THREADS=1 python -m experiments
+extremes [--quick]``.
 """
 
 import time
@@ -26,14 +22,11 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from experiments.engines.parts.plain_loop import PlainLoop, compiled
-from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.claim import Claim, Extra, Finding, Options
 from experiments.harness.scenes import grip_sets
-from experiments.harness.timing import best
 from seqopt import build_network, load_scene
 from seqopt.arrays import Ints
 from seqopt.engines.interface import Want
-from seqopt.engines.rigid._extremes import can_compile
 from seqopt.engines.rigid.compliance import ComplianceEngine
 
 CASES = (
@@ -71,54 +64,39 @@ def difference(engine: ComplianceEngine, bricks: int, sets: Ints) -> float:
     return float(max(np.abs(a - b).max() / (pull * each) for a, b, each in gaps))
 
 
-def least_us(engine: ComplianceEngine, bricks: int) -> float:
-    """Return the time of the arithmetic of a set of three grips at the rate of a product, µs."""
-    net, square = engine.network, np.random.default_rng(0).standard_normal((400, 400))
-    rate = best(lambda: square @ square, 5) / (2 * 400**3)
-    numbers = net.count_edges(bricks) + 3 * net.count_nodes(bricks) + 3 * len(net.scene.grounds)
-    return (2 * 10 * numbers + 9**3 / 3 + 4 * 9**2) * rate * 1e6
-
-
 def row(name: str, bricks: int, count: int, rounds: int) -> dict[str, object]:
     """Return what sets of three grips take in one case, µs each."""
     engine = ComplianceEngine(build_network(load_scene(name)))
     sets = grip_sets(engine.network, bricks, count)
     ask = partial(engine._extremes, bricks, want=WANT, compiled=True)
-    many: dict[str, Callable[[], object]] = {
-        "fields": lambda: engine._extremes(bricks, sets, WANT),
-        "compiled": lambda: ask(sets),
-    }
-    if compiled() is not None:
-        many["cpp"] = PlainLoop(engine, bricks, sets)
     gap = difference(engine, bricks, sets)
-    found = {f"{k}_us": 1e6 * v / len(sets) for k, v in taken(many, rounds).items()}
-    few: dict[str, Callable[[], object]] = {
+    many = {"fields": lambda: engine._extremes(bricks, sets, WANT), "compiled": lambda: ask(sets)}
+    few = {
         "fields_hundred": lambda: engine.solve(bricks, sets[:FEW]),
         "hundred": lambda: ask(sets[:FEW]),
     }
-    one: dict[str, Callable[[], object]] = {"call": lambda: engine.solve(bricks, sets[:1])}
-    small = taken(few, 20 * rounds) | taken(one, 50 * rounds)
-    size = {"call": 1}
-    found |= {f"{k}_us": 1e6 * v / size.get(k, FEW) for k, v in small.items()}
-    found["least_us"] = least_us(engine, bricks)
-    return {"scene": name, "bricks": bricks, **found, "difference": gap}
-
-
-def experiment(options: Options) -> Finding:
-    quick: bool = options.quick
-    if not can_compile():
-        return Finding(holds=False, without=", numba is missing", tables={})
-    cases = [("arch25", 17, 500)] if quick else CASES
-    table = pd.DataFrame([row(*case, 2 if quick else 7) for case in cases])
-    table["times_fields"] = table["fields_us"] / table["compiled_us"]
-    if "cpp_us" in table:
-        table["times_cpp"] = table["compiled_us"] / table["cpp_us"]
-    print(table.to_string(index=False, float_format="%.3g"))
-    return Finding(holds(table), tables={"extremes": table})
+    one = {"call": lambda: engine.solve(bricks, sets[:1])}
+    found = {"scene": name, "bricks": bricks}
+    for calls, size, times in ((many, len(sets), 1), (few, FEW, 20), (one, 1, 50)):
+        found |= {f"{k}_us": 1e6 * v / size for k, v in taken(calls, times * rounds).items()}
+    return found | {"difference": gap, "times_fields": found["fields_us"] / found["compiled_us"]}
 
 
 def holds(table: pd.DataFrame) -> bool:
     return bool((table["times_fields"] >= FASTER).all() and table["difference"].max() <= CLOSE)
 
 
-CLAIM = Claim(experiment, digits=4, quick="one case", timed=True)
+def experiment(options: Options) -> Finding:
+    cases, rounds = ([("arch25", 17, 500)], 2) if options.quick else (CASES, 7)
+    table = pd.DataFrame([row(*case, rounds) for case in cases])
+    print(table.to_string(index=False, float_format="%.3g"))
+    return Finding(holds(table), tables={"extremes": table})
+
+
+CLAIM = Claim(
+    experiment,
+    digits=4,
+    quick="one case",
+    timed=True,
+    needs=(Extra("numba", "pip install 'seqopt[fast]'"),),
+)

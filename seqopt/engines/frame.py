@@ -25,7 +25,7 @@ from seqopt.errors import SolverError
 from seqopt.network.network import Network, PartKind
 from seqopt.scene.scene import Scene
 
-CONTRAST = 1e7  # bar over joint stiffness; see experiments/engines/frame_contrast.py
+CONTRAST = 1e7  # bar over joint stiffness: softer bars bend, stiffer ones lose digits
 _FEWEST, _MOST = 3, 12  # corrections; how fast they shrink, each processor decides in its own way
 _LAST_FRAME_CORRECTION = 1e-6  # the largest of an accepted solution, relative to it
 _SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import seqopt
-from experiments.engines.parts.softness import held_softly
 from seqopt.arms import find_postures
 from seqopt.arms._judge import check_postures
 from seqopt.arms._model import ArmModel
@@ -319,16 +318,6 @@ def test_the_formula_is_that_of_the_table():
     grips = (3, 6)
     for one, two in zip(compliances(scene, grips), by_joints(scene, grips), strict=True):
         assert one == pytest.approx(two, rel=1e-9)
-
-
-def test_comparisons_of_stiffnesses_have_these_instead_of_joints():
-    scene = soft()
-    engine = make_engine("compliance", scene)
-    tables = {"one": seqopt.analyze(engine, seqopt.optimize(scene, "free", FORCE).steps)}
-    found = held_softly(engine, tables, [1e5, np.inf])
-    bare = make_engine("compliance", scene.with_grips(None))
-    assert found["F_rob"].tolist()[1] == held_softly(bare, tables, [np.inf])["F_rob"].tolist()[0]
-    assert found["F_rob"][0] != pytest.approx(found["F_rob"][1], rel=1e-2)
 
 
 def test_it_is_not_said_that_robots_are_rigid():

@@ -18,7 +18,7 @@ from experiments.placement import formulations
 from tests.builders import ROOT
 from tests.commands import run_experiment
 
-ALWAYS = "frame_contrast"  # one that takes a second runs among the quick tests too
+ALWAYS = "criteria_variants"  # one that takes a second runs among the quick tests too
 LONG = ("identify_arch25", "dry_map")
 
 
