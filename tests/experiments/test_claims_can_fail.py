@@ -10,10 +10,17 @@ import pandas as pd
 import pytest
 
 from experiments import figures
-from experiments.calibration import calibration, vault_loads
-from experiments.calibration.parts import arch_numbers, calibration_spread
+from experiments.calibration import calibration, identify_arch25, vault_loads
+from experiments.calibration.parts import calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
-from experiments.engines import engine_speed, extremes, fidelity_ladder, parallel, soft_grips
+from experiments.engines import (
+    engine_growth,
+    engine_speed,
+    extremes,
+    fidelity_ladder,
+    parallel,
+    soft_grips,
+)
 from experiments.exchange import four_arms, outside_assemblies
 from experiments.harness.claim import claims
 from experiments.harness.results import stored
@@ -29,7 +36,7 @@ from experiments.placement import (
     speed_accuracy,
     staged_construction,
 )
-from experiments.stability import classical, dry_map, witnesses
+from experiments.stability import classical, dry_grips, dry_map, dry_methods, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.counterpart_items import ITEMS
 from experiments.times import makespan
@@ -87,23 +94,23 @@ CHECKS = {
         ("discrete_arches",),
         *("tension_MPa", 3.5, {"bricks": 24}),
     ),
-    "dry_map arches": Check(
-        dry_map.map_holds,
+    "dry_map": Check(
+        dry_map.holds,
         ("dry_map",),
         *("least_payload", 2.0, {"bricks": 13, "thickness_m": 0.053, "robots": 3}),
     ),
-    "dry_map grips": Check(
-        dry_map.grips_hold, ("dry_grips", "dry_grips_build"), *("placed", 25, {"robots": 2}, 1)
+    "dry_grips": Check(
+        dry_grips.holds, ("dry_grips", "dry_grips_build"), *("placed", 25, {"robots": 2}, 1)
     ),
-    "dry_map methods": Check(
-        lambda *tables: all(dry_map.methods_hold(*tables).values()),
+    "dry_methods": Check(
+        lambda *tables: all(dry_methods.holds(*tables).values()),
         ("failing_steps", "failing_scale"),
         *("dry", "stands", {"method": "sequential", "step": 35}),
     ),
-    "engine_speed growth": Check(
-        engine_speed.growth_holds, ("engine_growth_runs",), *("error", 2e-9, {"scene": "chain338"})
+    "engine_growth": Check(
+        engine_growth.holds, ("engine_growth_runs",), *("error", 2e-9, {"scene": "chain338"})
     ),
-    "engine_speed speed": Check(
+    "engine_speed": Check(
         lambda table: engine_speed.holds(table.set_index(table.columns[0])["value"]),
         (stored("engine_speed").rename(columns={"Unnamed: 0": "name"}),),
         *("value", 900, {"name": "ratio_median"}),
@@ -154,7 +161,7 @@ CHECKS = {
         heuristic_gaps.holds, ("heuristic_gaps",), *("gap", 0.02, {"formulation": "beam"})
     ),
     "identify_arch25": Check(
-        lambda table: arch_numbers.holds(table, quick=False),
+        lambda table: identify_arch25.holds(table, quick=False),
         ("identify_arch25_refit",),
         *("shipped", 5.0, {"what": "Table B.1, p95_pct"}),
     ),

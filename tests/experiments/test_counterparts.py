@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.study.paper_counterparts import KNOWN, faults
+from experiments.study.paper_counterparts import KNOWN, faults, page
 from experiments.study.parts.counterpart_items import (
     AGREES,
     DISAGREES,
@@ -17,7 +17,6 @@ from experiments.study.parts.counterpart_items import (
     TITLES,
     verdict,
 )
-from experiments.study.parts.counterpart_page import page
 from experiments.study.parts.counterpart_rows import COUNTERPARTS, cell, ours, tabulate
 from tests.builders import ROOT
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.placement.parts.in_order import least_quantile, solve_in_order
+from experiments.placement.robust_placement import least_quantile, solve_in_order
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.layers import candidate_layers, travel
 from seqopt.graph.states.states import build_states

@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.stability.classical import CASES, FEW, faults, push, row
+from experiments.stability.classical import CASES, FEW, faults, ladder, push, row, wall
 from experiments.stability.parts.blocks import stack
-from experiments.stability.parts.classics import ladder, wall
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.stability.assessment import Verdict, assess
