@@ -21,8 +21,6 @@ Inputs: ``arch_tests.csv``, ``arch_stiffness.csv`` in ``seqopt/data/paper``. Com
 experiments calibration [--quick]``.
 """
 
-from itertools import product
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -31,7 +29,7 @@ from matplotlib.figure import Figure
 from experiments.calibration.parts import barrel_vaults as barrel
 from experiments.calibration.parts import calibration_spread as spread
 from experiments.calibration.parts.barrel_vaults import BED, LAWS, MEASURES, Law, laws, vaults
-from experiments.calibration.parts.calibration_readings import entries, readings, summary
+from experiments.calibration.parts.calibration_readings import readings
 from experiments.calibration.parts.calibration_spread import left_out, threshold, whole
 from experiments.harness.charts import note, subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options
@@ -184,18 +182,6 @@ def intervals(law: Law) -> dict[str, float]:
     return out
 
 
-def geometries(tests: tuple[barrel.Vault, ...]) -> pd.DataFrame:
-    rows = []
-    for line, place in product(barrel.LINES, barrel.PLACES):
-        chains = (barrel.chain(vault, line, place) for vault in tests)
-        law = Law(BED, tests, tuple(map(barrel.planar_parts, chains)))
-        pair = barrel.fit(law, "absolute", whole(law))
-        row = {"line": line, "place": place, "k_t": pair[0], "k_r": pair[1]}
-        row |= {"mean_absolute_percent": spread.mean_size(barrel.errors(law, pair))}
-        rows.append(row | {"left_out_percent": spread.mean_size(left_out(law, "absolute")[1])})
-    return pd.DataFrame(rows)
-
-
 def tabulate(law: Law, measure: str, label: str) -> tuple[pd.DataFrame, dict[str, object]]:
     pair = barrel.fit(law, measure, whole(law))
     error, out = barrel.errors(law, pair), left_out(law, measure)[1]
@@ -232,7 +218,8 @@ def experiment(options: Options) -> Finding:
     if options.quick:
         return Finding(good)
     kept = fits.drop(columns="engine_gap")  # rounding, another on every machine
-    tables = {"": table, "_fits": kept, "_comparison": beside, **others(models[BED])}
+    tables = {"": table, "_fits": kept, "_comparison": beside, "_readings": readings()}
+    tables |= {"_routes": spread.rotational(models[BED].tests)}
     return Finding(good, tables={f"calibration{end}": rows for end, rows in tables.items()})
 
 
@@ -242,15 +229,6 @@ def holds(fits: pd.DataFrame, beside: pd.DataFrame) -> bool:
     leads = error[BED] < paper[spread.IN_SAMPLE] < error[["b t", "b t2"]].min()
     unsure = own[spread.GAIN_LOW] < 0 < own[spread.GAIN_HIGH]
     return bool(leads and unsure and own[spread.ANEW] > paper[spread.ANEW])
-
-
-def others(bed: Law) -> dict[str, pd.DataFrame]:
-    scan, single, other = readings(), entries(), geometries(bed.tests)
-    print(summary(scan))
-    bounds = spread.rotational(bed.tests)
-    for frame in (single, other, bounds):
-        print(frame.to_string(index=False, float_format="%.4g"))
-    return {"_readings": scan, "_entries": single, "_routes": bounds}
 
 
 def picture() -> Figure:

@@ -5,8 +5,8 @@ proven: no value is below a proven bound, no bound is above a value. Where costs
 where a worst step comes first, the best is proven without a scene within a second. What is open is
 what no certificate closes: sums over states within budgets, and totals over scenarios.
 
-Method: every formulation that fits an instance, HiGHS on the MPS file, CP-SAT on its text, and a
-flow as a user of linopy writes it (sums and peaks only), one after the other with 4 s each; what is
+Method: every formulation that fits an instance, HiGHS on the MPS file and CP-SAT on its
+text, one after the other with 4 s each; what is
 given to outside solvers has 20,000 arcs at most. Values and bounds are of the first goal. Seconds
 are of the processor, reading and writing of files included. The best paths are kept in
 ``known.json``, a better one that was known before stays.
@@ -151,7 +151,7 @@ CLAIM = Claim(
     experiment,
     quick="three instances, our formulations alone",
     options=(Option("--only-of", "these instances alone, as free-7,wall-6; others stay", ""),),
-    needs=(Extra("ortools", "pip install 'seqopt[instances]'"),),
+    needs=(Extra("ortools", "pip install 'seqopt[cp]'"),),
     pictures={"instance_contest.png": drawn(chart, "instance_contest", "instance_library")},
     digits=9,
 )

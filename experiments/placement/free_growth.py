@@ -14,13 +14,38 @@ more, where a plan is proven.
 Inputs: the shipped scenes. Command: ``python -m experiments free_growth [--quick]``.
 """
 
+import json
+import resource
+import sys
+import time
+
 import pandas as pd
 from matplotlib.figure import Figure
 
+import seqopt
 from experiments.harness.charts import note, subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import apart, drawn, exponents_by
+from experiments.harness.scenes import scene_named
 from seqopt.report._style import GRAY, dress, look, plain, styled
+from seqopt.sequence.rules import with_robots
+
+ROOM = 1.7e9  # bytes
+
+
+def run(bricks: int, robots: int) -> dict[str, object]:
+    scene = with_robots(scene_named(f"chain{bricks}"), robots)
+    start = time.process_time()
+    search = seqopt.Search(max_memory=ROOM)
+    plan = seqopt.optimize(scene, "free", engine="compliance", search=search)
+    certificate = plan.certificate
+    row = {"bricks": bricks, "robots": robots, "status": plan.status}
+    row |= {"worst": plan.selection.objective[0], "bound": plan.selection.bound[0]}
+    row |= {"steps": len(plan.steps), "models": plan.models}
+    row |= {"states": 0 if certificate is None else certificate.states}
+    row |= {"seconds": time.process_time() - start}
+    return row | {"memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024}
+
 
 SOME = (7, 13, 25, 37, 49, 73)
 SIZES = {3: (7, 13, 25, 49, 73, 97, 145), 4: SOME, 5: (7, 13, 19, *SOME[2:])}
@@ -77,7 +102,7 @@ def chart(table: pd.DataFrame) -> Figure:
 
 def experiment(options: Options) -> Finding:
     sizes = QUICK if options.quick else SIZES
-    module = "experiments.placement.parts.free_growth_run"
+    module = "experiments.placement.free_growth"
     runs = ((bricks, robots) for robots, counts in sizes.items() for bricks in counts)
     table = pd.DataFrame(apart(module, *run) for run in runs)
     print(table.to_string(index=False, float_format="%.4g"))
@@ -92,3 +117,6 @@ CLAIM = Claim(
     quick="small arches",
     pictures={"free_growth.png": drawn(chart, "free_growth")},
 )
+
+if __name__ == "__main__":
+    print(json.dumps(run(*map(int, sys.argv[1:]))))

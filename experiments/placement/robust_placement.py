@@ -25,10 +25,9 @@ from __future__ import annotations
 import math
 import time
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain
-from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +41,6 @@ from experiments.harness.scenes import half_circle
 from formulations.scenario_program import solve_program
 from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
 from seqopt.arrays import Floats
-from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.compiled import best_in_order, compile_totals
 from seqopt.graph.layers.costs import Joined, LayeredCosts
@@ -51,67 +49,15 @@ from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
-from seqopt.scene._checks import short
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
 
 
-@dataclass(frozen=True)
-class InOrder:
-    """The best choice for several aims in order of importance.
-
-    ``choice``: a candidate for every move; ``values``: its value for every aim.
-    """
-
-    choice: tuple[int, ...]
-    values: tuple[float, ...]
-
-
-def solve_in_order(goals: Sequence[tuple[LayeredCosts, Aim]]) -> InOrder:
-    """Return the choice that is best for the first aim; among these best for the second; and so on.
-
-    Exact, sums that differ by less than `seqopt.graph.paths.TIED` counting as equal.
-
-    ``goals`` (sequence of (LayeredCosts, Aim)): costs of the same moves, each by its own criterion,
-    and whether their sum or the largest is to be small; the most important first. Raises
-    `InfeasibleError` if no choice is allowed by all; `ProblemError` if there is no goal, or costs
-    are of other moves or candidates.
-
-    Examples
-    --------
-    >>> nothing = np.zeros((1, 2))
-    >>> first, second = (
-    ...     LayeredCosts((np.array(costs),), (np.zeros((1, 3)),))
-    ...     for costs in ([2.0, 1.0, 1.0], [0.0, 5.0, 4.0])
-    ... )
-    >>> solve_in_order([(first, Aim.PEAK), (second, Aim.SUM)])
-    InOrder(choice=(2,), values=(1.0, 4.0))
-    """
-    layers = [costs for costs, _ in goals]
-    _require_same(layers)
-    choice = best_in_order(goals)
-    return InOrder(choice, tuple(aim.value_of(costs, choice) for costs, aim in goals))
-
-
-def _require_same(layers: Sequence[LayeredCosts]) -> None:
-    if not layers:
-        raise ProblemError("there is no aim; give at least one")
-    if len({costs.sizes for costs in layers}) > 1:
-        raise ProblemError(
-            "the problems have other moves or candidates; pose them with one schedule"
-        )
-
-
-StepCosts = Sequence[tuple[tuple[int, ...], Floats]]
-
-
-@dataclass(frozen=True)
-class StepQuantile:
+class StepQuantile(NamedTuple):
     """A choice whose open steps, except a few, keep the least level.
 
     ``choice``: of those that keep it, one with the fewest steps above, and then of least sum;
-    ``level``: in the unit of the criterion; ``above``: how many steps cost more; ``steps``: how
-    many open steps there are.
+    ``above``: how many of all open ``steps`` cost more.
     """
 
     choice: tuple[int, ...]
@@ -121,39 +67,26 @@ class StepQuantile:
 
 
 def least_quantile(problem: Layers, share: float = 0.1) -> StepQuantile:
-    """Return the choice with the least level that no more than a share of open steps exceed.
-
-    ``problem``: without budgets; ``share``: of the open steps, from 0 (the least peak) to below 1.
-    Raises `InfeasibleError` if no choice is allowed; `ProblemError` if the share is none, or there
-    are budgets.
-    """
-    number = isinstance(share, Real) and not isinstance(share, bool)
-    if not number or not 0 <= share < 1:
-        raise ProblemError(f"share is {short(share)}; give a number from 0 to below 1")
-    if problem.budgets:
-        raise ProblemError("quantiles over steps take no budgets; leave them out")
-    best_in_order([(problem.sums, Aim.SUM)])  # says if no choice is allowed
+    """Return the choice with the least level that no more than a share of open steps exceed."""
     every = chain.from_iterable(problem.evaluation.levels())
     steps = [(each.moves, problem.step_costs(each)) for each in every]
-    sizes = problem.sums.sizes
     most = math.floor(share * len(steps) + 1e-9)
     levels = np.unique(np.concatenate([costs[np.isfinite(costs)] for _, costs in steps]))
 
+    def above(level: float) -> LayeredCosts:
+        """Return how many steps of a choice cost more, infinite where not allowed."""
+        joined = Joined(problem.sums.sizes, np.add)
+        for moves, costs in steps:
+            joined.add(moves, np.where(np.isfinite(costs), (costs > level).astype(float), np.inf))
+        return joined.layered()
+
     def kept(level: float) -> bool:
-        return _above(steps, sizes, level).least(Aim.SUM) <= most
+        return above(level).least(Aim.SUM) <= most
 
     level = float(levels[bisect_left(levels, x=True, hi=len(levels) - 1, key=kept)])
-    layers = (_above(steps, sizes, level), problem.sums)
-    found = solve_in_order([(costs, Aim.SUM) for costs in layers])
-    return StepQuantile(found.choice, level, round(found.values[0]), len(steps))  # noqa: PD011  # no frame
-
-
-def _above(steps: StepCosts, sizes: Sequence[int], level: float) -> LayeredCosts:
-    """Return how many steps of a choice cost more than a level, infinite where not allowed."""
-    joined = Joined(sizes, np.add)
-    for moves, costs in steps:
-        joined.add(moves, np.where(np.isfinite(costs), (costs > level).astype(float), np.inf))
-    return joined.layered()
+    counts = above(level)
+    choice = best_in_order([(counts, Aim.SUM), (problem.sums, Aim.SUM)])
+    return StepQuantile(choice, level, round(counts.cost(choice)), len(steps))
 
 
 AIMS: dict[RobustAim, Criterion] = {
@@ -241,7 +174,7 @@ def plans(scene: Scene, count: int) -> dict[str, Choice]:
         "rank": solve(ranks, "overlap_dp").choice,
         "sum": solve(total, "overlap_dp").choice,
         "worst": solve(worst, "minimax").choice,
-        "worst, then sum": solve_in_order([(worst.peaks, Aim.PEAK), (total.sums, Aim.SUM)]).choice,
+        "worst, then sum": best_in_order([(worst.peaks, Aim.PEAK), (total.sums, Aim.SUM)]),
         "all but a tenth of the steps": least_quantile(worst, 0.1).choice,
         "robust, worst peak": solve(peaks).choice,
         "robust, worst total": solve(replace(totals, over=WORST_TOTAL)).choice,

@@ -7,7 +7,6 @@ full or half, and with free ones: then the smallest possible largest deviation f
 sought, over all tests and over some of them.
 """
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -89,54 +88,3 @@ def readings() -> pd.DataFrame:
         reading["load"] = "strip as wide as the fill is high" if spread else "line"
         rows += [{**reading, "law": law, **_row(tests, parts, law)} for law in POWERS]
     return pd.DataFrame(rows)
-
-
-def summary(scan: pd.DataFrame) -> str:
-    names = ["line", "place", "fewer", "shear", "load", "law"]
-    lines = [f"{len(scan)} readings"]
-    for percent in (5, 10):
-        columns = [*names, f"within_{percent}", f"halves_{percent}"]
-        best = scan.sort_values(f"within_{percent}", ascending=False)[columns].head(4)
-        lines.append(f"tests within {percent} % at the printed stiffnesses\n{best.to_string()}")
-    for name, (kind, *beside) in product(GROUPS, (("printed", "halves"), ("free", "k_t", "k_r"))):
-        columns = [*names, *(f"{column}_{name}" for column in (kind, *beside))]
-        best = scan.sort_values(f"{kind}_{name}")[columns].groupby("law").head(1)
-        text = best.to_string(float_format="%.3g")
-        lines.append(f"largest deviation over tests {name}, {kind} stiffnesses\n{text}")
-    return "\n".join(lines)
-
-
-def entries() -> pd.DataFrame:
-    """Return by what factor one printed entry would have to change to give the paper's stiffness.
-
-    Joint stiffnesses in proportion to the area, fitted to tests 3 to 8 of the paper's column.
-    """
-    tests = vaults()
-    parts = [planar_parts(chain(vault)) for vault in tests]
-    k = np.stack([np.ones_like(RATIO), RATIO], axis=1)
-    free = np.log(against_study(tests, parts, "b t", k))
-    best, middle, _ = closest(free[list(GROUPS["3-8"])])
-    pair = np.exp(-middle) * k[best : best + 1]
-    names, rows = ("span", "rise", "width", "thickness", "bricks", "load_at"), []
-    for vault, log in zip(tests, free[:, best], strict=True):
-        row = {"test": vault.test, "model_over_study": np.exp(log - middle)}
-        rows.append(row | {name: needed(vault, name, pair) for name in names})
-    return pd.DataFrame(rows)
-
-
-def needed(vault: Vault, name: str, pair: Floats) -> float:
-    """Return the factor nearest to 1 on one entry that gives the paper's stiffness, or NaN."""
-    factors, logs = [], []
-    for factor in np.geomspace(0.2, 5.0, 401):
-        value = getattr(vault, name) * factor
-        changed = replace(vault, **{name: round(value) if name == "bricks" else value})
-        line = chain(changed)
-        if 0 < line.loads[0] < line.points[-1, 0] and line.points[:, 1].min() > -1e-9:
-            factors.append(factor)
-            logs.append(np.log(against_study((changed,), [planar_parts(line)], "b t", pair)[0, 0]))
-    signs = np.sign(logs)
-    turns = np.flatnonzero(signs[:-1] != signs[1:])
-    if not len(turns):
-        return float("nan")
-    crossed = np.array(factors)[turns]
-    return float(crossed[np.abs(np.log(crossed)).argmin()])

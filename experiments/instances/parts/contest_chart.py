@@ -14,7 +14,7 @@ from seqopt.report._style import dress, name_panels, plain, styled
 
 BEST = "best of ours"
 PART = 1 / 3  # of the instances: ways that fit fewer are in the best of ours alone
-OUTSIDE = {"HiGHS": "-", "CP-SAT": (0, (1, 1.2)), "linopy": (0, (5, 1.5))}
+OUTSIDE = {"HiGHS": "-", "CP-SAT": (0, (1, 1.2))}
 COLORS = (inks.BLUE, inks.GREEN, inks.PURPLE, inks.ORANGE, inks.SKY)
 TIMES, GAPS = (0.02, 20.0), (1e-4, 1.0)  # s, of values: what axes show
 ROOM = 5.5  # percent between two labels

@@ -22,15 +22,13 @@ from seqopt.graph.instance import Instance
 from seqopt.graph.paths import fewest_moves, reached
 from seqopt.plan._paths import _claims
 
-OUTSIDE = ("HiGHS", "CP-SAT", "linopy")
+OUTSIDE = ("HiGHS", "CP-SAT")
 MOST_ARCS = 20_000  # of what outside solvers are given
 
 
 def solvers(one: Instance) -> tuple[str, ...]:
     """Return the ways to solve an instance: formulations that fit, then outside solvers."""
-    plain = not one.asks_time and one.goals[0].kind in ("sum", "peak")
-    outside = OUTSIDE if plain else OUTSIDE[:2]
-    return (*one.fitting, *(outside if one.arcs <= MOST_ARCS else ()))
+    return (*one.fitting, *(OUTSIDE if one.arcs <= MOST_ARCS else ()))
 
 
 def run(name: str, solver: str, seconds: float) -> dict[str, object]:
@@ -78,7 +76,7 @@ def _plain(claim) -> dict[str, object]:
 
 
 def _outside(one: Instance, solver: str, seconds: float) -> dict[str, object]:
-    """Return what a solver finds that reads a file, or a model as a user writes it."""
+    """Return what a solver finds that reads a file."""
     with TemporaryDirectory() as folder:
         end, bound, taken = WAYS[solver](one, Path(folder), seconds)
     if taken is None:
@@ -119,39 +117,7 @@ def _cp_sat(one: Instance, folder: Path, seconds: float):
     return solver.status_name(status).capitalize(), solver.best_objective_bound, found
 
 
-def _linopy(one: Instance, _: Path, seconds: float):
-    """Solve a unit flow as a user of linopy writes it, caps and peak as rows."""
-    import linopy  # noqa: PLC0415  # for this comparison alone
-    import pandas as pd  # noqa: PLC0415
-    import xarray as xr  # noqa: PLC0415
-
-    model = linopy.Model()
-    arcs = pd.RangeIndex(one.arcs, name="arc")
-    x = model.add_variables(coords=[arcs], name="x", binary=True)
-    source, target = (xr.DataArray(v, coords=[arcs], name="node") for v in (one.source, one.target))
-    leaves, comes = x.groupby(source).sum(), x.groupby(target).sum()
-    inner = np.setdiff1d(np.flatnonzero(~one.ends), [0])
-    model.add_constraints(leaves.sel(node=0) == 1)
-    model.add_constraints(leaves.sel(node=inner) - comes.sel(node=inner) == 0)
-    cost = xr.DataArray(one.amounts[:, one.goals[0].columns[0]], coords=[arcs])
-    for cap in one.caps:
-        own = xr.DataArray(one.amounts[:, cap.column], coords=[arcs])
-        model.add_constraints((own * x).sum() <= cap.most)
-    if one.goals[0].kind == "sum":
-        model.add_objective((cost * x).sum())
-    else:
-        worst = model.add_variables(name="worst")
-        model.add_constraints((cost * x).groupby(target).sum() - worst <= 0)
-        model.add_objective(1 * worst)
-    model.solve("highs", time_limit=seconds, output_flag=False, progress=False)
-    found = x.solution.to_numpy() if model.solution is not None else None
-    known = found is not None and np.isfinite(found).all()
-    info = model.solver_model.getInfo()
-    end = str(model.termination_condition).capitalize()
-    return end, float(info.mip_dual_bound), found if known else None
-
-
-WAYS = {"HiGHS": _highs, "CP-SAT": _cp_sat, "linopy": _linopy}
+WAYS = {"HiGHS": _highs, "CP-SAT": _cp_sat}
 
 if __name__ == "__main__":
     name, solver, seconds = sys.argv[1:]

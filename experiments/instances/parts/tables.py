@@ -75,6 +75,6 @@ def _ways(contest: pd.DataFrame, library: pd.DataFrame) -> str:
         counts = (len(own), own["value"].notna().sum(), own["best"].sum(), own["closed"].sum())
         times = [f"{two(own['seconds'].median())} s", f"{two(own['seconds'].max())} s"]
         rows.append([f"`{name}`", *map(str, counts), middle, *times])
-    rows.sort(key=lambda row: (row[0] in ("`HiGHS`", "`CP-SAT`", "`linopy`"), row[0]))
+    rows.sort(key=lambda row: (row[0] in ("`HiGHS`", "`CP-SAT`"), row[0]))
     head = ["way", "instances", "path found", "best known", "closed by itself", "largest gap"]
     return markdown([*head, "median time", "longest"], rows)
