@@ -29,6 +29,7 @@ from seqopt.responses.resources import Resources
 from seqopt.scene._armed import find_postures
 from seqopt.scene._checks import short
 from seqopt.scene.scenarios import Scenarios
+from seqopt.scene.scenarios import scenarios as sample
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.rules import FREE, FreeRules, parse_rules, with_robots
@@ -84,6 +85,48 @@ class Search:
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Robust:
+    """Scenarios over which a plan is to be good, and what counts of them.
+
+    Parameters
+    ----------
+    aim : RobustAim or str, optional
+        ``"worst-peak"``, ``"worst-total"`` or as ``"cvar=0.9"``.
+    vary : mapping of str to float, optional
+        How far samples are from the scene: ``stiffness`` of joints and ``grips`` of robots by a
+        factor, ``density`` by a share, ``position`` by m.
+    count, seed : int, optional
+        How many samples are drawn, and which.
+    scenes : Scenarios or sequence of Scene, optional
+        Scenarios in place of drawn ones.
+
+    Examples
+    --------
+    >>> Robust(vary={"stiffness": 2}, count=3).draw(load_scene("arch25")).settings["stiffness"]
+    [0.5, 2.0]
+    """
+
+    aim: RobustAim | str = WORST_PEAK
+    vary: Mapping[str, float] = field(default_factory=dict)
+    count: int = 30
+    seed: int = 0
+    scenes: Scenarios | Sequence[Scene] = ()
+
+    def draw(self, scene: Scene) -> Scenarios:
+        """Draw the samples of a scene."""
+        spread = {"stiffness": 3.0, "grips": 1.0, **self.vary}
+        factor, grips = spread.pop("stiffness"), spread.pop("grips")
+        for name, each in (("stiffness", factor), ("grips", grips)):
+            if each < 1:
+                raise ProblemError(f"vary {name}={each:g}: give a factor from 1")
+        if grips > 1 and scene.grip_kinds.rigid:
+            raise ProblemError(f"vary grips={grips:g}: they are rigid; say how stiff with grips")
+        factors = (1 / factor, factor)
+        drawn = sample(scene, stiffness=factors, count=self.count, seed=self.seed, **spread)
+        return drawn if grips == 1 else drawn.with_grips((1 / grips, grips))
+
+
 def optimize(  # noqa: PLR0913  # every question is a word of its own
     scene: Scene | str | Path,
     schedule: Schedule | Path | str | None = None,
@@ -95,8 +138,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     limits: Sequence[Limit | Filter | str] | str = (),
     budgets: Sequence[str] | str = (),
     stands: Standing | Mortar | str | None = None,
-    scenarios: Scenarios | Sequence[Scene] = (),
-    over: RobustAim | str = WORST_PEAK,
+    robust: Robust | None = None,
     also: Sequence[str] = (),
     order: str | Sequence[int] | None = None,
     mortar: Mortar | str | None = None,
@@ -125,8 +167,10 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     limits : sequence of Limit, Filter or str
         Bounds that no step may exceed: ``"payload"``, ``"F_largest=300"``, ``"linear_range=any"``;
         and filters, by the names by which they were registered.
-    budgets, stands, scenarios, over, also : optional
-        As of `seqopt.pose`: ``"travel=3.5m"``, ``"dry"``, `seqopt.scenarios`, ``"cvar=0.9"``.
+    budgets, stands, also : optional
+        As of `seqopt.pose`: ``"travel=3.5m"``, ``"dry"``.
+    robust : Robust, optional
+        Over which scenarios, and what counts of them.
     order : str or sequence of int, optional
         In which order bricks are placed: ``"ends"``, all names, or ``"search"``.
     mortar : Mortar or str, optional
@@ -175,7 +219,9 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     elif search.max_memory is not None:
         options["max_memory"] = search.max_memory
     words: dict[str, Any] = {"limits": asked, "budgets": budgets, "stands": stands, "also": also}
-    words |= {"scenarios": scenarios, "over": over, "sought": sought, "resources": shared}
+    words |= {"sought": sought, "resources": shared}
+    if robust is not None:
+        words |= {"scenarios": robust.scenes or robust.draw(found), "over": robust.aim}
     problem = _pose_words(own, moves, criterion, aim, states=states, **words)
     assemble = time.perf_counter() - start
     plan = solve(

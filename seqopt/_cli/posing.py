@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, TypeAlias
 
 from seqopt._cli import grammar, inputs, options
@@ -12,18 +11,17 @@ from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.problem.filters import parse_limits
-from seqopt.problem.problem import WORST_PEAK, Problem, RobustAim, parse_budgets, parse_robust
+from seqopt.problem.problem import Problem, parse_budgets, parse_robust
 from seqopt.problem.standing import Standing
-from seqopt.scene.scenarios import Scenarios, scenarios
+from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, Direction, FreeRules
 from seqopt.sequence.steps import StepKind
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._steps import step_times
-from seqopt.workflow import DEFAULTS, SEARCH, _chooses_states, _find_moves, _pose_words
+from seqopt.workflow import DEFAULTS, SEARCH, Robust, _chooses_states, _find_moves, _pose_words
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
-COUNT = 30
 SPREADS = ("stiffness", "density", "position", "grips")
 _NOT_FREE = "the free schedule has no such; leave it out"
 _NOT_STATES = "aims and --stands have no such; leave it out"
@@ -48,8 +46,7 @@ class PosedProblem:
     """The problem of a command, its scenarios, and those of the out-of-sample evaluation."""
 
     problem: Problem
-    whole: Problem | None = None  # the same from an empty site, if it begins elsewhere
-    aim: RobustAim | None = None
+    robust: Robust | None = None
     known: Scenarios | None = None
     unseen: Scenarios | None = None
 
@@ -73,23 +70,20 @@ def pose_problem(asked: options.Moves, change: Change | None = None) -> PosedPro
     limits = parse_limits(asked.limits, scene, "--limit")
     parse_budgets(choice.budgets, of_states=of_states)  # said before anything is built
     resources = grammar.parse_resources(choice, None if of_states else asked.tell)
-    over, known, unseen = _scenarios(choice, scene)
+    robust, known, unseen = _scenarios(choice, scene)
     engine = inputs.find_engine(asked, build_network(scene))
     named, rules = grammar.parse_robots(robots) or None, asked.rules or None
     every = _find_moves(engine.network, asked.schedule, named, choice.candidates, rules, "--rule")
     if isinstance(every, FreeRules) and asked.direction is not None:
         every = replace(every, **dict[str, Any](direction=asked.direction))
     words: dict[str, Any] = {"limits": limits, "budgets": choice.budgets, "stands": stands}
-    words |= {"scenarios": known or (), "over": over or WORST_PEAK}
     words |= {"sought": sought, "resources": resources}
-
-    def posed(begin: inputs.Place) -> Problem:
-        moves = inputs.between(every, begin, end)
-        states = _chooses_states(moves, choice.formulation, limits, (aim, stands, sought))
-        return _pose_words(engine, moves, criterion, aim, states=states, **words)
-
-    whole = posed(inputs.Place()) if begin.site is not None and change is None else None
-    return PosedProblem(posed(begin), whole, over, known, unseen)
+    if robust is not None:
+        words |= {"scenarios": known, "over": robust.aim}
+    moves = inputs.between(every, begin, end)
+    states = _chooses_states(moves, choice.formulation, limits, (aim, stands, sought))
+    problem = _pose_words(engine, moves, criterion, aim, states=states, **words)
+    return PosedProblem(problem, robust, known, unseen)
 
 
 def _aged(scene: Scene, begin: inputs.Place, standing: Standing | None) -> inputs.Place:
@@ -143,27 +137,22 @@ def _require_known(asked: options.Moves, choice: options.Chosen, *, of_states: b
 
 def _scenarios(
     asked: options.Chosen, scene: Scene
-) -> tuple[RobustAim | None, Scenarios | None, Scenarios | None]:
+) -> tuple[Robust | None, Scenarios | None, Scenarios | None]:
     """Return the robust aim, the scenarios, and the unseen ones of the next seed."""
     if asked.robust is None:
         return None, None, None
+    vary = grammar.parse_numbers(
+        "--vary", asked.vary, SPREADS, zero=True, advice=", as stiffness=3"
+    )
     try:
         aim = parse_robust(asked.robust)
     except ProblemError as error:
         raise ProblemError(f"--robust: {error}") from error
-    drawn = partial(_drawn, scene, asked.vary)
-    unseen = None if asked.unseen is None else drawn(asked.unseen, asked.seed + 1)
-    return aim, drawn(asked.scenarios or COUNT, asked.seed), unseen
-
-
-def _drawn(scene: Scene, vary: options.Numbers, count: int, seed: int) -> Scenarios:
-    """Return random samples of a scene."""
-    spread = grammar.parse_numbers("--vary", vary, SPREADS, zero=True, advice=", as stiffness=3")
-    factor, grips = spread.pop("stiffness", 3.0), spread.pop("grips", 1.0)
-    for name, each in (("stiffness", factor), ("grips", grips)):
-        if each < 1:
-            raise ProblemError(f"--vary {name}={each:g}: give a factor from 1")
-    if grips > 1 and scene.grip_kinds.rigid:
-        raise ProblemError(f"--vary grips={grips:g}: they are rigid; say how stiff with --grips")
-    drawn = scenarios(scene, stiffness=(1 / factor, factor), count=count, seed=seed, **spread)
-    return drawn if grips == 1 else drawn.with_grips((1 / grips, grips))
+    robust = Robust(aim=aim, vary=vary, count=asked.scenarios or Robust.count, seed=asked.seed)
+    try:
+        known = robust.draw(scene)
+    except ProblemError as error:
+        raise ProblemError(f"--{error}") from None
+    if asked.unseen is None:
+        return robust, known, None
+    return robust, known, replace(robust, count=asked.unseen, seed=asked.seed + 1).draw(scene)

@@ -22,6 +22,7 @@ from seqopt.responses.table import force_column
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import in_order
 from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.workflow import Robust
 from tests.arms.joints import compliances
 from tests.arms.scenes import beside, two_arms
 from tests.brute_force import least_peak, peaks, shortest, whole_graph
@@ -302,13 +303,20 @@ def test_workers_and_scenarios_hold_in_the_same_postures():
     assert alone.objective == shared.objective
     drawn = seqopt.scenarios(scene, count=2).with_grips((0.2, 0.5)).scenes
     plans = [
-        seqopt.optimize(scene, "free", FORCE, scenarios=drawn, search=seqopt.Search(workers=n))
+        seqopt.optimize(
+            scene, "free", FORCE, robust=Robust(scenes=drawn), search=seqopt.Search(workers=n)
+        )
         for n in (1, 2)
     ]
     assert plans[0].status == "optimal"
     assert plans[0].objective == plans[1].objective
     loop = seqopt.optimize(
-        scene, "three-robot", FORCE, "minimax", scenarios=drawn, search=seqopt.Search(workers=2)
+        scene,
+        "three-robot",
+        FORCE,
+        "minimax",
+        robust=Robust(scenes=drawn),
+        search=seqopt.Search(workers=2),
     )
     assert np.isfinite([*loop.objective.values()]).all()
 

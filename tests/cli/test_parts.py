@@ -32,11 +32,8 @@ FREE = ("--schedule", "free", "--no-stability")
 def test_a_build_goes_on_from_a_step_and_reads_back(capsys, folder, tmp_path):
     rest = tmp_path / "rest"
     scene = str(folder / "scene.json")
-    status, said, _ = run(
-        capsys, "optimize", scene, *FREE, "--from", f"{folder}:4", "--out", str(rest)
-    )
+    status, *_ = run(capsys, "optimize", scene, *FREE, "--from", f"{folder}:4", "--out", str(rest))
     assert status == 0
-    assert re.search(r"what is left after step 4: minmax .* from an empty site", said, re.S)
     steps = read_plan(load_scene(scene), rest / "plan.csv")
     assert steps[0].number == 5
     for command in ("analyze", "assess"):

@@ -16,6 +16,7 @@ from seqopt.graph.formulation import FormulationKind
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import Layers, candidate_layers, travel
 from seqopt.study.published import find_criterion
+from seqopt.workflow import Robust
 from tests.builders import small_arch
 from tests.layered import Costs
 
@@ -193,7 +194,7 @@ def test_every_plan_has_one_summary():
         seqopt.optimize(scene, criterion=ones, formulation="cascade", search=Search(proof=False)),
         seqopt.optimize(scene, criterion=ones, formulation="path_dp"),
         seqopt.optimize(scene, "free"),
-        seqopt.optimize(scene, criterion=ones, scenarios=seqopt.scenarios(scene, count=2)),
+        seqopt.optimize(scene, criterion=ones, robust=Robust(count=2)),
         seqopt.optimize(scene, "free", order="search"),
     ]
     own = {"criterion", *(name for plan in plans for name in criterion_of(plan).settings)}

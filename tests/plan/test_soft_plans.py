@@ -15,6 +15,7 @@ from seqopt.responses._staged import analyze_staged
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scenarios import require_alike
 from seqopt.sequence.rules import with_robots
+from seqopt.workflow import Robust
 from tests.builders import small_arch
 from tests.soft_bodies import SoftBodies
 
@@ -90,7 +91,7 @@ def test_scenarios_keep_who_is_like_whom(unlike):
     with pytest.raises(ProblemError, match="or other robots give way alike"):
         require_alike(unlike, unlike.with_grips(1e6), 1)
     drawn = seqopt.scenarios(unlike, count=3).with_grips((0.3, 3.0))
-    plan = seqopt.optimize(unlike, "free", "worst-ratio", scenarios=drawn.scenes)
+    plan = seqopt.optimize(unlike, "free", "worst-ratio", robust=Robust(scenes=drawn.scenes))
     assert plan.status == "optimal"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -18,7 +18,6 @@ from seqopt._cli.posing import Change, PosedProblem, pose_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
-from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
 from seqopt.graph.formulation import End, Run, as_formulation, trace_rows
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._range import at_sufficient_level
@@ -31,7 +30,7 @@ from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import OUTSIDE
-from seqopt.sequence.steps import StepKind, _idle_note
+from seqopt.sequence.steps import _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
 from seqopt.work._clock import Clock
@@ -89,7 +88,6 @@ class Found:
     plan: Plan
     assemble: float
     prover: BuildProver
-    whole: str = ""
     clock: Clock = field(default_factory=Clock)
 
     @cached_property
@@ -148,7 +146,8 @@ class Found:
         known, unseen = self.posed.known, self.posed.unseen
         if known is None:
             return out
-        out |= {"robust": str(self.posed.aim), "scenarios": known.settings}
+        assert self.posed.robust is not None
+        out |= {"robust": str(self.posed.robust.aim), "scenarios": known.settings}
         if unseen is None:
             return out
         if self.trial is not None:
@@ -211,8 +210,7 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
 
     plan = at_sufficient_level(choose(posed.problem), choose, clock)
     prover = inputs.find_prover(asked, plan.engine.network)
-    whole = _from_empty(posed.whole, plan, choose)
-    return Found(posed, plan, assemble, prover, whole, clock)
+    return Found(posed, plan, assemble, prover, clock)
 
 
 def answered(asked: Optimize, found: Found) -> Answer:
@@ -244,30 +242,6 @@ def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes |
         made["trace.csv"] = csv_text(pd.DataFrame(rows))
     table = plan.responses() if found.analyzed else outputs.steps_table(plan)
     return {**outputs.bare_files(plan, table, found.report), **made, **tables}
-
-
-def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], Plan]) -> str:
-    """Describe the optimum from an empty site, for comparison with a continued build."""
-    if whole is None or plan.certificate is None:
-        return ""
-    begin = plan.steps[0].number - 1
-    down = any(step.kind is StepKind.REMOVE for step in plan.steps)
-    site = "the whole structure" if down else "an empty site"
-    done = f"what is left after step {begin}: {_values(plan)}"
-    try:
-        return f"{done}; from {site} the best is {_values(choose(whole))}"
-    except InfeasibleError:
-        return f"{done}; from {site} there is no plan"
-    except NothingFoundError:
-        return f"{done}; from {site} no plan was found"
-    except (TimeUpError, KeyboardInterrupt):
-        return f"{done}; what the best from {site} takes was not found in time"
-
-
-def _values(plan: Plan) -> str:
-    """Describe the values and the number of steps of a plan."""
-    steps = "" if "steps" in plan.objective else f", {len(plan.steps)} steps"
-    return f"{OUTSIDE}: " * plan.is_far + values_text(plan.objective) + steps
 
 
 def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
@@ -314,7 +288,6 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
     yield f"{search}; {outputs.written_to(asked.path, page=page)}"
     yield from map(wrapped, remarks.waits_said(plan) if plan.certificate is not None else ())
     yield from (f"stability, {each}" for each in found.verdicts.get(plan.title, ()))
-    yield from [wrapped(found.whole)] if found.whole else []
     if plan.order:
         yield wrapped(", ".join(map(str, plan.order)), first="order: ")
     yield from (f"payload exceeded: {excess}" for excess in over)
