@@ -32,7 +32,7 @@ from seqopt._cli.commands.replan import Replan
 from seqopt._cli.commands.report import Report
 from seqopt._cli.commands.times import Times
 from seqopt._cli.options import Asked
-from seqopt._cli.signatures import signature_of
+from seqopt._cli.signatures import Signature, signature_of
 from seqopt._cli.watcher import Watcher
 from seqopt._registry import COMMANDS, Command
 from seqopt.graph.instance import Instance
@@ -72,7 +72,7 @@ def _function(
     asked: Callable[_P, Asked],
     returns: type[_T],
     about: str,
-    example: str,
+    example: str = "",
     beside: Sequence[str] = (),
 ) -> Callable[_P, _T]:
     """Return a command as a Python function; ``asked``: the class of its options.
@@ -86,45 +86,45 @@ def _function(
     known = [each for each in inspect.signature(asked).parameters.values() if each.name in places]
     known.sort(key=lambda each: (each.kind, places[each.name]))
     hidden = {each.name for each in command.options.values() if each.more.get("shell")} | {*beside}
-    shown = [each for each in known if each.name not in hidden]
-    taken = inspect.Signature(known)
+    taken, shown = inspect.Signature(known), [each for each in known if each.name not in hidden]
 
     def function(*args: _P.args, **kwargs: _P.kwargs) -> _T:
         values = taken.bind(*args, **kwargs).arguments
         with Watcher(shows=values.get("progress") is None) as watcher:
-            found: _T = _value(command.call({"progress": watcher} | values), values.get("out"))
-            return found
+            result = command.call({"progress": watcher} | values)
+            if isinstance(result, Result) and values.get("out") is not None:
+                result.answer()
+        found: Any = pd.DataFrame(result.value) if isinstance(result.value, list) else result.value
+        if isinstance(found, pd.DataFrame):
+            found.attrs |= {"notes": [*result.notes], "failures": [*result.failures]}
+        value: _T = found
+        return value
 
     function.__name__ = function.__qualname__ = name
     function.__signature__ = inspect.Signature(shown, return_annotation=returns)  # type: ignore[attr-defined]
-    lines = [*command.lines[""], "", "Parameters", "----------"]
-    for each in shown:
-        option = command.options.get(each.name)
-        help_text = (
-            "" if option is None else option.help.replace(": {choices}", "").partition("; ")[0]
-        )
-        told = OTHERWISE.get(each.name, f"{help_text[:1].upper()}{help_text[1:]}")
-        told = FLAG.sub(lambda flag: f"``{flag[1].replace('-', '_')}``", told)
-        needed = "" if each.default is each.empty else ", optional"
-        lines += [f"{each.name} : {each.annotation}{needed}", f"    {told}"]
-    kind = f"{returns.__module__.partition('.')[0]}.{returns.__name__}"
-    lines += ["", "Returns", "-------", kind.removeprefix("seqopt.").removeprefix("builtins.")]
-    lines += [f"    {about}", "", "Raises", "------", "SeqoptError"]
-    lines += ["    With one line that says what to change.", "", "Examples", "--------"]
-    function.__doc__ = "\n".join([*lines, inspect.cleandoc(example)])
+    function.__doc__ = _docstring(command, shown, returns, about, example)
     return function
 
 
-def _value(result: Any, out: object) -> Any:
-    """Return what a command found, and write its output if requested."""
-    if isinstance(result, Result):
-        if out is not None:
-            result.answer()
-        return result.value
-    found = pd.DataFrame(result.value) if isinstance(result.value, list) else result.value
-    if isinstance(found, pd.DataFrame):
-        found.attrs |= {"notes": [*result.notes], "failures": [*result.failures]}
-    return found
+def _docstring(
+    command: Signature, shown: Sequence[inspect.Parameter], returns: type, about: str, example: str
+) -> str:
+    """Return the docstring of a command as a function, of its help."""
+    lines = [*command.lines[""], "", "Parameters", "----------"]
+    for each in shown:
+        option = command.options.get(each.name)
+        help_text = "" if option is None else option.help.replace(": {choices}", "")
+        told = help_text[:1].upper() + help_text[1:].partition("; ")[0]
+        told = FLAG.sub(lambda flag: f"``{flag[1].replace('-', '_')}``", told)
+        needed = "" if each.default is each.empty else ", optional"
+        lines += [f"{each.name} : {each.annotation}{needed}"]
+        lines += [f"    {OTHERWISE.get(each.name, told)}"]
+    kind = f"{returns.__module__.partition('.')[0]}.{returns.__name__}"
+    lines += ["", "Returns", "-------", kind.removeprefix("seqopt.").removeprefix("builtins.")]
+    lines += [f"    {about}", "", "Raises", "------", "SeqoptError"]
+    lines += ["    With one line that says what to change."]
+    lines += ["", "Examples", "--------", inspect.cleandoc(example)] if example else []
+    return "\n".join(lines)
 
 
 compare = _function(
@@ -156,34 +156,6 @@ assess = _function(
     {'stands': 7}
     """,
 )
-analyze = _function(
-    Analyze,
-    pd.DataFrame,
-    "A row per step, units in the names of columns. ``attrs['notes']`` says what is worth\n"
-    "    knowing, ``attrs['failures']`` which steps are mechanisms, or were not solved.",
-    """
-    >>> analyze("wall:columns=2,courses=2", method="sequential").shape[0]
-    7
-    """,
-)
-times = _function(
-    Times,
-    pd.DataFrame,
-    "A row per step, s; ``attrs['robots']`` is how long each robot does what.",
-    """
-    >>> float(times("wall:columns=2,courses=2", method="sequential")["end_s"].iloc[-1])
-    145.0
-    """,
-)
-reach = _function(
-    Reach,
-    pd.DataFrame,
-    "A row per robot and node.",
-    """
-    >>> bool(reach("wall:columns=2,courses=2")["reached"].all())
-    True
-    """,
-)
 replan = _function(
     Replan,
     Plan,
@@ -196,31 +168,21 @@ replan = _function(
     """,
     beside=("cache", "mortar", "stability", "curing"),
 )
+analyze = _function(
+    Analyze,
+    pd.DataFrame,
+    "A row per step, units in the names of columns. ``attrs['notes']`` says what is worth\n"
+    "    knowing, ``attrs['failures']`` which steps are mechanisms, or were not solved.",
+)
+times = _function(
+    Times, pd.DataFrame, "A row per step, s; ``attrs['robots']`` is how long each robot does what."
+)
+reach = _function(Reach, pd.DataFrame, "A row per robot and node.")
 instance = _function(
     _Instance,
     Instance,
     "The graph of the problem, for any solver.",
-    """
-    >>> instance("wall:columns=2,courses=2", schedule="free", aim="minmax").name
-    'wall 2 x 2'
-    """,
     beside=("grips", "props", "payload", "stability", "time_limit", "curing"),
 )
-export = _function(
-    Export,
-    str,
-    "The text of the file.",
-    """
-    >>> len(export("wall:columns=2,courses=2").splitlines())
-    8
-    """,
-)
-report = _function(
-    Report,
-    tuple[Path, ...],
-    "Paths of what was written.",
-    """
-    >>> report("wall:columns=2,courses=2", out="wall.html")  # doctest: +SKIP
-    (PosixPath('wall.html'),)
-    """,
-)
+export = _function(Export, str, "The text of the file.")
+report = _function(Report, tuple[Path, ...], "Paths of what was written.")

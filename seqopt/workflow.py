@@ -121,7 +121,9 @@ class Robust:
             if each < 1:
                 raise ProblemError(f"vary {name}={each:g}: give a factor from 1")
         if grips > 1 and scene.grip_kinds.rigid:
-            raise ProblemError(f"vary grips={grips:g}: they are rigid; say how stiff with grips")
+            raise ProblemError(
+                f"vary grips={grips:g}: they are rigid; say how stiff with --grips or with_grips"
+            )
         factors = (1 / factor, factor)
         drawn = sample(scene, stiffness=factors, count=self.count, seed=self.seed, **spread)
         return drawn if grips == 1 else drawn.with_grips((1 / grips, grips))
@@ -138,8 +140,8 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     limits: Sequence[Limit | Filter | str] | str = (),
     budgets: Sequence[str] | str = (),
     stands: Standing | Mortar | str | None = None,
-    robust: Robust | None = None,
     also: Sequence[str] = (),
+    robust: Robust | None = None,
     order: str | Sequence[int] | None = None,
     mortar: Mortar | str | None = None,
     robots: int | Sequence[str] | None = None,

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from seqopt._cli.terminal import complain, note, show, show_text
+from seqopt._cli.terminal import complain, show, show_text
 from seqopt.errors import (
     InfeasibleError,
     MechanismError,
@@ -68,7 +68,6 @@ class Answer:
 
     facts: Mapping[str, object]  # values, mappings, sequences, tables, and what makes them if asked
     text: str = ""  # lines on standard output
-    headings: tuple[str, ...] = ()  # lines of the text that are headings
     data: str = ""  # a table as CSV for standard output, where no file is written for it
     written: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()  # what else is worth knowing: lines on standard error
@@ -144,10 +143,8 @@ def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) ->
         if answer.data:
             show(answer.data)
         if answer.text and not (answer.written and sys.stdout is None):
-            show_text(answer.text, answer.headings)
-    for text in () if quiet else answer.notes:
-        note(text)
-    for text in answer.failures:
+            show_text(answer.text)
+    for text in (*(() if quiet else answer.notes), *answer.failures):
         complain(text)
     return answer.status
 

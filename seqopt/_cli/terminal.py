@@ -7,25 +7,19 @@ Names come from foreign files: control characters are escaped.
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import sys
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
 from seqopt.errors import FileError, PluginWarning, SceneWarning
 
 NARROWEST, WIDEST = 40, 100  # columns that text is wrapped to
-STYLES = {"heading": "1", "bad": "1;31", "doubt": "33"}  # of terminals: bold, bold red, yellow
 CLEAR = "\r\033[K"  # of a terminal: the line it is on
 LONGEST = 2000  # characters of a line on standard error
-BEGIN = re.compile(
-    r"^seqopt: (error|warning|solver failed|nothing found|time is over|out of memory"
-    r"|payload exceeded)(?=:)"
-)
 
 
 def columns() -> int:
@@ -61,20 +55,6 @@ def is_terminal(stream: TextIO | None) -> bool:
         return False
 
 
-def colored(stream: TextIO | None) -> bool:
-    """Return whether to color a stream; ``NO_COLOR`` and ``FORCE_COLOR`` take precedence."""
-    if os.environ.get("NO_COLOR"):
-        return False
-    if os.environ.get("FORCE_COLOR"):
-        return stream is not None
-    return is_terminal(stream) and os.environ.get("TERM") != "dumb"
-
-
-def painted(text: str, style: str, stream: TextIO | None) -> str:
-    """Return text in one of `STYLES`, if its stream is colored."""
-    return f"\033[{STYLES[style]}m{text}\033[0m" if colored(stream) else text
-
-
 def harmless(text: str, kept: str = "") -> str:
     r"""Return text with control characters escaped, except those in ``kept``.
 
@@ -95,23 +75,16 @@ def show(text: str) -> None:
     sys.stdout.write(harmless(text, "\n\t"))
 
 
-def show_text(text: str, headings: Sequence[str] = ()) -> None:
-    """Write lines to standard output, some as headings, wrapped on a terminal.
-
-    Raises `FileError` if standard output is closed.
-    """
+def show_text(text: str) -> None:
+    """Write lines to standard output, wrapped on a terminal; else as `show`."""
     if is_terminal(sys.stdout):
         fits = columns()
         lines = (wrapped(x, rest="  ") if len(x) > fits else x for x in text.split("\n"))
         text = "\n".join(lines)
-    for line in text.split("\n"):
-        if line and line in headings and colored(sys.stdout):
-            sys.stdout.write(painted(harmless(line), "heading", sys.stdout) + "\n")
-        else:
-            show(line + "\n")
+    show(text + "\n")
 
 
-def complain(text: str, style: str = "bad") -> None:
+def complain(text: str) -> None:
     """Print a line on standard error; ignore a closed or full one."""
     if len(text) > LONGEST:
         text = f"{text[: LONGEST // 2]} … {text[-LONGEST // 4 :]}"
@@ -120,15 +93,9 @@ def complain(text: str, style: str = "bad") -> None:
         if sys.stderr is not None:
             watched = is_terminal(sys.stderr)
             text = wrapped(text, rest="  ") if watched else text
-            text = BEGIN.sub(lambda begin: painted(begin[0], style, sys.stderr), text)
             print(CLEAR * watched + text, file=sys.stderr, flush=True)
     except OSError:
         silence(sys.stderr)
-
-
-def note(text: str) -> None:
-    """Print a note on standard error; else as `complain`."""
-    complain(text, "doubt")
 
 
 def flush() -> None:
@@ -173,7 +140,7 @@ def _as_a_line(otherwise: Callable[..., None]) -> Callable[..., None]:
             return
         if issubclass(category, SceneWarning | PluginWarning):
             said.add(str(message))
-            note(f"seqopt: warning: {message}")
+            complain(f"seqopt: warning: {message}")
         else:
             otherwise(message, category, *rest)
 

@@ -13,7 +13,8 @@ from seqopt.work.progress import Stage, duration
 PATIENCE = 1.0  # s for which a command says nothing
 TICK = 0.5  # s between two looks at the clock
 WIDE = 20  # of a bar
-TAIL = ": 100 % |12345678901234567890| about 100 min left "  # beside which words have to find room
+TAIL = 50  # columns beside the words of a stage, with a bar
+SHORT = 24  # the same without one
 
 
 class Watcher:
@@ -35,11 +36,10 @@ class Watcher:
         self._wide = 0  # what is shown, in columns
         self._lock = threading.Lock()
         self._over = threading.Event()
-        self._clock = threading.Thread(target=self._tick, daemon=True)
 
     def __enter__(self) -> Watcher:
         if self._shows:
-            self._clock.start()
+            threading.Thread(target=self._tick, daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -58,12 +58,11 @@ class Watcher:
             return
         with self._lock:
             new = told if isinstance(told, Stage) else Stage(str(told), -1.0)
-            began, share = self._began.get(new.what, (time.perf_counter(), 0.0))
-            if new.share < share:  # it begins anew
-                began = time.perf_counter()
-            if new.share >= 0:
-                self._began[new.what] = began, new.share
-            self._stage, self._told = new, time.perf_counter()
+            self._told = time.perf_counter()
+            began, share = self._began.get(new.what, (self._told, 0.0))
+            if new.share >= 0:  # it begins anew where it falls
+                self._began[new.what] = began if new.share >= share else self._told, new.share
+            self._stage = new
             if not self._notebook:
                 self._show()
 
@@ -75,20 +74,21 @@ class Watcher:
 
     def _show(self) -> None:
         """Show the stage, from a second after the start of the command on."""
-        now = time.perf_counter()
+        now, stage = time.perf_counter(), self._stage
         if self._over.is_set() or now - self._start < PATIENCE:
             return
-        stage, left = self._stage, self._left(now)
-        what = harmless(stage.what)
+        what, left = harmless(stage.what), 0.0
+        if stage.left is not None:
+            left = stage.left - (now - self._told)
+        elif stage.share > 0:
+            left = (now - self._began[stage.what][0]) * (1 / stage.share - 1)
         if stage.share > 0 and left > 0:
             share = min(stage.share, 1.0)
-            bar = "#" * round(WIDE * share)
             about = f"about {duration(max(left, 1.0))} left"
-            what = what[: columns() - len(TAIL)]
-            self._put(f"{what}: {100 * share:3.0f} % |{bar:{WIDE}}| {about}")
+            bar = "#" * round(WIDE * share)
+            self._put(f"{what[: columns() - TAIL]}: {100 * share:3.0f} % |{bar:{WIDE}}| {about}")
         else:
-            what = what[: columns() - 24]
-            self._put(f"{what} … {duration(now - self._start)} so far")
+            self._put(f"{what[: columns() - SHORT]} … {duration(now - self._start)} so far")
 
     def _put(self, line: str) -> None:
         """Show a line in the place of the one before."""
@@ -96,11 +96,3 @@ class Watcher:
             sys.stderr.write(f"\r{line:{self._wide}}")
             sys.stderr.flush()
         self._wide = len(line)
-
-    def _left(self, now: float) -> float:
-        """Return the remaining time of the stage, s; zero if it is not known."""
-        stage = self._stage
-        if stage.left is not None:
-            return stage.left - (now - self._told)
-        took = now - self._began[stage.what][0] if stage.share > 0 else 0.0
-        return took * (1 - stage.share) / max(stage.share, 1e-9)

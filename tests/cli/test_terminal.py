@@ -11,7 +11,7 @@ import threading
 import pytest
 
 from seqopt._cli import watcher
-from seqopt._cli.terminal import colored, columns, complain, note, painted, show_text, wrapped
+from seqopt._cli.terminal import columns, complain, show_text, wrapped
 from seqopt._cli.watcher import Watcher
 from seqopt.work.progress import Stage, with_progress, within
 
@@ -26,11 +26,8 @@ class Screen(io.StringIO):
 
 
 def on_screen(monkeypatch):
-    """A terminal of 80 columns, without a word of the environment on colors."""
-    for name in ("NO_COLOR", "FORCE_COLOR"):
-        monkeypatch.delenv(name, raising=False)
+    """A terminal of 80 columns."""
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setenv("TERM", "xterm")
     stream = Screen()
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(sys, "stdout", stream)
@@ -138,30 +135,13 @@ def test_items_and_times_are_told_as_stages():
 def test_long_lines_are_wrapped_for_people_only(monkeypatch):
     screen = on_screen(monkeypatch)
     complain("seqopt: error: " + "word " * 40)
-    note("engine: " + "word " * 40)
+    complain("engine: " + "word " * 40)
     show_text("word " * 40)
     seen = re.sub(r"\033\[[0-9;]*[mK]", "", screen.getvalue())
     assert max(map(len, seen.splitlines())) <= 80
     monkeypatch.setattr(sys, "stderr", io.StringIO())
     complain("seqopt: error: " + "word " * 40)
     assert sys.stderr.getvalue().count("\n") == 1
-
-
-def test_colors_are_on_terminals_alone_and_never_the_only_sign(monkeypatch):
-    screen = on_screen(monkeypatch)
-    complain("seqopt: error: no such scene")
-    assert "\033[1;31mseqopt: error\033[0m: no such scene" in screen.getvalue()
-    plain = io.StringIO()
-    assert (colored(screen), colored(plain), colored(None)) == (True, False, False)
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    assert colored(plain)
-    monkeypatch.setenv("NO_COLOR", "1")
-    assert not colored(screen)
-    assert painted("error", "bad", screen) == "error"
-    monkeypatch.delenv("NO_COLOR")
-    monkeypatch.delenv("FORCE_COLOR")
-    monkeypatch.setenv("TERM", "dumb")
-    assert not colored(screen)
 
 
 @pytest.mark.parametrize(("width", "found"), [("80", 80), ("20", 40), ("300", 100)])

@@ -85,7 +85,6 @@ def _answer(
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
     about = {"criteria": criteria, **provenance(engine)}
     blocks = _comparison_blocks(result, scene, criterion, columns())
-    headings = [block.partition("\n")[0] for block in blocks]
     if result.speed is not None:
         blocks.append("\n".join([SPEED, *result.speed.describe(wrapped)]))
     written: tuple[Path, ...] = ()
@@ -102,7 +101,6 @@ def _answer(
         | {"criterion": criterion.name, **_facts(result)}
         | ({} if result.speed is None else {"speed": result.speed.facts()}),
         text="\n\n".join(blocks),
-        headings=(*headings, SPEED),
         written=written,
         scene=scene,
         notes=(

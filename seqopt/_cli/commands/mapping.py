@@ -47,7 +47,6 @@ def answer_map(asked: options.Fixed, over: str, holds: Sequence[str]) -> Answer:
     return Answer(
         facts={"versions": versions(), "cases": found.cases, "steps": found.steps},
         text="\n\n".join([*blocks, wrapped(where)]),
-        headings=tuple(block.splitlines()[0] for block in blocks),
         written=written,
         scene=scene,
         value=found.cases,

@@ -69,9 +69,7 @@ def run(asked: SceneAsked) -> Answer:
         write_text(page, scene_page(scene))
         lines.append(f"written to {page}; open it in a browser")
         written = (page,)
-    return Answer(
-        facts={"scene": facts}, text="\n".join(lines), headings=(lines[0],), written=written
-    )
+    return Answer(facts={"scene": facts}, text="\n".join(lines), written=written)
 
 
 def _network_facts(network: Network) -> dict[str, object]:
