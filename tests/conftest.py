@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
@@ -81,4 +81,4 @@ def loop25(engine25):
 
 @pytest.fixture(scope="session")
 def problem25(engine25, loop25):
-    return candidate_layers(engine25, loop25, EQUATIONS, also=("F_largest",))
+    return pose_decisions(engine25, loop25, EQUATIONS, also=("F_largest",))

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from experiments.harness.scenes import running_bond
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.scene._props import Prop
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import as_vectors, vertices_of

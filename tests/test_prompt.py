@@ -12,7 +12,7 @@ from seqopt.arrays import _LONGEST, Terse
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import SceneError
 from seqopt.graph._orders import among_orders
-from seqopt.graph.layers.layers import travel
+from seqopt.graph.decisions import travel
 from seqopt.graph.states.states import build_states
 from seqopt.plan.front import FrontProblem, find_front
 from seqopt.plan.out_of_sample import judge_unseen
@@ -143,9 +143,9 @@ def test_a_terse_value_leaves_out_defaults_and_counts_what_is_too_much():
 
 def test_figures_at_the_prompt_are_those_of_the_values(met):
     plan = met[0]
-    assert f"objective {plan.certificate.objective:.6g}" in repr(plan)
+    assert f"sum {plan.certificate.objective:.6g}, optimal" in repr(plan)
     assert f"objective {plan.certificate.objective:.6g}" in repr(plan.certificate)
-    counts = [len(move.candidates) for move in plan.problem.schedule.moves]
+    counts = [len(move.candidates) for move in plan.decisions.schedule.moves]
     assert f"{len(counts)} grips to choose from {min(counts)} to {max(counts)}" in repr(
-        plan.problem.schedule
+        plan.decisions.schedule
     )

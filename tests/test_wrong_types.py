@@ -14,7 +14,7 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.scene.parts import Anywhere, Robot
 from tests.builders import six_bricks
@@ -25,7 +25,7 @@ NETWORK = seqopt.build_network(SCENE)
 ENGINE = ComplianceEngine(NETWORK)
 LOOP = seqopt.three_robot_loop(NETWORK)
 EQUATIONS = seqopt.CRITERIA["equations-2-3"]
-PROBLEM = candidate_layers(ENGINE, LOOP, EQUATIONS)
+PROBLEM = pose_decisions(ENGINE, LOOP, EQUATIONS)
 
 
 @pytest.mark.parametrize(

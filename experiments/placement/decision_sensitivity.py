@@ -35,9 +35,8 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from seqopt import Scene, Schedule, build_network, load_scene, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.decisions import Decisions, move_costs, pose_decisions, rank_of
 from seqopt.graph.formulation import find_formulation
-from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.layers.ranking import move_costs, rank_of
 from seqopt.problem.requirements import Criterion, SceneFacts
 from seqopt.report._style import dress, looks, styled
 from seqopt.report.text import in_words
@@ -160,14 +159,14 @@ Decision = tuple[tuple[int, ...], tuple[int, ...]]
 """Both answers to the nominal problem of a criterion: the best, and the one that is searched."""
 
 
-def problems(scene: Scene, schedule: Schedule) -> dict[str, Layers]:
+def problems(scene: Scene, schedule: Schedule) -> dict[str, Decisions]:
     """Return the problem under every criterion of the nominal scene, all models solved once."""
-    posed = candidate_layers(ComplianceEngine(build_network(scene)), schedule, EQUATIONS, also=ALSO)
+    posed = pose_decisions(ComplianceEngine(build_network(scene)), schedule, EQUATIONS, also=ALSO)
     nominal = SceneFacts(ComplianceEngine(build_network(schedule.scene)))
     return {c.name: replace(posed, criterion=c.for_scene(nominal)) for c in TESTED}
 
 
-def judge(problem: Layers, nominal: Decision) -> dict[str, float]:
+def judge(problem: Decisions, nominal: Decision) -> dict[str, float]:
     chosen, searched = nominal
     plan = solve(problem, "overlap_dp")
     best = plan.certificate.objective

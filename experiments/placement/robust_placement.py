@@ -41,10 +41,11 @@ from experiments.harness.scenes import half_circle
 from formulations.scenario_program import solve_program
 from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
 from seqopt.arrays import Floats
+from seqopt.graph.compiled import best_in_order, compile_totals
+from seqopt.graph.decision_costs import Joined, LayeredCosts
+from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.graph.formulation import Watch
-from seqopt.graph.layers.compiled import best_in_order, compile_totals
-from seqopt.graph.layers.costs import Joined, LayeredCosts
-from seqopt.graph.layers.layers import Layers, candidate_layers, in_scenarios
+from seqopt.graph.states.states import States, of_decisions, over_scenarios
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
@@ -66,7 +67,7 @@ class StepQuantile(NamedTuple):
     steps: int
 
 
-def least_quantile(problem: Layers, share: float = 0.1) -> StepQuantile:
+def least_quantile(problem: Decisions, share: float = 0.1) -> StepQuantile:
     """Return the choice with the least level that no more than a share of open steps exceed."""
     every = chain.from_iterable(problem.evaluation.levels())
     steps = [(each.moves, problem.step_costs(each)) for each in every]
@@ -109,21 +110,21 @@ class Effort(NamedTuple):
     limit: float
 
 
-def posed(scene: Scene, criterion: Criterion) -> Layers:
+def posed(scene: Scene, criterion: Criterion) -> Decisions:
     engine = make_engine("compliance", build_network(scene))
-    return candidate_layers(engine, three_robot_loop(engine.network), criterion)
+    return pose_decisions(engine, three_robot_loop(engine.network), criterion)
 
 
-def over_draws(problem: Layers, count: int, seed: int) -> Layers:
-    """Return the problem over so many scenarios, costs computed."""
-    scene = problem.schedule.scene
-    found = in_scenarios(problem, scenarios(scene, count=count, seed=seed).scenes, WORST_PEAK)
-    return replace(found, known=found.costs_in_scenarios)
+def over_draws(problem: Decisions, count: int, seed: int) -> States:
+    """Return the candidates over so many scenarios."""
+    some = scenarios(problem.schedule.scene, count=count, seed=seed).scenes
+    return over_scenarios(of_decisions(problem), some, WORST_PEAK)
 
 
-def values(problem: Layers, aim: Aim, choice: Choice) -> Floats:
+def values(graph: States, aim: Aim, choice: Choice) -> Floats:
     """Return the value of a choice in every scenario, infinite where it exceeds a limit."""
-    return np.array([aim.value_of(costs, choice) for costs in problem.layered(aim)])
+    found = map(aim.costs, graph.costs_in_scenarios)
+    return np.array([aim.value_of(costs, choice) for costs in found])
 
 
 def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
@@ -134,13 +135,13 @@ def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
             most = over_draws(problem, max(effort.counts), seed)
             for aim in (aim for aim, own in AIMS.items() if own is criterion):
                 for count in effort.counts:
-                    some, known = most.scenes[:count], most.known[:count]
-                    plan = solve(replace(most, over=aim, scenes=some, known=known))
+                    some = most.scenarios[:count]
+                    plan = solve(replace(most, over=aim, scenarios=some))
                     row = {"aim": str(aim), "criterion": criterion.name, "seed": seed}
                     yield row | {"scenarios": count} | measured(plan, unseen)
 
 
-def measured(plan: Plan, unseen: Layers) -> dict[str, object]:
+def measured(plan: Plan, unseen: States) -> dict[str, object]:
     """Return what a plan is worth where it was made and elsewhere."""
     trial, proof = judge_unseen(plan, unseen).summary(), plan.certificate
     assert proof is not None
@@ -155,7 +156,7 @@ def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
     for aim in (WORST_TOTAL, TAIL):
         plan = solve(replace(most, over=aim))
         start = time.perf_counter()
-        compiled = compile_totals("totals", most.layered(Aim.SUM), aim)
+        compiled = compile_totals("totals", [c.sums for c in most.costs_in_scenarios], aim)
         told, value = solve_program(
             compiled.instance.asked, aim.most(count), whole=True, watch=Watch(limit)
         )

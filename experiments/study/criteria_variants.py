@@ -30,8 +30,7 @@ from experiments.harness.scenes import arch25
 from experiments.study.parts.ranks import rank_choice
 from seqopt import three_robot_loop
 from seqopt.arrays import Floats
-from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.layers.ranking import TIED, rank_of
+from seqopt.graph.decisions import TIED, Decisions, pose_decisions, rank_of
 from seqopt.problem.criteria import RankSum, _mean_ranks, equal
 from seqopt.report._style import BLUE, GRAY, GREEN, PURPLE, VERMILION, dress, styled
 from seqopt.responses._choices import StepChoices
@@ -63,7 +62,7 @@ def rules() -> list[Rule]:
     return [Rule(*parts) for parts in product(FOURTH, WINDOWS, JOINS, ROUNDED)]
 
 
-def order(problem: Layers, choice: tuple[int, ...], move: int, rule: Rule) -> Floats:
+def order(problem: Decisions, choice: tuple[int, ...], move: int, rule: Rule) -> Floats:
     """Return what the candidates of a move cost (C,), infinite where two robots meet."""
     shared = [s for s in problem.evaluation.steps if s.moves == (move - 1, move)]
     own = [s for s in problem.evaluation.steps if s.moves == (move,)][-WINDOWS["own steps"] :]
@@ -97,7 +96,7 @@ def _ranks(values: list[Floats], name: str, rule: Rule) -> Floats:
     return _mean_ranks(joined[rule.join])
 
 
-def placed(problem: Layers, rule: Rule) -> pd.DataFrame:
+def placed(problem: Decisions, rule: Rule) -> pd.DataFrame:
     """Return where the published nodes rank: a row per optimization, with ``alone`` if first."""
     choice, rows = published_choice(problem), []
     for move, node in enumerate(choice):
@@ -112,7 +111,7 @@ def _places(ranks: pd.Series) -> dict[str, object]:
     return {"first": int((ranks == 1).sum()), "among_three": int((ranks <= 3).sum())}
 
 
-def compression(problem: Layers, tried: list[Rule]) -> pd.DataFrame:
+def compression(problem: Decisions, tried: list[Rule]) -> pd.DataFrame:
     """Return how often each rule names the published node alone, first, and among three."""
     rows = []
     for rule in tried:
@@ -155,7 +154,7 @@ def variants() -> list[RankSum]:
     return out
 
 
-def scores(problem: Layers, criteria: list[RankSum]) -> pd.DataFrame:
+def scores(problem: Decisions, criteria: list[RankSum]) -> pd.DataFrame:
     """Return how often each criterion names the published node first, and among three."""
     choice = published_choice(problem)
     rows = []
@@ -199,7 +198,7 @@ def chart(table: pd.DataFrame, observed: pd.DataFrame) -> Figure:
 def experiment(options: Options) -> Finding:
     engine, tried = arch25(), variants()
     also = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest", "F_rob1", "F_rob2", "F_rob3")
-    problem = candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS, also=also)
+    problem = pose_decisions(engine, three_robot_loop(engine.network), EQUATIONS, also=also)
     if options.quick:
         closest = {CLOSEST.before, CLOSEST.after}, CROWN + CLOSEST.delay
         tried = tried[:1] + [c for c in tried if ({c.before, c.after}, c.crown) == closest]

@@ -28,12 +28,12 @@ from seqopt._interrupts import answered
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph._windows import alone_steps, posed_anew
+from seqopt.graph.compiled import on_paths
+from seqopt.graph.decision_costs import Joined
+from seqopt.graph.decisions import Decisions, windows
 from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, Instance, _Target
-from seqopt.graph.layers.compiled import on_paths
-from seqopt.graph.layers.costs import Joined
-from seqopt.graph.layers.layers import Layers, windows
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
 
@@ -137,7 +137,7 @@ class LazyProof(NamedTuple):
     models: int
 
 
-def prove_lazily(problem: Layers, formulation: Formulation, watch: Watch) -> LazyProof:
+def prove_lazily(problem: Decisions, formulation: Formulation, watch: Watch) -> LazyProof:
     """Solve pairs of candidates until a best path of their lower bounds has no unsolved one.
 
     Raises `InfeasibleError` if no choice is allowed; `ProblemError` if the formulation is not
@@ -157,7 +157,7 @@ def prove_lazily(problem: Layers, formulation: Formulation, watch: Watch) -> Laz
     return LazyProof(search.bounds, stopped, search.models)
 
 
-def _floor(problem: Layers, formulation: Formulation) -> float:
+def _floor(problem: Decisions, formulation: Formulation) -> float:
     """Return what any pair costs at least; raise an error where that is not known."""
     if formulation.kind is not FormulationKind.EXACT:
         raise ProblemError(f"{formulation.name}: the lazy search proves; give an exact formulation")
@@ -175,7 +175,7 @@ def _floor(problem: Layers, formulation: Formulation) -> float:
 class _Search:
     """A search on its way: the bounds, and pairs on their best path that are not solved."""
 
-    def __init__(self, problem: Layers, formulation: Formulation) -> None:
+    def __init__(self, problem: Decisions, formulation: Formulation) -> None:
         aim, floor = formulation.aim or Aim.SUM, _floor(problem, formulation)
         self._problem, self._aim, schedule = problem, aim, problem.schedule
         self._each = isinstance(problem.criterion, WeightedSum | WorstRatio)  # pair by pair

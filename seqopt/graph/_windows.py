@@ -13,8 +13,8 @@ from seqopt.arrays import Floats, Terse
 from seqopt.engines.interface import Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MemoryShortError, NothingFoundError, TimeUpError
+from seqopt.graph.decisions import Decisions
 from seqopt.graph.formulation import Watch
-from seqopt.graph.layers.layers import Layers
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices
 from seqopt.responses.table import step_fields
@@ -30,7 +30,7 @@ class Windows(Terse):
     engine had at hand on the way; ``rows``: by move, the steps that are solved.
     """
 
-    problem: Layers
+    problem: Decisions
     choice: list[int] = field(default_factory=list)
     fields: dict[int, Fields] = field(default_factory=dict, compare=False)
     rows: dict[int, tuple[StepChoices, ...]] = field(default_factory=dict, compare=False)
@@ -66,7 +66,7 @@ class Windows(Terse):
         return f"{len(self.choice)} of {len(moves)} moves were chosen, at nodes {' '.join(nodes)}"
 
 
-def walk_windows(problem: Layers, watch: Watch) -> Windows:
+def walk_windows(problem: Decisions, watch: Watch) -> Windows:
     """Choose what costs least, one move after the other (equation 1 of Bruun et al.).
 
     Raises `NothingFoundError` if a move has no candidate left after the choices before it, while
@@ -98,7 +98,7 @@ def walk_windows(problem: Layers, watch: Watch) -> Windows:
 
 
 def _decided(
-    problem: Layers, alone: Layers, choice: Sequence[int]
+    problem: Decisions, alone: Decisions, choice: Sequence[int]
 ) -> Generator[tuple[StepChoices, ...], None, None]:
     """Yield the steps that moves decide, one move after the other, by ascending brick counts.
 
@@ -126,13 +126,13 @@ def _decided(
             yield tuple(sorted((*shared, *own.pop(k, ())), key=lambda each: each.step.number))
 
 
-def alone_steps(problem: Layers) -> Layers:
+def alone_steps(problem: Decisions) -> Decisions:
     """Return the problem of the steps in which one move is open."""
     steps = tuple(step for step in problem.schedule.steps if len(step.moves) == 1)
     return posed_anew(problem, replace(problem.schedule, steps=steps))
 
 
-def posed_anew(problem: Layers, schedule: Schedule) -> Layers:
+def posed_anew(problem: Decisions, schedule: Schedule) -> Decisions:
     """Return the problem of another schedule, everything else being the same."""
     return replace(problem, evaluation=replace(problem.evaluation, schedule=schedule))
 

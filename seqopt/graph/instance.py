@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
@@ -14,9 +14,10 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, as_formulation, formulations
 from seqopt.graph.graph import Graph, Rows
-from seqopt.graph.source import ARCS, Source
 from seqopt.problem.problem import Aim
 from seqopt.problem.resources import Resource, StepArrays
+from seqopt.responses._tolerance import values_text
+from seqopt.scene.scene import Order
 
 if TYPE_CHECKING:
     from seqopt.graph._timed import TimedGraph
@@ -46,7 +47,7 @@ class _Cap(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Instance(Source, FrozenValue, Shown):
+class Instance(FrozenValue, Shown):
     """A graph with amounts of its arcs, goals and caps of paths through it; no scene is needed.
 
     A path leads from node 0 to one of the ends. Goals are made small one after the other: of the
@@ -84,8 +85,6 @@ class Instance(Source, FrozenValue, Shown):
     <Instance 'arch25': 493 nodes, 12453 arcs, least sum>
     """
 
-    kind = ARCS
-
     name: str
     source: Rows
     target: Rows
@@ -121,15 +120,16 @@ class Instance(Source, FrozenValue, Shown):
         capped = "".join(f", {cap.name} <= {cap.most:g}" for cap in self.caps)
         return f"<Instance {self.name!r}: {self.nodes} nodes, {self.arcs} arcs, {asked}{capped}>"
 
+    title, candidates, scenarios, models, standing, begin = "", (), (), 0, None, None  # of no scene
+
     @property
     def alone_in_scene(self) -> NoReturn:
         """Nothing: an instance has no scene; a `ProblemError` says so."""
         raise ProblemError(f"instance {self.name}: it is costs alone; no scene, no steps")
 
-    @property
-    def as_layers(self) -> Any:
-        """Nothing, as `alone_in_scene`."""
-        return self.alone_in_scene
+    def at(self, order: Order) -> Instance:
+        """Return itself: its order is given."""
+        return self
 
     @property
     def fitting(self) -> tuple[str, ...]:
@@ -159,6 +159,31 @@ class Instance(Source, FrozenValue, Shown):
     def names_of(self, aim: Aim | None) -> tuple[str, ...]:
         """Return what every goal is called."""
         return tuple(goal.name for goal in self.goals)
+
+    def in_display_units(self, aim: Aim | None, values: Sequence[float]) -> dict[str, float]:
+        """Return values of the first goals by their names."""
+        return dict(zip(self.names_of(aim), values, strict=False))
+
+    def bounded(self, bounds: Sequence[Any]) -> Sequence[Any]:
+        """Return the bounds of goals."""
+        return bounds
+
+    def chosen_nodes(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
+        """Return the nodes of a path."""
+        return tuple(state[-1] for state in states)
+
+    def chosen_candidates(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
+        """Raise a `ProblemError`: an instance has no moves."""
+        return self.alone_in_scene
+
+    def settles(self, *, exact: bool) -> bool:
+        """Return whether a judged plan is optimal though it has a gap: never."""
+        return False
+
+    def said(self, objective: Mapping[str, float], gap: float | None, status: str) -> str:
+        """Return objective, gap and status of a plan in words."""
+        within = f" within {gap:.2g}" if gap and gap < np.inf else ""
+        return f"{values_text(objective)}, {status}{within}"
 
     @property
     def nodes(self) -> int:

@@ -14,14 +14,13 @@ from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._explore import Explorer
 from seqopt.graph._timed import TimedGraph
+from seqopt.graph.compiled import on_paths
 from seqopt.graph.formulation import as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
-from seqopt.graph.layers.compiled import compile_layers, on_paths
-from seqopt.graph.layers.layers import Layers
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
-from seqopt.plan.pose import graph_of, usual
+from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import Aim, Problem
 
 
@@ -71,14 +70,15 @@ def compile_instance(
     """
     name = name or problem.engine.network.scene.name
     graph = graph_of(problem)
-    if not isinstance(graph, Layers):
+    if graph.decisions is None:
         instance = _of_states(name, graph, below)
     elif below < np.inf:
         raise ProblemError("below: it is about states; name aims, or leave it out")
     else:  # a level for every move
-        graph.require_possible()
-        asked = aim or as_formulation(usual(problem)).aim
-        found = compile_layers(graph, asked, name, alone=True)
+        graph.decisions.require_possible(graph.worlds)
+        asked = aim or as_formulation(graph.default_formulation).aim
+        worlds: Any = {"each": graph.costs_in_scenarios, "over": graph.over}
+        found = graph.decisions.compiled(asked, name, alone=True, **worlds)
         if found.offset:
             raise ProblemError(
                 f"instance {name}: a cost is below zero; ask for a criterion that is never negative"

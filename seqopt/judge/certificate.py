@@ -12,7 +12,7 @@ import numpy as np
 
 from seqopt.arrays import FrozenValue
 from seqopt.errors import FileError
-from seqopt.graph.layers.layers import Layers
+from seqopt.graph.decisions import Decisions
 from seqopt.network.network import Network
 from seqopt.responses._blocks import packed, remade
 from seqopt.responses._choices import Evaluation
@@ -25,7 +25,7 @@ _Met = Mapping[int, Mapping[str, float]]  # responses, by step
 
 
 def _require_anew(
-    problem: Layers, choice: Sequence[int], met: Callable[[], _Met] | None = None
+    problem: Decisions, choice: Sequence[int], met: Callable[[], _Met] | None = None
 ) -> None:
     """Raise an error if a choice leads to other responses than its problem has from a cache.
 

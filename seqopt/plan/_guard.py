@@ -20,9 +20,10 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError, SeqoptError, SolverError, message_of
+from seqopt.graph.decision_costs import Budget
 from seqopt.graph.formulation import Formulation, Solution, formulations
 from seqopt.graph.graph import LabelProof
-from seqopt.graph.layers.costs import Budget
+from seqopt.problem.problem import AskedBudget
 from seqopt.scene._checks import LARGEST_NUMBER, short
 
 Result = TypeVar("Result")
@@ -188,7 +189,7 @@ def _motion(given: Floats) -> Floats:
 
 
 def require_fit(
-    budgets: Sequence[Budget], formulation: Formulation, options: Mapping[str, object]
+    budgets: Sequence[Budget | AskedBudget], formulation: Formulation, options: Mapping[str, object]
 ) -> None:
     """Raise a `ProblemError` unless a formulation supports the budgets and options given."""
     if budgets and not formulation.takes_budgets:

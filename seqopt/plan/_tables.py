@@ -10,14 +10,17 @@ import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.graph._windows import Windows
-from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.ranking import move_costs, rank_of
+from seqopt.graph.decisions import Decisions, move_costs, rank_of
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices
 
 
 def chosen_table(
-    problem: Layers, choice: tuple[int, ...], aim: Aim, search: Windows | None, grips: pd.DataFrame
+    problem: Decisions,
+    choice: tuple[int, ...],
+    aim: Aim,
+    search: Windows | None,
+    grips: pd.DataFrame,
 ) -> pd.DataFrame:
     """Return the choice and its costs, move by move, as of `seqopt.plan.plan.Plan.table`.
 
@@ -37,7 +40,7 @@ def chosen_table(
     return moves_table(problem, choice, grips).join(pd.DataFrame(rows))
 
 
-def moves_table(problem: Layers, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:
+def moves_table(problem: Decisions, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:
     """Return the choice, a row per move, as of `seqopt.plan.plan.Plan.table` without costs.
 
     ``grips``: of the plan, as of `seqopt.responses.table.grips_table`.
@@ -61,7 +64,7 @@ def moves_table(problem: Layers, choice: Sequence[int], grips: pd.DataFrame) -> 
     )
 
 
-def choice_table(problem: Layers, choices: StepChoices) -> pd.DataFrame:
+def choice_table(problem: Decisions, choices: StepChoices) -> pd.DataFrame:
     """Return responses and cost of every choice of a step, by its nodes, SI units."""
     axes = next(iter(choices.responses.values())).ndim
     moves = [problem.schedule.moves[m] for m in choices.moves[-axes:]]
@@ -71,7 +74,9 @@ def choice_table(problem: Layers, choices: StepChoices) -> pd.DataFrame:
     return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
 
 
-def alternatives(problem: Layers, choice: tuple[int, ...], search: Windows | None) -> pd.DataFrame:
+def alternatives(
+    problem: Decisions, choice: tuple[int, ...], search: Windows | None
+) -> pd.DataFrame:
     """Return responses and cost of every evaluated choice, as of `Plan.alternatives`.
 
     ``search``: the models evaluated along the choice, if not all were.
@@ -90,7 +95,7 @@ def alternatives(problem: Layers, choice: tuple[int, ...], search: Windows | Non
 
 
 def _looked_at(
-    problem: Layers, choice: tuple[int, ...], search: Windows | None
+    problem: Decisions, choice: tuple[int, ...], search: Windows | None
 ) -> Iterator[tuple[StepChoices, int | None]]:
     """Yield the evaluated steps and, if the earlier move is fixed, its node."""
     if search is None and not problem.evaluation.streams:

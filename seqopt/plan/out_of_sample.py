@@ -9,17 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.compiled import best_in_order
-from seqopt.graph.layers.costs import LayeredCosts, ScenarioCosts
-from seqopt.graph.layers.layers import Layers, in_scenarios
-from seqopt.graph.states.states import over_scenarios
+from seqopt.graph.compiled import best_in_order
+from seqopt.graph.decision_costs import LayeredCosts, ScenarioCosts
+from seqopt.graph.states.states import States, over_scenarios
 from seqopt.judge._schedules import plan_values
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import WORST_PEAK, Aim
@@ -33,7 +31,7 @@ PLANS = ("robust", "nominal", "knows_it")
 class Trial(Terse):
     """Values of plans, scenario by scenario.
 
-    ``plan``: what was judged; ``known``: the layers over scenarios that it was chosen from;
+    ``plan``: what was judged; ``graph``: the candidates over scenarios that it was chosen from;
     ``nominal``: the exact optimum of the nominal scene, of the same aim in one scenario; ``table``:
     a row per scenario. Columns: ``set`` (``nominal``, ``optimized`` or ``unseen``), ``scenario``
     (from 1), then for each of the plans ``robust``, ``nominal`` and ``knows_it`` its ``_total`` and
@@ -42,7 +40,7 @@ class Trial(Terse):
     """
 
     plan: Plan
-    layers: Layers
+    graph: States
     nominal: tuple[int, ...]
     table: pd.DataFrame
 
@@ -54,11 +52,11 @@ class Trial(Terse):
     @property
     def known(self) -> tuple[Scene, ...]:
         """The scenarios of the optimization."""
-        return self.layers.scenes
+        return self.graph.worlds
 
     def summary(self) -> dict[str, dict[str, float]]:
         """Return the robust objective of each set of scenarios, by plan; some may be infinite."""
-        aim = self.layers.over
+        aim = self.graph.over
         column = "peak" if aim.aim is Aim.PEAK else "total"
         return {
             str(name): {plan: aim.value(rows[f"{plan}_{column}"].to_numpy()) for plan in PLANS}
@@ -66,31 +64,32 @@ class Trial(Terse):
         }
 
 
-def judge_unseen(plan: Plan, scenes: Layers | Scenarios | Sequence[Scene]) -> Trial:
+def judge_unseen(plan: Plan, scenes: States | Scenarios | Sequence[Scene]) -> Trial:
     """Evaluate a plan in other scenarios, with two plans for comparison.
 
     ``plan``: of candidates over scenarios; ``scenes``: not those it was made for: drawn with
-    another seed. Or the layers over them, whose costs may be known. Result: also of the nominal
+    another seed. Or the graph over them, whose costs may be known. Result: also of the nominal
     scene and of the scenarios that it was made for. Raises `ProblemError` if a scenario has other
     bricks or nodes.
     """
-    problem: Any = plan.graph
-    if not (problem.candidates and problem.scenarios):
+    graph, own = plan.graph, getattr(plan.graph, "decisions", None)
+    if own is None or not graph.scenarios:
         raise ProblemError("the plan was not chosen over scenarios; pose with scenarios")
-    nominal, aim = problem.as_layers, problem.over.aim
-    known = ScenarioCosts(nominal.sums, nominal.peaks, 0, 0.0)
-    chosen = best_choice(aim.costs(nominal), aim)
-    if not isinstance(scenes, Layers):
+    assert isinstance(graph, States)  # as one that has decisions
+    aim = graph.over.aim
+    known = ScenarioCosts(own.sums, own.peaks, 0, 0.0)
+    chosen = best_choice(aim.costs(own), aim)
+    if not isinstance(scenes, States):
         some = scenes.scenes if isinstance(scenes, Scenarios) else scenes
-        scenes = in_scenarios(nominal, some, problem.over)
-    sets = {"nominal": (known,), "optimized": problem.costs_in_scenarios}
+        scenes = over_scenarios(replace(graph, scenarios=()), some, graph.over)
+    sets = {"nominal": (known,), "optimized": graph.costs_in_scenarios}
     sets["unseen"] = scenes.costs_in_scenarios
     rows: list[dict[str, object]] = [
         {"set": name, "scenario": i, **_row(costs, aim, (plan.choice, chosen))}
         for name, found in sets.items()
         for i, costs in enumerate(found, start=1)
     ]
-    return Trial(plan, problem, chosen, pd.DataFrame(rows))
+    return Trial(plan, graph, chosen, pd.DataFrame(rows))
 
 
 def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:

@@ -13,10 +13,10 @@ import pandas as pd
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import provenance
+from seqopt.errors import ProblemError
+from seqopt.graph.decisions import Decisions
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Solution
 from seqopt.graph.instance import Instance
-from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.ranking import Objectives, objectives
 from seqopt.graph.states.states import States
 from seqopt.judge._step_checks import certified
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
@@ -53,7 +53,7 @@ class Plan(ShownBuild):
     ----------
     problem : Problem
         The problem; or the graph of choices, if that was given.
-    graph : Layers, States or Instance
+    graph : States or Instance
         What was chosen from.
     formulation : Formulation
         The formulation that solved it.
@@ -81,14 +81,14 @@ class Plan(ShownBuild):
     --------
     >>> import seqopt
     >>> seqopt.optimize("arch25")
-    Plan('arch25', 'three-robot', by overlap_dp: 90 steps, objective 657.465, gap 0 %)
+    Plan('arch25', 'three-robot', by overlap_dp: 90 steps, sum 657.465, optimal)
     >>> plan = seqopt.optimize("arch25", "free", aim="minmax,steps")
     >>> plan.status, plan.regrips
     (<Status.OPTIMAL: 'optimal'>, 0)
     """
 
-    problem: Problem | Layers | States | Instance
-    graph: Layers | States | Instance
+    problem: Problem | States | Instance
+    graph: States | Instance
     formulation: Formulation
     selection: Solution
     certificate: Certificate | None
@@ -127,18 +127,25 @@ class Plan(ShownBuild):
         return (Departure(FAR_OFF, said, (self.moved.step,)), *found)
 
     @property
-    def layers(self) -> Layers:
-        """The layers of candidates; raises `ProblemError` if states were chosen."""
-        return self.graph.as_layers
+    def decisions(self) -> Decisions:
+        """The candidates of moves; raises `ProblemError` if states were chosen."""
+        found = self._of_scene.decisions
+        if found is None:
+            raise ProblemError(
+                "the plan has no moves to show: it was chosen from states, which have no candidates"
+            )
+        return found
 
     @property
     def states(self) -> States:
         """The graph of states; raises `ProblemError` if candidates were chosen."""
-        return self.graph.as_states
+        if self._of_scene.decisions is not None:
+            raise ProblemError("the plan was chosen from candidates, not from states of the build")
+        return self._of_scene
 
     @property
-    def _of_scene(self) -> States | Layers:
-        """The graph of the scene itself; raises `ProblemError` if only costs were given."""
+    def _of_scene(self) -> States:
+        """The graph of a scene; raises `ProblemError` if only costs were given."""
         return self.graph.alone_in_scene
 
     @property
@@ -276,7 +283,7 @@ class Plan(ShownBuild):
 
     @property
     def _window_models(self) -> int:
-        return window_models(self.layers.schedule, self.choice)
+        return window_models(self.decisions.schedule, self.choice)
 
     @property
     def regrips(self) -> int:
@@ -305,7 +312,7 @@ class Plan(ShownBuild):
         # of all fields, which what steps leave is judged by too
         answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))
         columns = _response_columns(self.engine.network, answers)
-        columns.update(self.graph.step_columns(self.steps))
+        columns.update(self._of_scene.step_columns(self.steps))
         return columns
 
     def table(self) -> pd.DataFrame:
@@ -322,8 +329,8 @@ class Plan(ShownBuild):
 
         aim = self.formulation.aim
         if aim is None or self.graph.scenarios:
-            return _tables.moves_table(self.layers, self.choice, self.grips())
-        return _tables.chosen_table(self.layers, self.choice, aim, self.search, self.grips())
+            return _tables.moves_table(self.decisions, self.choice, self.grips())
+        return _tables.chosen_table(self.decisions, self.choice, aim, self.search, self.grips())
 
     def alternatives(self) -> pd.DataFrame:
         """Return the responses and the cost of every evaluated choice.
@@ -333,22 +340,7 @@ class Plan(ShownBuild):
         """
         from seqopt.plan import _tables  # noqa: PLC0415  # few ask for it
 
-        return _tables.alternatives(self.layers, self.choice, self.search)
-
-    def objectives(self) -> Objectives:
-        """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
-
-        Result: as of `seqopt.graph.layers.ranking.objectives`; None where there is no proof.
-        """
-        if (
-            self.certificate is None
-            or self.search is not None
-            or not self.graph.candidates
-            or self.graph.scenarios
-        ):
-            return {"objectives": None, "gap_parts": None}
-        heuristic = self.formulation.kind is FormulationKind.HEURISTIC
-        return objectives(self.layers, self.choice, heuristic=heuristic)
+        return _tables.alternatives(self.decisions, self.choice, self.search)
 
     def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
         """Return whether every step stands and by which margins, by the cone program.
@@ -373,8 +365,7 @@ class Plan(ShownBuild):
         ``idle_robots``, which never grip; limits of the linear range that are left, which model was
         ``enough``, what is known of ``arms``, and payloads that are exceeded;
         ``models_evaluated``, ``states_in_proof``, ``seconds``;
-        of criteria of ranks the sums under both ``objectives`` and of heuristics ``gap_parts``; of
-        an order that was sought ``order``, ``orders`` (among which), ``order_status``,
+        of an order that was sought ``order``, ``orders`` (among which), ``order_status``,
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
@@ -399,7 +390,7 @@ class Plan(ShownBuild):
 
 def _summarized(plan: Plan) -> dict[str, object]:
     """Return the summary of a plan, with a fixed set of keys."""
-    graph, proof, scene = plan.graph, plan.certificate, plan.engine.network.scene
+    graph, proof, scene = plan._of_scene, plan.certificate, plan.engine.network.scene
     asked = plan.problem if isinstance(plan.problem, Problem) else plan._of_scene
     narrowed = plan.among and "optimal" in plan.status
     return {
@@ -417,7 +408,6 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "bound_rests_on": rests_on(plan),
         "gap": plan.gap,
         "claimed_gap": None if proof is None or plan.gap is None else _known_gap(proof.claimed_gap),
-        **plan.objectives(),
         "budgets": graph.spent(plan.objective, plan.selection),
         "steps": len(plan.steps),
         "steps_before_release": len(plan.steps) - graph.letting_go(plan.steps),

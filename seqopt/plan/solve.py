@@ -1,6 +1,6 @@
 """From a problem to its plan: a graph of choices, a formulation, a judge.
 
-A problem becomes a graph: layers of candidates, states of a build, or the arcs of an instance. A
+A problem becomes a graph: of decisions, or of states of a build; an instance has its arcs. A
 formulation chooses a path through it. The judge computes its values and a bound again, from the
 problem's own data. What was found and proven is the plan.
 """
@@ -17,31 +17,19 @@ import numpy as np
 
 from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.graph._windows import Windows, walk_windows
-from seqopt.graph.formulation import (
-    End,
-    Formulation,
-    Run,
-    Solution,
-    Watch,
-    as_formulation,
-    formulations,
-    timed,
-)
+from seqopt.graph.decisions import Decisions
+from seqopt.graph.formulation import End, Formulation, Run, Solution, Watch, formulations, timed
 from seqopt.graph.instance import Instance
-from seqopt.graph.layers.compiled import compile_layers
-from seqopt.graph.layers.layers import Layers
-from seqopt.graph.source import ARCS, CANDIDATES, STATES, Source
-from seqopt.graph.states.states import States
+from seqopt.graph.states.states import States, of_decisions
 from seqopt.judge._step_checks import check_shape
 from seqopt.judge.certificate import _require_anew
 from seqopt.plan._guard import require_fit, require_proof, require_time
 from seqopt.plan._paths import Found, find_path, judged
 from seqopt.plan._range import best_within
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import AIMS, graph_kind, graph_of, in_layers, questions_of, usual
+from seqopt.plan.pose import AIMS, chooses_moves, graph_of, in_layers
 from seqopt.problem.amounts import Amount
 from seqopt.problem.problem import Aim, Problem
-from seqopt.problem.requirements import LINEAR_RANGE
 from seqopt.scene._armed import check_postures
 from seqopt.scene.arm import from_arms
 from seqopt.sequence._rule_check import check_carried
@@ -51,7 +39,7 @@ EFFORT = ("seconds", "max_memory")  # of any formulation; responses have a memor
 
 
 def solve(
-    problem: Problem | Layers | States | Instance,
+    problem: Problem | States | Decisions | Instance,
     formulation: Formulation | str | None = None,
     *,
     proof: bool = True,
@@ -107,13 +95,14 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
     Parts without time are skipped and noted by the clock: without the proof, values and bounds are
     claimed only. Raises `TimeUpError` if there is no plan in time.
     """
-    if isinstance(problem, Source):
+    if isinstance(problem, Decisions):
+        problem = of_decisions(problem)
+    if isinstance(problem, States | Instance):
         return _chosen(problem, problem.formulation(formulation), run)
     if not isinstance(problem, Problem):
         kind = type(problem).__name__
         raise ProblemError(f"a {kind} is not a problem; give one that seqopt.pose made")
-    found = as_formulation(formulation or usual(problem), *questions_of(problem))
-    kind, found = _fitting(problem, found)
+    moves, found = _fitting(problem, graph_of(problem).formulation(formulation))
     end = time.perf_counter() + run.time_limit
 
     def best(asked: Problem) -> Plan:
@@ -123,7 +112,7 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
 
         def solved(one: Problem) -> Plan:
             with run.clock.needed("posing the problem"):
-                graph = graph_of(one, kind)
+                graph = graph_of(one, moves=moves)
             return _chosen(graph, found, how)
 
         plan = solved(asked)
@@ -132,27 +121,35 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
     return replace(best_within(problem, best, run.clock), problem=problem)
 
 
-def _fitting(problem: Problem, formulation: Formulation) -> tuple[str, Formulation]:
-    """Return the kind of graph that a formulation takes, and the formulation with the asked aim."""
-    kind, aim = graph_kind(problem), formulation.aim
+def _fitting(problem: Problem, formulation: Formulation) -> tuple[bool, Formulation]:
+    """Return whether a formulation chooses candidates of moves, and it with the asked aim."""
+    moves, aim = chooses_moves(problem), formulation.aim
     totals = problem.scenarios and problem.over.aim is Aim.SUM
-    if kind == CANDIDATES and formulation.of_states and not totals:
-        return STATES, formulation
+    if moves and formulation.of_states and not totals:
+        return False, formulation
     asked: dict[tuple[Amount, ...], Aim | None] = {(goal,): each for each, goal in AIMS.items()}
     asked[()] = aim  # its own, where none is asked
-    of_candidates = in_layers(problem.moves) and problem.goals in asked and not problem.is_timed
-    if aim is None or not (kind == CANDIDATES or (kind == STATES and of_candidates)):
-        return kind, formulation
-    return CANDIDATES, replace(formulation, aim=asked[problem.goals])
+    could = in_layers(problem.moves) and problem.goals in asked
+    could &= not (problem.is_timed or problem.orders)
+    if aim is None or not (moves or could):
+        return moves, formulation
+    return True, replace(formulation, aim=asked[problem.goals])
 
 
-def _chosen(graph: Any, formulation: Formulation, run: Run) -> Plan:
+def _chosen(graph: States | Instance, formulation: Formulation, run: Run) -> Plan:
     """Let a formulation choose from a graph; the judged answer is a plan.
 
     Raises `InfeasibleError` if no choice is feasible; `ProblemError` if graph, formulation and
     options are incompatible; `SolverError` if an answer fails its check.
     """
-    found = ROUTES[graph.kind](graph, formulation, run)
+    if isinstance(graph, Instance):
+        found = _from_arcs(graph, formulation, run)
+    elif graph.decisions is not None:
+        found = _from_decisions(graph, graph.decisions, formulation, run)
+    else:
+        from seqopt.plan._states import find_states  # noqa: PLC0415  # with their proofs
+
+        found = find_states(graph, formulation, run)
     return Plan(graph, graph.at(found.selection.order), formulation, *found)
 
 
@@ -164,46 +161,56 @@ def _from_arcs(instance: Instance, formulation: Formulation, run: Run) -> Found:
     return find_path(instance, formulation, run)
 
 
-def _from_layers(graph: Layers, formulation: Formulation, run: Run) -> Found:
+def _from_decisions(
+    graph: States, decisions: Decisions, formulation: Formulation, run: Run
+) -> Found:
     """Choose candidates of all moves, for one scene or over scenarios."""
-    require_fit(graph.budgets, formulation, run.options)
+    require_fit(decisions.budgets, formulation, run.options)
     require_time(formulation, run.time_limit)
     require_time(formulation, run.clock.left)
     limit = min(run.time_limit, run.options.get("seconds", math.inf))
     own = {name: value for name, value in run.options.items() if name not in EFFORT}
     run = replace(run, options=own, time_limit=limit)
-    graph.require_possible()
+    decisions.require_possible(graph.worlds)
     if run.lazy:
         require_proof(run.proof)
-        return _by_pairs(graph, formulation, run)
-    return (_by_all_costs if run.proof else _by_windows)(graph, formulation, run)
+    if graph.scenarios and (run.lazy or not run.proof):
+        instead = "leave out lazy" if run.lazy else "ask for the proof"
+        raise ProblemError(f"the costs of all choices are needed; {instead}")
+    if run.lazy:
+        return _lazily(graph, decisions, formulation, run)
+    if not run.proof:
+        return _by_windows(graph, decisions, formulation, run)
+    return _by_all_costs(graph, decisions, formulation, run)
 
 
-def _by_all_costs(graph: Layers, formulation: Formulation, run: Run) -> Found:
+def _by_all_costs(graph: States, decisions: Decisions, formulation: Formulation, run: Run) -> Found:
     """Choose by the costs of all choices; the answer is certified."""
-    seconds: dict[str, float] = {}
+    aim, seconds = formulation.aim or Aim.SUM, dict[str, float]()
     with run.clock.needed("computing the responses of all choices"):
-        stages = graph.seconds(formulation.aim or Aim.SUM)  # of costs: solving is timed alone
+        with timed(seconds, "respond"):
+            stages = {} if graph.costs_in_scenarios else decisions.seconds(aim)
+        seconds |= stages  # of one scene costs are a stage of their own
         with timed(seconds, "compile"):
-            found = compile_layers(graph, formulation.aim, alone=formulation.alone)
+            worlds: Any = {"each": graph.costs_in_scenarios, "over": graph.over}
+            found = decisions.compiled(formulation.aim, alone=formulation.alone, **worlds)
     path = find_path(found.instance, formulation, run, found.offset)
     choice = found.choice([node for (node,) in path.selection.states])
     seconds |= path.seconds | {"compile": seconds["compile"] + path.seconds["compile"]}
     proof = path.certificate
     with timed(seconds, "verify"):
         if proof is not None:
-            for layers in graph.from_cache:
-                _require_anew(layers, choice)
-            spent = {budget.name: budget.spent(choice) for budget in graph.budgets}
+            for each in map(decisions.of, graph.scenarios) if graph.scenarios else [decisions]:
+                _require_anew(each, choice)
+            spent = {budget.name: budget.spent(choice) for budget in decisions.caps}
             proof = replace(proof, spent=spent)  # amounts below zero and without a bound as well
-        steps = _checked(graph.steps(choice), graph)
+        steps = _checked(decisions.steps(choice), graph, decisions)
     seconds["verify"] += path.seconds["verify"]
-    rows = tuple(map(tuple, found.instance.states[[s for (s,) in path.selection.states]].tolist()))
-    selection = replace(path.selection, states=rows)
-    return Found(selection, proof, steps, {**stages, **seconds})
+    selection = replace(path.selection, states=decisions.rows(choice))
+    return Found(selection, proof, steps, seconds)
 
 
-def _by_windows(graph: Layers, formulation: Formulation, run: Run) -> Found:
+def _by_windows(graph: States, decisions: Decisions, formulation: Formulation, run: Run) -> Found:
     """Choose by a window search that evaluates only the models it visits; without certificate."""
     alone = formulation.window_options
     if alone is None or run.options not in ({}, alone):
@@ -214,29 +221,25 @@ def _by_windows(graph: Layers, formulation: Formulation, run: Run) -> Found:
             f"{formulation.name}{options} looks beyond the window of a move and needs all models: "
             f"use {' or '.join(able)} without options, or ask for the proof"
         )
-    if graph.scenes:
-        raise ProblemError("the costs of all choices are needed; ask for the proof")
     seconds: dict[str, float] = {}
     with timed(seconds, "search"):
-        found = walk_windows(graph, Watch(run.left))
+        found = walk_windows(decisions, Watch(run.left))
     with timed(seconds, "verify"):
-        steps = _checked(graph.steps(found.choice), graph)
-        _require_anew(graph, found.choice, found.met)
-    chosen = Solution(graph.rows(found.choice), (np.nan,), (-np.inf,))
+        steps = _checked(decisions.steps(found.choice), graph, decisions)
+        _require_anew(decisions, found.choice, found.met)
+    chosen = Solution(decisions.rows(found.choice), (np.nan,), (-np.inf,))
     return Found(chosen, None, steps, seconds, found)
 
 
-def _by_pairs(graph: Layers, formulation: Formulation, run: Run) -> Found:
+def _lazily(graph: States, decisions: Decisions, formulation: Formulation, run: Run) -> Found:
     """Choose by only the models that the optimality proof needs; the answer is certified."""
-    if graph.scenes:
-        raise ProblemError("the costs of all choices are needed; leave out lazy")
     if run.options:
         raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
     from seqopt.graph._lazy_pairs import prove_lazily  # noqa: PLC0415  # few ask for it
 
     seconds, watch = dict[str, float](), Watch(run.left, run.progress)
     with timed(seconds, "search"):
-        found = prove_lazily(graph, formulation, watch)
+        found = prove_lazily(decisions, formulation, watch)
         solved, nodes = found.bounds.compiled(unknown=False)
         path = find_path(solved, formulation, Run(proof=False)).selection
         passed = nodes[[node for (node,) in path.states]]
@@ -247,40 +250,25 @@ def _by_pairs(graph: Layers, formulation: Formulation, run: Run) -> Found:
         claimed = replace(path, states=states, bound=bound, trace=watch.trace)
         claimed = replace(claimed, stopped=found.stopped)
         certificate = judged(floors, formulation, claimed)
-        firsts = np.cumsum([1, *map(len, graph.candidates[:-1])])
-        along = Windows(graph, (passed - firsts).tolist())
-        steps = _checked(graph.steps(along.choice), graph)
-        _require_anew(graph, along.choice, along.met)
-    chosen = replace(claimed, states=graph.rows(along.choice))
+        firsts = np.cumsum([1, *map(len, decisions.candidates[:-1])])
+        along = Windows(decisions, (passed - firsts).tolist())
+        steps = _checked(decisions.steps(along.choice), graph, decisions)
+        _require_anew(decisions, along.choice, along.met)
+    chosen = replace(claimed, states=decisions.rows(along.choice))
     return Found(chosen, certificate, steps, seconds, along, found.models)
 
 
-def _checked(steps: tuple[Step, ...], graph: Layers) -> tuple[Step, ...]:
+def _checked(steps: tuple[Step, ...], graph: States, decisions: Decisions) -> tuple[Step, ...]:
     """Return steps after checking postures, shape and payloads; raise a `SolverError` otherwise."""
-    engine, schedule = graph.engine, graph.schedule
+    schedule, limits = decisions.schedule, decisions.limits
     try:
         check_postures(schedule.scene, steps)
-        if any(limit.label == LINEAR_RANGE for limit in graph.limits):
-            for each in graph.scenarios or (engine,):
-                check_shape(each, steps, graph.limits)
-        check_carried(engine.network.scene, schedule, steps, graph.scenes)
+        for each in graph.scenarios or (graph.engine,):
+            check_shape(each, steps, limits)
+        check_carried(graph.network.scene, schedule, steps, graph.worlds)
     except StepError as error:
         raise SolverError(f"a choice is not allowed: {error}") from error
     return steps
-
-
-def _from_states(graph: States, formulation: Formulation, run: Run) -> Found:
-    """Choose the states of a build."""
-    from seqopt.plan._states import find_states  # noqa: PLC0415  # with their proofs
-
-    return find_states(graph, formulation, run)
-
-
-ROUTES: dict[str, Callable[[Any, Formulation, Run], Found]] = {
-    CANDIDATES: _from_layers,
-    STATES: _from_states,
-    ARCS: _from_arcs,
-}
 
 
 def on_the_way(plan: Plan) -> Plan:

@@ -151,7 +151,7 @@ def plan_page(
     first, *rest = _builds(scene, tables, left, verdicts)
     along = None
     if isinstance(plan, Plan):  # what it made small, where it is the largest step that counts
-        criterion = getattr(plan.graph, "criterion", None) or plan.layers.criterion
+        criterion = plan._of_scene.criterion
         with suppress(SeqoptError):  # what no table has
             along = _worst_along(scene, first.table, plan.goals[0], criterion)
     builds = [replace(first, along=along, tasks=tasks or {}), *rest]

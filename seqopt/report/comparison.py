@@ -17,9 +17,9 @@ from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
 from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
+from seqopt.graph.decision_costs import TINY
+from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation, formulations
-from seqopt.graph.layers.costs import TINY
-from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.plan._range import keeping
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import pose
@@ -178,7 +178,7 @@ def compare(
 
 
 def _speed(
-    engine: Engine, found: tuple[Layers | None, Plan | None], seconds: float, progress: Tell
+    engine: Engine, found: tuple[Decisions | None, Plan | None], seconds: float, progress: Tell
 ) -> SpeedTable:
     """Return speed and accuracy for the loop or, where there is none, the free schedule."""
     loop, free = found
@@ -227,16 +227,16 @@ def _add_largest(
 
 def _plans(
     engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str]
-) -> tuple[dict[str, Plan], Layers | None, str]:
+) -> tuple[dict[str, Plan], Decisions | None, str]:
     """Return the plans of all formulations and the problem of the loop, or why there is none."""
     network = engine.network
     count = len(robots) or min(len(network.scene.robots), MOST)
 
     def solved(
         schedule: Schedule, named: Mapping[str, Formulation], limits: Sequence[Limit] = ()
-    ) -> tuple[dict[str, Plan], Layers]:
+    ) -> tuple[dict[str, Plan], Decisions]:
         means = Resources(progress=progress)
-        problem, plans = candidate_layers(engine, schedule, criterion, limits, (), means), {}
+        problem, plans = pose_decisions(engine, schedule, criterion, limits, (), means), {}
         for done, (name, formulation) in enumerate(named.items()):
             progress(Stage("comparing", (done + 1) / (len(named) + 1)))
             plans[name] = on_the_way(solve(problem, formulation))
@@ -244,7 +244,7 @@ def _plans(
 
     def kept(
         schedule: Schedule, named: Mapping[str, Formulation]
-    ) -> tuple[dict[str, Plan], Layers]:
+    ) -> tuple[dict[str, Plan], Decisions]:
         """Within the linear range, if one of the plans leaves it and all can keep it."""
         found, again = solved(schedule, named), (Limit(LINEAR_RANGE, 1.0),)
         shift = RESPONSES["D_max"]
@@ -308,7 +308,7 @@ def _row(plan: Plan) -> dict[str, object]:
 
 
 def _facts(
-    problem: Layers, rows: Mapping[str, dict[str, object]], robots: Sequence[str]
+    problem: Decisions, rows: Mapping[str, dict[str, object]], robots: Sequence[str]
 ) -> LoopFacts:
     """Return the facts of a loop, and add to the published plan's row what it is worth."""
     method = problem.schedule.method

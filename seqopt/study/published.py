@@ -10,7 +10,7 @@ import pandas as pd
 
 from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.graph.layers.layers import Layers
+from seqopt.graph.decisions import Decisions
 from seqopt.problem.criteria import (
     OVER_METHODS,
     WORST_OVER_METHODS,
@@ -213,7 +213,7 @@ def published_plan(scene: Scene) -> tuple[Step, ...]:
     return parse_plan(scene, source.read_text(encoding="utf-8"), "published three-robot plan")
 
 
-def published_choice(problem: Layers) -> tuple[int, ...]:
+def published_choice(problem: Decisions) -> tuple[int, ...]:
     """Return the published node of every move of the loop, as index among its candidates."""
     schedule = problem.schedule
     plan = published_plan(schedule.scene)

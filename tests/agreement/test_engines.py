@@ -13,7 +13,7 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.responses.table import step_fields
 from seqopt.sequence.three_robots import three_robot_loop
@@ -203,7 +203,7 @@ def test_the_frame_says_when_it_fails(engine25):
 def test_the_frame_poses_the_same_problem():
     net = build_network(small_arch(6))
     a, b = (
-        candidate_layers(e(net), three_robot_loop(net), WEIGHTED)
+        pose_decisions(e(net), three_robot_loop(net), WEIGHTED)
         for e in (ComplianceEngine, FrameEngine)
     )
     for x, y in zip(a.sums.single, b.sums.single, strict=True):

@@ -16,11 +16,11 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.decisions import steps_over, travel
 from seqopt.graph.formulation import FormulationKind, exhibits, formulations
-from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.instances.compiled import compile_instance
 from seqopt.judge._schedules import plan_values
-from seqopt.plan.pose import layers_of, states_of
+from seqopt.plan.pose import decisions_of, states_of
 from seqopt.problem import Amount, Filter
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim
@@ -93,7 +93,7 @@ def of_steps(problem, aim):
     found["F_largest"] = forces.fillna(0.0).to_numpy(float)
     rows = [{n: v[k : k + 1] for n, v in found.items()} for k in range(len(plan.steps))]
     each = [
-        float(layers_of(problem).criterion.costs(row, step.bricks, 1)[0])
+        float(decisions_of(problem).criterion.costs(row, step.bricks, 1)[0])
         for row, step in zip(rows, plan.steps, strict=True)
     ]
     yield "steps", sum(each) if aim is Aim.SUM else max(each)
@@ -121,7 +121,7 @@ def test_ranks_are_of_open_grips_alone(schedule, aim):
     problem = posed(schedule, "ranks")
     found = dict(by_layers(problem, aim))
     assert found == pytest.approx(dict.fromkeys(found, next(iter(found.values()))), rel=1e-6)
-    layers = layers_of(problem)
+    layers = decisions_of(problem)
     assert layers.given
     assert not len(layers.given_costs)
     with pytest.raises(ProblemError, match="it ranks the choices of a move"):
@@ -132,7 +132,7 @@ def test_who_takes_a_grip_is_known_of_open_ones_alone():
     move = WeightedSum("move", (("F_move", 1.0, 50.0),))
     engine = seqopt.make_engine("compliance", small_arch(5))
     problem = seqopt.pose(engine, seqopt.three_robot_loop(engine.network), move)
-    assert not len(layers_of(problem).given_costs)
+    assert not len(decisions_of(problem).given_costs)
     assert seqopt.solve(problem, "overlap_dp").certificate.gap < 1e-9
 
 
@@ -143,7 +143,7 @@ def test_a_given_step_that_the_criterion_forbids_leaves_no_plan():
         return np.full_like(responses["F_largest"], 1.0 if bricks > 1 else np.inf)
 
     problem = posed("three-robot")
-    assert layers_of(problem).given[0].bricks == 1
+    assert decisions_of(problem).given[0].bricks == 1
     problem = problem.but(criterion=StepCost("several", ("F_largest",), several))
     with pytest.raises(InfeasibleError, match=r"criterion several: step 1, where no grip is left"):
         seqopt.solve(problem, "overlap_dp")
@@ -164,7 +164,7 @@ def ways(scene, steps):
 def test_travel_is_one_number(schedule):
     """The least that layers and states say, and what a budget says that each plan goes."""
     problem = posed(schedule)
-    layers, scene = layers_of(problem), problem.scene
+    layers, scene = decisions_of(problem), problem.scene
     budget = travel(layers, np.inf)
     least = seqopt.solve(problem.but(goals="travel"))
     goes = states_of(problem.but(goals="travel"))
@@ -190,7 +190,7 @@ def test_travel_is_one_number(schedule):
 def test_ways_between_moves_that_are_not_neighbors_are_refused():
     """They were left out, so that any budget was kept."""
     with pytest.raises(ProblemError, match="from the grip of move 1 to that of move 3"):
-        travel(layers_of(posed("two-robot")), 1.0)
+        travel(decisions_of(posed("two-robot")), 1.0)
     assert seqopt.solve(posed("two-robot").but(goals="travel")).objective["travel"] > 0
 
 
@@ -198,7 +198,7 @@ def test_ways_between_moves_that_are_not_neighbors_are_refused():
 def test_steps_over_a_level_are_those_of_the_plan(schedule):
     """Steps without an open grip count, as in the table of the plan."""
     problem = posed(schedule)
-    layers = layers_of(problem)
+    layers = decisions_of(problem)
     free = seqopt.solve(layers, "overlap_dp")
     known = of_table(free.responses(), "T_max")
     apart = np.unique(np.round(known, 3))

@@ -11,8 +11,8 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError, TimeUpError
 from seqopt.graph._windows import walk_windows
+from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import Watch
-from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
@@ -62,10 +62,10 @@ FIRST, *OTHERS = CRITERIA
 def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
     schedule = SCHEDULES[method](engine25.network)
     counting = Counting(engine25)
-    asked = candidate_layers(counting, schedule, CRITERIA[criterion])
+    asked = pose_decisions(counting, schedule, CRITERIA[criterion])
     counting.sets = 0  # some criteria ask for the scene's methods when they are posed
     found = solve(asked, "cascade", proof=False)
-    problem = candidate_layers(engine25, schedule, CRITERIA[criterion])
+    problem = pose_decisions(engine25, schedule, CRITERIA[criterion])
     for name, options in (("rank_search", {"horizon": 1}), ("cascade", {})):
         plan = solve(problem, name, **options)
         assert found.nodes == plan.nodes
@@ -81,12 +81,11 @@ def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
 @pytest.mark.parametrize(("response", "bound"), [("F_largest", 300), ("M_sup", 12), ("T_max", 80)])
 def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, response, bound):
     schedule, limits = three_robot_loop(engine25.network), [Limit(response, bound)]
-    problem = candidate_layers(engine25, schedule, EQUATIONS, limits)
+    problem = pose_decisions(engine25, schedule, EQUATIONS, limits)
     found = walk_windows(problem, Watch())
     assert tuple(found.choice) == solve(problem, "cascade").choice
     assert (
-        found.choice
-        != walk_windows(candidate_layers(engine25, schedule, EQUATIONS), Watch()).choice
+        found.choice != walk_windows(pose_decisions(engine25, schedule, EQUATIONS), Watch()).choice
     )
 
 
@@ -94,14 +93,14 @@ def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, respo
 def test_on_any_chain_it_chooses_as_the_cascade_does(scene):
     engine = ComplianceEngine(build_network(scene))
     schedule = three_robot_loop(engine.network)
-    problem = candidate_layers(engine, schedule, WEIGHTED)
+    problem = pose_decisions(engine, schedule, WEIGHTED)
     found = walk_windows(problem, Watch())
     assert tuple(found.choice) == solve(problem, "cascade").choice
 
 
 def test_a_time_limit_ends_it_and_says_what_was_chosen(engine25):
     """An hour is enough; of no time every moment is the last."""
-    problem = candidate_layers(engine25, three_robot_loop(engine25.network), EQUATIONS)
+    problem = pose_decisions(engine25, three_robot_loop(engine25.network), EQUATIONS)
     plan = solve(problem, "cascade", proof=False, time_limit=3600.0)
     assert plan.nodes == solve(problem, "cascade", proof=False).nodes
     with pytest.raises(TimeUpError, match=r"^.* s: no move was chosen yet; give more"):

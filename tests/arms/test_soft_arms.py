@@ -16,7 +16,7 @@ from seqopt.arms._model import ArmModel
 from seqopt.arms._permits import permits
 from seqopt.engines.registry import make_engine
 from seqopt.errors import GripError, StepError
-from seqopt.plan.pose import layers_of
+from seqopt.plan.pose import decisions_of
 from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.table import force_column
 from seqopt.scene.arm import Arm
@@ -196,7 +196,7 @@ def test_the_loop_agrees_with_brute_force(aim):
     scene = soft()
     engine = make_engine("compliance", scene)
     problem = seqopt.pose(engine, three_robot_loop(engine.network), FORCE, aim)
-    layers, known, values = layers_of(problem), {}, []
+    layers, known, values = decisions_of(problem), {}, []
     for choice in product(*(range(len(move.candidates)) for move in layers.schedule.moves)):
         try:
             steps = layers.steps(choice)

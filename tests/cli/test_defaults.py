@@ -64,7 +64,7 @@ def test_optimize_alone_says_what_it_found_and_how_to_keep_it(capsys):
     said = capsys.readouterr().out
     first, second, *_ = said.splitlines()
     best = "largest force 375 N (95.7 % of payload), displacement 14.1 µm"
-    assert first == f"{best}; objective 657.465, gap 0 %"
+    assert first == f"{best}; sum 657.465, optimal"
     assert second.startswith("overlap_dp (exact): 90 steps, ")
     assert "--out DIR writes the plan" in second
 

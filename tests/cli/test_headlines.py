@@ -89,7 +89,7 @@ def test_gaps_below_the_tolerance_of_proofs_are_none(capsys):
     assert repr(Certificate((1.0,), (1.0,), 2.2e-16, 0.0)).endswith("gap 0 %>")
     assert repr(Certificate((1.0,), (0.9,), 0.1, 0.1)).endswith("gap 10 %>")
     status, said, _ = run(capsys, "optimize", "wall:columns=3,courses=2", "--no-stability")
-    assert (status, said.splitlines()[0].split("; ")[1]) == (0, "objective 32.3083, gap 0 %")
+    assert (status, said.splitlines()[0].split("; ")[1]) == (0, "sum 32.3083, optimal")
 
 
 def test_a_limit_that_helps_has_three_digits_and_does_help():

@@ -29,7 +29,7 @@ from seqopt.engines.rigid._refinement import (
 )
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
@@ -89,7 +89,7 @@ def test_a_torsion_free_joint_matters_only_where_it_acts(arch25, engine25, monke
 def test_an_arch_with_a_torsion_free_joint_is_posed_together(arch25, together):
     """It took 49 s, set by set, and now solves none on its own."""
     net = build_network(torsion_free(arch25, TWISTED))
-    problem = candidate_layers(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
+    problem = pose_decisions(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
     assert all(np.isfinite(cost).any() for cost in problem.sums.single)
 
 

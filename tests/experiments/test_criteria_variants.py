@@ -14,7 +14,7 @@ from experiments.study.criteria_variants import (
     placed,
     rules,
 )
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.study.published import EQUATIONS, published_choice
 
 OBSERVED = pd.read_csv(RESULTS / "criteria_compression.csv")
@@ -25,7 +25,7 @@ COUNTS = ["alone", "first", "among_three", "first_after_crown"]
 def problem(engine25, loop25):
     robots = ("F_rob1", "F_rob2", "F_rob3")
     also = ("T_max", "M_sup", "D_max", "C_max", "F_move", *robots)
-    return candidate_layers(engine25, loop25, EQUATIONS, also=also)
+    return pose_decisions(engine25, loop25, EQUATIONS, also=also)
 
 
 def test_the_rule_with_compression_is_the_one_that_is_told(problem):

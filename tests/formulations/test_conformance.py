@@ -16,6 +16,8 @@ from formulations.choice import Choice
 from formulations.on_graph import on_graph
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
+from seqopt.graph.decision_costs import Budget, LayeredCosts
+from seqopt.graph.decisions import pose_decisions, steps_over, travel
 from seqopt.graph.formulation import (
     GROUP,
     End,
@@ -24,8 +26,6 @@ from seqopt.graph.formulation import (
     find_formulation,
     formulations,
 )
-from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.layers import candidate_layers, steps_over, travel
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.problem import Aim
@@ -323,7 +323,7 @@ def test_prices_are_slopes_of_the_bound(name, problem):
     ids=lambda given: getattr(given, "name", given),
 )
 def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
-    problem = candidate_layers(engine25, SCHEDULES[method](engine25.network), criterion)
+    problem = pose_decisions(engine25, SCHEDULES[method](engine25.network), criterion)
     values = [valued(problem, name) for name in EXACT_SUMS]
     assert len(values) == 5
     assert np.ptp(values) <= 1e-6 * max(values)
@@ -340,7 +340,7 @@ def valued(problem, name, **options):
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
 def test_all_exact_ones_equal_brute_force_on_small_arches(count, criterion):
     engine = ComplianceEngine(build_network(small_arch(count)))
-    problem = candidate_layers(engine, three_robot_loop(engine.network), criterion)
+    problem = pose_decisions(engine, three_robot_loop(engine.network), criterion)
     best = valued(problem, "rank_search", horizon=count)
     assert best == pytest.approx(Costs(problem.sums).best())
     for name in EXACT_SUMS:
@@ -377,10 +377,10 @@ def test_a_longer_horizon_and_a_wider_beam_serve(problem25):
 
 def test_limits_hold_or_are_infeasible(engine25):
     schedule = three_robot_loop(engine25.network)
-    best = valued(candidate_layers(engine25, schedule, WORST_RATIO), "minimax")
+    best = valued(pose_decisions(engine25, schedule, WORST_RATIO), "minimax")
     for factor in (1.001, 0.999):
         limits = [Limit(name, factor * best * bound) for name, bound in WORST_RATIO.limits]
-        problem = candidate_layers(engine25, schedule, EQUATIONS, limits)
+        problem = pose_decisions(engine25, schedule, EQUATIONS, limits)
         if factor > 1:
             choice = solve(problem, ALL["overlap_dp"]).choice
             for choices in problem.evaluation.steps:

@@ -12,8 +12,8 @@ import pytest
 from formulations import solvers
 from formulations.flow import Flow
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError
+from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, formulations
-from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.problem.problem import Aim
 from tests.layered import Costs, answer, changed, told
 from tests.quality.degenerate import MALFORMED, judge, outcomes

@@ -15,11 +15,11 @@ import seqopt
 from formulations.states._search import exact_best, narrow
 from seqopt.errors import InfeasibleError, NothingFoundError, SolverError
 from seqopt.graph._explore import Explorer
+from seqopt.graph.decisions import travel
 from seqopt.graph.formulation import FormulationKind, find_formulation
-from seqopt.graph.layers.layers import travel
 from seqopt.graph.states._visits import StateSpace
 from seqopt.graph.states.states import build_states, within
-from seqopt.plan.pose import layers_of, states_of
+from seqopt.plan.pose import decisions_of, states_of
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.builders import small_arch
@@ -129,7 +129,7 @@ def test_margins_are_the_best_within_budgets(bricks, name, orders):
 
 @pytest.mark.parametrize("formulation", ["labels", "overlap_mip", "lagrangian", "overlap_lp"])
 def test_candidates_have_a_choice_within_every_optimum(formulation):
-    problem = layers_of(posed(6, "loop").but(goals=()))
+    problem = decisions_of(posed(6, "loop").but(goals=()))
     posed_way = travel(problem, np.inf)
     least = least_spent(problem, posed_way)
     kind = find_formulation(formulation).kind

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from formulations import beam, rank_search
 from formulations.solvers import minimize_by_highs
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.decision_costs import LayeredCosts
 from seqopt.graph.formulation import FormulationKind, Watch
 from seqopt.graph.formulation import formulations as registered
-from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.problem.problem import Aim
 from tests.layered import Costs, answer
 from tests.strategies import problems

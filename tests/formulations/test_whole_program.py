@@ -10,9 +10,9 @@ import pytest
 from formulations.exhibits import _assigned, _below
 from formulations.flow import ACCURACY, OVERLAP_MIP, unit_flow
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.decision_costs import LayeredCosts
 from seqopt.graph.formulation import Watch, exhibits
 from seqopt.graph.graph import Graph
-from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.problem.problem import Aim
 from tests.layered import Costs, answer
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.problem.problem import Aim
 from tests.layered import Costs, answer
 from tests.strategies import problems

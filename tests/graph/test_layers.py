@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import rankdata
 
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.plan._tables import choice_table
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import _mean_ranks, _ranks_of
@@ -19,7 +19,7 @@ from seqopt.study.published import CRITERIA, EQUATIONS, paper_models
 
 def test_a_third_support_ends_twisting(engine25):
     schedule = modified_sequential(engine25.network)
-    problem = candidate_layers(engine25, schedule, EQUATIONS)
+    problem = pose_decisions(engine25, schedule, EQUATIONS)
     table = solve(problem, "cascade").responses()
     worst = 1e-6 * table["D_max_1e-3mm"].max()
     assert worst < 20e-6  # the sequential method reaches 306e-6 m
@@ -34,7 +34,7 @@ def test_models(problem25):
 
 def test_payloads_can_be_kept(engine25, loop25):
     """The printed equations overload no robot once its payload is a limit."""
-    problem = candidate_layers(engine25, loop25, EQUATIONS, payload_limits(loop25.scene))
+    problem = pose_decisions(engine25, loop25, EQUATIONS, payload_limits(loop25.scene))
     plan = solve(problem, "overlap_dp").responses()
     forces = plan[["F_rob1_N", "F_rob2_N", "F_rob3_N"]].to_numpy(float)
     assert np.nanmax(np.abs(forces)) <= 392.4

@@ -13,12 +13,13 @@ from scipy.stats import rankdata
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
-from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.layers.ranking import _least_among_least, move_costs, objectives, split_gap
+from seqopt.graph.compiled import best_in_order
+from seqopt.graph.decision_costs import LayeredCosts
+from seqopt.graph.decisions import move_costs, pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, _ranks_of
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED
@@ -31,7 +32,7 @@ values = st.one_of(st.integers(0, 4).map(float), st.just(np.nan))
 
 def posed(count, criterion, limits=()):
     engine = ComplianceEngine(build_network(small_arch(count)))
-    return candidate_layers(engine, three_robot_loop(engine.network), criterion, limits)
+    return pose_decisions(engine, three_robot_loop(engine.network), criterion, limits)
 
 
 def rank_again(problem, choice):
@@ -84,7 +85,7 @@ def test_exact_ones_equal_brute_force_under_every_objective(count, ranked):
 
 
 def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25, loop25):
-    problem = candidate_layers(engine25, loop25, CONDITIONAL)
+    problem = pose_decisions(engine25, loop25, CONDITIONAL)
     choice = solve(problem, "cascade").choice
     for k in range(len(choice)):
         before = choice[k - 1] if k else 0
@@ -94,58 +95,41 @@ def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25
         assert charged[choice[k]] == charged.min()
 
 
+def conditional(problem):
+    """The same candidates, ranks being those given the choice before."""
+    criterion = replace(problem.criterion, ranked=Ranked.CONDITIONAL)
+    return replace(problem, criterion=criterion)
+
+
 def test_the_reference_arch_under_both(problem25):
     """The cascade loses nothing by being short of sight, and all by the change of objective."""
-    cascade = solve(problem25, "cascade")
-    assert objectives(problem25, cascade.choice, heuristic=False) == {
-        "objectives": {
-            "pairs": pytest.approx(663.81, abs=0.01),
-            "conditional": pytest.approx(664.5),
-        },
-        "gap_parts": None,
-    }
-    conditional = problem25.ranked(Ranked.CONDITIONAL)
-    exact = solve(conditional, "overlap_dp").certificate
-    assert exact.objective == pytest.approx(656.025)
-    assert solve(conditional, "cascade").certificate.gap == pytest.approx(0.01275, abs=1e-5)
-    parts = split_gap(problem25, cascade.choice)
-    assert sum(parts.values()) == pytest.approx(cascade.certificate.gap)
-    assert abs(parts["short_sight"]) < 1e-5
-    assert parts["objective"] > 0.009
-    summary = cascade.summary()
-    assert summary["gap_parts"] == parts
-    assert summary["objectives"]["conditional"] == pytest.approx(664.5)
-    assert solve(problem25, "overlap_dp").summary()["gap_parts"] is None
-    assert solve(problem25, "cascade", proof=False).summary()["objectives"] is None
+    cascade, other = solve(problem25, "cascade"), conditional(problem25)
+    assert problem25.sums.cost(cascade.choice) == pytest.approx(663.81, abs=0.01)
+    assert other.sums.cost(cascade.choice) == pytest.approx(664.5)
+    exact = solve(other, "overlap_dp")
+    assert exact.certificate.objective == pytest.approx(656.025)
+    assert solve(other, "cascade").certificate.gap == pytest.approx(0.01275, abs=1e-5)
+    sighted = best_in_order([(other.sums, Aim.SUM), (problem25.sums, Aim.SUM)])
+    assert problem25.sums.cost(sighted) == pytest.approx(663.81, abs=0.01)
 
 
-def test_under_the_conditional_objective_sight_is_all_that_is_lost(engine25, loop25):
-    problem = candidate_layers(engine25, loop25, CONDITIONAL)
-    plan = solve(problem, "cascade")
-    parts = split_gap(problem, plan.choice)
-    assert parts["objective"] == 0
-    assert parts["short_sight"] == pytest.approx(plan.certificate.gap) != 0
-    assert problem.ranked(Ranked.CONDITIONAL) is problem
-    assert problem.ranked(Ranked.PAIRS) is problem.ranked(Ranked.PAIRS)
-
-
-def test_without_ranks_there_is_one_objective(engine25, loop25):
-    problem = candidate_layers(engine25, loop25, WEIGHTED)
-    choice = solve(problem, "cascade").choice
-    found = objectives(problem, choice, heuristic=True)
-    assert found == {"objectives": None, "gap_parts": None}
-    assert solve(problem, "cascade").summary()["gap_parts"] is None
+def test_a_search_of_one_move_is_charged_ranks_given_the_choice_before(problem25, engine25, loop25):
+    assert problem25.alone == conditional(problem25).sums
+    assert conditional(problem25).alone == conditional(problem25).sums
+    assert problem25.alone != problem25.sums
+    plain = pose_decisions(engine25, loop25, WEIGHTED)
+    assert plain.alone is plain.sums
 
 
 def test_limits_hold_under_both(engine25, loop25):
     limit = Limit("F_largest", 300.0)
     for ranked in Ranked:
-        problem = candidate_layers(engine25, loop25, replace(EQUATIONS, ranked=ranked), [limit])
+        problem = pose_decisions(engine25, loop25, replace(EQUATIONS, ranked=ranked), [limit])
         choice = solve(problem, "overlap_dp").choice
         for step in problem.evaluation.steps:
             assert step.responses["F_largest"][tuple(choice[m] for m in step.moves)] <= 300.0
-        others = {r: np.isfinite(problem.ranked(r).sums.shared[5]) for r in Ranked}
-        np.testing.assert_array_equal(*others.values())
+        others = [np.isfinite(each.shared[5]) for each in (problem.sums, problem.alone)]
+        np.testing.assert_array_equal(*others)
 
 
 @given(first=problems(), data=st.data())
@@ -161,11 +145,12 @@ def test_of_the_best_choices_the_cheapest_by_the_other_costs(first, data):
         for arrays in (costs.single, costs.shared)
     ]
     second = LayeredCosts(*parts)
+    goals = [(costs, Aim.SUM), (second, Aim.SUM)]
     choices = [c for c in product(*map(range, costs.sizes)) if np.isfinite(costs.cost(c))]
     if not choices:
         with pytest.raises(InfeasibleError):
-            _least_among_least(costs, second)
+            best_in_order(goals)
         return
     least = min(map(costs.cost, choices))
     wanted = min(second.cost(c) for c in choices if costs.cost(c) == least)
-    assert _least_among_least(costs, second) == pytest.approx(wanted)
+    assert second.cost(best_in_order(goals)) == pytest.approx(wanted)

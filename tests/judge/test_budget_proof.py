@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt.errors import InfeasibleError, SolverError, TimeUpError
+from seqopt.graph.decision_costs import Budget, LayeredCosts
+from seqopt.graph.decisions import steps_over, travel
 from seqopt.graph.formulation import End, FormulationKind, formulations
 from seqopt.graph.graph import Graph
-from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.judge import _budget_proof as budget_proof
 from seqopt.judge._budget_proof import least_within
 from seqopt.judge.arithmetic import budget_bounds

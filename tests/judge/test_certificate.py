@@ -10,9 +10,9 @@ from hypothesis import given
 
 from seqopt import judge_instance
 from seqopt.errors import SolverError
+from seqopt.graph.decision_costs import Budget, LayeredCosts
+from seqopt.graph.decisions import travel
 from seqopt.graph.formulation import FormulationKind, find_formulation
-from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.layers import travel
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.solve import solve
 from seqopt.problem.problem import Aim

@@ -13,7 +13,7 @@ import seqopt
 from seqopt.engines.interface import Want
 from seqopt.graph import Explorer
 from seqopt.graph._orders import OrderSpace, among_orders, whole_bound
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.paths import distances, keep_best, least_peak, lexicographic_bounds, reached
 from seqopt.graph.states.explored import explore, floors_of_goals
 from seqopt.graph.states.states import build_states

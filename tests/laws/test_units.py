@@ -10,8 +10,8 @@ import pytest
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import find_formulation
-from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.sequence.three_robots import three_robot_loop
@@ -26,7 +26,7 @@ SCALES += [pytest.param(scales, marks=pytest.mark.slow) for scales in INVERSE]
 
 
 def solved(scene, criterion):
-    problem = candidate_layers(
+    problem = pose_decisions(
         ComplianceEngine(build_network(scene)), three_robot_loop(build_network(scene)), criterion
     )
     plan = solve(problem, find_formulation("overlap_dp"))

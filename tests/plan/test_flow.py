@@ -9,7 +9,7 @@ import pytest
 
 from formulations.flow import ACCURACY, unit_flow
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.paths import TIED
 from tests.layered import Costs, answer
 

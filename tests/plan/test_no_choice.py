@@ -19,10 +19,9 @@ from seqopt.errors import (
     SolverError,
 )
 from seqopt.graph import formulation as registry
+from seqopt.graph.decision_costs import Budget, LayeredCosts
+from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import FormulationKind, Solution, find_formulation, formulations
-from seqopt.graph.layers.compiled import compile_layers
-from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.responses import _blocks as batches
@@ -39,7 +38,7 @@ def test_a_schedule_without_an_open_move_is_no_problem(capsys, tmp_path, count):
     scene = arch_scene(ArchShape(pitch=[1.2, 0.7][:count]))
     network = build_network(scene)
     with pytest.raises(ProblemError, match=f"with {count} bricks it leaves no grip open"):
-        candidate_layers(ComplianceEngine(network), modified_sequential(network), EQUATIONS)
+        pose_decisions(ComplianceEngine(network), modified_sequential(network), EQUATIONS)
     path = tmp_path / "scene.json"
     save_scene(scene, path)
     words = ("--schedule", "modified-sequential", "--out", str(tmp_path / "out"))
@@ -54,7 +53,7 @@ def test_a_schedule_without_an_open_move_is_no_problem(capsys, tmp_path, count):
 @pytest.fixture(scope="module")
 def problem():
     network = build_network(six_bricks())
-    return candidate_layers(ComplianceEngine(network), three_robot_loop(network), EQUATIONS)
+    return pose_decisions(ComplianceEngine(network), three_robot_loop(network), EQUATIONS)
 
 
 NODES = (1,), (2,), (3,)
@@ -119,7 +118,7 @@ def test_a_formulation_that_returns_nonsense_has_failed(problem, what):
 
 def test_whole_numbers_of_any_kind_are_a_choice(problem):
     exact = find_formulation("overlap_dp")
-    true = exact.solve(compile_layers(problem, exact.aim).instance)
+    true = exact.solve(problem.compiled(exact.aim).instance)
     odd = replace(true, states=np.array(true.states), objective=np.array(true.objective))
     plan = solve(problem, replace(exact, solve=lambda _: odd))
     assert plan.selection == solve(problem, exact).selection

@@ -9,8 +9,8 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.layers import candidate_layers, travel
+from seqopt.graph.decision_costs import LayeredCosts
+from seqopt.graph.decisions import pose_decisions, travel
 from seqopt.problem.requirements import Excess, Limit, overloads, payload_limits
 from tests.layered import Costs
 
@@ -92,7 +92,7 @@ def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):
 
 def test_an_optimum_within_budgets_is_proven_or_claimed(engine25, monkeypatch):
     criterion = seqopt.CRITERIA["worst-ratio-published"]
-    problem = candidate_layers(engine25, seqopt.three_robot_loop(engine25.network), criterion)
+    problem = pose_decisions(engine25, seqopt.three_robot_loop(engine25.network), criterion)
     free = seqopt.solve(problem, "overlap_dp")
     assert free.summary()["status"] == "optimal"
     tight = replace(

@@ -12,9 +12,9 @@ import seqopt
 from seqopt import Search
 from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError, StepError
+from seqopt.graph.decision_costs import LayeredCosts
+from seqopt.graph.decisions import Decisions, pose_decisions, travel
 from seqopt.graph.formulation import FormulationKind
-from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.layers import Layers, candidate_layers, travel
 from seqopt.study.published import find_criterion
 from seqopt.workflow import Robust
 from tests.builders import small_arch
@@ -41,7 +41,7 @@ class Counting:
 @pytest.fixture
 def counted(engine25):
     engine = Counting(engine25)
-    return engine, candidate_layers(engine, seqopt.three_robot_loop(engine.network), WORST)
+    return engine, pose_decisions(engine, seqopt.three_robot_loop(engine.network), WORST)
 
 
 def test_posing_computes_nothing(counted):
@@ -83,7 +83,7 @@ def test_only_the_costs_of_the_aim_are_computed(counted):
 
 
 def test_a_plan_is_a_value(engine25):
-    problem = candidate_layers(engine25, seqopt.three_robot_loop(engine25.network), WORST)
+    problem = pose_decisions(engine25, seqopt.three_robot_loop(engine25.network), WORST)
     plan, again = (seqopt.solve(problem, "overlap_dp") for _ in range(2))
     assert plan == again
     assert hash(plan) == hash(again)
@@ -142,7 +142,7 @@ def test_without_proof_only_windows_are_searched(counted, name):
 
 
 def test_the_short_cut_does_what_the_long_way_does(arch25, engine25):
-    problem = candidate_layers(
+    problem = pose_decisions(
         engine25, seqopt.three_robot_loop(engine25.network), find_criterion("equations-2-3")
     )
     plan = seqopt.solve(problem, "overlap_dp")
@@ -178,12 +178,12 @@ def test_a_wrong_word_gets_the_words_there_are(arch25, wrong, error, message):
 
 
 def test_a_problem_is_the_same_after_pickling(engine25):
-    problem = candidate_layers(engine25, seqopt.three_robot_loop(engine25.network), WORST)
+    problem = pose_decisions(engine25, seqopt.three_robot_loop(engine25.network), WORST)
     costs = pickle.loads(pickle.dumps(problem.sums))
     assert costs == problem.sums
     assert hash(costs) == hash(problem.sums)
     assert not costs.single[0].flags.writeable
-    assert isinstance(problem, Layers)
+    assert isinstance(problem, Decisions)
 
 
 def test_every_plan_has_one_summary():

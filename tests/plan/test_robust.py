@@ -17,13 +17,13 @@ from formulations.scenario_program import solve_program
 from formulations.states._totals import by_weights, cheapest_by, least_total
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.compiled import compile_costs, compile_totals
+from seqopt.graph.decision_costs import LayeredCosts, largest_of
+from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import Run, Watch, as_formulation
-from seqopt.graph.layers.compiled import compile_costs, compile_totals
-from seqopt.graph.layers.costs import LayeredCosts, largest_of
-from seqopt.graph.layers.layers import candidate_layers, in_scenarios
 from seqopt.plan._paths import find_path
 from seqopt.plan.out_of_sample import judge_unseen
-from seqopt.plan.pose import graph_of, layers_of
+from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
 from seqopt.responses.resources import Resources
 from seqopt.scene.scenarios import scenarios
@@ -267,9 +267,9 @@ def test_costs_of_a_scenario_are_those_of_its_own_problem():
     problem = posed()
     some = scenarios(problem.schedule.scene, count=2, seed=3)
     found = graph_of(robust(problem, some, WORST_PEAK))
-    for scene, costs in zip(found.scenes, found.costs_in_scenarios, strict=True):
+    for scene, costs in zip(found.worlds, found.costs_in_scenarios, strict=True):
         engine = ComplianceEngine(seqopt.build_network(scene))
-        own = candidate_layers(engine, problem.schedule, problem.criterion)
+        own = pose_decisions(engine, problem.schedule, problem.criterion)
         for mine, found_costs in ((own.sums, costs.sums), (own.peaks, costs.peaks)):
             for part in ("single", "shared"):
                 pairs = zip(getattr(mine, part), getattr(found_costs, part), strict=True)
@@ -311,7 +311,7 @@ def test_limits_hold_in_every_scenario():
 def largest_force(scene, plan):
     """The largest force of a grip in the steps whose grips were chosen."""
     table = seqopt.analyze(ComplianceEngine(seqopt.build_network(scene)), plan.steps)
-    chosen = {step.number for step in plan.layers.schedule.steps if step.moves}
+    chosen = {step.number for step in plan.decisions.schedule.steps if step.moves}
     rows = table[table["step"].isin(chosen)]
     return rows[["F_rob1_N", "F_rob2_N", "F_rob3_N"]].abs().max().max()
 
@@ -320,11 +320,13 @@ def test_peaks_of_scenarios_join_into_one():
     problem = posed()
     some = scenarios(problem.schedule.scene, count=3)
     found = graph_of(robust(problem, some, WORST_PEAK))
-    layers = found.layered(Aim.PEAK)
+    layers = [costs.peaks for costs in found.costs_in_scenarios]
     joined = largest_of(layers)
     choice = seqopt.solve(problem, "overlap_dp").choice
     assert joined.worst(choice) == max(costs.worst(choice) for costs in layers)
-    assert found.peaks == joined
+    best = found.decisions.compiled(Aim.PEAK, each=found.costs_in_scenarios)
+    assert seqopt.solve(found).objective["worst-peak"] == joined.least(Aim.PEAK)
+    assert best.instance.goals[0].name == "minmax (worst-peak)"
 
 
 # bad input
@@ -349,8 +351,6 @@ def test_what_is_no_problem_is_refused():
     problem = posed()
     scene = problem.schedule.scene
     drawn = scenarios(scene, count=1)
-    with pytest.raises(ProblemError, match="no scenario"):
-        in_scenarios(layers_of(problem), [], WORST_PEAK)
     with pytest.raises(ProblemError, match="give worst-peak"):
         robust(problem, drawn, None)
     assert robust(problem, drawn, "worst-peak") == robust(problem, drawn, WORST_PEAK)

@@ -7,10 +7,8 @@ import pytest
 import seqopt
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
-from seqopt.graph.source import ARCS, CANDIDATES, STATES, Source
 from seqopt.network.build import build_network
 from seqopt.plan.pose import graph_of
-from seqopt.plan.solve import ROUTES
 from seqopt.sequence.three_robots import three_robot_loop
 from tests.builders import small_arch
 
@@ -22,22 +20,17 @@ def posed(goals):
     return seqopt.pose(engine, three_robot_loop(engine.network), WORST, goals)
 
 
-def test_every_graph_of_choices_has_a_route():
-    assert {source.kind for source in Source.__subclasses__()} == {*ROUTES}
-
-
 def test_a_problem_its_graphs_and_its_instance_have_one_optimum():
     problem = posed("sum")
-    layers, states = graph_of(problem, CANDIDATES), graph_of(problem, STATES)
+    moves, states = (graph_of(problem, moves=each) for each in (True, False))
     arcs = seqopt.compile_instance(problem)
-    assert [g.kind for g in (layers, states, arcs)] == [CANDIDATES, STATES, ARCS]
-    plans = [seqopt.solve(each) for each in (problem, layers, states, arcs)]
+    plans = [seqopt.solve(each) for each in (problem, moves, states, arcs)]
     best = plans[0].certificate.values
     for plan in plans:
         assert plan.certificate.values == pytest.approx(best, rel=1e-9)
         assert plan.gap == pytest.approx(0, abs=1e-9)
     assert [bool(plan.steps) for plan in plans] == [True, True, True, False]
-    assert [plan.graph for plan in plans[1:]] == [layers, states, arcs]
+    assert [plan.graph for plan in plans[1:]] == [moves, states, arcs]
 
 
 def test_a_formulation_takes_the_aim_that_is_asked():

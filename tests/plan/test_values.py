@@ -7,7 +7,7 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.decision_costs import Budget, LayeredCosts
 from tests.layered import Costs, answer
 
 

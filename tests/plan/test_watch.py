@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from seqopt.errors import ProblemError
+from seqopt.graph.decision_costs import LayeredCosts
 from seqopt.graph.formulation import Finding, Watch, find_formulation
-from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.plan.solve import solve
 from tests.layered import Costs
 

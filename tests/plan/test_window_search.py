@@ -10,8 +10,8 @@ from seqopt.engines.rigid._extremes import can_compile
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SolverError
 from seqopt.graph._windows import walk_windows
+from seqopt.graph.decisions import pose_decisions, windows
 from seqopt.graph.formulation import Watch
-from seqopt.graph.layers.layers import candidate_layers, windows
 from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
 from seqopt.responses import _choices
@@ -23,17 +23,17 @@ from seqopt.study.published import EQUATIONS, WEIGHTED
 def test_a_dead_end_that_the_cascade_foresees(engine25):
     schedule, limits = three_robot_loop(engine25.network), [Limit("T_max", 64.0)]
     with pytest.raises(SolverError, match="move 8, step 31: rob2 has no allowed grip after"):
-        walk_windows(candidate_layers(engine25, schedule, EQUATIONS, limits), Watch())
-    plan = solve(candidate_layers(engine25, schedule, EQUATIONS, limits), "cascade")
+        walk_windows(pose_decisions(engine25, schedule, EQUATIONS, limits), Watch())
+    plan = solve(pose_decisions(engine25, schedule, EQUATIONS, limits), "cascade")
     assert len(plan.nodes) == len(schedule.moves)
 
 
 def test_a_window_depends_on_the_choices_before_it(engine25):
     schedule = three_robot_loop(engine25.network)
-    found = walk_windows(candidate_layers(engine25, schedule, EQUATIONS), Watch())
+    found = walk_windows(pose_decisions(engine25, schedule, EQUATIONS), Watch())
     before = found.choice[8]
     own, other = (
-        candidate_layers(engine25, windows(schedule, [(9, c)], alone=True), EQUATIONS)
+        pose_decisions(engine25, windows(schedule, [(9, c)], alone=True), EQUATIONS)
         for c in (before, 1 if before == 0 else 0)
     )
     own, other = (each.sums.single[0].tolist() for each in (own, other))
@@ -42,7 +42,7 @@ def test_a_window_depends_on_the_choices_before_it(engine25):
 
 
 def test_the_table_says_what_the_next_one_costs(engine25):
-    problem = candidate_layers(engine25, three_robot_loop(engine25.network), WEIGHTED)
+    problem = pose_decisions(engine25, three_robot_loop(engine25.network), WEIGHTED)
     plan = solve(problem, "rank_search", proof=False)
     found, table = plan.search, plan.table()
     assert len(table) == 22
@@ -59,7 +59,7 @@ def test_the_search_answers_steps_on_its_way(monkeypatch):
     monkeypatch.setattr(_choices, "COMPILED", 0.0)
     network = half_circle(60)
     engine, known = ComplianceEngine(network), three_robot_loop(network)
-    plan = solve(candidate_layers(engine, known, EQUATIONS), "cascade", proof=False)
+    plan = solve(pose_decisions(engine, known, EQUATIONS), "cascade", proof=False)
     late = {step.number for step in plan.steps if step.bricks > 40}
     assert late <= plan.search.fields.keys() | {plan.steps[-1].number}
     found, fresh = plan.responses(), analyze(ComplianceEngine(network), plan.steps)
@@ -74,7 +74,7 @@ def test_a_dead_end_is_named(engine25):
     schedule = three_robot_loop(engine25.network)
     with pytest.raises(SolverError, match="move 1, step 3: rob3 has no allowed grip"):
         walk_windows(
-            candidate_layers(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)]), Watch()
+            pose_decisions(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)]), Watch()
         )
 
 

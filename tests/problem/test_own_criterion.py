@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import seqopt
 from experiments.placement.robust_placement import least_quantile
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.compiled import best_in_order
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.compiled import best_in_order
+from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.states.states import build_states
 from seqopt.judge._proof import Proof
 from seqopt.problem.criteria import StepCost, WeightedSum
@@ -33,7 +33,7 @@ def weighed(responses, bricks):
 def posed(criterion, scene=None):
     network = seqopt.build_network(six_bricks() if scene is None else scene)
     engine = seqopt.make_engine("compliance", network)
-    return candidate_layers(engine, seqopt.three_robot_loop(network), criterion)
+    return pose_decisions(engine, seqopt.three_robot_loop(network), criterion)
 
 
 def test_a_function_costs_what_the_same_ready_made_criterion_does():

@@ -14,8 +14,8 @@ from experiments.harness.scenes import half_circle
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decision_costs import Budget, LayeredCosts
+from seqopt.graph.decisions import pose_decisions
 from seqopt.network.network import Network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
@@ -156,13 +156,13 @@ def opposed(size: Size, rng: Rng, total: float) -> Costs:
 def arch(size: Size, criterion: Criterion, limits: tuple[Limit, ...] = ()) -> Costs:
     """Return the problem of the three-robot loop on a small arch."""
     engine = ComplianceEngine(half_circle(size.bricks))
-    return of_layers(candidate_layers(engine, three_robot_loop(engine.network), criterion, limits))
+    return of_layers(pose_decisions(engine, three_robot_loop(engine.network), criterion, limits))
 
 
 def flat(size: Size, _: Rng) -> Costs:
     """Return a problem in which all possible choices respond equally."""
     engine = Even(ComplianceEngine(half_circle(size.bricks)))
-    return of_layers(candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS))
+    return of_layers(pose_decisions(engine, three_robot_loop(engine.network), EQUATIONS))
 
 
 class Even:

@@ -78,8 +78,8 @@ MODULES = {
     "seqopt.engines.rigid._operator": RIGID,
     "seqopt.engines.rigid._grip_equations": RIGID,
     "seqopt.engines.rigid._growth": ("engines/test_operator", "engines/test_growth"),
-    "seqopt.graph.layers.compiled": ("judge/test_certificate", "formulations/test_programs"),
-    "seqopt.graph.layers.costs": ("graph/test_costs", "plan/test_values"),
+    "seqopt.graph.compiled": ("judge/test_certificate", "formulations/test_programs"),
+    "seqopt.graph.decision_costs": ("graph/test_costs", "plan/test_values"),
     **PROOFS,
     "seqopt.problem.criteria": (
         *("problem/test_criteria", "problem/test_own_criterion", "problem/test_scales"),

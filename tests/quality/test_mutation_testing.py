@@ -69,7 +69,7 @@ def test_what_is_called_equivalent_is_one_change_of_one_line():
     assert reason(mutant(module, line, line.replace("True", "False")))
     assert not reason(mutant(module, line, line.replace("a, b", "b, a")))
     assert not reason(mutant(module, line, line.replace("True", "False").replace("x", "z")))
-    costs = "seqopt.graph.layers.costs"
+    costs = "seqopt.graph.decision_costs"
     assert reason(mutant(costs, "out, before = [], 0", "out, before = [], -1"))
     assert not reason(mutant(costs, "out, before = [], 0", "out, before = [], 1"))
     assert not reason(mutant(module, "out, before = [], 0", "out, before = [], -1"))

@@ -15,7 +15,7 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, TimeUpError
 from seqopt.graph.formulation import formulations
-from seqopt.plan.pose import layers_of
+from seqopt.plan.pose import decisions_of
 from seqopt.problem.problem import Aim
 from seqopt.report._speed._chart import PALE, speed_chart
 from seqopt.report._speed._measure import Reference, Timer, speed_accuracy
@@ -112,11 +112,11 @@ def test_the_gap_is_that_of_the_judge(loop):
     for name in SUMS:
         plan = seqopt.solve(loop, name)
         assert reference.gap(plan) == pytest.approx(plan.certificate.gap, abs=1e-9)
-    sums = layers_of(loop).sums
+    sums = decisions_of(loop).sums
     choices = [*product(*(range(len(single)) for single in sums.single))]
     worst = max((c for c in choices if np.isfinite(sums.cost(c))), key=sums.cost)
     plan = seqopt.solve(loop)
-    rows = layers_of(loop).rows(worst)
+    rows = decisions_of(loop).rows(worst)
     bad = replace(plan, selection=replace(plan.selection, states=rows))
     assert reference.gap(bad) > 0.01  # a choice that is not the best has one
 

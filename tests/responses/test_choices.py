@@ -9,7 +9,7 @@ import pytest
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.responses import _blocks as batches
@@ -27,7 +27,7 @@ def test_states_hold_the_responses_of_their_steps(engine25, method):
     """Every response of a random filled schedule is found again in the problem's steps."""
     schedule = SCHEDULES[method](engine25.network)
     also = ("F_largest", "F_move", "F_rob1", "F_rob2", "F_rob3", *COMPARED, "C_max")
-    problem = candidate_layers(engine25, schedule, EQUATIONS, also=also)
+    problem = pose_decisions(engine25, schedule, EQUATIONS, also=also)
     rng = np.random.default_rng(1)
     choice: list[int] = []
     for k, move in enumerate(schedule.moves):
@@ -51,20 +51,20 @@ def test_states_hold_the_responses_of_their_steps(engine25, method):
 
 def test_unknown_responses_are_refused(engine25, loop25):
     with pytest.raises(ProblemError, match="response F_rob9 does not exist; give C_max, D_max"):
-        candidate_layers(engine25, loop25, RankSum("x", equal("F_rob9"), equal("F_rob9")))
+        pose_decisions(engine25, loop25, RankSum("x", equal("F_rob9"), equal("F_rob9")))
 
 
 def test_each_robot_is_a_term_whatever_its_name(arch25):
     """Equation 2 ranks the forces of all robots of a scene."""
     robots = tuple(replace(r, name=n) for r, n in zip(arch25.robots, "abc", strict=True))
     net = build_network(replace(arch25, robots=robots))
-    renamed = candidate_layers(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
+    renamed = pose_decisions(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
     first = renamed.evaluation.steps[0].responses
     assert {"F_a", "F_b", "F_c", "T_max", "M_sup"} == set(first)
 
 
 def test_only_what_is_asked_is_evaluated(engine25, loop25):
-    plain = candidate_layers(engine25, loop25, RankSum("tension", equal("T_max"), equal("T_max")))
+    plain = pose_decisions(engine25, loop25, RankSum("tension", equal("T_max"), equal("T_max")))
     assert {name for s in plain.evaluation.steps for name in s.responses} == {"T_max"}
 
 

@@ -12,7 +12,7 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError, SolverError
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
 from seqopt.sequence.three_robots import three_robot_loop
@@ -49,9 +49,7 @@ def test_an_engine_of_ones_own_is_held_to_finite_numbers(field, value, named):
     """NaN dropped T_max from the ranks, and the choice was called optimal."""
     network = build_network(six_bricks())
     engine = Broken(ComplianceEngine(network), field, value)
-    problem = candidate_layers(
-        engine, three_robot_loop(network), EQUATIONS, also=("T_max", "M_sup")
-    )
+    problem = pose_decisions(engine, three_robot_loop(network), EQUATIONS, also=("T_max", "M_sup"))
     with np.errstate(invalid="ignore"):
         with pytest.raises(SolverError, match=f"({named}) is not finite"):
             analyze(engine, sequential(network))

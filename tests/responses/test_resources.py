@@ -17,7 +17,7 @@ from seqopt.engines.interface import Want
 from seqopt.engines.registry import ENGINES, make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MemoryShortError, ProblemError, SceneError
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.responses import _blocks as batches
@@ -222,12 +222,12 @@ def test_resources_that_cannot_be_meant_are_refused(wrong):
 )
 def test_costs_are_the_same_where_responses_are_not_kept(engine25, loop25, criterion):
     """Where there is memory for costs alone, responses come and go; nothing else changes."""
-    problem = candidate_layers(engine25, loop25, CRITERIA[criterion])
+    problem = pose_decisions(engine25, loop25, CRITERIA[criterion])
     asked = problem.evaluation.wanted
     costs, whole = batches._bytes_of_costs(loop25), batches._bytes_of_choices(loop25, asked)
     assert costs < whole
     few = Resources(max_memory=whole - 1)
-    streamed = candidate_layers(engine25, loop25, CRITERIA[criterion], resources=few)
+    streamed = pose_decisions(engine25, loop25, CRITERIA[criterion], resources=few)
     assert streamed.evaluation.streams
     assert streamed.sums == problem.sums
     assert streamed.peaks == problem.peaks
@@ -239,15 +239,15 @@ def test_costs_are_the_same_where_responses_are_not_kept(engine25, loop25, crite
     with pytest.raises(MemoryShortError, match="do not fit into the memory"):
         _ = streamed.evaluation.steps
     with pytest.raises(MemoryShortError, match="search without proof"):
-        _ = candidate_layers(engine25, loop25, EQUATIONS, resources=Resources(max_memory=1e5)).sums
+        _ = pose_decisions(engine25, loop25, EQUATIONS, resources=Resources(max_memory=1e5)).sums
 
 
 def test_alternatives_are_those_that_go_with_the_choice_where_responses_are_not_kept(
     engine25, loop25
 ):
-    whole = candidate_layers(engine25, loop25, EQUATIONS)
+    whole = pose_decisions(engine25, loop25, EQUATIONS)
     kept = batches._bytes_of_choices(loop25, whole.evaluation.wanted)
-    few = candidate_layers(engine25, loop25, EQUATIONS, resources=Resources(max_memory=kept - 1))
+    few = pose_decisions(engine25, loop25, EQUATIONS, resources=Resources(max_memory=kept - 1))
     every, some = (solve(p, "cascade").alternatives() for p in (whole, few))
     assert 0 < len(some) < len(every)
     both = some.merge(every, on=["step", "node", "second_node"], how="left", indicator=True)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import candidate_layers, steps_over
+from seqopt.graph.decisions import pose_decisions, steps_over
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.filters import parse_limits
@@ -60,7 +60,7 @@ def called(*names):
 
 def posed(scene, criterion, **more):
     network = build_network(scene)
-    return candidate_layers(ComplianceEngine(network), three_robot_loop(network), criterion, **more)
+    return pose_decisions(ComplianceEngine(network), three_robot_loop(network), criterion, **more)
 
 
 @cache

@@ -17,7 +17,8 @@ from seqopt._cli.main import main
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, SceneError
-from seqopt.graph.layers.layers import candidate_layers, in_scenarios
+from seqopt.graph.decisions import pose_decisions
+from seqopt.graph.states.states import of_decisions, over_scenarios
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WeightedSum
 from seqopt.problem.problem import WORST_TOTAL
@@ -156,14 +157,16 @@ SEARCHES = {
     "all": lambda problem: solve(problem, "overlap_dp"),
     "lazy": lambda problem: solve(problem, "overlap_dp", lazy=True),
     "without proof": lambda problem: solve(problem, "cascade", proof=False),
-    "over scenarios": lambda problem: solve(in_scenarios(problem, [SCENE], WORST_TOTAL)),
+    "over scenarios": lambda problem: solve(
+        over_scenarios(of_decisions(problem), [SCENE], WORST_TOTAL)
+    ),
 }
 
 
 def posed(cache):
     engine, schedule = make_engine("compliance", SCENE), three_robot_loop(SCENE)
     criterion = WeightedSum("all", tuple((name, 1.0, 1.0) for name in ("T_max", "M_sup", "F_move")))
-    return candidate_layers(engine, schedule, criterion, resources=Resources(cache=cache))
+    return pose_decisions(engine, schedule, criterion, resources=Resources(cache=cache))
 
 
 @pytest.mark.parametrize("how", SEARCHES)
@@ -228,14 +231,14 @@ def test_a_search_without_proof_uses_it_too(tmp_path, asked):
     def plan():
         engine = make_engine("compliance", SCENE)
         resources = Resources(cache=tmp_path)
-        problem = candidate_layers(engine, three_robot_loop(SCENE), EQUATIONS, resources=resources)
+        problem = pose_decisions(engine, three_robot_loop(SCENE), EQUATIONS, resources=resources)
         return solve(problem, "cascade", proof=False)
 
     first = plan()
     blocks = len(asked)
     asked.clear()
     assert plan().alternatives().equals(first.alternatives())
-    open_steps = sum(len(step.moves) > 0 for step in first.problem.schedule.steps)
+    open_steps = sum(len(step.moves) > 0 for step in first.decisions.schedule.steps)
     assert 0 < len(asked) <= open_steps  # those of the plan itself are computed anew
     assert len(asked) < blocks
 

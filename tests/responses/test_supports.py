@@ -11,7 +11,7 @@ import pytest
 from experiments.harness.scenes import running_bond
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import WeightedSum
 from seqopt.problem.requirements import Limit
@@ -64,7 +64,7 @@ def test_an_arch_built_from_both_sides_reports_its_worse_support(arch25):
 def test_criteria_see_the_largest(arch, bricks):
     schedule = one_move(arch, bricks)
     each = moments(arch, schedule)
-    problem = candidate_layers(arch, schedule, MOMENT)
+    problem = pose_decisions(arch, schedule, MOMENT)
     assert problem.sums.single[0] == pytest.approx(each.max(axis=1), rel=1e-12)
     assert len(set(each.argmax(axis=1))) == 2  # each end is the worse one for some candidate
 
@@ -75,7 +75,7 @@ def test_limits_see_the_largest(arch):
     each = moments(arch, schedule)
     bound = 0.9 * float(each.max())
     assert (each[:, 0] <= bound).all()
-    problem = candidate_layers(arch, schedule, MOMENT, (Limit("M_sup", bound),))
+    problem = pose_decisions(arch, schedule, MOMENT, (Limit("M_sup", bound),))
     allowed = np.isfinite(problem.sums.single[0])
     assert (allowed == (each[:, 1] <= bound)).all()
     assert 0 < allowed.sum() < len(allowed)
@@ -84,9 +84,7 @@ def test_limits_see_the_largest(arch):
 def test_the_order_of_the_ends_changes_no_criterion(arch):
     scene = arch.network.scene
     turned = ComplianceEngine(build_network(replace(scene, grounds=scene.grounds[::-1])))
-    one, other = (
-        candidate_layers(e, one_move(e, 6), MOMENT).sums.single[0] for e in (arch, turned)
-    )
+    one, other = (pose_decisions(e, one_move(e, 6), MOMENT).sums.single[0] for e in (arch, turned))
     assert other == pytest.approx(one, rel=1e-9)
 
 

@@ -9,7 +9,7 @@ import pytest
 import seqopt
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import StepError
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.sequence.steps import StepKind, idle_robots
@@ -68,7 +68,7 @@ def test_a_move_of_two_robots_lasts_until_the_next_brick_is_held(engine25):
 def test_two_robots_hold_better_where_the_best_nodes_are_chosen(engine25):
     """The sequential method is one of the choices; the best is better, and proven so."""
     schedule = _two_robot_loop(engine25.network)
-    problem = candidate_layers(engine25, schedule, WEIGHTED)
+    problem = pose_decisions(engine25, schedule, WEIGHTED)
     plan = solve(problem, "overlap_dp")
     steps = sequential(engine25.network)
     held = {(s.bricks, n) for s in steps if s.kind is StepKind.PLACE for n in s.held}
@@ -112,6 +112,6 @@ def test_too_few_robots_or_bricks_are_counted():
 def test_the_engine_answers_a_loop_of_five():
     engine = ComplianceEngine(build_network(replace(small_arch(8), robots=anywhere(5))))
     plan = solve(
-        candidate_layers(engine, robot_loop(engine.network), EQUATIONS), "cascade", proof=False
+        pose_decisions(engine, robot_loop(engine.network), EQUATIONS), "cascade", proof=False
     )
     assert max(len(step.held) for step in plan.steps) == 5

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from experiments.study.parts.ranks import rank_choice
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.decisions import pose_decisions
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import CLOSEST, printed_steps, published_choice
 
@@ -22,7 +22,7 @@ def test_the_published_plan_under_the_printed_equations(problem25):
 
 def test_the_published_plan_under_a_variant(engine25, loop25):
     """Tension and forces alone, the crown brick counted before the crown: 14 and 20 of 22."""
-    problem = candidate_layers(engine25, loop25, CLOSEST)
+    problem = pose_decisions(engine25, loop25, CLOSEST)
     ranks = rank_choice(problem, published_choice(problem))["rank_in_window"]
     assert (ranks == 1).sum() >= 14
     assert (ranks <= 3).sum() >= 20

@@ -21,7 +21,7 @@ from seqopt.arrays import Floats
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import Layers, candidate_layers
+from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report.comparison import Comparison, compare
@@ -61,7 +61,7 @@ class Ours:
 
     engine: ComplianceEngine
     methods: Comparison
-    problem: Layers
+    problem: Decisions
 
     @property
     def scene(self) -> Scene:
@@ -76,7 +76,7 @@ class Ours:
 def ours() -> Ours:
     """Return the models that counterparts are read from."""
     engine = ComplianceEngine(build_network(load_scene("arch25")))
-    problem = candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS)
+    problem = pose_decisions(engine, three_robot_loop(engine.network), EQUATIONS)
     return Ours(engine, compare(engine, EQUATIONS), problem)
 
 

@@ -9,13 +9,12 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.ranking import move_costs, rank_of
+from seqopt.graph.decision_costs import LayeredCosts
+from seqopt.graph.decisions import Decisions, move_costs, rank_of
 from seqopt.problem.problem import Aim
 
 
-def rank_choice(problem: Layers, choice: Sequence[int]) -> pd.DataFrame:
+def rank_choice(problem: Decisions, choice: Sequence[int]) -> pd.DataFrame:
     """Return where chosen nodes rank, move by move, the choice before each being fixed.
 
     ``choice``: a candidate for every move. Result: a row per move. Columns: ``move``, ``step``,

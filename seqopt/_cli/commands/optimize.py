@@ -24,7 +24,7 @@ from seqopt.plan._range import at_sufficient_level
 from seqopt.plan._softer import _payload_advice
 from seqopt.plan._status import order_bound_said
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import usual
+from seqopt.plan.pose import graph_of
 from seqopt.plan.solve import _solve_run
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN, overloads
@@ -136,7 +136,7 @@ class Found:
         """The summary with the entries that the command adds."""
         plan = self.plan
         loop = plan.method == "three-robot" and plan.graph.candidates
-        counts = paper_models(plan.layers.schedule) if loop else ()
+        counts = paper_models(plan.decisions.schedule) if loop else ()
         out = self.summary | {
             "seconds": {"assemble": self.assemble, **plan.seconds},
             "models_paper_count": dict(zip(("cascading", "overlap"), counts, strict=False)) or None,
@@ -189,7 +189,8 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
     start = time.perf_counter()
     with clock.needed("posing the problem"):
         posed = pose_problem(asked, change)
-        formulation = as_formulation(asked.formulation or usual(posed.problem))
+        usual = graph_of(posed.problem).default_formulation
+        formulation = as_formulation(asked.formulation or usual)
     how: dict[str, Any] = grammar.parse_options(formulation, asked.option)
     if asked.max_memory is not None and "max_memory" in formulation.options:
         how["max_memory"] = grammar.parse_size(str(asked.max_memory))

@@ -15,18 +15,28 @@ from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
-from seqopt.graph.source import STATES, Source
+from seqopt.graph.decision_costs import ScenarioCosts
+from seqopt.graph.decisions import Decisions
+from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.graph.states._checks import check_parts, checked_limits, of_states
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.problem.amounts import LARGEST, NONE, STATE_RESPONSES, Amount, StateArrays, judged_by
+from seqopt.problem.amounts import (
+    LARGEST,
+    NONE,
+    STATE_RESPONSES,
+    SUM,
+    Amount,
+    StateArrays,
+    judged_by,
+)
 from seqopt.problem.filters import Filter, filters_of
 from seqopt.problem.problem import WORST_PEAK, Aim, Orders, RobustAim, _goals, _require_for_curing
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.resources import Resource
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets, _near
-from seqopt.responses._tolerance import is_tolerance
+from seqopt.responses._tolerance import is_tolerance, values_text
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
@@ -46,8 +56,8 @@ COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stab
 
 
 @dataclass(frozen=True, repr=False)
-class States(Source, Shown):
-    """The problem of the free schedule of a scene; everything is computed when first needed.
+class States(Shown):
+    """The states of a build and the moves between them; everything is computed when first needed.
 
     ``engine``: what computes responses; ``rules``: which moves are possible: those that rules
     allow, or those that choose the open grips of a schedule, however many are open in a step;
@@ -61,10 +71,10 @@ class States(Source, Shown):
     largest. ``resources``: workers of grip sets and the cache of responses, which the proof does
     not use; ``spares``: whether the finished structure without grips costs nothing; ``filters``:
     further requirements of states; ``orders``: which orders of the bricks are searched, by default
-    the scene's own alone: values keep its scales; ``paths``: resources that plans must keep.
+    the scene's own alone: values keep its scales; ``paths``: resources that plans must keep;
+    ``decisions``: of a schedule, what candidates of its moves cost, where these are chosen: then
+    there are no goals, and the formulation says whether the sum or the largest counts.
     """
-
-    kind = STATES
 
     engine: Engine
     rules: FreeRules | Schedule
@@ -82,6 +92,7 @@ class States(Source, Shown):
     filters: tuple[Filter, ...] = ()
     orders: Orders | None = None
     paths: tuple[Resource, ...] = ()
+    decisions: Decisions | None = None
 
     def __repr__(self) -> str:
         caps = zip(self.names[len(self.aims) :], self.budgets, strict=True)
@@ -105,7 +116,7 @@ class States(Source, Shown):
     @property
     def totals(self) -> bool:
         """Whether totals of scenarios count, not the worst steps in any."""
-        first = self.goals[0]
+        first = next(iter(self.goals), SUM)
         return self.over.aim is Aim.SUM and first.states is not None and not first.is_peak
 
     @property
@@ -118,9 +129,11 @@ class States(Source, Shown):
         """Itself: its engine is that of the nominal scene."""
         return self
 
-    def names_of(self, _: Aim | None) -> tuple[str, ...]:
-        """Return what every goal is called, then what has a budget."""
-        return self.names
+    def names_of(self, aim: Aim | None) -> tuple[str, ...]:
+        """Return what every goal is called, then what has a budget; ``aim``: of decisions."""
+        if self.decisions is None:
+            return self.names
+        return (self.title or ("minmax" if aim is Aim.PEAK else "sum"),)
 
     def at(self, order: Order) -> States:
         """Return the problem of one order of the bricks, by name; itself where it is given: ()."""
@@ -160,8 +173,20 @@ class States(Source, Shown):
 
     @property
     def title(self) -> str:
-        """What it is about, where plans stand beside each other."""
-        return f"{self.method} schedule"
+        """What it is about, where plans stand beside each other; empty for their formulations."""
+        if self.decisions is None:
+            return f"{self.method} schedule"
+        return str(self.over) if self.scenarios else ""
+
+    @property
+    def candidates(self) -> tuple[tuple[int, ...], ...]:
+        """The nodes that can be chosen, move by move; none where states are chosen."""
+        return () if self.decisions is None else self.decisions.candidates
+
+    @cached_property
+    def costs_in_scenarios(self) -> tuple[ScenarioCosts, ...]:
+        """What candidates cost, scenario by scenario."""
+        return () if self.decisions is None else self.decisions.costs_in(self.scenarios)
 
     @property
     def begin(self) -> Site | None:
@@ -171,37 +196,62 @@ class States(Source, Shown):
     @property
     def questions(self) -> tuple[str, ...]:
         """What a formulation must answer to choose from it."""
+        if self.orders is not None:
+            return ("order",)
         if self.is_timed or self.paths:
             return ("time",) * self.is_timed + ("resource",) * bool(self.paths)
-        return ("goals",) if self.orders is None else ("order",)
+        if self.totals:
+            return ("tail",) if self.decisions is None else ("tail", "instance")
+        return ("goals",)
 
     @property
     def default_formulation(self) -> str:
         """The name of the formulation that chooses from it if none is named."""
-        others = {"order": "order_search"} | dict.fromkeys(("time", "resource"), "makespan_labels")
-        return others.get(self.questions[0], "schedule_search")
+        if self.decisions is None:
+            others = dict.fromkeys(("time", "resource"), "makespan_labels")
+            return ({"order": "order_search"} | others).get(self.questions[0], "schedule_search")
+        if self.scenarios:
+            return "scenario_search" if self.totals else "minimax"
+        return "labels" if self.decisions.budgets else "overlap_dp"
 
-    @property
-    def as_states(self) -> States:
-        """Itself."""
-        return self
+    def formulation(self, named: Formulation | str | None) -> Formulation:
+        """Return the formulation that chooses from it; a `ProblemError` if it does not fit."""
+        return as_formulation(named or self.default_formulation, *self.questions)
 
     def in_display_units(self, aim: Aim | None, values: Sequence[float]) -> dict[str, float]:
         """Return values of the first goals by their names; of a tilt, what is survived, degrees."""
+        if self.decisions is not None:
+            return dict(zip(self.names_of(aim), values, strict=False))
         found = zip(self.names, self.goals, values, strict=False)
         return {name: goal.shown(value) for name, goal, value in found}
 
     def bounded(self, bounds: Sequence[Any]) -> Sequence[Any]:
         """Return the bounds of goals, without those of budgets."""
-        return bounds[: len(self.aims)]
+        return bounds[: max(1, len(self.aims))]
 
     def chosen_nodes(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
-        """Raise a `ProblemError`: a state is more than one node."""
-        return self.chosen_candidates(states)
+        """Return the node chosen for every move; a `ProblemError` where states were chosen."""
+        if self.decisions is None:
+            raise ProblemError("states were chosen, not candidates of moves; take its steps")
+        return tuple(state[-1] for state in states)
+
+    def chosen_candidates(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
+        """Return the candidate chosen for every move; a `ProblemError` where states were chosen."""
+        nodes = self.chosen_nodes(states)
+        pairs = zip(self.candidates, nodes, strict=True)
+        return tuple(candidates.index(node) for candidates, node in pairs)
 
     def settles(self, *, exact: bool) -> bool:
         """Return whether a judged exact search is optimal, up to the proven width of margins."""
-        return exact and not (self.budgets or self.totals or self.is_timed or self.paths)
+        beside = self.budgets or self.totals or self.is_timed or self.paths or self.decisions
+        return exact and not beside
+
+    def said(self, objective: Mapping[str, float], gap: float | None, status: str) -> str:
+        """Return objective, gap and status of a plan in words."""
+        within = f" within {gap:.2g}" if gap and gap < np.inf else ""
+        among = f" among candidates {self.among}" if self.among else ""
+        values = values_text(objective) or "not compared with the optimum"
+        return f"{values}, {status}{within}{among}"
 
     def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
         """Return the settings of the problem for a summary; ``limits``: bounds by name."""
@@ -210,8 +260,8 @@ class States(Source, Shown):
             sets = {name: getattr(self.stability, name) for name in COUNTED}
             stands = {**self.standing.described(), **sets}
         return {
-            "aims": [*self.names[: len(self.aims)]],
-            **judged_by(self.goals, self.criterion),
+            "aims": [*self.names_of(aim)][: max(1, len(self.aims))],
+            **judged_by(self.goals or (SUM,), self.criterion),
             "scenarios": len(self.scenarios),
             "limits": limits,
             **({"filters": [*map(str, self.filters)]} if self.filters else {}),
@@ -223,9 +273,29 @@ class States(Source, Shown):
     def spent(
         self, objective: Mapping[str, float], found: Solution
     ) -> dict[str, dict[str, float | None]]:
-        """Return cap and use of every budget; multipliers are not known."""
-        capped = zip(self.names[len(self.aims) :], self.budgets, strict=True)
-        return {n: {"bound": cap, "spent": objective[n], "price": None} for n, cap in capped}
+        """Return cap, use and multiplier, if one is known, of every budget."""
+        if self.decisions is None:
+            capped = zip(self.names[len(self.aims) :], self.budgets, strict=True)
+            return {n: {"bound": cap, "spent": objective[n], "price": None} for n, cap in capped}
+        caps, choice = self.decisions.caps, self.chosen_candidates(found.states)
+        known = [budget.name for budget in caps if np.isfinite(budget.bound)]
+        prices = dict(zip(known, found.prices[0] if found.prices else (), strict=False))
+        return {
+            budget.name: {
+                "bound": budget.bound if np.isfinite(budget.bound) else None,
+                "spent": budget.spent(choice),
+                "price": prices.get(budget.name),
+            }
+            for budget in caps
+        }
+
+    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
+        """Return further columns of the table of responses: of decisions who was chosen for."""
+        if self.decisions is None:
+            return {}
+        own = self.decisions.schedule
+        robots = {s.number: ";".join(own.moves[m].robot for m in s.moves) for s in own.steps}
+        return {"optimized_robot": [robots.get(step.number, np.nan) for step in steps]}
 
     def letting_go(self, steps: Sequence[Step]) -> int:
         """Return how many steps at the end only let go."""
@@ -300,6 +370,9 @@ class States(Source, Shown):
     @property
     def models(self) -> int:
         """How many grip sets were solved."""
+        if self.decisions is not None:
+            found = self.costs_in_scenarios or (self.decisions,)
+            return sum(costs.models for costs in found)
         if self.each:
             return sum(problem.models for problem in self.each)
         return self.sets.solved + self.screened.solved * (self.screened is not self.sets)
@@ -519,6 +592,12 @@ def _ascending(held: Ints, most: Floats) -> tuple[Ints, Floats]:
     """Return places held (n, r) in ascending order, and what those who hold may carry."""
     order = np.argsort(held, axis=1, kind="stable")
     return np.take_along_axis(held, order, axis=1), np.asarray(most[order])
+
+
+def of_decisions(decisions: Decisions) -> States:
+    """Return the graph in which candidates of moves are chosen."""
+    asked = decisions.engine, decisions.schedule, decisions.criterion, (), decisions.limits
+    return States(*asked, resources=decisions.evaluation.resources, decisions=decisions)
 
 
 def build_states(

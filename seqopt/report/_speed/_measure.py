@@ -20,12 +20,11 @@ from seqopt._interrupts import ending
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
 from seqopt.errors import ProblemError, SeqoptError, SolverError, TimeUpError
+from seqopt.graph.decision_costs import TINY
 from seqopt.graph.formulation import QUESTIONS, End, Formulation, FormulationKind, formulations
-from seqopt.graph.layers.costs import TINY
-from seqopt.graph.source import CANDIDATES
 from seqopt.judge._schedules import plan_values
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import graph_kind, layers_of, questions_of, states_of, usual
+from seqopt.plan.pose import chooses_moves, decisions_of, graph_of, states_of
 from seqopt.plan.solve import on_the_way, solve
 from seqopt.problem.problem import Aim, Problem
 from seqopt.report._speed._table import CUT, DONE, FAILED, SpeedTable
@@ -77,17 +76,17 @@ class Reference:
 
     def prepare(self) -> None:
         """Compute what gaps are measured by; a `SolverError` says that no optimum was proven."""
-        _ = layers_of(self.problem).sums if self.in_layers else self._best
+        _ = decisions_of(self.problem).sums if self.in_layers else self._best
 
     @property
     def in_layers(self) -> bool:
         """Whether candidates are chosen in layers, and not states."""
-        return graph_kind(self.problem) == CANDIDATES
+        return chooses_moves(self.problem)
 
     @cached_property
     def _best(self) -> tuple[float, ...]:
         """The value of every goal in the proven optimum."""
-        plan = solve(self.problem, usual(self.problem))
+        plan = solve(self.problem)
         if plan.ended is End.INTERRUPTED:
             raise KeyboardInterrupt
         if plan.ended is not End.DONE or plan.certificate is None:
@@ -97,7 +96,7 @@ class Reference:
     def gap(self, plan: Plan) -> float:
         """Return how far a plan is above the optimum, over its size; infinite if not allowed."""
         if self.in_layers:
-            costs = layers_of(self.problem).sums
+            costs = decisions_of(self.problem).sums
             size = float(np.abs(costs.parts(plan.choice)).sum())
             if not np.isfinite(size):
                 return np.inf
@@ -144,7 +143,7 @@ class _Stage:
     def prepared(self) -> Problem:
         """Return the problem with the costs of all its choices."""
         found = self.posed()
-        _ = layers_of(found).sums
+        _ = decisions_of(found).sums
         return found
 
     def rows(self, ways: list[_Way]) -> Iterator[dict[str, object]]:
@@ -198,12 +197,12 @@ def _reason(error: Exception) -> str:
 
 def _ways(problem: Problem) -> list[_Way]:
     """Return what chooses: formulations that minimize the same, and a search without proof."""
-    (asked,) = questions_of(problem)[:1]
+    asked = graph_of(problem).questions[0]
     if asked != "goals":
         raise ProblemError(
             f"speed: it is measured where grips or states are chosen, not {QUESTIONS[asked]}"
         )
-    of_costs = graph_kind(problem) == CANDIDATES
+    of_costs = chooses_moves(problem)
     known = [
         each
         for each in formulations("goals").values()

@@ -1,4 +1,9 @@
-"""The problem of support placement over a whole build, as one frozen value."""
+"""Decisions of a build: which candidate every open grip of a schedule takes, one after the other.
+
+A decision is a move with the candidate that is chosen for it. The forced steps behind it are those
+in which its move is the last that is open: alone, or beside the move before it. Their costs are
+computed brick count by brick count, for all candidates at once, and joined along the chain.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +11,8 @@ import math
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain, pairwise
 
 import numpy as np
@@ -16,13 +20,11 @@ import numpy as np
 from seqopt._showing import Shown
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import Recipe, engine_for, recipe_for
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
-from seqopt.graph.formulation import Solution
-from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts, ScenarioCosts, largest_of
-from seqopt.graph.source import CANDIDATES, Source
+from seqopt.graph.compiled import Compiled, best_in_order, compile_costs, compile_totals
+from seqopt.graph.decision_costs import Budget, Joined, LayeredCosts, ScenarioCosts, largest_of
 from seqopt.problem.criteria import Ranked, RankSum, _counts_every_step
-from seqopt.problem.problem import WORST_PEAK, Aim, RobustAim
+from seqopt.problem.problem import WORST_PEAK, Aim, AskedBudget, RobustAim
 from seqopt.problem.requirements import (
     Criterion,
     Excess,
@@ -33,20 +35,18 @@ from seqopt.problem.requirements import (
     _excesses,
     _response_along,
     _step_limits,
-    pickled,
     robots_of,
 )
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, robot_response
 from seqopt.responses.resources import HERE, Resources
-from seqopt.scene.scenarios import require_alike
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.site import _begin_step
 from seqopt.sequence.steps import Step
-from seqopt.work._workers import hire, map_ordered
-from seqopt.work.progress import Progress
+
+TIED = 1e-9  # costs this close, relative to the largest, are equal
 
 
 def windows(
@@ -79,34 +79,25 @@ def windows(
 
 
 @dataclass(frozen=True, repr=False)
-class Layers(Source, Shown):
-    """Support placement over a whole build; responses, sums and peaks are computed on first use.
+class Decisions(Shown):
+    """What candidates of all moves cost; responses, sums and peaks are computed on first use.
 
     ``criterion``: what a step costs; ``limits``: bounds that no step may exceed, whether or not a
     grip is open in it; ``evaluation``: raw responses of every open step; ``budgets``: caps on
-    totals over the build, without scenarios; ``scenes``: scenarios, in all of which limits hold;
-    the criterion has the numbers of the nominal scene in them; ``over``: what counts of the values
-    in all of them; ``known``: costs in scenarios, where they were computed before.
+    totals over the build, given or in words.
     """
-
-    kind = CANDIDATES
 
     criterion: Criterion
     limits: tuple[Limit, ...]
     evaluation: Evaluation
-    budgets: tuple[Budget, ...] = ()
-    scenes: tuple[Scene, ...] = ()
-    over: RobustAim = WORST_PEAK
-    known: tuple[ScenarioCosts, ...] = field(default=(), compare=False)
+    budgets: tuple[Budget | AskedBudget, ...] = ()
 
     def __repr__(self) -> str:
         schedule = self.schedule
         counts = f"{len(schedule.steps)} steps, {len(schedule.moves)} moves"
         extras = f"{len(self.limits)} limits, {len(self.budgets)} budgets"
         what = f"{schedule.scene.name!r}, {schedule.method!r}: {counts}"
-        if self.scenes:
-            extras = f"{len(self.scenes)} scenarios, {self.over}"
-        return f"Layers({what}, criterion {self.criterion.name!r}, {extras})"
+        return f"Decisions({what}, criterion {self.criterion.name!r}, {extras})"
 
     @property
     def engine(self) -> Engine:
@@ -119,167 +110,39 @@ class Layers(Source, Shown):
         return self.evaluation.schedule
 
     @property
-    def method(self) -> str:
-        """The name of the schedule."""
-        return self.schedule.method
-
-    @property
-    def among(self) -> str:
-        """The candidates that are kept, in words; empty for all."""
-        return self.schedule.left_out
-
-    @property
-    def title(self) -> str:
-        """What counts over scenarios; empty without."""
-        return str(self.over) if self.scenes else ""
-
-    @cached_property
-    def alone_in_scene(self) -> Layers:
-        """The same problem in the nominal scene."""
-        return replace(self, scenes=(), known=()) if self.scenes else self
-
-    @cached_property
-    def scenarios(self) -> tuple[Engine, ...]:
-        """What computes the responses of every scenario."""
-        return tuple(engine_for(self.engine, scene) for scene in self.scenes)
-
-    @property
-    def questions(self) -> tuple[str, ...]:
-        """What a formulation must answer to choose from it."""
-        totals = bool(self.scenes) and self.over.aim is Aim.SUM
-        return ("tail" if totals else "goals", "instance")
-
-    @property
-    def default_formulation(self) -> str:
-        """The name of the formulation that chooses from it if none is named."""
-        if self.scenes:
-            return "scenario_search" if "tail" in self.questions else "minimax"
-        return "labels" if self.budgets else "overlap_dp"
-
-    @property
-    def as_layers(self) -> Layers:
-        """The same problem in the nominal scene."""
-        return self.alone_in_scene
-
-    def chosen_candidates(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
-        """Return the candidate chosen for every move."""
-        pairs = zip(self.candidates, self.chosen_nodes(states), strict=True)
-        return tuple(candidates.index(node) for candidates, node in pairs)
-
-    def said(self, objective: Mapping[str, float], gap: float | None, status: str) -> str:
-        """Return objective and gap, or status, of a plan in words."""
-        if gap is None:
-            values = ", ".join(f"{name} {value:.6g}" for name, value in objective.items())
-            return f"{values} (claimed), {status}" if values else "not compared with the optimum"
-        proven = f"heuristic: {self.among}" if self.among else f"gap {100 * gap:.3g} %"
-        (value,) = objective.values()
-        return f"objective {value:.6g}, {proven}"
-
-    def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
-        """Return the settings of the problem for a summary; ``limits``: bounds by name."""
-        return {
-            "aims": [*self.names_of(aim)],
-            "criterion": self.criterion.name,
-            **self.criterion.settings,
-            "scenarios": len(self.scenes),
-            "limits": limits,
-            "rules": {},
-            "stands": None,
-        }
-
-    def spent(
-        self, objective: Mapping[str, float], found: Solution
-    ) -> dict[str, dict[str, float | None]]:
-        """Return cap, use and multiplier of every budget."""
-        known = [budget.name for budget in self.budgets if math.isfinite(budget.bound)]
-        prices = dict(zip(known, found.prices[0] if found.prices else (), strict=False))
-        return {
-            budget.name: {
-                "bound": budget.bound if math.isfinite(budget.bound) else None,
-                "spent": budget.spent(self.chosen_candidates(found.states)),
-                "price": prices.get(budget.name),
-            }
-            for budget in self.budgets
-        }
-
-    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
-        """Return the robots that were chosen for, by step."""
-        moves = self.schedule.moves
-        robots = {s.number: ";".join(moves[m].robot for m in s.moves) for s in self.schedule.steps}
-        return {"optimized_robot": [robots.get(step.number, math.nan) for step in steps]}
-
-    @property
     def models(self) -> int:
-        """How many different models were solved, in all scenarios."""
-        if self.scenes:
-            return sum(costs.models for costs in self.costs_in_scenarios)
+        """How many different models were solved."""
         return self.evaluation.models
 
-    def names_of(self, aim: Aim | None) -> tuple[str, ...]:
-        """Return what the goal of an aim is called."""
-        return (self.title or ("minmax" if aim is Aim.PEAK else "sum"),)
+    def of(self, engine: Engine) -> Decisions:
+        """Return the same decisions by another engine, as of a scenario, without budgets."""
+        return replace(self, evaluation=replace(self.evaluation, engine=engine), budgets=())
+
+    @cached_property
+    def caps(self) -> tuple[Budget, ...]:
+        """The budgets as amounts of candidates and pairs."""
+        return tuple(b if isinstance(b, Budget) else self._budget(b) for b in self.budgets)
+
+    def _budget(self, asked: AskedBudget) -> Budget:
+        """Return a budget in words; a share is of what the optimum without budgets takes."""
+        if asked.response:
+            budget = steps_over(self, asked.response, asked.level, asked.bound)
+        else:
+            budget = travel(self, asked.bound)
+        if not asked.share:
+            return budget
+        free = best_in_order([(self.sums, Aim.SUM)])
+        return replace(budget, bound=asked.bound * budget.spent(free))
 
     @property
     def sums(self) -> LayeredCosts:
         """The costs whose sum over the build is minimized."""
-        if self.scenes:
-            raise ProblemError(
-                f"{self.over}: totals over scenarios are no sum of one cost; take scenario_search, "
-                "or minimax with worst-peak"
-            )
         return self._sums[0]
 
-    @cached_property
+    @property
     def peaks(self) -> LayeredCosts:
-        """The costs whose largest over the build is minimized, of scenarios the largest in any."""
-        if self.scenes:
-            return largest_of(self.layered(Aim.PEAK))
+        """The costs whose largest over the build is minimized."""
         return self._peaks[0]
-
-    def layered(self, aim: Aim) -> tuple[LayeredCosts, ...]:
-        """Return the costs whose sums or peaks an aim is about, scenario by scenario."""
-        return tuple(map(aim.costs, self.costs_in_scenarios))
-
-    @property
-    def costs_in_scenarios(self) -> tuple[ScenarioCosts, ...]:
-        """What choices cost, scenario by scenario.
-
-        Raises `InfeasibleError` if a step without an open grip exceeds a limit in a scenario;
-        `MechanismError`, `SolverError`, `WorkerError` as engines and workers do.
-        """
-        return self.known or self._in_scenarios[0]
-
-    @cached_property
-    def _in_scenarios(self) -> tuple[tuple[ScenarioCosts, ...], float]:
-        """The costs in every scenario, and what they took from the first to the last, s."""
-        start, resources = time.perf_counter(), self.evaluation.resources
-        asked, recipes = self._in_all, [recipe_for(self.engine, scene) for scene in self.scenes]
-        progress = Progress("scenarios", len(recipes), resources.progress)
-        with hire(resources.executor, resources.workers) as crew:
-            if crew is not None:
-                pickled((asked, recipes[0]), self.criterion)  # says if tasks cannot be sent
-            tasks, each = enumerate(recipes, start=1), partial(_costs_in, asked)
-            done = map_ordered(each, tasks, crew, done=lambda *_: progress.add(1))
-            with closing(done) as found:
-                return tuple(found), time.perf_counter() - start
-
-    @property
-    def from_cache(self) -> Iterator[Layers]:
-        """The problems whose responses may come from files, one for every scenario."""
-        if self.evaluation.resources.cache is None:
-            return
-        for scene in self.scenes:
-            yield _in_scenario(self._in_all, recipe_for(self.engine, scene))
-        if not self.scenes:
-            yield self
-
-    @property
-    def _in_all(self) -> _Asked:
-        """Responses needed in all scenarios; the criterion has the nominal scene's numbers."""
-        evaluation = self.evaluation
-        also = getattr(evaluation.wanted, "also", ())
-        wanted = ResponsesAsked(self.criterion, self.limits, also)
-        return evaluation.schedule, wanted, evaluation.resources.alone()
 
     @cached_property
     def _sums(self) -> tuple[LayeredCosts, float]:
@@ -336,12 +199,7 @@ class Layers(Source, Shown):
         return costs
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return how long responses (``respond``) and costs (``rank``) of an aim took, s.
-
-        Of scenarios responses and costs of both aims are one.
-        """
-        if self.scenes:
-            return {"respond": 0.0 if self.known else self._in_scenarios[1]}
+        """Return how long responses (``respond``) and costs (``rank``) of an aim took, s."""
         ranked = self._sums[1] if aim is Aim.SUM else self._peaks[1]
         return {"respond": self.evaluation.seconds, "rank": ranked}
 
@@ -386,21 +244,13 @@ class Layers(Source, Shown):
             found[choices.moves[-1]].append(choices)
         return found
 
-    @property
+    @cached_property
     def alone(self) -> LayeredCosts:
         """The costs that a search of one move alone is charged: ranks among its candidates."""
-        return self.sums if self.scenes else self.ranked(Ranked.CONDITIONAL).sums
-
-    def ranked(self, ranked: Ranked) -> Layers:
-        """Return the same problem with its ranks taken in a way; itself if it has none."""
-        return self if getattr(self.criterion, "ranked", ranked) is ranked else self._ranked_else
-
-    @cached_property
-    def _ranked_else(self) -> Layers:
-        criterion = self.criterion
-        assert isinstance(criterion, RankSum)
-        (other,) = {*Ranked} - {criterion.ranked}
-        return replace(self, criterion=replace(criterion, ranked=other))
+        own, criterion = Ranked.CONDITIONAL, self.criterion
+        if not isinstance(criterion, RankSum) or criterion.ranked is own:
+            return self.sums
+        return replace(self, criterion=replace(criterion, ranked=own)).sums
 
     def step_costs(self, choices: StepChoices) -> Floats:
         """Return the costs of a step's choices, (C,) or (C, D), infinite where not allowed."""
@@ -416,20 +266,69 @@ class Layers(Source, Shown):
             costs[limit.exceeded(choices.responses[limit.response])] = np.inf
         return costs
 
-    def require_possible(self) -> None:
+    def require_possible(self, worlds: Sequence[Scene] = ()) -> None:
         """Raise an error if no choice can keep a limit: of a grip that is given, or of a carrier.
 
-        Raises `InfeasibleError`, naming the limit, the value and the steps; of scenarios, given
-        grips are looked at when costs are computed.
+        ``worlds``: scenes of scenarios, in which bricks are carried too. Raises `InfeasibleError`,
+        naming the limit, the value and the steps.
         """
-        _require_carried(self.schedule, [self.engine.network.scene, *self.scenes])
-        if self.scenes or not (self.limits and self.given):
+        _require_carried(self.schedule, [self.engine.network.scene, *worlds])
+        if worlds or not (self.limits and self.given):  # looked at when their costs are computed
             return
         table = self.evaluation.table_of_given(limit.response for limit in self.limits)
         for excess in _excesses(self.schedule.scene, table, self.limits):
             raise InfeasibleError(
                 f"{excess}, where no grip is left to choose; relax the limit or change the schedule"
             )
+
+    def costs_in(self, engines: Sequence[Engine]) -> tuple[ScenarioCosts, ...]:
+        """Return what candidates cost by every engine of a scenario, which an error names."""
+        out = []
+        for number, own in enumerate(map(self.of, engines), start=1):
+            try:
+                own.require_possible()
+                found = own.sums, own.peaks, own.models, own.evaluation.seconds
+            except MechanismError as error:
+                raise MechanismError(f"scenario {number}: {error}", error.mode) from error
+            except SolverError as error:
+                raise SolverError(f"scenario {number}: {error}") from error
+            out.append(ScenarioCosts(*found))
+        return tuple(out)
+
+    def compiled(
+        self,
+        aim: Aim | None,
+        name: str = "",
+        *,
+        alone: bool = False,
+        each: Sequence[ScenarioCosts] = (),
+        over: RobustAim = WORST_PEAK,
+    ) -> Compiled:
+        """Return the graph of decisions whose sums or peaks count.
+
+        ``alone``: whether with what a search of one move alone is charged; of peaks, with their
+        parts; ``each``: costs in scenarios, of which the robust aim ``over`` makes one value.
+        """
+        name, aim, nodes = name or self.schedule.scene.name, aim or Aim.SUM, self.candidates
+        if not each:
+            costs = aim.costs(self)
+            charged = self.alone if aim is Aim.SUM else costs
+            return compile_costs(name, costs, aim, self.caps, charged if alone else None, nodes)
+        try:
+            if over.aim is Aim.SUM:
+                return compile_totals(name, [costs.sums for costs in each], over, nodes)
+            if aim is Aim.SUM:
+                raise ProblemError(
+                    f"{over}: totals over scenarios are no sum of one cost; take "
+                    "scenario_search, or minimax with worst-peak"
+                )
+            costs = largest_of([costs.peaks for costs in each])
+            found = compile_costs(name, costs, aim, (), costs if alone else None, nodes)
+        except InfeasibleError as error:
+            raise InfeasibleError(f"over all {len(each)} scenarios, {error}") from error
+        (goal,) = found.instance.goals
+        named = goal._replace(name=f"{goal.name} ({over})")
+        return found._replace(instance=replace(found.instance, goals=(named,)))
 
     @property
     def candidates(self) -> tuple[tuple[int, ...], ...]:
@@ -449,43 +348,6 @@ class Layers(Source, Shown):
         return self.schedule.fill(self.nodes(choice))
 
 
-_Asked = tuple[Schedule, ResponsesAsked, Resources]  # the same in every scenario
-
-
-def _in_scenario(asked: _Asked, recipe: Recipe) -> Layers:
-    """Return the problem of one scenario, by the recipe of its engine."""
-    schedule, wanted, resources = asked
-    evaluation = Evaluation(recipe.make(), schedule, wanted, resources)
-    return Layers(wanted.criterion, wanted.limits, evaluation)
-
-
-def _costs_in(asked: _Asked, numbered: tuple[int, Recipe]) -> ScenarioCosts:
-    """Return what choices cost in one scenario, which is named where that fails."""
-    number, problem = numbered[0], _in_scenario(asked, numbered[1])
-    evaluation = problem.evaluation
-    try:
-        problem.require_possible()
-        return ScenarioCosts(problem.sums, problem.peaks, evaluation.models, evaluation.seconds)
-    except MechanismError as error:
-        raise MechanismError(f"scenario {number}: {error}", error.mode) from error
-    except SolverError as error:
-        raise SolverError(f"scenario {number}: {error}") from error
-
-
-def in_scenarios(nominal: Layers, scenes: Sequence[Scene], over: RobustAim) -> Layers:
-    """Return a problem over scenarios; nothing is computed yet.
-
-    ``nominal``: with an engine of `seqopt.make_engine`; ``scenes``: with the same bricks and nodes.
-    Raises `ProblemError` if there is no scenario, or one has other bricks or nodes.
-    """
-    if not scenes:
-        raise ProblemError("there is no scenario; give at least one")
-    for i, scene in enumerate(scenes, start=1):
-        require_alike(nominal.schedule.scene, scene, i)
-    recipe_for(nominal.engine, scenes[0])  # says if engines for other scenes cannot be made
-    return replace(nominal, scenes=tuple(scenes), over=over)
-
-
 def _require_carried(schedule: Schedule, scenes: Sequence[Scene]) -> None:
     """Raise an `InfeasibleError` if a robot has to carry a brick in a scene that is too heavy."""
     steps = (_begin_step(schedule.scene, schedule.begin), *schedule.steps)
@@ -499,14 +361,14 @@ def _require_carried(schedule: Schedule, scenes: Sequence[Scene]) -> None:
         raise InfeasibleError(f"{schedule.method} schedule: {said}; it takes {' '.join(enough)}")
 
 
-def candidate_layers(
+def pose_decisions(
     engine: Engine,
     schedule: Schedule,
     criterion: Criterion,
     limits: Sequence[Limit] = (),
     also: Sequence[str] = (),
     resources: Resources = HERE,
-) -> Layers:
+) -> Decisions:
     """Return the problem of choosing the open grips of a schedule; nothing is computed yet.
 
     ``limits``: bounds of all steps, whether or not a grip is open in them. ``also``: responses to
@@ -525,10 +387,10 @@ def candidate_layers(
         why = f"does not exist{did_you_mean(min(unknown), known)}"
         raise ProblemError(f"response {min(unknown)} {why}; give {', '.join(sorted(known))}")
     schedule.require_pairs()
-    return Layers(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))
+    return Decisions(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))
 
 
-def steps_over(problem: Layers, response: str, level: float, bound: float) -> Budget:
+def steps_over(problem: Decisions, response: str, level: float, bound: float) -> Budget:
     """Return a bound on the number of steps in which a response exceeds a level.
 
     ``problem``: whose choices the budget is for; ``response``: among those that the problem
@@ -550,7 +412,7 @@ def steps_over(problem: Layers, response: str, level: float, bound: float) -> Bu
     return joined.budget(f"steps with {response} over {level:g}", bound)
 
 
-def travel(problem: Layers, bound: float) -> Budget:
+def travel(problem: Decisions, bound: float) -> Budget:
     """Return a cap on the straight distances of robots from grip to grip over the whole build.
 
     ``problem``: whose choices the budget is for; ``bound``: m. Result: each choice takes the
@@ -596,3 +458,26 @@ def _ways(schedule: Schedule) -> Iterator[tuple[str, tuple[_Grip, _Grip]]]:
         for ends in pairwise(grip for grip in grips if grip is not None):
             if ends[0] != ends[1]:
                 yield robot.name, ends
+
+
+def move_costs(problem: Decisions, move: int, before: int) -> Floats:
+    """Return the costs of a move's candidates, the choice before it being fixed.
+
+    The search of a single move (equation 1 of Bruun et al.): each step of the window is ranked over
+    the candidates of this move alone.
+
+    ``problem``: whose responses are evaluated if they are not yet; ``move``, ``before``: a move,
+    and the candidate chosen for the move before it. Result (C_k,).
+    """
+    costs = map(problem.step_costs, problem.window_choices(move, before))
+    return np.asarray(sum(costs, np.zeros(len(problem.schedule.moves[move].candidates))))
+
+
+def rank_of(costs: Floats, chosen: int) -> int:
+    """Return the rank of a candidate: 1 if none costs less.
+
+    ``costs`` (C,): equal if they differ by less than ``TIED`` of the largest; ``chosen``: index of
+    the candidate.
+    """
+    tie = TIED * float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
+    return int((costs < costs[chosen] - tie).sum()) + 1

@@ -1,10 +1,11 @@
-"""Costs and budgets of choices, as arrays, independent of what the choices mean."""
+"""Costs and budgets of candidates and pairs, as arrays, independent of what they mean."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
 
@@ -146,14 +147,8 @@ class Budget(FrozenValue):
         return self.amounts.cost(choice)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ScenarioCosts(FrozenValue):
-    """What the choices of a schedule cost in one scenario.
-
-    ``sums``, ``peaks``: as of `seqopt.graph.layers.layers.Layers`; infinite where a limit is
-    exceeded; ``models``: how many different models were solved; ``seconds``: that solving them
-    took, s.
-    """
+class ScenarioCosts(NamedTuple):
+    """What candidates cost in one scenario, models that were solved, and seconds that took."""
 
     sums: LayeredCosts
     peaks: LayeredCosts

@@ -1,4 +1,4 @@
-"""Layers of candidates as a graph: a level for every move, an arc for every allowed pair."""
+"""Decisions of candidates as a graph: a level for every move, an arc for every allowed pair."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.graph import Graph, Rows
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Cap, _Target
-from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.layers import Layers
 from seqopt.graph.paths import distances, lexicographic, reached
 from seqopt.problem.problem import Aim, RobustAim
 
@@ -22,7 +21,7 @@ Blocks = Sequence[Floats]
 
 
 class Compiled(NamedTuple):
-    """Layers as an instance.
+    """Decisions as an instance.
 
     ``candidates`` (n,): what every node stands for; ``offset``: what every path takes beside its
     arcs, since costs below zero were raised by as much, level by level.
@@ -35,32 +34,6 @@ class Compiled(NamedTuple):
     def choice(self, nodes: Sequence[int]) -> tuple[int, ...]:
         """Return the candidates on a path."""
         return tuple(self.candidates[list(nodes)].tolist())
-
-
-def compile_layers(
-    problem: Layers, aim: Aim | None, name: str = "", *, alone: bool = False
-) -> Compiled:
-    """Return the graph of choices, of one scene or over scenarios, whose sums or peaks count.
-
-    ``alone``: whether with what a search of one move alone is charged; of peaks, with their parts.
-    """
-    name, nodes = name or problem.schedule.scene.name, problem.candidates
-    aim = aim or Aim.SUM
-    if not problem.scenes:
-        costs = aim.costs(problem)
-        charged = problem.alone if aim is Aim.SUM else costs
-        return compile_costs(name, costs, aim, problem.budgets, charged if alone else None, nodes)
-    try:
-        if problem.over.aim is Aim.SUM:
-            return compile_totals(name, problem.layered(Aim.SUM), problem.over, nodes)
-        costs = aim.costs(problem)
-        found = compile_costs(name, costs, aim, (), costs if alone else None, nodes)
-    except InfeasibleError as error:
-        count = len(problem.scenes)
-        raise InfeasibleError(f"over all {count} scenarios, {error}") from error
-    (goal,) = found.instance.goals
-    named = goal._replace(name=f"{goal.name} ({problem.over})")
-    return found._replace(instance=replace(found.instance, goals=(named,)))
 
 
 def compile_costs(
