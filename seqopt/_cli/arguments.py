@@ -33,6 +33,11 @@ ALL = "--help-all"
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
 PRINTED = ("quiet", "json", "strict")  # what concerns the printed answer alone
+GONE = {
+    "--keep": "--to 12 leaves the first 12 bricks of --order",
+    "--load-factor": "in Python seqopt.stability.load_factors has it",
+    "--staged": "in Python seqopt.responses.analyze_staged has it",
+}  # options that there were, and what to do in their place
 MISSING = "the following arguments are required"
 
 
@@ -49,6 +54,8 @@ def _nearest(message: str, options: Iterable[str]) -> str:
     found = UNKNOWN.search(message)
     if found is None:
         return ""
+    if found[1] in GONE:
+        return f" ({found[1]} is no more; {GONE[found[1]]})"
     known = {option.lstrip("-"): option for option in options}
     if found[1] in known.values():
         return " (options stand after the command)"

@@ -19,14 +19,14 @@ from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import Mortar, _mortar_name
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, LIMITED, USUAL, make_engine, simplest
-from seqopt.errors import ExtraError, ProblemError, SceneError, SeqoptError, StepError
+from seqopt.errors import ExtraError, ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence, ShownBuild
 from seqopt.plan.plan import Plan
-from seqopt.scene.scene import Scene, _parse_order, in_order
+from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import dump_scene, load_scene
-from seqopt.sequence._parts import _standing, read_site, what_is_left
+from seqopt.sequence._parts import read_site, what_is_left
 from seqopt.sequence.rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import read_plan
@@ -176,22 +176,6 @@ def find_place(text: int | str | None, name: str, scene: Scene) -> tuple[Scene, 
         return read_place(scene, str(text), bare=name == "from")
     except StepError as error:
         raise StepError(f"--{name} {text}: {error}") from None
-
-
-def kept_place(asked: options.Moves, keep: str, scene: Scene, begin: Place) -> tuple[Scene, Place]:
-    """Return where a take-down ends by --keep, and the scene in an order that begins with these."""
-    where = f"--keep {keep}"
-    if asked.to is not None:
-        raise StepError(f"{where}: --to {asked.to} says already what stays; leave one out")
-    try:
-        names = [*_parse_order(scene, keep)]
-    except SeqoptError as error:
-        raise StepError(f"{where}: {error}") from None
-    found, count = _standing(scene, names, where)
-    stands = len(scene.placed) if begin.site is None else begin.site.bricks
-    if {*found.build_order[:stands]} != {*scene.build_order[:stands]}:
-        raise StepError(f"{where}: not all of these stand where it begins; keep what stands")
-    return found, Place(Site(count))
 
 
 def read_place(scene: Scene, text: str, *, bare: bool = True) -> tuple[Scene, Place]:

@@ -319,8 +319,7 @@ class Limited(Asked):
 class Moves(Judged, Aimed, Stands, Team, Built):
     """Which steps may a build have?
 
-    --rule and --direction go with --schedule free alone, --keep with --direction take-down and not
-    with --to.
+    --rule and --direction go with --schedule free alone.
 
     schedule : NAME|FILE
         free: any robot may release, hold or place next, or a sequence with open grips: {schedules}
@@ -331,19 +330,17 @@ class Moves(Judged, Aimed, Stands, Team, Built):
         JSON file (bricks that stand, by names or how many, grips by robot, ages of bricks in s
         where mortar cures, else just placed); or with so many bricks that nobody holds
     to : PLAN:STEP|STATE|N
-        where it ends, said in the same ways; a number of bricks leaves grips to the rule ending
+        where it ends, said in the same ways; a number of bricks, of a take-down those that stay,
+        leaves grips to the rule ending
     direction : build|take-down
         with --schedule free: take-down removes bricks, the newest first, from the whole structure
         to the empty site, if nothing else is said
-    keep : BRICK,BRICK
-        with --direction take-down: bricks that stay, as 1..12
     """
 
     schedule: str | Path | None = None
     begin: str | None = word(None, flag="--from", shell=True)
     to: int | str | None = word(None, shell=True)
     direction: str | None = word(None, shell=True)
-    keep: Bricks | None = word(None, shell=True)
 
 
 class Chosen(Ranks, Timed, Moves):

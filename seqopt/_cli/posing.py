@@ -108,9 +108,6 @@ def _ends(
     begin, robots = _aged(scene, begin, standing), asked.robots
     if change is not None:
         scene, begin, robots = change(scene, begin)
-    if asked.keep is not None:
-        scene, end = inputs.kept_place(asked, str(asked.keep), scene, begin)
-        return scene, begin, end, robots
     found, end = inputs.find_place(asked.to, "to", scene)
     if found != scene:
         raise StepError(f"--to {asked.to}: its bricks are not those that follow in this order")
@@ -128,8 +125,6 @@ def _require_known(asked: options.Moves, choice: options.Chosen, *, of_states: b
             )
     if asked.direction == down and not free:
         raise ProblemError(f"--direction {down}: it goes with --schedule {FREE}")
-    if asked.keep is not None and asked.direction != down:
-        raise ProblemError(f"--keep {asked.keep}: it goes with --direction {down}")
     for name, why in _WRONG["free" if free else "states" if of_states else "candidates"].items():
         if getattr(asked, name, None):
             raise ProblemError(f"--{'rule' if name == 'rules' else name}: {why}")

@@ -198,7 +198,6 @@ def test_numbers_are_read_where_they_are_given():
         ("--stands dry --ranked pairs", "leave it out"),
         ("--rule least_grips=1", "give --schedule free"),
         ("--direction take-down", "--schedule free"),
-        ("--keep 1..3", "--direction take-down"),
         ("--friction 0.5", "--stands"),
         ("--schedule free --tilt 1", "--stands"),
         ("--curing 15min", "--stands"),

@@ -91,6 +91,14 @@ def test_an_option_before_its_command_is_told_where_it_stands(capsys):
     assert "--json (options stand after the command)" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("words", ["assess --load-factor", "analyze --staged fitted"])
+def test_an_option_that_is_gone_is_told_what_takes_its_place(capsys, words):
+    assert main(words.split()) == 2
+    err = capsys.readouterr().err
+    assert re.search(r"is no more; in Python seqopt\.\w+\.\w+ has it", err)
+    assert err.count("\n") == 1
+
+
 def test_a_missing_argument_is_named_where_nothing_is_mistyped(capsys):
     assert main(["judge", "problem.npz"]) == 2
     assert "arguments are required: " in capsys.readouterr().err

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from math import isfinite
@@ -127,10 +127,6 @@ class Found:
             self.prover.refusal = remarks.WHY[self.clock.left_out.pop(VERDICTS)]
         return found or {}
 
-    def proving(self) -> AbstractContextManager[None]:
-        """Start the proof of stability in another process, as commands may, unlike scripts."""
-        return self.prover.begun(self.plan.steps) if self.clock.left else nullcontext()
-
     @cached_property
     def report(self) -> dict[str, object]:
         """The summary with the entries that the command adds."""
@@ -217,10 +213,9 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
 def answered(asked: Optimize, found: Found) -> Answer:
     """Write a plan, and return its answer, without the parts that exceed the time limit."""
     made: dict[str, bytes | str] = {}
-    with found.proving():
-        if (
-            found.analyzed and found.summary and asked.path is not None
-        ):  # what says most comes first
+    proving = found.prover.begun(found.plan.steps) if found.clock.left else nullcontext()
+    with proving:  # in another process, as commands may, unlike scripts
+        if asked.path is not None and found.analyzed and found.summary:  # what says most is first
             tables = partial(outputs.plan_files, found.plan, choices=asked.tables == "all")
             made = found.clock.spare("its tables", tables, made)
         _ = found.verdicts, found.trial
