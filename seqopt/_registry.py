@@ -28,7 +28,7 @@ VIEWS = {
     "ShownBuild.report": "seqopt.report._pages:build_page",
     "Stability.plot": "seqopt.report.charts:tilt_picture",
     "FailureMap.plot": "seqopt.report.charts:failure_figure",
-    "SpeedTable.plot": "seqopt.report._speed._chart:speed_chart",
+    "RegretTable.plot": "seqopt.report._regret._chart:regret_chart",
 }
 """By a class of values and a way, what shows them so; values of its subclasses, too."""
 OFFERS = {

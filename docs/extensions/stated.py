@@ -10,18 +10,19 @@ import pandas as pd
 from experiments.harness.results import markdown, stored, two
 from experiments.instances.parts.tables import instance_tables
 from experiments.placement.formulations import CUT, QUESTIONS, ratios
-from experiments.placement.speed_accuracy import speed_tables
+from experiments.placement.speed_accuracy import tables
+from seqopt.report._regret._measure import RIGID_GRIPS
+from seqopt.report._regret._table import percent
 
 INSTANCES = ("instance_library", "instance_contest", "instance_large")
 
 
 def stated() -> dict[str, str]:
     """Return every figure and table by the name that stands for it."""
-    every, points = stored("formulations"), stored("speed_points")
+    every = stored("formulations")
     return (
         {"questions_table": _questions(every), "refused_table": _refused(every)}
-        | _engines(points)
-        | _taken(points)
+        | _taken(stored("regret"))
         | _heuristics(stored("heuristic_gaps"))
         | _outside(stored("outside_assemblies"))
         | _composing(stored("composing"))
@@ -122,28 +123,21 @@ def _outside(table: pd.DataFrame) -> dict[str, str]:
     }
 
 
-def _taken(points: pd.DataFrame) -> dict[str, str]:
-    """Return which engine and formulation to take in each scene of README's chart."""
-    names = ("arch", "vault", "wall")
-    return {
-        f"take_{name}": table.sentence
-        for name, table in zip(names, speed_tables(points), strict=True)
-    }
-
-
-def _engines(rows: pd.DataFrame) -> dict[str, str]:
-    """Return how long engines take on the reference arch, with the proof and without."""
-    arch = rows[rows["scene"] == "arch25"]
-    took = arch.set_index(["engine", "formulation", "proof"])["seconds"].sort_index()
-    proven = {name: took[name, "overlap_dp", True] for name in ("compliance", "auto", "frame")}
-    without = took["frame", "cascade", False]
-    return {
-        "frame_times": two(proven["frame"] / proven["compliance"]),
-        "auto_more": two(100 * (proven["auto"] / proven["compliance"] - 1)),
-        "frame_proof_share": two(100 * (1 - without / proven["frame"])),
-        "frame_proof_s": two(proven["frame"]),
-        "frame_no_proof_s": two(without),
-        "rigid_proof_s": two(proven["compliance"]),
+def _taken(rows: pd.DataFrame) -> dict[str, str]:
+    """Return which way to take in each scene of README's chart, and what others lose."""
+    names = ("arch", "soft", "dry", "vault", "wall")
+    found = dict(zip(names, tables(rows), strict=True))
+    soft, arch = found["soft"].table, found["arch"].table
+    rigid = soft[(soft["engine"] == RIGID_GRIPS) & (soft["without"] == "")]
+    took = arch.set_index(["engine", "schedule", "formulation", "without"])["seconds"]
+    search = "free", "schedule_search", ""
+    return {f"take_{name}": table.sentence for name, table in found.items()} | {
+        "rigid_grips_regret": " and ".join(percent(each) for each in sorted(rigid["regret"])),
+        "ranks_regret_soft": " and ".join(
+            percent(each) for each in sorted(soft.loc[soft["without"] == "ranks", "regret"])
+        ),
+        "rigid_proof_s": two(took["compliance", "loop", "overlap_dp", "ranks"]),
+        "frame_times": two(took["frame", *search] / took["compliance", *search]),
     }
 
 

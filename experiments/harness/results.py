@@ -33,7 +33,11 @@ def save_figure(figure: Figure, name: str) -> None:
     FIGURES.mkdir(exist_ok=True)
     buffer = io.BytesIO()
     figure.savefig(buffer, dpi=DPI, format="png")
-    few = Image.open(buffer).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    few = (
+        Image.open(buffer)
+        .convert("RGB")
+        .quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    )
     few.save(FIGURES / name, optimize=True)
 
 

@@ -18,8 +18,8 @@ from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
 from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import overloads
+from seqopt.report._regret._table import RegretTable
 from seqopt.report._robots import _known_arms
-from seqopt.report._speed._table import SpeedTable
 from seqopt.report.comparison import CLOSED, Comparison, fixed_methods, largest, shown_table
 from seqopt.report.page import Build, Scatter, _Drawn, report_page
 from seqopt.report.text import IN_UNITS, _worst_along, in_words
@@ -189,18 +189,18 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     return _page(engine, builds, sentence, tables, scatter)
 
 
-def _speed_parts(speed: SpeedTable) -> Iterator[tuple[str, pd.DataFrame | _Drawn]]:
+def _speed_parts(speed: RegretTable) -> Iterator[tuple[str, pd.DataFrame | _Drawn]]:
     """Yield speed against accuracy as a picture, where matplotlib is installed, and a table."""
-    title = f"Speed against accuracy, errors beside {speed.reference}"
+    title = f"Speed against regret, valued by {speed.reference}"
     with suppress(ExtraError):
-        draw = display(SpeedTable, "plot")
+        draw = display(RegretTable, "plot")
         from seqopt.report._style import WIDTH, picture_files  # noqa: PLC0415  # an extra
 
         wide, narrow = (
             picture_files("", draw(speed, width=width))[".png"] for width in (WIDTH, PHONE)
         )
         yield title, _Drawn(wide, narrow, speed.sentence)
-    yield f"{title}, in numbers. {speed.sentence}", speed.rows()
+    yield f"{title}, in numbers. {speed.sentence}", speed.table
 
 
 def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:

@@ -25,10 +25,10 @@ from seqopt.plan.plan import Plan
 from seqopt.plan.pose import pose
 from seqopt.plan.solve import on_the_way, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum, WorstRatio
-from seqopt.problem.problem import Aim, Problem
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import LINEAR_RANGE, Criterion, Limit, _prop_faults, overloads
-from seqopt.report._speed._measure import speed_accuracy
-from seqopt.report._speed._table import SpeedTable
+from seqopt.report._regret._measure import measure_regret
+from seqopt.report._regret._table import RegretTable
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._grip_sets import Moved
 from seqopt.responses._tolerance import COLUMN, is_tolerance
@@ -98,10 +98,10 @@ class Comparison(Terse):
         table counts the steps that fall, as ``falls_dry``.
     enough : Enough
         Which model was enough for all steps, and what more detailed ones would change.
-    speed : SpeedTable or None
-        How long every engine and formulation takes for the loop, or where there is none the free
-        schedule, and how accurate it is, if that was asked for: ``speed.sentence`` says which to
-        take, ``speed.table`` has the numbers, ``speed.plot()`` draws them.
+    speed : RegretTable or None
+        How long every way to a plan takes, and what its plan costs in the most detailed model, if
+        that was asked for: ``speed.sentence`` says which to take, ``speed.table`` has the numbers,
+        ``speed.plot()`` draws them.
     """
 
     maxima: pd.DataFrame
@@ -115,7 +115,7 @@ class Comparison(Terse):
     criteria: Mapping[str, Criterion]
     verdicts: Mapping[str, tuple[BuildVerdicts, ...]]
     enough: Enough
-    speed: SpeedTable | None = None
+    speed: RegretTable | None = None
 
 
 def compare(
@@ -125,6 +125,7 @@ def compare(
     robots: Sequence[str] = (),
     prover: BuildProver | None = None,
     speed: float = 0.0,
+    reference: str = "",
 ) -> Comparison:
     """Analyze every method on an engine's scene and solve its usual loop by every formulation.
 
@@ -137,13 +138,15 @@ def compare(
     prover : BuildProver, optional
         Says which steps stand; by default dry, and with epoxy.
     speed : float, optional
-        Seconds for each engine and formulation, to set their speed against their accuracy.
+        Seconds for all ways to a plan together, to set their speed against what their plans cost.
+    reference : str, optional
+        The engine that values these plans; by default the most detailed one with data.
 
     Returns
     -------
     Comparison
     """
-    engine = simplest(engine)
+    asked, engine = engine, simplest(engine)
     scene, (tables, notes, refused) = engine.network.scene, _method_tables(engine, robots)
     maxima = pd.DataFrame({name: _quantities(scene, t) for name, t in tables.items()})
     known = published_about(scene) if tables else None
@@ -157,7 +160,11 @@ def compare(
     free, why = _free_plan(engine, criterion, fixed, robots, progress)
     if not tables and free is None:  # whose refusal says most
         raise type(first := next(iter(refused.values())))(f"{first}; {why[0]}")
-    measured = _speed(engine, (problem, free), seconds=speed, progress=progress) if speed else None
+    measured = None
+    if speed:
+        how: dict[str, Any] = {"seconds": speed, "reference": reference, "progress": progress}
+        how |= {} if free is None else {"rules": free.states.rules}
+        measured = measure_regret(asked, criterion, **how)
     notes += why
     criteria: dict[str, Criterion] = {}
     if problem is not None:
@@ -175,24 +182,6 @@ def compare(
     found = (maxima, printed, table, tables, loop, tuple(notes), refusal, left)
     enough = what_was_enough(within, tables)
     return Comparison(*found, criteria, verdicts, enough, measured)
-
-
-def _speed(
-    engine: Engine, found: tuple[Decisions | None, Plan | None], seconds: float, progress: Tell
-) -> SpeedTable:
-    """Return speed and accuracy for the loop or, where there is none, the free schedule."""
-    loop, free = found
-    if loop is not None:
-        problem = Problem(engine, loop.schedule, loop.criterion)
-    elif free is not None:
-        states = free.states
-        problem = Problem(engine, states.rules, states.criterion, states.goals)
-    else:
-        raise ProblemError(
-            f"speed: neither a loop of the robots of {engine.network.scene.name} nor a free "
-            "schedule is possible, so nothing is chosen; leave it out, or change their reach"
-        )
-    return speed_accuracy(problem, seconds, progress)
 
 
 def _table(

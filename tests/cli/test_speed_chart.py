@@ -24,12 +24,13 @@ def test_what_is_no_time_is_refused_in_a_line(words, capsys):
 def test_a_comparison_with_speed(tmp_path, capsys):
     out = tmp_path / "speed"
     words = ["compare", WALL, "--no-stability"]
-    assert main([*words, "--speed", "3", "--out", str(out)]) == 0
+    assert main([*words, "--speed", "20", "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    block = said.split("Speed against accuracy\n")[1].split("written to")[0]
+    block = said.split("Speed against regret\n")[1].split("written to")[0]
     assert all(len(line) <= 80 for line in block.splitlines())
     rows = pd.read_csv(out / "speed.csv")
     assert {"compliance", "planar", "frame"} <= {*rows["engine"]}
+    assert {"loop", "free"} == {*rows["schedule"]}
     sentence = " ".join(block.partition("\n\n")[0].split())
     assert sentence.startswith("Take ")
     page = (out / "report.html").read_text(encoding="utf-8")
@@ -37,5 +38,7 @@ def test_a_comparison_with_speed(tmp_path, capsys):
     assert page.count("data:image/png;base64,") == 2  # for wide screens and for narrow ones
     assert (out / "speed.png").exists()
     assert "speed.csv" in said
+    assert main([*words, "--speed", "9", "--reference", "rigid"]) == 2
+    assert "reference 'rigid' does not exist; give one of planar" in capsys.readouterr().err
     assert main([*words, "--json"]) == 0
     assert "speed" not in json.loads(capsys.readouterr().out)

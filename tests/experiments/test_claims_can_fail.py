@@ -200,8 +200,8 @@ CHECKS = {
     ),
     "speed_accuracy": Check(
         lambda points: all(speed_accuracy.holds(points).values()),
-        ("speed_points",),
-        *("seconds", 0.01, {"engine": "frame"}),
+        ("regret",),
+        *("regret", 0.5, {"engine": "rigid grips"}),
     ),
     "staged_construction": Check(
         lambda *tables: all(staged_construction.holds(*tables).values()),

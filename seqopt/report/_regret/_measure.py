@@ -1,0 +1,379 @@
+r"""The regret of every way to a plan: what it costs in the most detailed model of the scene.
+
+A *way* is an engine with a schedule, a formulation and what it leaves out. With :math:`p_w` the
+plan that it returns and :math:`v(p)` the worst step of a plan in the *reference*, the most detailed
+model that the scene has data for,
+
+.. math::
+
+   \text{regret}_w = \frac{v(p_w)}{\min_u v(p_u)} - 1 .
+
+So what a search missed and what a model got wrong are one number, as a builder meets them. The end
+counts for all: a loop leaves its robots where they are, and what then bears itself is asked of it
+as of a free schedule. Beside it stand its parts: the *gap* of the plan to the bound that the way
+proves, in its own model, and the *error* of the worst step that its own model promised.
+
+All ways share the time that is given: whoever needs less leaves more to those after it. Each is
+repeated up to `TIMES` times where that takes little; the least time counts.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias, TypeVar
+
+import numpy as np
+import pandas as pd
+
+from seqopt._interrupts import ending
+from seqopt.contact.mortar import Mortar
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
+from seqopt.engines.registry import USUAL as USUAL_ENGINE
+from seqopt.errors import MechanismError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
+from seqopt.graph.formulation import (
+    End,
+    Finding,
+    Formulation,
+    FormulationKind,
+    find_formulation,
+    formulations,
+)
+from seqopt.judge._schedules import plan_values
+from seqopt.network.build import build_network
+from seqopt.plan.plan import Plan
+from seqopt.plan.pose import pose, states_of
+from seqopt.plan.solve import on_the_way, solve
+from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum
+from seqopt.problem.problem import Problem
+from seqopt.problem.requirements import Criterion
+from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, RegretTable
+from seqopt.sequence.rules import FREE, FreeRules
+from seqopt.sequence.schedule import Schedule, thin
+from seqopt.sequence.schedule_file import find_schedule
+from seqopt.sequence.steps import Step, StepKind
+from seqopt.stability._step_verdicts import step_verdicts
+from seqopt.stability.assessment import Verdict
+from seqopt.work.progress import Stage, Tell
+
+TIMES = 3
+SHARE = 4  # times its part of what is left that a way may take
+REPEAT = 0.1  # share of what it may take up to which a way is repeated
+LOOP = "loop"
+RIGID_GRIPS = "rigid grips"  # exactly rigid bricks, and grips too, though their stiffness is given
+USUAL = {LOOP: "overlap_dp", FREE: "schedule_search"}
+USUAL_RULES = FreeRules()
+NEAR = "near:6"
+FEW = ("cascade", "path_beam", "schedule_search")  # formulations that need not look at all
+SLOW = ("frame", "discrete")  # engines that come last
+KEPT = 0.7  # share of its time after which what can return its best plan so far does
+NOTHING = 1e-9  # regrets and errors below are none
+Found = TypeVar("Found")
+Valued: TypeAlias = tuple[float, float, str, str]
+"""The worst step of a plan and its end, that of its own steps, its status, and why it falls."""
+
+
+@dataclass(frozen=True)
+class Timer:
+    """What tells the time, s, what ends a block by a `TimeoutError`, and how often it repeats."""
+
+    now: Callable[[], float] = time.perf_counter
+    within: Callable[[float], AbstractContextManager[None]] = ending
+    times: int = TIMES
+
+    def least(self, seconds: float, call: Callable[[], Found]) -> tuple[float, Found]:
+        """Return the least time that a call takes, and what it returns; `TimeoutError` if late."""
+        start = self.now()
+        with self.within(seconds):
+            found = call()
+        best = spent = self.now() - start
+        for _ in range(1, self.times):
+            if spent + best > REPEAT * seconds:
+                break
+            start = self.now()
+            with suppress(TimeoutError), self.within(seconds):
+                found = call()
+                best = min(best, self.now() - start)
+            spent += self.now() - start
+        return best, found
+
+
+WALL = Timer()
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way to a plan.
+
+    ``engine``: a name, or `RIGID_GRIPS`; ``schedule``: `LOOP` or `FREE`; ``without``: what it
+    leaves out, or adds: ``no proof``, ``near:6`` (candidates), ``ranks`` (the objective) or
+    ``stands`` (states proven to stand).
+    """
+
+    engine: str
+    schedule: str
+    formulation: str
+    without: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """What all ways have in common.
+
+    ``reference``: the problem that values plans; ``criterion``: the objective of ways by ranks;
+    ``loop``: the schedule with open grips, if there is one; ``rules``: of the free one; ``mortar``:
+    whose joints every step is asked to stand with; None where joints do not open.
+    """
+
+    reference: Problem
+    criterion: Criterion
+    loop: Schedule | None
+    rules: FreeRules
+    mortar: Mortar | None
+    timer: Timer
+    findings: list[Finding] = field(default_factory=list)
+    known: dict[Sequence[Step], Valued] = field(default_factory=dict)
+
+    def engine(self, name: str) -> Engine:
+        """Return an engine of a way, of which nothing is computed yet."""
+        network = self.reference.engine.network
+        if name == RIGID_GRIPS:
+            rigid = build_network(network.scene.with_grips(None))
+            return simplest(make_engine("auto", rigid))
+        mortar = self.mortar if name in LIMITED else None
+        return make_engine(name, network, mortar) if name in ENGINES else self.reference.engine
+
+    def problem(self, way: Way) -> Problem:
+        """Return the problem that a way solves, with an engine of its own."""
+        engine, near = self.engine(way.engine), way.without if way.without == NEAR else ""
+        if way.without == "ranks":
+            return pose(engine, self._schedule(engine, ""), self.criterion)
+        free = replace(self.rules, candidates=near or self.rules.candidates)
+        moves = free if way.schedule == FREE else self._schedule(engine, near)
+        stands = self.mortar if way.without == "stands" else None
+        worst = states_of(self.reference).criterion
+        return pose(engine, moves, worst, "minmax", stands=stands)
+
+    def _schedule(self, engine: Engine, near: str) -> Schedule:
+        assert self.loop is not None  # else no way asks for it
+        found = (
+            find_schedule(engine.network) if engine.network.scene != self.loop.scene else self.loop
+        )
+        return thin(found, near) if near else found
+
+    def row(self, way: Way, seconds: float) -> dict[str, object]:
+        """Return the row of a way, which may take so long."""
+        proof, told = way.without != "no proof", list[Finding]()
+
+        def call() -> Plan:
+            told.clear()
+            how: dict[str, Any] = {"proof": proof, "progress": told.append}
+            if "seconds" in find_formulation(way.formulation).options:
+                how["time_limit"] = KEPT * seconds
+            return on_the_way(solve(self.problem(way), way.formulation, **how))
+
+        about = {"engine": way.engine, "schedule": way.schedule, "formulation": way.formulation}
+        row = {**about, "without": way.without, "exact": False, "models": 0, "why": ""}
+        row |= dict.fromkeys(("seconds", "value", "own", "gap", "error"), np.nan)
+        try:
+            took, plan = self.timer.least(max(seconds, 1e-3), call)
+        except (SeqoptError, TimeoutError) as error:
+            late = isinstance(error, TimeoutError | TimeUpError)
+            return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}
+        self.findings[:] = [each for each in told if isinstance(each, Finding)]
+        value, along, status, why = self.value(plan.steps)
+        if plan.ended is not End.DONE and status == DONE:
+            status = CUT
+        gap = plan.certificate.gap if plan.certificate is not None else np.nan
+        own = plan.objective.get("minmax", np.nan)
+        exact = gap == 0 and way.without not in (NEAR, "ranks")
+        row |= {"seconds": took, "value": value, "gap": gap, "exact": exact}
+        row |= {"own": own, "error": abs(own / along - 1.0)}
+        return row | {"models": plan.models, "status": status, "why": why}
+
+    def value(self, steps: Sequence[Step]) -> Valued:
+        """Return the worst step of a plan in the reference; infinite, and why, where it falls."""
+        if steps not in self.known:
+            self.known[steps] = self._value(steps)
+        return self.known[steps]
+
+    def _value(self, steps: Sequence[Step]) -> Valued:
+        last, bare = steps[-1], (None,) * len(steps[-1].grips)
+        end = [replace(last, grips=bare, kind=StepKind.RELEASE)] if last.held else []
+        try:
+            along, *after = (
+                plan_values(states_of(self.reference), part)[0] for part in (steps, end) if part
+            )
+        except MechanismError as error:
+            return np.inf, np.nan, FALLS, str(error)
+        except SeqoptError as error:  # a limit is exceeded
+            return np.inf, np.nan, FAILED, str(error)
+        if self.mortar is not None and _name_of(self.reference.engine) != "discrete":
+            verdicts = step_verdicts(self.reference.engine.network, [*steps, *end], self.mortar)
+            for step, verdict in zip([*steps, *end], verdicts, strict=True):
+                if verdict is not Verdict.STANDS:
+                    status = FALLS if verdict is Verdict.FALLS else FAILED
+                    return np.inf, along, status, f"step {step.number} {verdict.value}"
+        return max([along, *after]), along, DONE, ""
+
+
+def measure_regret(
+    engine: Engine,
+    criterion: Criterion,
+    *,
+    rules: FreeRules = USUAL_RULES,
+    seconds: float = 60.0,
+    reference: str = "",
+    progress: Tell = lambda _: None,
+    timer: Timer = WALL,
+) -> RegretTable:
+    """Return what the plan of every way costs in the most detailed model of a scene.
+
+    Parameters
+    ----------
+    engine : Engine
+        Has the scene; its mortar says where joints may open.
+    criterion : Criterion
+        The cost of a step, of which the largest counts. Of one that ranks candidates the sum is an
+        objective of the loop, and the worst ratio counts.
+    rules : FreeRules, optional
+        Of the free schedule.
+    seconds : float, optional
+        For all ways together, s.
+    reference : str, optional
+        The engine that values plans; by default ``compliance``, with the stiffness of grips that
+        the scene has. Where the engine has a mortar, every step has to stand with it, too, which is
+        proven by its joints' equilibrium; ``discrete`` lets these open and slip instead.
+    progress, timer : callable, Timer, optional
+        Called with the progress; tells the time.
+
+    Returns
+    -------
+    RegretTable
+
+    Raises
+    ------
+    ProblemError
+        If there is no such reference, or no way finds a plan that stands in it.
+    """
+    start = timer.now()
+    mortar = _mortar_of(engine)
+    named = _find_reference(engine, reference, mortar)
+    worst = WORST_OVER_METHODS if isinstance(criterion, RankSum) else criterion
+    problem = pose(named, rules, worst, "minmax")
+    course = _Course(problem, criterion, _loop(engine), rules, mortar, timer)
+    name = _name_of(named)
+    ways, refused = _ways(course, name)
+    rows, curves = list[dict[str, object]](), dict[int, tuple[Finding, ...]]()
+    late = set[tuple[str, str]]()  # engines and schedules that need too long to look at all
+    for done, way in enumerate(ways):
+        progress(Stage(f"regret: {way.engine}, {way.schedule}", done / len(ways)))
+        left, others = seconds - (timer.now() - start), len(ways) - done
+        most = left / 4 if way.formulation in FEW else min(left / 2, SHARE * left / others)
+        course.findings.clear()
+        skips = (way.engine, way.schedule) in late and way.formulation not in FEW
+        rows.append(course.row(way, 0.0 if skips else max(left / others, most)))
+        if rows[-1]["status"] == CUT and way.formulation not in FEW:
+            late.add((way.engine, way.schedule))
+        curves[done] = tuple(course.findings)
+    table = _with_regret(pd.DataFrame(rows))
+    if not np.isfinite(table["value"].min()):
+        why = next((f": {row['engine']}, {row['why']}" for row in rows if row["why"]), "")
+        raise NothingFoundError(f"regret: no plan holds in the reference{why}; give more seconds")
+    scene = engine.network.scene
+    soft = ", soft grips" * bool(np.any(engine.network.compliances.compliance))
+    stands = ", where every step stands" * (mortar is not None and name != "discrete")
+    about = scene.name, len(scene.bricks), name, f"{name}{soft}{stands}", worst.name, seconds
+    return RegretTable(*about, table, refused, curves)
+
+
+def _name_of(engine: Engine) -> str:
+    recipe = recipe_of(engine)
+    return type(engine).__name__ if recipe is None else recipe.name
+
+
+def _mortar_of(engine: Engine) -> Mortar | None:
+    recipe = recipe_of(engine)
+    found = dict(recipe.options).get("mortar") if recipe else None
+    return found if isinstance(found, Mortar) else None
+
+
+def _find_reference(engine: Engine, name: str, mortar: Mortar | None) -> Engine:
+    """Return the engine that values plans: the most detailed one that the scene has data for."""
+    known = [each for each in ENGINES if each != "auto"]
+    if name and name not in known:
+        raise ProblemError(f"reference {name!r} does not exist; give one of {', '.join(known)}")
+    if recipe_of(engine) is None and not name:
+        return engine  # an object of one's own
+    return make_engine(name or USUAL_ENGINE, engine.network, mortar if name in LIMITED else None)
+
+
+def _loop(engine: Engine) -> Schedule | None:
+    with suppress(SeqoptError):
+        return find_schedule(engine.network)
+    return None
+
+
+def _ways(course: _Course, reference: str) -> tuple[list[Way], dict[str, str]]:
+    """Return all ways, the usual ones first, and engines that cannot model the scene, and why."""
+    refused, engines = dict[str, str](), list[str]()
+    soft = bool(np.any(course.reference.engine.network.compliances.compliance))
+    for name in ("planar", "compliance", *([RIGID_GRIPS] if soft else []), "frame", "discrete"):
+        if name == "discrete" != reference and course.mortar is None:
+            continue  # where joints do not open it says what rigid bricks say
+        try:
+            course.engine(name)
+        except SeqoptError as error:
+            refused[name] = str(error)
+        else:
+            engines.append(name)
+    if reference not in engines and reference not in refused:
+        engines.append(reference)
+    kinds = [*([LOOP] if course.loop else []), FREE]
+    base = "compliance" if reference in ("discrete", *engines[:1]) else reference
+    usual = [
+        Way(engine, *more)
+        for engine in sorted({base, *engines}, key=lambda e: (e in SLOW, e != base))
+        for more in [*[(LOOP, "cascade", "no proof")][: len(kinds) - 1], *USUAL.items()]
+        if more[0] in kinds
+    ]
+    every = [Way(base, kind, name) for kind in kinds for name in _formulations(kind)]
+    quick = [way for way in usual if way.engine not in SLOW]
+    out = [*quick, *(Way(base, *more) for more in _variants(course)), *every, *usual]
+    return [*dict.fromkeys(out)], refused
+
+
+def _variants(course: _Course) -> Iterator[tuple[str, str, str]]:
+    """Yield schedule, formulation and what is left out, or added, of ways with the usual engine."""
+    if course.loop:
+        yield LOOP, USUAL[LOOP], NEAR
+        if isinstance(course.criterion, RankSum):
+            yield LOOP, "cascade", "ranks"
+            yield LOOP, USUAL[LOOP], "ranks"
+    yield FREE, USUAL[FREE], "no proof"
+    yield FREE, USUAL[FREE], NEAR
+    if course.mortar is not None:
+        yield from [(LOOP, USUAL[FREE], "stands")] if course.loop else []
+        yield FREE, USUAL[FREE], "stands"
+
+
+def _formulations(kind: str) -> list[str]:
+    """Return the formulations of a kind of schedule; integer programs and bounds last."""
+    known = formulations("costs" if kind == LOOP else "goals").values()
+
+    def late(each: Formulation) -> tuple[bool, bool]:
+        slow = each.kind is FormulationKind.BOUND or each.name.endswith("_mip")
+        return slow, each.name != "path_dp"
+
+    return [each.name for each in sorted(known, key=late)]
+
+
+def _with_regret(table: pd.DataFrame) -> pd.DataFrame:
+    """Return rows with their regret; less than `NOTHING` is none."""
+    best = table["value"].min()
+    regret = (table["value"] / best - 1.0).clip(lower=0.0)
+    regret, error = (e.where(~(e < NOTHING), 0.0) for e in (regret, table["error"]))
+    return table.assign(regret=regret, error=error)

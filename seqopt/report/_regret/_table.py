@@ -1,0 +1,226 @@
+"""What every way to a plan takes and costs, and which of them to take."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from seqopt._showing import display
+from seqopt.arrays import Bools
+from seqopt.graph.formulation import Finding
+from seqopt.sequence.rules import FREE
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DONE, CUT, FAILED, FALLS = "done", "stopped", "failed", "falls"
+COLUMNS = 80  # of a terminal
+MANY = 4  # ways that are counted, not named, where they fail alike
+SAME = 1.1  # times that differ by less are equal: repetitions do
+USUAL_NAMES = ("overlap_dp", "schedule_search")
+NAMED = {FREE: "the free schedule", "loop": "the loop"}
+
+
+def dominated(table: pd.DataFrame) -> Bools:
+    """Return which rows are dominated: another is as good in everything, and better in something.
+
+    ``table``: with ``seconds``, ``regret`` and ``exact``: what proves its plan is not dominated by
+    what does not. A row without a plan that holds is dominated. Times count as equal where they
+    differ by less than `SAME`, so that noise decides nothing.
+    """
+    known = np.isfinite(table[["seconds", "regret"]].to_numpy(float)).all(axis=1)
+    seconds, proves = table["seconds"].to_numpy(float), table["exact"].to_numpy(bool)
+    no_later = seconds[:, None] <= SAME * seconds
+    better = seconds[:, None] * SAME < seconds
+    for values in (table["regret"].to_numpy(float), ~proves):
+        no_later &= values[:, None] <= values
+        better |= values[:, None] < values
+    beats = no_later & better & known[:, None]
+    return np.asarray(beats.any(axis=0) | ~known)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RegretTable:
+    """What the plans of all ways cost in the most detailed model of one scene.
+
+    ``reference``: the engine that values plans, and ``valued`` with what it takes into account;
+    ``worst``: the criterion whose largest value of any step counts; ``limit``: of all ways
+    together, s; ``table``: a row per ``engine``, ``schedule``, ``formulation`` and what is left out
+    (``without``), with the ``seconds`` from scene to plan, its ``value`` in the reference and in
+    its ``own`` model, the ``regret`` over the best known, the ``gap`` to the bound that it proves
+    and the ``error`` of what its model promised; whether it proves its plan (``exact``), the
+    ``models`` that it solved, its ``status``, and ``why`` there is no plan, or none that holds;
+    ``refused``: engines that cannot model the scene, and why; ``curves``: incumbents and bounds
+    over time, by row.
+
+    >>> row = {"engine": "compliance", "schedule": "free", "formulation": "schedule_search"}
+    >>> row |= {"without": "", "exact": True, "seconds": 0.1, "status": "done", "why": ""}
+    >>> table = pd.DataFrame([row]).assign(regret=0.0, gap=0.0, error=0.0)
+    >>> about = "arch25", 25, "compliance", "compliance", "worst-ratio", 10.0
+    >>> RegretTable(*about, table).sentence[:43]
+    'Take compliance with schedule_search on the'
+    """
+
+    scene: str
+    bricks: int
+    reference: str
+    valued: str
+    worst: str
+    limit: float
+    table: pd.DataFrame
+    refused: Mapping[str, str] = field(default_factory=dict)
+    curves: Mapping[int, Sequence[Finding]] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"<RegretTable of {self.scene}: {self.sentence}>"
+
+    def __str__(self) -> str:
+        return "\n".join([*_wrapped(self.sentence), "", *self.lines()])
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self.sentence}</p>{self.table.drop(columns='why')._repr_html_()}"  # type: ignore[operator]
+
+    def plot(self) -> Figure:
+        """Return the chart of speed against regret (extra ``plot``)."""
+        found: Figure = display(RegretTable, "plot")(self)
+        return found
+
+    @cached_property
+    def kept(self) -> Bools:
+        """Which rows no other one beats."""
+        return ~dominated(self.table)
+
+    @cached_property
+    def is_proven(self) -> bool:
+        """Whether no plan of the free schedule is better in the reference than the best known."""
+        best = self.table[self.table["exact"] & (self.table["regret"] == 0)]
+        return bool(((best["engine"] == self.reference) & (best["schedule"] == FREE)).any())
+
+    @cached_property
+    def take(self) -> pd.Series[float]:
+        """The row to take: of the least regret, one that proves its plan if any does, the soonest.
+
+        Of those that are equally soon one of the reference, and the usual formulation.
+        """
+        best = self.table[self.kept & (self.table["status"] == DONE)]
+        best = best[best["regret"] == best["regret"].min()]
+        best = best[best["exact"] == best["exact"].max()]
+        best = best[best["seconds"] <= SAME * best["seconds"].min()]
+        other, usual = best["engine"] != self.reference, best["formulation"].isin(USUAL_NAMES)
+        by = pd.DataFrame({"other": other, "unusual": ~usual, "seconds": best["seconds"]})
+        found: pd.Series[float] = best.loc[by.sort_values([*by]).index[0]]
+        return found
+
+    @cached_property
+    def sooner(self) -> pd.DataFrame:
+        """The rows that take less time than the one to take, and lose something for it."""
+        kept = self.table[self.kept & (self.table["regret"] > self.take["regret"])]
+        soon = kept[kept["seconds"] * SAME < self.take["seconds"]]
+        return soon.sort_values("regret").drop_duplicates("regret")
+
+    @property
+    def sentence(self) -> str:
+        """Which way to take, why, and what a sooner one gives up."""
+        took = self.take
+        known = (
+            "no plan of the free schedule is better, which is proven"
+            if self.is_proven
+            else "no plan known is better"
+        )
+        lost = known if took["regret"] == 0 else f"{percent(took['regret'])} above the best known"
+        said = f"Take {way_named(took)}: {lost}, in {seconds_text(took['seconds'])}"
+        if self.sooner.empty:
+            return f"{said}; nothing else is sooner by more than a tenth."
+        one: Any = self.sooner.iloc[0]
+        late = f"in {seconds_text(one['seconds'])}: its plan is {percent(one['regret'])} worse"
+        return f"{said}; sooner is {way_named(one)} {late}."
+
+    def facts(self) -> dict[str, object]:
+        """Return what a summary says, for scripts."""
+        took = {name: self.take[name] for name in ("engine", "schedule", "formulation", "without")}
+        about: dict[str, object] = {
+            "sentence": self.sentence,
+            "reference": self.reference,
+            "worst": self.worst,
+        }
+        rows = self.table.astype(object).where(self.table.notna(), None).to_dict("records")
+        return {
+            **about,
+            "proven": self.is_proven,
+            "take": took,
+            "rows": rows,
+            "refused": self.refused,
+        }
+
+    def lines(self) -> Iterator[str]:
+        """Yield the table in at most `COLUMNS` letters: ``*`` marks what no other way beats."""
+        zero = "proven to be the best" if self.is_proven else "of the best plan known"
+        yield from _wrapped(
+            f"Regret: what the worst step ({self.worst}) takes, valued by {self.valued}, above "
+            f"that {zero}. Gap: to the bound that a way proves in its own model. Error: of the "
+            f"worst step that it promised. All ways had {self.limit:g} s."
+        )
+        yield f"{'':41}{'seconds':>9}{'regret':>10}{'gap':>10}{'error':>10}"
+        for (engine, schedule), own in self.table.groupby(["engine", "schedule"], sort=False):
+            yield f"{engine}, {NAMED[str(schedule)]}"
+            without = own[~np.isfinite(own["regret"].to_numpy(float))]
+            for at, row in own.drop(without.index).iterrows():
+                mark = "*" if self.kept[self.table.index.get_loc(at)] else " "
+                numbers = [percent(row[name]) for name in ("regret", "gap", "error")]
+                late = f"  {CUT}" if row["status"] == CUT else ""
+                yield (
+                    f"{mark} {_short(row):39}{_digits(row['seconds']):>9}"
+                    f"{''.join(f'{number:>10}' for number in numbers)}{late}"
+                )
+            for (status, why), rows in without.groupby(["status", "why"], sort=False):
+                named = [_short(row) for _, row in rows.iterrows()]
+                what = ", ".join(named) if len(named) < MANY else f"{len(named)} ways"
+                yield from _wrapped(f"  {what}: {status}{f', {why}' if why else ''}")
+        for name, why in self.refused.items():
+            yield from _wrapped(f"{name}: {why}")
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, COLUMNS, subsequent_indent="    ", break_on_hyphens=False)
+
+
+def _short(row: pd.Series[float]) -> str:
+    return str(row["formulation"]) + (f", {row['without']}" if row["without"] else "")
+
+
+def way_named(row: pd.Series[float]) -> str:
+    """Return a way in words: ``compliance with cascade, no proof, on the loop``."""
+    comma = "," if row["without"] else ""
+    return f"{row['engine']} with {_short(row)}{comma} on {NAMED[str(row['schedule'])]}"
+
+
+def percent(share: float) -> str:
+    """Return a share as people write it.
+
+    >>> percent(0.1837), percent(2e-7), percent(0.0), percent(float("inf"))
+    ('18 %', '2e-05 %', '0', '-')
+    """
+    if not np.isfinite(share):
+        return "-"
+    number = f"{100 * share:,.0f}" if share >= 1 else f"{100 * share:.2g}"
+    return f"{number} %" if share else "0"
+
+
+def _digits(seconds: float) -> str:
+    """Return a time with three digits that count."""
+    return f"{seconds:,.0f}" if seconds >= 100 else f"{seconds:#.3g}"
+
+
+def seconds_text(seconds: float) -> str:
+    """Return a time in words.
+
+    >>> seconds_text(0.1014), seconds_text(26.04), seconds_text(512.2)
+    ('0.101 s', '26.0 s', '512 s')
+    """
+    return f"{_digits(seconds)} s"

@@ -1,0 +1,207 @@
+"""Speed against regret: what plans cost in the reference, what to take, and the chart."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager, nullcontext
+from functools import partial
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import seqopt
+from seqopt.errors import NothingFoundError, ProblemError
+from seqopt.plan.pose import states_of
+from seqopt.report._regret._chart import PALE, regret_chart
+from seqopt.report._regret._measure import RIGID_GRIPS, Timer, measure_regret
+from seqopt.report._regret._table import CUT, DONE, FALLS, SAME, RegretTable, dominated
+from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.table import force_column
+from seqopt.sequence.rules import FREE
+from seqopt.sequence.steps import Step, StepKind
+from tests.builders import small_arch
+from tests.pictures import flaws
+
+RANKS, WORST = seqopt.CRITERIA["equations-2-3"], seqopt.CRITERIA["worst-ratio"]
+ONCE = {"seconds": 600.0, "timer": Timer(within=lambda _: nullcontext(), times=1)}
+COLUMNS = ["engine", "schedule", "formulation", "without", "exact", "seconds", "regret"]
+
+
+def table_of(*rows):
+    table = pd.DataFrame(rows, columns=COLUMNS)
+    return table.assign(status=DONE, why="", gap=0.0, error=0.0, value=1.0, own=1.0, models=1)
+
+
+def made(*rows, curves=()):
+    about = "arch", 7, "compliance", "compliance", "worst-ratio", 9.0
+    return RegretTable(*about, table_of(*rows), {}, dict(curves))
+
+
+FOUR = (
+    ("compliance", FREE, "schedule_search", "", True, 0.1, 0.0),
+    ("compliance", "loop", "cascade", "no proof", False, 0.05, 0.18),
+    ("frame", FREE, "schedule_search", "", True, 30.0, 0.0),
+    ("compliance", FREE, "flow_mip", "", True, 0.3, 0.0),
+)
+
+
+def beats(one, other):
+    """Return whether a row of time, regret and lack of proof beats another, by the definition."""
+    pairs = [*zip(one[1:], other[1:], strict=True)]
+    no_worse = one[0] <= SAME * other[0] and all(a <= b for a, b in pairs)
+    return no_worse and (SAME * one[0] < other[0] or any(a < b for a, b in pairs))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_is_beaten_is_so_by_the_definition(seed):
+    rng = np.random.default_rng(seed)
+    size = 25
+    values = {"seconds": 10 ** rng.uniform(-1, 1, size), "regret": rng.integers(0, 3, size) / 100}
+    table = pd.DataFrame(values | {"exact": rng.integers(0, 2, size) == 1})
+    rows = table.assign(exact=~table["exact"]).to_numpy(float)
+    found = dominated(table)
+    assert found.tolist() == [any(beats(one, other) for one in rows) for other in rows]
+    assert not found.all()  # somebody stays: beating goes in no circle
+    table.loc[0, ["seconds", "regret", "exact"]] = [1e-3, 0.0, True]
+    assert dominated(table)[1:].all()  # by one that is best in everything
+    for lost in (np.nan, np.inf):  # without a plan, or with one that falls
+        table.loc[0, "regret"] = lost
+        assert dominated(table)[0]
+
+
+def test_what_to_take_is_computed():
+    found = made(*FOUR)
+    assert found.kept.tolist() == [True, True, False, False]
+    assert found.sentence == (
+        "Take compliance with schedule_search on the free schedule: no plan of the free schedule "
+        "is better, which is proven, in 0.100 s; sooner is compliance with cascade, no proof, on "
+        "the loop in 0.0500 s: its plan is 18 % worse."
+    )
+    others = made(*FOUR[2:])  # other rows, another sentence
+    assert others.sentence.startswith("Take compliance with flow_mip on the free schedule")
+    assert "nothing else is sooner" in others.sentence
+    unproven = made(FOUR[1])
+    assert not unproven.is_proven
+    assert "no plan known is better" not in unproven.sentence  # it is not the best known
+    luck = made(FOUR[0], ("compliance", FREE, "path_beam", "", False, 0.05, 0.0))
+    assert luck.take["formulation"] == "schedule_search"  # what proves comes first
+
+
+def test_long_reasons_are_wrapped():
+    found = made(*FOUR)
+    found.table.loc[2, ["regret", "why"]] = [np.nan, "brick 5: " + "it is too far " * 9]
+    assert max(map(len, str(found).splitlines())) <= 80
+    assert sum("too far" in line for line in found.lines()) > 1
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return measure_regret(seqopt.make_engine("compliance", small_arch(4)), RANKS, **ONCE)
+
+
+def test_regret_is_that_of_the_worst_step_in_the_reference(measured):
+    """A second route: the worst of all steps, and of the end, by the table of responses."""
+    engine = seqopt.make_engine("compliance", small_arch(4))
+    problem = seqopt.pose(engine, seqopt.FreeRules(), WORST, "minmax")
+    best = seqopt.solve(problem)
+    rows = measured.table.set_index(["engine", "schedule", "formulation", "without"])["value"]
+    assert rows["compliance", FREE, "schedule_search", ""] == best.objective["minmax"]
+    loop = seqopt.solve(seqopt.pose(engine, seqopt.three_robot_loop(engine.network), RANKS))
+    limits = dict(states_of(problem).criterion.limits)
+    bare = Step(1, StepKind.RELEASE, 4, (None, None, None))
+    table = pd.concat([seqopt.analyze(engine, loop.steps), seqopt.analyze(engine, [bare])])
+    grips = table[[force_column(robot) for robot in engine.network.scene.robots]].to_numpy(float)
+    shares = [np.nanmax(np.abs(grips)) / limits["F_largest"]]
+    for name in ("M_sup", "T_max", "D_max"):
+        shares.append(table[RESPONSES[name].column].max() / RESPONSES[name].scale / limits[name])
+    assert rows["compliance", "loop", "overlap_dp", "ranks"] == pytest.approx(max(shares))
+
+
+def test_every_way_is_a_row_and_nothing_is_drawn_wrong(measured):
+    table = measured.table
+    assert {"loop", FREE} == {*table["schedule"]}
+    assert {"compliance", "frame"} <= {*table["engine"]}
+    assert {"cascade", "beam", "flow_mip", "path_dp", "minimax"} <= {*table["formulation"]}
+    assert {"", "no proof", "near:6", "ranks"} == {*table["without"]}
+    assert (table["status"] == DONE).all()
+    assert (table["regret"] >= 0).all()
+    assert measured.is_proven
+    exact = table["exact"] & (table["schedule"] == FREE) & (table["engine"] == "compliance")
+    assert (table.loc[exact, "regret"] == 0).all()
+    assert (table.loc[table["engine"] == "compliance", "error"].dropna() == 0).all()
+    frame = table.loc[table["engine"] == "frame", "error"].dropna()
+    assert frame.between(1e-9, 1e-4).any()
+    assert any(len(found) > 1 for found in measured.curves.values())  # incumbents over time
+    assert all(len(line) <= 80 for line in measured.lines())
+    assert flaws(regret_chart(measured)) == []
+    assert flaws(regret_chart(measured, made(*FOUR), width=3.9)) == []
+
+
+def test_softer_grips_are_the_reference_and_rigid_ones_a_way():
+    scene = small_arch(3).with_grips(1e5)
+    found = measure_regret(seqopt.make_engine("compliance", scene), WORST, **ONCE)
+    assert found.valued == "compliance, soft grips"
+    rigid = found.table[found.table["engine"] == RIGID_GRIPS]
+    assert (rigid["error"].dropna() > 0.01).all()  # what they promise is not what comes
+    assert not {"ranks"} & {*found.table["without"]}  # nothing ranks here
+
+
+@pytest.mark.slow
+def test_a_plan_that_falls_has_no_regret():
+    engine = partial(seqopt.make_engine, "auto", small_arch(5))
+    found = measure_regret(engine(mortar="dry"), WORST, **ONCE)
+    assert found.valued == "compliance, where every step stands"
+    fallen = found.table["status"] == FALLS
+    assert fallen.any()
+    assert not np.isfinite(found.table.loc[fallen, "regret"]).any()
+    assert found.table.loc[fallen, "why"].str.contains("does not stand|unstable").all()
+    stands = found.table[found.table["without"] == "stands"]
+    assert (stands["status"] == DONE).all()
+    assert found.take["without"] == "stands" or not fallen.all()
+    assert "fall" in " ".join(t.get_text() for t in regret_chart(found).axes[0].texts)
+    without = measure_regret(engine(), WORST, **ONCE).table  # the control: epoxy's joints
+    assert not (without["status"] == FALLS).any()
+
+
+def test_the_chart_shows_both_and_pales_what_is_beaten():
+    figure = regret_chart(made(*FOUR))
+    regrets, parts = figure.axes
+    points = [line for line in regrets.get_lines() if len(line.get_xdata()) == 1]
+    assert sum(line.get_alpha() == PALE for line in points) == 2
+    (ring,) = (line for line in points if line.get_markersize() > 10)
+    assert list(ring.get_xdata()) == [0.1]
+    assert figure.get_suptitle().replace("\n", " ") == made(*FOUR).sentence.replace("_", " ")
+    assert "proven 0" in [tick.get_text() for tick in regrets.get_yticklabels()]
+    assert len(parts.texts) == 3  # the integer program is neither kept nor usual
+
+
+class _Late:
+    """A clock whose time is over in every call after some."""
+
+    def __init__(self, calls):
+        self.left = calls
+
+    @contextmanager
+    def within(self, _):
+        self.left -= 1
+        if self.left < 0:
+            raise TimeoutError
+        yield
+
+
+def test_what_is_stopped_is_said():
+    engine = seqopt.make_engine("compliance", small_arch(4))
+    found = measure_regret(engine, WORST, seconds=60.0, timer=Timer(within=_Late(9).within))
+    late = found.table["status"] == CUT
+    assert 0 < late.sum() < len(late)
+    assert found.table.loc[late, "regret"].isna().all()
+    assert not found.kept[late].any()
+    assert any("stopped" in line for line in found.lines())
+    with pytest.raises(NothingFoundError, match="give more seconds"):
+        measure_regret(engine, WORST, seconds=60.0, timer=Timer(within=_Late(0).within))
+
+
+def test_other_references_are_refused():
+    engine = seqopt.make_engine("compliance", small_arch(4))
+    with pytest.raises(ProblemError, match="reference 'planer' does not exist; give one of planar"):
+        measure_regret(engine, WORST, reference="planer")
