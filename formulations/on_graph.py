@@ -6,7 +6,7 @@ free schedule, of all orders, or of an instance; see `on_graph`. One of your own
 alone:
 
 >>> from formulations.on_graph import (
-...     Aim, Choice, FormulationKind, Graph, Watch, on_graph, onward,
+...     Aim, Choice, FormulationKind, Graph, Watch, on_graph, onward, path_values,
 ... )
 """
 
@@ -128,7 +128,16 @@ class OnGraph(Terse):
         return after_margins(problem, lambda rest: chosen(rest, choose, watch, tell), tell)
 
 
-__all__ = ["Aim", "Choice", "FormulationKind", "Graph", "Watch", "on_graph", "onward"]
+__all__ = [
+    "Aim",
+    "Choice",
+    "FormulationKind",
+    "Graph",
+    "Watch",
+    "on_graph",
+    "onward",
+    "path_values",
+]
 PATHS = ("goals", "tail", "order", "instance")  # what a path through a graph answers
 
 
