@@ -20,6 +20,19 @@ def test_what_is_no_time_is_refused_in_a_line(words, capsys):
     assert "give seconds, and the scene before it" in line
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--reference", "planar"], "--reference: it values the plans of --speed; give --speed 60"),
+        (["--speed", "9", "--reference", "rigid"], "reference 'rigid' does not exist; give one of"),
+    ],
+)
+def test_a_reference_that_values_nothing_is_refused_in_a_line(words, said, capsys):
+    assert main(["compare", WALL, *words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+
+
 @pytest.mark.slow
 def test_a_comparison_with_speed(tmp_path, capsys):
     out = tmp_path / "speed"
@@ -38,7 +51,5 @@ def test_a_comparison_with_speed(tmp_path, capsys):
     assert page.count("data:image/png;base64,") == 2  # for wide screens and for narrow ones
     assert (out / "speed.png").exists()
     assert "speed.csv" in said
-    assert main([*words, "--speed", "9", "--reference", "rigid"]) == 2
-    assert "reference 'rigid' does not exist; give one of planar" in capsys.readouterr().err
     assert main([*words, "--json"]) == 0
     assert "speed" not in json.loads(capsys.readouterr().out)

@@ -15,9 +15,11 @@ from seqopt._showing import PAGE
 from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance, simplest
+from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.problem.requirements import Criterion
 from seqopt.report._pages import comparison_page
+from seqopt.report._regret._measure import check_reference
 from seqopt.report.comparison import Comparison, _comparison_blocks, _printed_largest, compare
 from seqopt.responses.table import builds_in_words
 from seqopt.stability._builds import BuildProver
@@ -69,6 +71,9 @@ def run(asked: Compare) -> Result:
     seqopt compare arch25 --grips 1e6
     seqopt compare arch25 --grips 1e6 --speed 60 --out speed
     """
+    if asked.reference and not asked.speed:
+        raise ProblemError("--reference: it values the plans of --speed; give --speed 60 with it")
+    check_reference(asked.reference)
     scene = inputs.find_scene(asked)
     find_postures(scene, asked.cache, asked.tell)
     engine = inputs.find_engine(asked, build_network(scene))

@@ -301,11 +301,16 @@ def _mortar_of(engine: Engine) -> Mortar | None:
     return found if isinstance(found, Mortar) else None
 
 
-def _find_reference(engine: Engine, name: str, mortar: Mortar | None) -> Engine:
-    """Return the engine that values plans: the most detailed one that the scene has data for."""
+def check_reference(name: str) -> None:
+    """Raise a `ProblemError` if no engine that can value plans has a name; the empty one may."""
     known = [each for each in ENGINES if each != "auto"]
     if name and name not in known:
         raise ProblemError(f"reference {name!r} does not exist; give one of {', '.join(known)}")
+
+
+def _find_reference(engine: Engine, name: str, mortar: Mortar | None) -> Engine:
+    """Return the engine that values plans: the most detailed one that the scene has data for."""
+    check_reference(name)
     if recipe_of(engine) is None and not name:
         return engine  # an object of one's own
     return make_engine(name or USUAL_ENGINE, engine.network, mortar if name in LIMITED else None)
