@@ -417,8 +417,8 @@ def test_claims_stand_apart_from_their_parts():
     ("a", "b"),
     [
         ("experiments.engines.fidelity_ladder", "experiments.engines.engine_speed"),
-        ("experiments.engines.fidelity_ladder", "experiments.peers.parts.chain"),
-        ("experiments.harness.scenes", "experiments.peers.parts.chain"),
+        ("experiments.engines.fidelity_ladder", "experiments.peers.parts.models"),
+        ("experiments.harness.scenes", "experiments.peers.parts.models"),
     ],
 )
 def test_an_experiment_that_reaches_across_is_seen(a, b):

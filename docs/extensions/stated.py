@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.harness.results import markdown, stored, two
-from experiments.instances.parts.tables import instance_tables
+from experiments.instances.instance_contest import instance_tables
 from experiments.placement.formulations import CUT, QUESTIONS, ratios
 from experiments.placement.speed_accuracy import tables
 from seqopt.report._regret._measure import RIGID_GRIPS

@@ -32,9 +32,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from experiments.discrete.parts.arch_pads import JOINTS, Reading, readings
+from experiments.discrete.parts.arch_pads import JOINTS, Across, Pinch, Reading, readings
 from experiments.discrete.parts.arches_lmgc90 import PAD, READINGS, witness
-from experiments.discrete.parts.pads import Across, Pinch
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.lmgc90 import python_with_lmgc90

@@ -18,14 +18,162 @@ experiments instance_contest [--quick] [--only-of NAME,NAME]``.
 import json
 from collections.abc import Sequence
 
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.optimize import isotonic_regression
 
+from experiments.harness.charts import note, subplots
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
-from experiments.harness.results import drawn, stored
-from experiments.instances.parts.contest_chart import chart
+from experiments.harness.results import drawn, markdown, stored, two
 from experiments.instances.parts.contest_run import OUTSIDE, run, solvers
-from experiments.instances.parts.library import KNOWN, MADE, instance, known
+from experiments.instances.parts.library import KNOWN, MADE, command, instance, known
 from seqopt import judge_instance
+from seqopt.arrays import Floats
+from seqopt.report import _style as inks
+from seqopt.report._style import dress, name_panels, plain, styled
+
+BEST = "best of ours"
+PART = 1 / 3  # of the instances: ways that fit fewer are in the best of ours alone
+DASHES = {"HiGHS": "-", "CP-SAT": (0, (1, 1.2))}
+COLORS = (inks.BLUE, inks.GREEN, inks.PURPLE, inks.ORANGE, inks.SKY)
+TIMES, GAPS = (0.02, 20.0), (1e-4, 1.0)  # s, of values: what axes show
+ROOM = 5.5  # percent between two labels
+
+
+@styled
+def chart(contest: pd.DataFrame, library: pd.DataFrame) -> Figure:
+    """Draw the share of all instances closed within a time, and within a gap after every run."""
+    runs = with_gaps(contest, library)
+    runs["closing"] = runs["seconds"].where(runs["closed"], np.inf)
+    runs["left"] = runs["gap"].fillna(np.inf)
+    count = len(library)
+    figure, (times, left) = subplots(4.4, 1, 2, sharey=True)
+    _profiles(times, _by_way(runs, "closing", count), TIMES, count)
+    _profiles(left, _by_way(runs, "left", count), GAPS, count)
+    times.set(xlabel="processor time [s]", title="closed by its own bound within a time")
+    left.set(xlabel="gap to its own bound, of its value", title="not more left when its run ended")
+    times.set(ylabel=f"share of all {count} instances [%]")
+    dress(times, left)
+    name_panels(times, left)
+    return figure
+
+
+def _by_way(runs: pd.DataFrame, column: str, count: int) -> dict[str, Floats]:
+    """Return a value for every instance that a way fits, least first, and the best of ours."""
+    ours = runs[~runs["solver"].isin(OUTSIDE)]
+    found = {BEST: ours.groupby("instance")[column].min()}
+    for name, own in runs.groupby("solver", sort=False):
+        if len(own) >= PART * count:
+            found[str(name)] = own[column]
+    return {name: np.sort(values.to_numpy()) for name, values in found.items()}
+
+
+def _profiles(axes: Axes, ways: dict[str, Floats], limits: tuple[float, float], count: int) -> None:
+    """Draw a curve for every way, with its name where it ends and how many instances it fits."""
+    low, high = limits
+    ours = [name for name in ways if name not in OUTSIDE and name != BEST]
+    colors = {BEST: inks.INK} | dict.fromkeys(OUTSIDE, inks.VERMILION)
+    colors |= dict(zip(ours, COLORS, strict=False))
+    ends = {}
+    for name, values in ways.items():
+        at = np.concatenate([[low], values[(values > low) & (values <= high)], [high]])
+        share = 100 * np.searchsorted(values, at, side="right") / count
+        look = {"color": colors[name], "ls": DASHES.get(name, "-")}
+        axes.step(at, share, where="post", lw=1.2 if name in ours else 2.0, **look)
+        ends[name] = share[-1]
+    axes.set(xscale="log", xlim=limits, ylim=(0, 103))
+    plain(axes.xaxis)
+    for name, height in _apart(ends).items():
+        words = f"{name.replace('_', ' ')}, {len(ways[name])}"
+        color, across = colors[name], axes.get_yaxis_transform()
+        line = {"transform": across, "clip_on": False, "color": color, "lw": 0.6}
+        axes.plot([1.0, 1.04], [ends[name], height], **line)
+        note(axes, words, (1.05, height), (0, -3), xycoords=across, color=color)
+
+
+def _apart(ends: dict[str, float]) -> dict[str, float]:
+    """Return heights of labels as close to the ends of their curves as room for each allows."""
+    names = sorted(ends, key=lambda name: ends[name])
+    steps = ROOM * np.arange(len(names))
+    heights = isotonic_regression(np.array([ends[name] for name in names]) - steps).x + steps
+    return dict(zip(names, heights.tolist(), strict=True))
+
+
+CLOSED = 1e-6  # of a value: a gap that is none
+
+
+def instance_tables(
+    library: pd.DataFrame, contest: pd.DataFrame, large: pd.DataFrame
+) -> dict[str, str]:
+    """Return the tables by the names under which pages have them."""
+    still = library[library["gap"] > CLOSED]
+    named = [
+        f"- `{row.instance}`: {100 * row.gap:.2g} % ({row.asked})" for row in still.itertuples()
+    ]
+    return {
+        "instance_count": str(len(library)),
+        "instance_library": _library(library),
+        "instance_open": "\n".join(
+            [
+                f"Of {len(library)} instances {len(library) - len(still)} are closed. What is left "
+                "between the best path and what is proven:",
+                "",
+                *named,
+            ]
+        ),
+        "instance_ways": _ways(contest, library),
+        "instance_large": _large(large),
+    }
+
+
+def _large(large: pd.DataFrame) -> str:
+    """Return a row per instance that is made by its command alone: its size, and the command."""
+    rows = []
+    for row in large.itertuples():
+        size = f"{row.nodes:,} / {row.arcs:,}"
+        rows.append(
+            [f"`{row.instance}`", size, f"{row.size_MB:.1f} MB", f"`{command(row.instance)}`"]
+        )
+    return markdown(["instance", "nodes / arcs", "file", "command"], rows)
+
+
+def with_gaps(contest: pd.DataFrame, library: pd.DataFrame) -> pd.DataFrame:
+    """Return runs with their gaps, whether the best known was found, and closed by the run."""
+    best = contest["instance"].map(library.set_index("instance")["value"])
+    off = (contest["value"] - best).abs() <= 1e-5 * best.abs()
+    size = contest["value"].abs().replace(0.0, 1.0)
+    gap = ((contest["value"] - contest["bound"]) / size).clip(lower=0.0)
+    return contest.assign(best=off, gap=gap, closed=off & (gap <= 1e-4))
+
+
+def _library(library: pd.DataFrame) -> str:
+    rows = []
+    for row in library.itertuples():
+        gap = "none" if row.gap <= CLOSED else f"{100 * row.gap:.2g} %"
+        values = " ".join(f"{float(value):.6g}" for value in str(row.values).split())
+        size = f"{row.nodes:,} / {row.arcs:,}"
+        proven = f"{row.proven:.6g}"
+        rows.append([f"`{row.instance}`", size, row.asked, values, proven, gap, f"`{row.by}`"])
+    head = ["instance", "nodes / arcs", "asked", "best known", "proven", "gap", "found by"]
+    return markdown(head, rows)
+
+
+def _ways(contest: pd.DataFrame, library: pd.DataFrame) -> str:
+    """Return a row per way to solve: what it was given, found and closed, its times and gaps."""
+    table = with_gaps(contest, library)
+    rows = []
+    for name, own in table.groupby("solver", sort=False):
+        left = own["gap"].replace(np.inf, np.nan).dropna()
+        middle = f"{100 * left.max():.2g} %" if len(left) else "–"
+        counts = (len(own), own["value"].notna().sum(), own["best"].sum(), own["closed"].sum())
+        times = [f"{two(own['seconds'].median())} s", f"{two(own['seconds'].max())} s"]
+        rows.append([f"`{name}`", *map(str, counts), middle, *times])
+    rows.sort(key=lambda row: (row[0] in tuple(f"`{name}`" for name in OUTSIDE), row[0]))
+    head = ["way", "instances", "path found", "best known", "closed by itself", "largest gap"]
+    return markdown([*head, "median time", "longest"], rows)
+
 
 QUICK = ("chain-8", "pair-25-peak", "wall-6")
 SECONDS = 4.0

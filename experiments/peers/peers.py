@@ -28,9 +28,7 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25
 from experiments.harness.timing import best
-from experiments.peers.parts.chain import Answer, Peer, chain_of
-from experiments.peers.parts.loops import LOOPS, loop
-from experiments.peers.parts.opensees import OpenSees, open_sees
+from experiments.peers.parts.models import LOOPS, Answer, OpenSees, Peer, chain_of, loop, open_sees
 from seqopt import Network, pose, solve, three_robot_loop
 from seqopt.arrays import Ints
 from seqopt.engines.interface import Fields, Want, grip_columns

@@ -14,6 +14,8 @@ from experiments.discrete.parts import arches_lmgc90, springs_lmgc90
 from experiments.discrete.parts.arch_pads import (
     SPREADS,
     STIFFER,
+    Across,
+    Pinch,
     bed_at_corners,
     drawn_in,
     ground_forces,
@@ -30,7 +32,6 @@ from experiments.discrete.parts.arches_lmgc90 import (
     spread_engine,
     witness,
 )
-from experiments.discrete.parts.pads import Across, Pinch
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.harness.yardstick import error, moved
 from seqopt.engines.discrete._bed import BedStiffness

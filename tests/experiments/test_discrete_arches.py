@@ -18,12 +18,15 @@ from experiments.discrete.discrete_arches import (
 )
 from experiments.discrete.parts.arch_pads import (
     CORNERS,
+    Across,
     AtCorners,
+    PaddedEngine,
+    Pinch,
     Reading,
+    pad_stiffness,
     pads_at_corners,
     readings,
 )
-from experiments.discrete.parts.pads import Across, PaddedEngine, Pinch, pad_stiffness
 from experiments.harness.results import RESULTS
 from experiments.harness.yardstick import STEPS, error, moved
 from seqopt.engines.interface import Want

@@ -9,9 +9,7 @@ import pandas as pd
 import pytest
 
 from experiments.peers import peers
-from experiments.peers.parts.chain import chain_of
-from experiments.peers.parts.loops import LOOPS, kept, loop
-from experiments.peers.parts.opensees import OpenSees, open_sees
+from experiments.peers.parts.models import LOOPS, OpenSees, chain_of, kept, loop, open_sees
 from experiments.peers.peers import Case, difference
 from seqopt.engines.interface import Want, grip_columns
 

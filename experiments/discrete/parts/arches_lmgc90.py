@@ -16,8 +16,15 @@ import pandas as pd
 from scipy.spatial import ConvexHull
 
 from experiments.discrete.parts import arch_pads
-from experiments.discrete.parts.arch_pads import SPREADS, AtCorners, padded, posed
-from experiments.discrete.parts.pads import Across, PaddedEngine, Pinch
+from experiments.discrete.parts.arch_pads import (
+    SPREADS,
+    Across,
+    AtCorners,
+    PaddedEngine,
+    Pinch,
+    padded,
+    posed,
+)
 from experiments.harness import lmgc90
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.harness.yardstick import error, inner_nodes, moved
