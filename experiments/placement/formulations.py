@@ -41,7 +41,7 @@ from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.results import RESULTS, drawn, stored
 from experiments.harness.scenes import scene_named
 from seqopt import CRITERIA, FreeRules, Search, build_network, make_engine, optimize
-from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
+from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.formulation import exhibits, formulations
 from seqopt.graph.states.states import build_states
 from seqopt.report._style import SMALL, plain, styled
@@ -84,7 +84,7 @@ ENDINGS: dict[type[BaseException], str] = {
     ProblemError: "refused",
     TimeUpError: "out of time",
     MemoryError: "out of memory",
-    SeqoptError: "failed",
+    Exception: "failed",
     KeyboardInterrupt: "out of time",
 }  # the first that fits
 PLANS = ("optimal", "feasible")  # how a row ended that goes on to larger arches
@@ -165,7 +165,7 @@ def run(*cell: object) -> dict[str, object]:
     start = time.process_time()
     try:
         row = cut(bricks, number) if name == CUT else plan(question, bricks, name, number)
-    except (SeqoptError, MemoryError, KeyboardInterrupt) as error:
+    except (Exception, KeyboardInterrupt) as error:  # a cell that fails is a row, whatever fails
         ended = next(word for kind, word in ENDINGS.items() if isinstance(error, kind))
         row = {"ended": ended, "said": str(error)}
     return row | {"seconds": time.process_time() - start}
