@@ -14,28 +14,272 @@ in closed form (a weighted median for absolute errors, a quotient for squares), 
 the ratio finds the global optimum, which is computed again with the compliance operator of the
 scene. Every test is also predicted from a fit to the other seven. The confidence region holds all
 pairs whose sum of squares is at most ``1 + p F(p, 8 - 2) / (8 - 2)`` times the smallest, ``p = 2``;
-a profile has ``p = 1``. What else bounds ``k_r`` is in `calibration_spread`, how the paper's own
-column comes about in `calibration_readings`, both of `experiments.calibration.parts`.
+a profile has ``p = 1``. `rotational` says by how many routes the tests bound ``k_r``.
+
+`readings` are interpretations of the printed tests that might give the paper's own column: what
+span and rise measure, where the load acts and over which width, how many bricks there are, how
+stiff joints are across, and what multiplies the rotational stiffness. Each is tried with the
+printed joint stiffnesses, full or half, and with free ones: then the smallest possible largest
+deviation from the column is sought, over all tests and over some of them.
 
 Inputs: ``arch_tests.csv``, ``arch_stiffness.csv`` in ``seqopt/data/paper``. Command: ``python -m
 experiments calibration [--quick]``.
 """
 
+from collections.abc import Callable
+from itertools import product
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from scipy import stats
 
 from experiments.calibration.parts import barrel_vaults as barrel
-from experiments.calibration.parts import calibration_spread as spread
-from experiments.calibration.parts.barrel_vaults import BED, LAWS, MEASURES, Law, laws, vaults
-from experiments.calibration.parts.calibration_readings import readings
-from experiments.calibration.parts.calibration_spread import left_out, threshold, whole
+from experiments.calibration.parts.barrel_vaults import (
+    BED,
+    LAWS,
+    MEASURES,
+    Law,
+    Parts,
+    Vault,
+    chain,
+    errors,
+    fit,
+    laws,
+    planar_parts,
+    vaults,
+)
 from experiments.harness.charts import note, subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import stored
 from seqopt.arrays import Floats
 from seqopt.report._style import BLUE, GREEN, ORANGE, VERMILION, dress, name_panels, plain, styled
+
+PRINTED = (1e11, 0.9e9)  # N/m³ and what is printed in kN/(rad m²), in N
+POWERS = {"b": (0, 1.0), "b t": (1, 1.0), "b t2": (2, 1.0), "b t3/12": (3, 1 / 12)}
+SHEAR = {"rigid": 0.0, "as along": 1.0, "a tenth": 10.0}  # compliance across over along
+HALVES = ((1.0, 1.0), (0.5, 0.5), (1.0, 0.5), (0.5, 1.0))  # of k_t and of k_r
+GROUPS = {"all": range(8), "2-8": range(1, 8), "3-8": range(2, 8)}
+GROUPS |= {"2,3,4,6,7,8": (1, 2, 3, 5, 6, 7)}
+RATIOS = np.geomspace(1e-5, 1e4, 181)
+
+
+def section(vault: Vault, law: str) -> float:
+    """Return what multiplies the rotational stiffness."""
+    power, factor = POWERS[law]
+    return vault.width * vault.thickness**power * factor
+
+
+def against_study(tests: tuple[Vault, ...], parts: list[Parts], law: str, k: Floats) -> Floats:
+    """Return stiffnesses over the paper's (T, R) for rows (R, 2) of k_t and k_r."""
+    rows = []
+    for vault, part in zip(tests, parts, strict=True):
+        slide, turn = k[:, 0] * vault.area, k[:, 1] * section(vault, law)
+        rows.append(barrel.planar_stiffness(part, slide, turn) / vault.study)
+    return np.array(rows)
+
+
+def closest(logs: Floats) -> tuple[int, float, float]:
+    """Return the column of logarithms with the least half-range, its middle, that half-range.
+
+    Of some that are equal but for rounding it is the first.
+    """
+    top, bottom = logs.max(axis=0), logs.min(axis=0)
+    half = (top - bottom) / 2
+    best = int(np.argmax(half <= half.min() * (1 + 1e-9)))
+    return best, float(top[best] + bottom[best]) / 2, float(half[best])
+
+
+def _row(tests: tuple[Vault, ...], parts: list[Parts], law: str) -> dict[str, object]:
+    """Return how one reading does with printed and with free joint stiffnesses."""
+    printed = np.array([[PRINTED[0] * a, PRINTED[1] * b] for a, b in HALVES])
+    ratio = against_study(tests, parts, law, printed)
+    out: dict[str, object] = {}
+    for percent in (5, 10):
+        within = (np.abs(ratio - 1) <= percent / 100).sum(axis=0)
+        out[f"within_{percent}"] = int(within.max())
+        out[f"halves_{percent}"] = "{:g} {:g}".format(*HALVES[within.argmax()])
+    for name, group in GROUPS.items():
+        worst = np.abs(np.log(ratio[list(group)])).max(axis=0)
+        out[f"printed_{name}"] = 100 * (np.exp(worst.min()) - 1)
+        out[f"halves_{name}"] = "{:g} {:g}".format(*HALVES[worst.argmin()])
+    for i, vault in enumerate(tests):
+        out[f"printed_test_{vault.test}"] = ratio[i, 0]
+    free = np.log(
+        against_study(tests, parts, law, np.stack([np.ones_like(RATIOS), RATIOS], axis=1))
+    )
+    for name, group in GROUPS.items():
+        best, middle, half = closest(free[list(group)])
+        out[f"free_{name}"] = 100 * (np.exp(half) - 1)
+        out[f"k_t_{name}"] = np.exp(-middle)
+        out[f"k_r_{name}"] = np.exp(-middle) * RATIOS[best]
+    return out
+
+
+def readings() -> pd.DataFrame:
+    """Return a row per reading; ``free_*`` are the least largest deviations in percent."""
+    tests, rows = vaults(), []
+    lines, places = barrel.LINES, barrel.PLACES
+    for line, place, fewer, spread, shear in product(lines, places, (0, 1), (0, 1), SHEAR):
+        parts = [
+            planar_parts(chain(v, line, place, fewer=fewer, strip=spread * v.fill), SHEAR[shear])
+            for v in tests
+        ]
+        reading = {"line": line, "place": place, "fewer": fewer, "shear": shear}
+        reading["load"] = "strip as wide as the fill is high" if spread else "line"
+        rows += [{**reading, "law": law, **_row(tests, parts, law)} for law in POWERS]
+    return pd.DataFrame(rows)
+
+
+LEVEL = 0.95
+ACROSS = {"rigid": 0.0, "as stiff as along": 1.0, "a tenth as stiff": 10.0}  # compliance ratio
+DECISIVE = 5  # the test whose error the paper's column owes most of its mean to
+DRAWS = 2000
+RATIO = np.geomspace(1e-5, 1e4, 4001)  # searched k_r / k_t
+TURN = np.geomspace(2e10, 2e13, 1501)  # k_r, N/m³
+IN_SAMPLE, ANEW = "mean absolute error, all tests fitted", "law chosen anew for each test left out"
+GAIN = "mean gain over the paper, paired"
+GAIN_LOW, GAIN_HIGH = "95 % interval of that, from", "95 % interval of that, to"
+
+
+def whole(law: Law) -> Floats:
+    """Return the mask that keeps all tests."""
+    return np.ones(len(law.tests), dtype=bool)
+
+
+def left_out(law: Law, measure: str) -> tuple[list[tuple[float, float]], Floats]:
+    """Return the pairs fitted without each test in turn, and the error on that test."""
+    count = len(law.tests)
+    pairs = [fit(law, measure, np.arange(count) != i) for i in range(count)]
+    return pairs, np.array([errors(law, pair)[i] for i, pair in enumerate(pairs)])
+
+
+def chosen_anew(models: dict[str, Law]) -> tuple[list[str], Floats]:
+    """Return the law that fits best without each test, and its error on that test."""
+    names, out = [], []
+    for i in range(8):
+        kept = np.arange(8) != i
+        trials = {name: errors(law, fit(law, "absolute", kept)) for name, law in models.items()}
+        names.append(min(trials, key=lambda name: float(np.abs(trials[name][kept]).mean())))
+        out.append(trials[names[-1]][i])
+    return names, np.array(out)
+
+
+def bed(tests: tuple[Vault, ...], across: str) -> Law:
+    """Return the bed of springs with joints so stiff across."""
+    chains = map(barrel.chain, tests)
+    return Law(BED, tests, tuple(planar_parts(c, ACROSS[across]) for c in chains))
+
+
+def mean_size(error: Floats) -> float:
+    return float(100 * np.abs(error).mean())
+
+
+def root_mean_square(error: Floats) -> float:
+    return float(100 * np.sqrt((error**2).mean()))
+
+
+def comparison(models: dict[str, Law]) -> pd.DataFrame:
+    """Return errors of the bed of springs beside those of the paper's column, percent."""
+    law, squares = models[BED], "root mean square, least squares"
+    paper = np.array([v.study / v.measured - 1 for v in law.tests])
+    own, least = (errors(law, fit(law, measure, whole(law))) for measure in MEASURES)
+    other = np.array([v.test != DECISIVE for v in law.tests])
+    size, root = mean_size(paper), root_mean_square(paper)
+    left = root_mean_square(left_out(law, "squares")[1])
+    rows = [
+        (IN_SAMPLE, mean_size(own), size),
+        ("each test left out", mean_size(left_out(law, "absolute")[1]), size),
+        (ANEW, mean_size(chosen_anew({name: models[name] for name in LAWS})[1]), size),
+        (f"without test {DECISIVE}", mean_size(own[other]), mean_size(paper[other])),
+        (f"{squares}, all tests fitted", root_mean_square(least), root),
+        (f"{squares}, each test left out", left, root),
+        *_paired(100 * (np.abs(paper) - np.abs(own))),
+    ]
+    for across in ACROSS:
+        varied = bed(law.tests, across)
+        inside = errors(varied, fit(varied, "absolute", whole(varied)))
+        rows += [(f"{across} across, all tests fitted", mean_size(inside), size)]
+        outside = left_out(varied, "absolute")[1]
+        rows += [(f"{across} across, each test left out", mean_size(outside), size)]
+    return pd.DataFrame(rows, columns=["what", "bed_percent", "paper_percent"])
+
+
+def _paired(gains: Floats) -> list[tuple[str, float, float]]:
+    """Return the mean of gains over the paper, its standard error and its interval, points."""
+    mean, error = float(gains.mean()), float(stats.sem(gains))
+    reach = error * float(stats.t.ppf(0.5 + LEVEL / 2, len(gains) - 1))
+    named = {GAIN: mean, "standard error of that": error}
+    named |= {GAIN_LOW: mean - reach, GAIN_HIGH: mean + reach}
+    return [(name, value, np.nan) for name, value in named.items()]
+
+
+Route = tuple[Callable[[Floats], Floats], float]
+"""What is summed over the tests, of model over measured (T, R), and up to which multiple of its
+least value k_r is kept."""
+
+
+def threshold(numbers: int, fitted: int, count: int = 8) -> float:
+    """Return the border of a region of ``numbers`` of the fitted ones, over the least sum."""
+    rest = count - fitted
+    return float(1 + numbers * stats.f.ppf(LEVEL, numbers, rest) / rest)
+
+
+def routes(count: int = 8) -> dict[str, Route]:
+    """Return profiles that differ in which error is taken for random, and how it is spread."""
+    squares, sizes = threshold(1, 2, count), float(np.exp(stats.chi2.ppf(LEVEL, 1) / 2 / count))
+    return {
+        "squares of relative errors": (lambda x: ((x - 1) ** 2).sum(axis=0), squares),
+        "sizes of relative errors": (lambda x: np.abs(x - 1).sum(axis=0), sizes),
+        "squares of logarithms": (lambda x: (np.log(x) ** 2).sum(axis=0), squares),
+        "sizes of logarithms": (lambda x: np.abs(np.log(x)).sum(axis=0), sizes),
+    }
+
+
+def interval(values: Floats, sums: Floats, limit: float) -> tuple[float, float]:
+    """Return where sums first and last are within the limit; an open end is 0 or infinite."""
+    border = limit * sums.min()
+    inside = np.flatnonzero(sums <= border)
+    low, high = inside[0], inside[-1]
+    return (
+        0.0 if low == 0 else _crossing(values, sums, (low - 1, low), border),
+        np.inf if high == len(values) - 1 else _crossing(values, sums, (high, high + 1), border),
+    )
+
+
+def _crossing(values: Floats, sums: Floats, between: tuple[int, int], border: float) -> float:
+    """Return the value at which sums cross a border, logarithms in proportion."""
+    a, b = between
+    share = (border - sums[a]) / (sums[b] - sums[a])
+    return float(values[a] ** (1 - share) * values[b] ** share)
+
+
+def rotational(tests: tuple[Vault, ...]) -> pd.DataFrame:
+    """Return what bounds k_r by several routes: a row each, N/m³."""
+    rows = []
+    for across in ACROSS:
+        share = bed(tests, across).relative(RATIO)
+        for name, (summed, limit) in routes(len(tests)).items():
+            sums = np.array([summed(k / RATIO * share).min() for k in TURN])
+            low, high = interval(TURN, sums, limit)
+            rows.append((f"profile, {name}", across, low, float(TURN[sums.argmin()]), high))
+        for measure in MEASURES:
+            drawn = np.percentile(resampled(share, measure), [2.5, 50, 97.5], method="higher")
+            rows.append((f"tests drawn anew, {measure}", across, *map(float, drawn)))
+    return pd.DataFrame(rows, columns=["route", "across", "k_r_from", "k_r", "k_r_to"])
+
+
+def resampled(share: Floats, measure: str) -> Floats:
+    """Return k_r fitted to tests drawn with replacement, infinite where joints do not turn."""
+    random, coarse, ratio = np.random.default_rng(1), share[:, ::5], RATIO[::5]
+    out = []
+    for _ in range(DRAWS):
+        drawn = random.integers(0, len(coarse), len(coarse))
+        best, scale = barrel.best_of(coarse[drawn], measure)
+        out.append(np.inf if best == len(ratio) - 1 else scale * ratio[best])
+    return np.array(out)
+
 
 LOOKS = {"b t": (ORANGE, "--"), "b t2": (GREEN, ":"), "b t3/12": (BLUE, "-")}
 TEXTS = {"b t": "$b\\,t$", "b t2": "$b\\,t^2$", "b t3/12": "$b\\,t^3/12$"}
@@ -178,27 +422,27 @@ def intervals(law: Law) -> dict[str, float]:
     limit = threshold(1, 1 if law.bounds[0] == law.bounds[1] else 2)
     out = {}
     for name, (values, sums) in profiles(law).items():
-        out[f"{name}_from"], out[f"{name}_to"] = spread.interval(values, sums, limit)
+        out[f"{name}_from"], out[f"{name}_to"] = interval(values, sums, limit)
     return out
 
 
 def tabulate(law: Law, measure: str, label: str) -> tuple[pd.DataFrame, dict[str, object]]:
-    pair = barrel.fit(law, measure, whole(law))
-    error, out = barrel.errors(law, pair), left_out(law, measure)[1]
+    pair = fit(law, measure, whole(law))
+    error, out = errors(law, pair), left_out(law, measure)[1]
     share = turning_share(law, pair)
     rows, gap = [], 0.0
     for i, vault in enumerate(law.tests):
         made = barrel.scene(vault, pair[0] * vault.area, pair[1] * LAWS[law.name](vault))
-        k = barrel.load_stiffness(made, barrel.chain(vault).loads[0])
+        k = barrel.load_stiffness(made, chain(vault).loads[0])
         gap = max(gap, abs(k / (vault.measured * (1 + error[i])) - 1))
         row = {"law": label, "measure": measure, "test": vault.test, "k_e": vault.measured / 1e6}
         row |= {"k_m": vault.study / 1e6, "k_fit": k / 1e6, "turning_share": share[i]}
         row |= {"paper_percent": 100 * (vault.study / vault.measured - 1)}
         rows.append(row | {"fit_percent": 100 * error[i], "left_out_percent": 100 * out[i]})
     total = {"law": label, "measure": measure, "k_t": pair[0], "k_r": pair[1]}
-    total |= {"mean_absolute_percent": spread.mean_size(error)}
-    total |= {"root_mean_square_percent": spread.root_mean_square(error)}
-    total |= {"left_out_percent": spread.mean_size(out), "left_out_worst": 100 * max(abs(out))}
+    total |= {"mean_absolute_percent": mean_size(error)}
+    total |= {"root_mean_square_percent": root_mean_square(error)}
+    total |= {"left_out_percent": mean_size(out), "left_out_worst": 100 * max(abs(out))}
     return pd.DataFrame(rows), total | {"engine_gap": gap}
 
 
@@ -212,23 +456,23 @@ def experiment(options: Options) -> Finding:
     print(fits.to_string(index=False, float_format="%.4g"))
     bed = table[(table["law"] == BED) & (table["measure"] == "absolute")]
     print(bed.drop(columns=["law", "measure"]).to_string(index=False, float_format="%.3g"))
-    beside = spread.comparison(models)
+    beside = comparison(models)
     print(beside.to_string(index=False, float_format="%.2f", na_rep=""))
     good = holds(fits, beside) and bool(fits["engine_gap"].max() <= 1e-9)
     if options.quick:
         return Finding(good)
     kept = fits.drop(columns="engine_gap")  # rounding, another on every machine
     tables = {"": table, "_fits": kept, "_comparison": beside, "_readings": readings()}
-    tables |= {"_routes": spread.rotational(models[BED].tests)}
+    tables |= {"_routes": rotational(models[BED].tests)}
     return Finding(good, tables={f"calibration{end}": rows for end, rows in tables.items()})
 
 
 def holds(fits: pd.DataFrame, beside: pd.DataFrame) -> bool:
     error = fits[fits["measure"] == "absolute"].set_index("law")["mean_absolute_percent"]
     own, paper = (beside.set_index("what")[f"{name}_percent"] for name in ("bed", "paper"))
-    leads = error[BED] < paper[spread.IN_SAMPLE] < error[["b t", "b t2"]].min()
-    unsure = own[spread.GAIN_LOW] < 0 < own[spread.GAIN_HIGH]
-    return bool(leads and unsure and own[spread.ANEW] > paper[spread.ANEW])
+    leads = error[BED] < paper[IN_SAMPLE] < error[["b t", "b t2"]].min()
+    unsure = own[GAIN_LOW] < 0 < own[GAIN_HIGH]
+    return bool(leads and unsure and own[ANEW] > paper[ANEW])
 
 
 def picture() -> Figure:

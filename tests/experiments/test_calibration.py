@@ -9,7 +9,23 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from experiments.calibration.calibration import intervals, squares, turning_share
+from experiments.calibration.calibration import (
+    ANEW,
+    GAIN,
+    GROUPS,
+    IN_SAMPLE,
+    RATIOS,
+    against_study,
+    chosen_anew,
+    closest,
+    comparison,
+    interval,
+    intervals,
+    left_out,
+    rotational,
+    squares,
+    turning_share,
+)
 from experiments.calibration.parts.barrel_vaults import (
     BED,
     Chain,
@@ -24,17 +40,6 @@ from experiments.calibration.parts.barrel_vaults import (
     scene,
     square_scale,
     vaults,
-)
-from experiments.calibration.parts.calibration_readings import GROUPS, RATIO, against_study, closest
-from experiments.calibration.parts.calibration_spread import (
-    ANEW,
-    GAIN,
-    IN_SAMPLE,
-    chosen_anew,
-    comparison,
-    interval,
-    left_out,
-    rotational,
 )
 from experiments.harness.results import RESULTS
 from seqopt.network._mechanics import spring_maps
@@ -230,7 +235,7 @@ def test_the_studys_column_in_proportion_to_the_area():
     """Tests 3 to 8 reach the floor of any model linear in width; test 1 is far from them."""
     floor = np.sqrt((434 / 2.88) / (140 / 1.01)) - 1
     parts = [planar_parts(chain(vault)) for vault in VAULTS]
-    k = np.stack([np.ones_like(RATIO), RATIO], axis=1)
+    k = np.stack([np.ones_like(RATIOS), RATIOS], axis=1)
     free = np.log(against_study(VAULTS, parts, "b t", k))
     best, middle, half = closest(free[list(GROUPS["3-8"])])
     assert np.exp(half) - 1 == pytest.approx(floor, rel=1e-6)

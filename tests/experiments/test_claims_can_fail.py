@@ -11,7 +11,6 @@ import pytest
 
 from experiments import figures
 from experiments.calibration import calibration, identify_arch25, vault_loads
-from experiments.calibration.parts import calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
 from experiments.engines import (
     engine_growth,
@@ -67,7 +66,7 @@ CHECKS = {
     "calibration": Check(
         calibration.holds,
         ("calibration_fits", "calibration_comparison"),
-        *("paper_percent", 10.0, {"what": calibration_spread.IN_SAMPLE}, 1),
+        *("paper_percent", 10.0, {"what": calibration.IN_SAMPLE}, 1),
     ),
     "classical": Check(
         lambda table: not classical.faults(table),
