@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from seqopt.engines.interface import Want
-from seqopt.engines.rigid import _extremes, _grown, _growth
-from seqopt.engines.rigid._extremes import extremes_in, extremes_of, rows_of
+from seqopt.engines.rigid import _extremes, _growth
+from seqopt.engines.rigid._extremes import extremes_in
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.responses._blocks import COMPILED, Block, answer
@@ -24,7 +23,6 @@ from tests.limit_scenes import chain, loosened
 needs_numba = pytest.mark.skipif(not _extremes.can_compile(), reason="no numba")
 once = pytest.mark.xdist_group("compiled loops")  # which one worker compiles
 SOME = [Want.RESPONSES, Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT, Want(0)]
-NONE, MANY = np.empty((1, 0), dtype=np.int64), np.empty((500, 0), dtype=np.int64)
 CLOSE = 1e-12  # of what is largest
 
 
@@ -55,18 +53,6 @@ def test_they_are_those_of_the_fields(grips, want):
     sets = sets_of(engine.network, 6, grips)
     found = engine._extremes(6, sets, want, compiled=True)
     assert apart(found, of_fields(engine, 6, sets, want)) <= CLOSE
-
-
-@needs_numba
-@once
-def test_in_parts_of_a_larger_structure():
-    engine = ComplianceEngine(build_network(load_scene("dome163")))
-    bricks, want = 33, Want.RESPONSES
-    sets = sets_of(engine.network, bricks, 3)
-    operator = engine._operator(bricks, np.arange(2 * bricks).reshape(-1, 1))
-    assert len(rows_of(operator, want).rows) > 1
-    found = engine._extremes(bricks, sets, want, compiled=True)
-    assert apart(found, of_fields(engine, bricks, sets, want)) <= CLOSE
 
 
 @needs_numba
@@ -125,7 +111,7 @@ def test_no_number_depends_on_how_many_threads_share_the_sets(monkeypatch):
     network = build_network(load_scene("dome163"))
     sets, found = sets_of(network, 60, 3), []
     for threads in (1, 3):
-        for module in (_grown, _growth):
+        for module in (_extremes, _growth):
             monkeypatch.setattr(module, "cores", lambda threads=threads: threads)
         monkeypatch.setattr(_growth, "_AT_ONCE", 2**12)
         engine = ComplianceEngine(network)
@@ -165,32 +151,6 @@ def test_a_set_has_the_same_whatever_is_beside_it():
 
 
 @needs_numba
-@once
-def test_a_wrong_row_is_seen():
-    """The control of the comparisons above."""
-    engine = ComplianceEngine(build_network(six_bricks()))
-    operator = engine._operator(6, np.arange(12).reshape(-1, 1))
-    known = rows_of(operator, Want.EDGES)
-    index, force = operator.load_index(np.array([[0, 9]])), np.ones((1, 6))
-    true = extremes_of(known, index, force, NONE)
-    wrong = known._replace(rows=known.rows * (1 + 1e-9))
-    found = extremes_of(wrong, index, force, NONE)
-    assert np.abs(found - true).max() > CLOSE * np.abs(true).max()
-
-
-@needs_numba
-def test_threads_do_not_disturb_each_other():
-    engine = ComplianceEngine(build_network(six_bricks()))
-    operator = engine._operator(6, np.arange(12).reshape(-1, 1))
-    known, index = rows_of(operator, Want.RESPONSES), operator.load_index(np.array([[0, 9]] * 500))
-    forces = [np.random.default_rng(i).normal(size=index.shape) for i in range(8)]
-    alone = [extremes_of(known, index, force, MANY) for force in forces]
-    with ThreadPoolExecutor(4) as pool:
-        beside = pool.map(lambda force: extremes_of(known, index, force, MANY), forces)
-        assert all(map(np.array_equal, alone, beside))
-
-
-@needs_numba
 @pytest.mark.slow  # compiles anew
 def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
     code = (
@@ -198,11 +158,10 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
         "def refuse(*_, **__): raise OSError('read only')\n"
         "tempfile.TemporaryFile = refuse\n"  # what numba tries folders by
         "import numpy as np\n"
-        "from seqopt.engines.rigid._compiled import solve_grips as solve\n"
-        "force, pivot = np.empty((1, 1)), np.empty((1, 1))\n"
-        "held = np.zeros((1, 1), dtype=np.int64), np.zeros((1, 1), dtype=np.int64)\n"
-        "solve(np.full((1, 1), 2.0), np.ones(1), np.ones((1, 1)), held, force, pivot)\n"
-        "print(force[0, 0], type(solve._cache).__name__)\n"
+        "from seqopt.engines.rigid._compiled import _substitute as solve\n"
+        "low, share = np.full((1, 1, 16), -0.5), np.ones((1, 16))\n"
+        "solve(low, share)\n"
+        "print(share[0, 0], type(solve._cache).__name__)\n"
     )
     command = [sys.executable, "-W", "error", "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=True)

@@ -114,7 +114,7 @@ CHECKS = {
         (stored("engine_speed").rename(columns={"Unnamed: 0": "name"}),),
         *("value", 900, {"name": "ratio_median"}),
     ),
-    "extremes": Check(extremes.holds, ("extremes",), *("times_fields", 1.4, {"bricks": 17})),
+    "extremes": Check(extremes.holds, ("extremes",), *("times_fields", 1.4, {"bricks": 99})),
     "fidelity_ladder": Check(
         lambda table: fidelity_ladder.judge(table) and fidelity_ladder.cheaper(table),
         ("fidelity_ladder",),

@@ -1,11 +1,9 @@
 """The loops of `seqopt.engines.rigid._extremes`, compiled by numba where it is installed.
 
 Nothing else imports this file. Grip sets are solved a few at a time, side by side, so that a
-processor works on several at once; what loads mean is summed for one stretch of edges or
-nodes at a time, over all sets, so that it stays in the processor's cache. The code is compiled when
-it is first called and kept in the folder that numba chooses: beside this file, or the user's own
-(``NUMBA_CACHE_DIR`` names another). No function touches what another call works on, and none holds
-Python's lock.
+processor works on several at once. The code is compiled when it is first called and kept in the
+folder that numba chooses: beside this file, or the user's own (``NUMBA_CACHE_DIR`` names another).
+No function touches what another call works on, and none holds Python's lock.
 """
 
 from __future__ import annotations
@@ -18,8 +16,10 @@ import numba
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
+from seqopt.engines.rigid._extremes import Edges, Ends, Grown, Kept, Motion, Part
 
 _SIDE_BY_SIDE = 16  # sets: a number that is known when loops are compiled
+_ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -43,31 +43,21 @@ def _compiled(*freedom: str) -> Callable[[_Function], _Function]:
 
 
 @_compiled()
-def solve_grips(
-    flexibility: Floats,
-    dead: Floats,
-    axis: Floats,
-    held: tuple[Ints, Ints],
-    force: Floats,
-    pivot: Floats,
-) -> None:
-    """Find the forces (S, k) that undo the displacements (l,) at grips, and scaled pivots (k, S).
+def solve_grown(grown: Grown, axis: Floats, columns: Ints, force: Floats, pivot: Floats) -> None:
+    """Find the forces (S, k) that hold nodes (S, r) still, and scaled pivots (k, S).
 
-    As ``_solve_positive`` of `seqopt.engines.rigid._grip_equations`, of rigid grips. ``axis`` (b,
-    d): along bricks; ``held`` (S, r), (S, k): nodes and their loads.
+    As ``_solve_positive`` of `seqopt.engines.rigid._grip_equations`, of rigid grips.
     """
-    columns, index = held
-    sets, count = index.shape
+    sets, count = force.shape
     low, share = np.empty((count, count, _SIDE_BY_SIDE)), np.empty((count, _SIDE_BY_SIDE))
-    at = np.empty(count, dtype=np.uint64)  # else each look-up asks whether it counts from the end
     for start in range(0, sets, _SIDE_BY_SIDE):
         for s in range(_SIDE_BY_SIDE):
             mine = min(start + s, sets - 1)
-            for i in range(count):
-                at[i] = index[mine, i]
+            at = columns[mine]
+            for i in range(len(at)):
+                _weigh(share, s, grown, at, i)
                 for j in range(i + 1):
-                    low[i, j, s] = flexibility[at[i], at[j]]
-                share[i, s] = -dead[at[i]]
+                    _gather(low, s, grown, at, (i, j))
             _brace(low, s, axis, columns, mine)
         _undo(low, share, start, force, pivot)
 
@@ -112,51 +102,6 @@ def _brace(low: Floats, s: int, axis: Floats, columns: Ints, mine: int) -> None:
 
 
 @_compiled()
-def share_pairs(
-    axis: Floats,
-    inner: tuple[Ints, Floats],
-    held: tuple[Ints, Ints],
-    force: Floats,
-    size: Floats,
-    idle: Ints,
-) -> None:
-    """Find what each grip bears, where each of two on one brick takes what reaches its own node.
-
-    As ``share_pairs`` of `seqopt.engines.rigid._grip_equations`. ``inner`` (b,), (l + 1, b): the
-    inner edges, and what loads mean to them; ``size`` (S, r): of the forces; ``idle`` (S, p): inner
-    edges that carry nothing then, -1 for none.
-    """
-    columns, index = held
-    edge, mean = inner
-    width, own = axis.shape[1], np.empty(force.shape[1])
-    for s in range(len(columns)):
-        pairs = 0
-        for k in range(len(own)):
-            own[k] = force[s, k]
-        for second in range(1, columns.shape[1]):
-            for first in range(second):
-                node, brick = columns[s, first], columns[s, first] // 2
-                if columns[s, second] // 2 != brick:
-                    continue
-                idle[s, pairs] = edge[brick]
-                pairs += 1
-                carried = mean[len(mean) - 1, brick]
-                for k in range(len(own)):
-                    carried += own[k] * mean[index[s, k], brick]
-                carried *= 1.0 - 2.0 * (node % 2)  # the axis leads to the second node
-                for i in range(width):
-                    own[width * first + i] += carried * axis[brick, i]
-                    own[width * second + i] -= carried * axis[brick, i]
-        for k in range(pairs, idle.shape[1]):
-            idle[s, k] = -1
-        for grip in range(size.shape[1]):
-            squared = 0.0
-            for i in range(width * grip, width * grip + width):
-                squared += own[i] * own[i]
-            size[s, grip] = np.sqrt(squared)
-
-
-@_compiled()
 def _eliminate(low: Floats, pivots: Floats) -> None:
     """Turn lower triangles (k, k, w) into their factors, with reciprocals of the pivots (k, w)."""
     count = len(low)
@@ -194,56 +139,195 @@ def _substitute(low: Floats, share: Floats) -> None:
 
 
 @_compiled()
-def _sum_into(out: Floats, rows: Floats, part: int, loads: tuple[Ints, Floats], s: int) -> None:
-    """Find what the weight, the last of the rows (p, l + 1, n), and forces of a set mean in a part.
+def _weigh(share: Floats, s: int, grown: Grown, at: Ints, i: int) -> None:
+    """Write what undoes how far the weight moves a grip's node."""
+    brick, first = at[i] // 2, 3 * (at[i] % 2)
+    for a in range(3):
+        total = 0.0
+        for p in range(6):
+            total -= grown.nodes[brick, first + a, p] * grown.twist[0, 6 * brick + p]
+        share[3 * i + a, s] = total
 
-    Rows are not cut out, for each part and set: it takes as long as summing a hundred numbers.
-    Three at a time: those of a grip in space.
-    """
-    index, force = loads
-    count, weight, m = index.shape[1], rows.shape[1] - 1, part
+
+@_compiled()
+def _gather(low: Floats, s: int, grown: Grown, at: Ints, pair: tuple[int, int]) -> None:
+    """Write how far forces at one grip's node move that of another."""
+    i, j = pair
+    brick, first = at[i] // 2, 3 * (at[i] % 2)
+    other, second = at[j] // 2, 3 * (at[j] % 2)
+    for a in range(3):
+        for c in range(3):
+            total = 0.0
+            for p in range(6):
+                moved = 0.0
+                for q in range(6):
+                    turn = grown.nodes[other, second + c, q]
+                    moved += grown.twist[1 + 6 * brick + p, 6 * other + q] * turn
+                total += grown.nodes[brick, first + a, p] * moved
+            low[3 * i + a, 3 * j + c, s] = total
+
+
+@_compiled()
+def _add_six(out: Floats, rows: Floats, first: int, much: Floats) -> None:
+    """Add six neighboring rows, so much of each."""
+    a, b, c = rows[first], rows[first + 1], rows[first + 2]
+    d, e, f = rows[first + 3], rows[first + 4], rows[first + 5]
+    p, q, r, s, t, u = much[0], much[1], much[2], much[3], much[4], much[5]
     for n in range(len(out)):
-        out[n] = rows[m, weight, n]
-    for k in range(0, count - 2, 3):
-        a, b, c = index[s, k], index[s, k + 1], index[s, k + 2]
-        p, q, r = force[s, k], force[s, k + 1], force[s, k + 2]
-        for n in range(len(out)):
-            out[n] += p * rows[m, a, n] + q * rows[m, b, n] + r * rows[m, c, n]
-    for k in range(count - count % 3, count):
-        for n in range(len(out)):
-            out[n] += force[s, k] * rows[m, index[s, k], n]
+        out[n] += (p * a[n] + q * b[n] + r * c[n]) + (s * d[n] + t * e[n] + u * f[n])
 
 
-@_compiled("nnan", "nsz")  # else no maximum is taken of several numbers at once
-def reduce_rows(
-    rows: Floats,
-    counts: tuple[int, int, int, int],
-    loads: tuple[Ints, Floats],
-    idle: Ints,
-    found: Floats,
+@_compiled()
+def _sum_up(
+    moved: Floats, carried: Floats, grown: Grown, kept: Kept, at: Ints, force: Floats
 ) -> None:
-    """Find extremes of what forces (S, k) at loads (S, k) and the weight mean.
+    """Find the twists and wrenches under the weight and forces at nodes."""
+    pull, shares = np.empty(6), np.zeros(len(kept.twist))
+    moved[:] = grown.twist[0, : len(moved)]
+    carried[:] = grown.wrench[0, : len(carried)]
+    for i in range(len(at)):
+        known = False
+        for k in range(len(kept.node)):
+            if at[i] == kept.node[k]:
+                shares[3 * k : 3 * k + 3] = force[3 * i : 3 * i + 3]
+                known = True
+        if known:
+            continue
+        brick, first = at[i] // 2, 3 * (at[i] % 2)
+        for p in range(6):
+            pull[p] = 0.0
+            for a in range(3):
+                pull[p] += grown.nodes[brick, first + a, p] * force[3 * i + a]
+        _add_six(moved, grown.twist, 1 + 6 * brick, pull)
+        _add_six(carried, grown.wrench, 1 + 6 * brick, pull)
+    for row in range(0, len(shares), 6):
+        _add_six(moved, kept.twist, row, shares[row : row + 6])
+        _add_six(carried, kept.wrench, row, shares[row : row + 6])
 
-    ``rows`` (p, l + 1, n), ``counts``, ``found`` (4, S): as of `seqopt.engines.rigid._extremes`,
-    and of how many edges in all; ``idle`` (S, q): edges that carry nothing, -1 for none.
+
+@_compiled("nnan", "nsz")
+def _extremes_outside(carried: Floats, edges: Edges, part: Part) -> tuple[float, float]:
+    """Return the least and the largest force of all edges but inner ones."""
+    least, most = np.inf, -np.inf
+    for e in range(part.edges - part.bricks):
+        j, tension = edges.first[e], 0.0
+        if j < len(carried):  # else its spring does not act yet
+            x, y, z = edges.along[0, e], edges.along[1, e], edges.along[2, e]
+            tension = x * carried[j] + y * carried[j + 1] + z * carried[j + 2]
+        least, most = min(least, tension), max(most, tension)
+    return least, most
+
+
+@_compiled()
+def _pull_bricks(
+    tension: Floats, carried: Floats, edges: Edges, part: Part, at: Ints, force: Floats
+) -> None:
+    """Find the forces of inner edges (b,)."""
+    for b in range(part.bricks):
+        total = part.at_second[b]
+        for k in range(edges.start[b], edges.start[b + 1]):
+            if edges.at[k] < len(carried):
+                total += edges.much[k] * carried[edges.at[k]]
+        tension[b] = total
+    for i in range(len(at)):
+        for a in range(3):
+            along = part.axis[at[i] // 2, a] * (at[i] % 2)
+            tension[at[i] // 2] += along * force[3 * i + a]
+
+
+@_compiled()
+def _share_pairs(tension: Floats, part: Part, at: Ints, force: Floats) -> None:
+    """Let each of two grips on one brick take what reaches its own node, in place."""
+    for second in range(1, len(at)):
+        for first in range(second):
+            brick = at[first] // 2
+            if at[second] // 2 == brick:
+                between = tension[brick] * (1.0 - 2.0 * (at[first] % 2))
+                tension[brick] = 0.0
+                for a in range(3):
+                    force[3 * first + a] += between * part.axis[brick, a]
+                    force[3 * second + a] -= between * part.axis[brick, a]
+
+
+@_compiled("nnan", "nsz")
+def _square(moved: Floats, motion: Motion, node: int) -> float:
+    """Return the square of how far a node moves."""
+    square = 0.0
+    for row in range(3 * node, 3 * node + 3):
+        total = 0.0
+        for k in range(motion.start[row], motion.start[row + 1]):
+            if motion.at[k] < len(moved):
+                alone = 6 * motion.since[k] > len(moved)
+                total += motion.much[k] * moved[motion.at[k]] * (1.0 + alone)
+        square += total * total
+    return square
+
+
+@_compiled("nnan", "nsz")
+def _farthest(moved: Floats, motion: Motion, nodes: int, first: int) -> tuple[float, int]:
+    """Return the square of how far any node moves, and its brick: one that may be it is first."""
+    best, far = 0.0, first
+    for after in range(-1, len(moved) // 6):
+        brick = first if after < 0 else after
+        shift = turn = 0.0
+        for p in range(6 * brick, 6 * brick + 3):
+            shift += moved[p] * moved[p]
+            turn += moved[p + 3] * moved[p + 3]
+        turn *= motion.reach[brick] * motion.reach[brick]
+        if 2 * (shift + turn) * _ROUNDED <= best:  # as the square of a sum is no more than that
+            continue
+        if (shift + turn + 2 * np.sqrt(shift * turn)) * _ROUNDED <= best:
+            continue
+        for k in range(motion.first[brick], motion.first[brick + 1]):
+            if motion.node[k] < nodes:
+                square = _square(moved, motion, motion.node[k])
+                if square > best:
+                    best, far = square, brick
+    return best, far
+
+
+@_compiled("nnan", "nsz")
+def _most_moment(carried: Floats, ends: Ends) -> float:
+    """Return the square of the largest moment at any ground end that acts."""
+    most = 0.0
+    for g in range(len(ends.first)):
+        first, square = ends.first[g], 0.0
+        if first >= len(carried):
+            continue
+        for c in range(3):
+            total = 0.0
+            for p in range(6):
+                total += carried[first + p] * ends.moment[g, p, c]
+            square += total * total
+        most = max(most, square)
+    return most
+
+
+@_compiled("nnan", "nsz")
+def reduce_grown(
+    grown: Grown,
+    kept: Kept,
+    maps: tuple[Edges, Motion, Ends],
+    part: Part,
+    columns: Ints,
+    force: Floats,
+) -> Floats:
+    """Return squares of extremes of sets, (4, S), and let grips on one brick share, in place.
+
+    Of edge forces they are no squares. ``force`` (S, k): of rigid grips at nodes (S, r).
     """
-    edges, nodes, ends, total = counts
-    out = np.empty(rows.shape[2])
-    tension, x, y, z = out[:edges], out[edges:], out[edges + nodes :], out[edges + 2 * nodes :]
-    behind = edges + 3 * nodes
-    u, v, w = out[behind:], out[behind + ends :], out[behind + 2 * ends :]
-    for part in range(len(rows)):
-        for s in range(len(idle)):
-            _sum_into(out, rows, part, loads, s)
-            for k in range(idle.shape[1]):
-                place = idle[s, k] - min(part * edges, total - edges)
-                if idle[s, k] >= 0 and 0 <= place < edges:
-                    out[place] = 0.0
-            least, most, shift, moment = found[0, s], found[1, s], found[2, s], found[3, s]
-            for n in range(edges):
-                least, most = min(least, tension[n]), max(most, tension[n])
-            for n in range(nodes):
-                shift = max(shift, x[n] * x[n] + y[n] * y[n] + z[n] * z[n])
-            for n in range(ends):
-                moment = max(moment, u[n] * u[n] + v[n] * v[n] + w[n] * w[n])
-            found[0, s], found[1, s], found[2, s], found[3, s] = least, most, shift, moment
+    edges, motion, ends = maps
+    found, tension = np.zeros((4, len(columns))), np.empty(part.bricks)
+    carried, moved, far = np.empty(part.wrenches), np.empty(6 * part.bricks), 0
+    for s in range(len(columns)):
+        _sum_up(moved, carried, grown, kept, columns[s], force[s])
+        if part.nodes:
+            found[2, s], far = _farthest(moved, motion, part.nodes, far)
+        found[3, s] = _most_moment(carried, ends)
+        least, most = _extremes_outside(carried, edges, part)
+        _pull_bricks(tension, carried, edges, part, columns[s], force[s])
+        _share_pairs(tension, part, columns[s], force[s])
+        for b in range(part.bricks):
+            least, most = min(least, tension[b]), max(most, tension[b])
+        found[0, s], found[1, s] = least, most
+    return found

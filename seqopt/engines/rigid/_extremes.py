@@ -1,32 +1,30 @@
 """The extremes of the fields of many grip sets, without the fields.
 
 Who compares grip sets asks for the largest tension of any edge, the largest displacement of any
-node, the largest moment at any ground end. What every load means is kept by parts of the structure,
-as many edges and nodes to a part as stay in the processor's cache while all grip sets are summed
-there; of each sum only the extremes are kept.
-
-The loops are those of `seqopt.engines.rigid._compiled`, where numba is installed; else, and for
-little work, extremes are taken from fields, which are the reference. Loading numba takes half a
-second, so it is left to those who ask for it.
+node, the largest moment at any ground end. Where a structure has more nodes than there are grip
+sets, most of what an operator holds is asked of none of them. What the grips of a set move at each
+other, and what they and the weight do to bricks and springs, is then read from
+`seqopt.engines.rigid._growth` itself, by the loops of `seqopt.engines.rigid._compiled` where numba
+is installed. What that means to edges, nodes and ground ends stands by entries: no sparse matrix is
+cut for every brick count. Else extremes are taken from fields, which are the reference.
 """
 
 from __future__ import annotations
 
 from functools import cache
 from importlib.util import find_spec
-from math import prod
 from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import Fields, Want, names_wanted
-from seqopt.engines.rigid._operator import ComplianceOperator
+from seqopt.engines.interface import Fields, Want
+from seqopt.engines.rigid._operator import Doubts, OperatorBuilder
+from seqopt.engines.rigid._response_maps import SceneMaps, inner_edges
+from seqopt.work._threads import cores, in_threads, one_thread
 
-_PART = 2**15  # numbers under all loads of a part: a quarter of a megabyte
-_LEAST = 256  # of them under each load
-_LINE = 8  # of them in a line of the processor's cache
+_SETS = 64  # grip sets that a thread takes at least
 
 
 class Extremes(NamedTuple):
@@ -42,80 +40,6 @@ class Extremes(NamedTuple):
     shift: Floats
     moment: Floats
     force: Floats
-
-
-class ExtremeRows(NamedTuple):
-    """What every load of an operator means, by parts of the structure.
-
-    ``rows`` (p, l + 1, n): the weight's last; ``counts``: edges, nodes, ground ends of a part. A
-    row has the forces of its edges, then the displacements of its nodes along x, then y, then z,
-    then the moments at its ends so. Where the last part has fewer, some stand twice.
-    """
-
-    rows: Floats
-    counts: tuple[int, int, int]
-    edges: int  # in all
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the rows."""
-        return self.rows.nbytes
-
-
-_OF = {"edge_force": 1, "displacement": 3, "support": 6}  # of which the last three are taken
-
-
-def rows_of(operator: ComplianceOperator, want: Want) -> ExtremeRows:
-    """Return what every load of an operator means to the extremes of some fields."""
-    asked = names_wanted(want).intersection(_OF)
-    return operator.made(("extremes", asked), lambda: _made_rows(operator, asked))
-
-
-def _made_rows(operator: ComplianceOperator, asked: frozenset[str]) -> ExtremeRows:
-    loads, maps = len(operator.twist), operator.maps
-    sizes = [maps.count(name) // size if name in asked else 0 for name, size in _OF.items()]
-    total = sizes[0] + 3 * (sizes[1] + sizes[2])
-    parts = max(1, min(total * loads // _PART, total // _LEAST))
-    edges, nodes, ends = (-(-size // parts) for size in sizes)
-    rows, first = _in_lines(parts, loads, edges + 3 * (nodes + ends)), 0
-    for count, (name, size) in zip((edges, nodes, ends), _OF.items(), strict=True):
-        if not count:
-            continue
-        found = operator.mean(name)
-        field = found.reshape(len(found), -1, size).transpose(0, 2, 1)[:, -3:]
-        for part in range(parts):
-            start = min(part * count, field.shape[2] - count)
-            for axis in range(field.shape[1]):
-                here = slice(first + axis * count, first + axis * count + count)
-                rows[part, :, here] = field[:, axis, start : start + count]
-        first += count * field.shape[1]
-    return ExtremeRows(rows, (edges, nodes, ends), sizes[0])
-
-
-def _in_lines(parts: int, loads: int, width: int) -> Floats:
-    """Return zeros of which each row begins with a line of the processor's cache: a fifth faster.
-
-    Rows are longer by what is left of their last lines.
-    """
-    shape = parts, loads, width + -width % _LINE
-    rows = np.zeros(prod(shape) + _LINE)
-    first = -(rows.ctypes.data // rows.itemsize) % _LINE
-    return rows[first : first + prod(shape)].reshape(shape)
-
-
-def extremes_of(known: ExtremeRows, index: Ints, force: Floats, idle: Ints) -> Floats:
-    """Return the extremes of edge forces, of displacements and of moments of sets, (4, S).
-
-    ``index``, ``force`` (S, k): loads of the operator, and how much of each; ``idle`` (S, q): edges
-    that carry nothing whatever these mean, -1 for none.
-    """
-    found = np.zeros((4, len(index)))
-    if known.counts[0]:
-        found[0], found[1] = np.inf, -np.inf
-    counts = *known.counts, known.edges
-    _loops().reduce_rows(known.rows, counts, (index, force), idle, found)
-    np.sqrt(found[2:], out=found[2:])
-    return found
 
 
 def extremes_in(fields: Fields, want: Want) -> Extremes:
@@ -152,35 +76,159 @@ def _loops() -> ModuleType:
     return _compiled
 
 
-class Solved(NamedTuple):
-    """Forces of rigid grips as compiled loops find them.
+class Grown(NamedTuple):
+    """What unit wrenches on bricks mean, and how inner nodes (B, 6, 6) follow their bricks."""
 
-    ``force`` (S, k): at loads, N; ``pivot`` (k, S): scaled; ``size`` (S, r): of the forces of
-    grips, what is between two on one brick shared by them; ``idle`` (S, q): edges that carry
-    nothing then.
+    twist: Floats
+    wrench: Floats
+    nodes: Floats
+
+
+class Kept(NamedTuple):
+    """What forces at nodes (q,) mean that all grip sets hold: three rows each, and rows of zeros.
+
+    So many that they are a multiple of six: as many as of a brick.
     """
 
-    force: Floats
-    pivot: Floats
-    size: Floats
-    idle: Ints
+    node: Ints
+    twist: Floats
+    wrench: Floats
 
 
-def solve_compiled(operator: ComplianceOperator, columns: Ints, index: Ints) -> Solved:
-    """Return what rigid grips exert on nodes (S, r), which are loads (S, k)."""
-    (sets, grips), axis, loops = columns.shape, operator.axis, _loops()
-    found = Solved(
-        force=np.empty(index.shape),
-        pivot=np.empty(index.shape[::-1]),
-        size=np.empty(columns.shape),
-        idle=np.empty((sets, grips // 2), dtype=np.int64),
-    )
-    flexibility, dead, held = operator.flexibility, operator.dead_displacement, (columns, index)
-    loops.solve_grips(flexibility, dead, axis, held, found.force, found.pivot)
-    edge = operator.inner_edge
-    mean = operator.made(
-        "inner edges", lambda: np.ascontiguousarray(operator.mean("edge_force")[:, edge])
-    )
-    inner = edge, mean
-    loops.share_pairs(axis, inner, held, found.force, found.size, found.idle)
-    return found
+class Edges(NamedTuple):
+    """What edges carry of the forces of springs.
+
+    ``first`` (E - B,), ``along`` (3, E - B): of all but inner edges, where the force of its spring
+    is, and how much of it. ``start``, ``at``, ``much``: the entries of rows of inner edges (B,).
+    """
+
+    first: Ints
+    along: Floats
+    start: Ints
+    at: Ints
+    much: Floats
+
+
+class Motion(NamedTuple):
+    """How nodes follow bricks: entries of a matrix, and from which brick count on each holds.
+
+    ``first`` (B + 1,), ``node``: the nodes that follow each brick; ``reach`` (B,): how far from its
+    centroid the last of these is, m.
+    """
+
+    start: Ints
+    at: Ints
+    much: Floats
+    since: Ints
+    first: Ints
+    node: Ints
+    reach: Floats
+
+
+class Ends(NamedTuple):
+    """Where wrenches are of ground ends (G,), and the moments (G, 6, 3) for unit ones."""
+
+    first: Ints
+    moment: Floats
+
+
+class Part(NamedTuple):
+    """A partial structure: counts, and what `inner_edges` says of its bricks."""
+
+    bricks: int
+    wrenches: int  # numbers: six for every spring that acts
+    edges: int
+    nodes: int  # none where nobody asks how far they move
+    at_second: Floats
+    axis: Floats
+
+
+def maps_by_entry(scene: SceneMaps) -> tuple[Edges, Motion, Ends]:
+    """Return what wrenches and twists of a whole scene mean, in space."""
+    spring = scene.network.edge_spring
+    through, outer = scene.edge[spring < 0], scene.edge[spring >= 0].tocoo()
+    along = np.zeros((3, outer.shape[0]))
+    along[outer.col % 6, outer.row] = outer.data
+    rows = through.indptr.astype(np.int64), through.indices.astype(np.int64), through.data
+    edges = Edges(6 * spring[spring >= 0], along, *rows)
+    moment = np.ascontiguousarray(scene.support[:, :, 3:])
+    return edges, _motion_of(scene), Ends(6 * scene.network.springs.support, moment)
+
+
+def _motion_of(scene: SceneMaps) -> Motion:
+    network, entries = scene.network, scene.motion.tocoo()
+    start, at = (part.astype(np.int64) for part in (scene.motion.indptr, scene.motion.indices))
+    pairs = np.unique(np.stack([entries.col // 6, entries.row // 3]), axis=1)
+    brick, node = pairs.astype(np.int64)
+    first = np.searchsorted(brick, np.arange(len(network.inner) + 1))
+    arm = np.linalg.norm(network.node_position[node] - network.centroid[brick], axis=1)
+    reach = np.maximum.reduceat(arm, first[:-1])  # each has its inner nodes at least
+    return Motion(start, at, scene.motion.data, scene.since, first, node, reach)
+
+
+class GrownExtremes:
+    """Answers grip sets of the brick count that a growth has reached.
+
+    ``builder``: in space, of a scene whose grips transmit no moments and whose ground stays.
+    """
+
+    def __init__(self, builder: OperatorBuilder) -> None:
+        self._network, self._growth = builder.network, builder.growth
+        self._grown = Grown(self._growth.twist, self._growth.wrench, builder.nodes)
+        self._maps = maps_by_entry(builder.maps)
+        self._part = Part(0, 0, 0, 0, np.empty(0), np.empty((0, 3)))
+        self._growth.remembers = True
+
+    def reach(self, bricks: int) -> None:
+        """Let a number of bricks stand."""
+        if bricks == self._part.bricks == self._growth.bricks:
+            return
+        with one_thread():
+            self._growth.reach(bricks)
+        network, (twist, _, nodes) = self._network, self._grown
+        acting = int(np.searchsorted(network.springs.since, bricks, side="right"))
+        counts = bricks, 6 * acting, network.count_edges(bricks), network.count_nodes(bricks)
+        _, axis, at_second = inner_edges(network, bricks)
+        self._part = Part(*counts, at_second, axis)
+        own, every = twist[1 : 1 + 6 * bricks, : 6 * bricks], np.arange(bricks)
+        blocks = own.reshape(bricks, 6, bricks, 6)[every, :, every]
+        self.doubts = Doubts(
+            np.einsum("nip,npq,niq->ni", nodes[:bricks], blocks, nodes[:bricks]).ravel(),
+            np.einsum("nip,np->ni", nodes[:bricks], twist[0, : 6 * bricks].reshape(-1, 6)).ravel(),
+            np.repeat(self._growth.loss[:bricks], nodes.shape[1]),
+        )
+
+    def forces(self, columns: Ints) -> tuple[Floats, Floats]:
+        """Return forces (S, k) of rigid grips at nodes (S, r), and their scaled pivots (k, S)."""
+        force = np.empty((len(columns), 3 * columns.shape[1]))
+        pivot = np.empty(force.shape[::-1])
+        _loops().solve_grown(self._grown, self._part.axis, columns, force, pivot)
+        return force, pivot
+
+    def extremes(self, columns: Ints, force: Floats, want: Want) -> Floats:
+        """Return extremes (4, S) as of `Extremes`; two grips on one brick share, in place."""
+        part = self._part if want & Want.DISPLACEMENTS else self._part._replace(nodes=0)
+        grown, maps, loops, kept = self._grown, self._maps, _loops(), self._kept(columns)
+
+        def reduce(own: slice) -> Floats:
+            squares: Floats = loops.reduce_grown(grown, kept, maps, part, columns[own], force[own])
+            return squares
+
+        step = max(_SETS, -(-len(columns) // cores()))
+        parts = [slice(start, start + step) for start in range(0, max(len(columns), 1), step)]
+        found = np.concatenate(in_threads(reduce, parts), axis=1)
+        np.sqrt(found[2:], out=found[2:])
+        return found
+
+    def _kept(self, columns: Ints) -> Kept:
+        """Return what forces mean at the nodes that all sets (S, r) hold."""
+        (twist, wrench, nodes), part = self._grown, self._part
+        held = [n for n in columns[0].tolist() if (columns == n).any(axis=1).all()]
+        found, count = [], -(-len(held) // 2) * 6
+        for answers, width in ((twist, 6 * part.bricks), (wrench, part.wrenches)):
+            rows = np.zeros((count, width))
+            for i, node in enumerate(held):
+                turned = nodes[node // 2, 3 * (node % 2) : 3 * (node % 2) + 3]
+                rows[3 * i : 3 * i + 3] = turned @ answers[1 + 6 * (node // 2) :][:6, :width]
+            found.append(rows)
+        return Kept(np.array(held, dtype=np.int64), *found)

@@ -19,7 +19,7 @@ from seqopt.engines.interface import _couples
 from seqopt.engines.rigid._operator import ComplianceOperator
 
 if TYPE_CHECKING:
-    from seqopt.engines.rigid._grown import GrownExtremes
+    from seqopt.engines.rigid._extremes import GrownExtremes
 
 
 class Pairs(NamedTuple):

@@ -5,11 +5,10 @@ The operators of all brick counts come from what grows with the build.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
-from typing import Any, TypeVar
 
 import numpy as np
 
@@ -27,7 +26,6 @@ from seqopt.engines.rigid._response_maps import (
 )
 from seqopt.network.network import Network
 
-_Made = TypeVar("_Made")
 _OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
 _TOGETHER = 1000  # sets up to which one product takes less than one for every field
 _FEW = 200  # loads whose responses take little, and are always made once for all
@@ -214,7 +212,9 @@ class ComplianceOperator(FrozenValue):
 
     def of_loads(self, *names: str) -> Floats:
         """Return fields under every load side by side, (l + 1, Q), made when first asked for."""
-        return self.made(names, lambda: np.hstack([self.mean(name) for name in names]))
+        if names not in self._made:
+            self._made[names] = frozen(np.hstack([self.mean(name) for name in names]))
+        return self._made[names]
 
     def mean(self, name: str) -> Floats:
         """Return a field under every load, (l + 1, Q), and keep it nowhere."""
@@ -229,15 +229,8 @@ class ComplianceOperator(FrozenValue):
             out[-1] += self.maps.ground
         return out
 
-    def made(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
-        """Return arrays that are kept with the operator, made when they are first asked for."""
-        known: _Made | None = self._made.get(name)
-        if known is None:
-            known = self._made[name] = frozen(make())
-        return known
-
     @cached_property
-    def _made(self) -> dict[Hashable, Any]:
+    def _made(self) -> dict[tuple[str, ...], Floats]:
         return {}
 
     def _states(self, name: str) -> Floats:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from math import isfinite, prod
+from math import prod
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,14 +35,7 @@ from seqopt.engines.interface import (
     names_wanted,
     require_finite,
 )
-from seqopt.engines.rigid._extremes import (
-    Extremes,
-    can_compile,
-    extremes_in,
-    extremes_of,
-    rows_of,
-    solve_compiled,
-)
+from seqopt.engines.rigid._extremes import Extremes, GrownExtremes, can_compile, extremes_in
 from seqopt.engines.rigid._grip_equations import (
     Pairs,
     _by_grip,
@@ -60,7 +53,6 @@ from seqopt.scene.scene import Scene
 from seqopt.work._threads import one_thread
 
 if TYPE_CHECKING:
-    from seqopt.engines.rigid._grown import GrownExtremes
     from seqopt.engines.rigid._refinement import Refinements
 
 _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
@@ -157,33 +149,13 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     return out
 
 
-def _solve_fast_extremes(
-    operator: ComplianceOperator, columns: Ints, want: Want, accuracy: float
-) -> tuple[Floats, Floats, Bools]:
-    """Return extremes (4, S) of rigid grips, their forces (S, r), and which sets have others.
-
-    These are the sets that an operator alone answers not well enough.
-    """
-    sets = len(columns)
-    found, size, apart = np.empty((4, sets)), np.empty(columns.shape), np.empty(sets, dtype=bool)
-    for start in range(0, sets, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        index = operator.load_index(columns[part])
-        force, pivot, size[part], idle = solve_compiled(operator, columns[part], index)
-        wrong = ~well_conditioned(operator, index, _GripForces(force, pivot), accuracy / _UNSEEN)
-        if np.count_nonzero(wrong):
-            force[wrong] = 0.0
-        found[:, part] = extremes_of(rows_of(operator, want), index, force, idle)
-        apart[part] = wrong
-    if not isfinite(found.sum()):
-        apart |= ~np.isfinite(found).all(axis=0)
-    return found, size, apart
-
-
 def _solve_grown_extremes(
     grown: GrownExtremes, columns: Ints, want: Want, accuracy: float
 ) -> tuple[Floats, Floats, Bools]:
-    """Return the same straight from what grows with the build."""
+    """Return extremes (4, S) of rigid grips, their forces (S, r), and which sets have others.
+
+    These are the sets that what grows with the build answers not well enough.
+    """
     index = load_rows(columns, 3, 0)
     force, pivot = grown.forces(columns)
     apart = ~well_conditioned(grown, index, _GripForces(force, pivot), accuracy / _UNSEEN)
@@ -263,8 +235,8 @@ class ComplianceEngine(NamedEngine):
     ) -> Extremes:
         """Return the extremes of the fields that are wanted, for grip sets (S, r).
 
-        ``compiled``: whether by compiled loops, where numba is there and rows of all loads are
-        made; else they are taken from the fields.
+        ``compiled``: whether by compiled loops, where numba is there and sets are few beside the
+        nodes; else they are taken from the fields.
         """
         columns, numbers = grip_columns(self._network, bricks, grips), np.asarray(grips)
         compliance = read_compliance(self._network, columns, numbers, None)
@@ -275,16 +247,12 @@ class ComplianceEngine(NamedEngine):
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
         if bricks <= min(self._uniform, len(self._tree.spring)):
-            accuracy = self._accepted(want)
-            if are_few(bricks * len(self._basis.force), len(columns)):
-                operator = self._operator(bricks, columns)
-                found, size, apart = _solve_fast_extremes(operator, columns, want, accuracy)
-            elif self._can_grow and self._builder.growth.bricks <= bricks:
+            many = are_few(bricks * len(self._basis.force), len(columns))  # fields take less
+            if not many and self._can_grow and self._builder.growth.bricks <= bricks:
                 if self._grown is None:
-                    from seqopt.engines.rigid._grown import GrownExtremes  # noqa: PLC0415  # large
-
                     self._grown = GrownExtremes(self._builder)
                 self._grown.reach(bricks)
+                accuracy = self._accepted(want)
                 found, size, apart = _solve_grown_extremes(self._grown, columns, want, accuracy)
         if np.count_nonzero(apart):
             fields = self._found(bricks, columns[apart], RIGID, want)
