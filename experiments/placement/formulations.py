@@ -197,7 +197,7 @@ def alone(*cell: object, memory: float = MEMORY, most: float = MOST) -> dict[str
     with ProcessPoolExecutor(1, context, limited, (memory, most)) as pool:
         try:
             return dict(pool.submit(best, *cell).result())
-        except (BrokenProcessPool, KeyboardInterrupt):  # the latter of its own limit
+        except (BrokenProcessPool, KeyboardInterrupt, MemoryError):  # of its own limits
             return {"ended": "killed", "said": "by a limit of time or memory"}
 
 

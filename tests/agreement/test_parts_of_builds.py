@@ -131,7 +131,7 @@ def test_limits_standing_and_scenarios_go_on_too():
     begin = Site.after(plan.steps, 3)
     limit, rules = Limit("T_max", 1e3), FreeRules(begin=begin)
     some = seqopt.scenarios(scene, count=2, seed=1)
-    for more in ({"limits": [limit]}, {"stands": "epoxy"}, {"scenarios": some}):
+    for more in ({"limits": [limit]}, {"stands": "epoxy"}, {"robust": seqopt.Robust(scenes=some)}):
         rest = seqopt.optimize(scene, "free", ONES, aim="minmax,steps", rules=rules, **more)
         whole = seqopt.optimize(scene, "free", ONES, aim="minmax,steps", **more)
         assert rest.status == whole.status == "optimal"
