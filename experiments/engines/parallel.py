@@ -5,20 +5,17 @@ others. Where compiled loops are installed one process keeps two cores busy alre
 measured beside it. The answers are the same to the last bit, on Dask's local cluster too.
 
 Method: the states of the three-robot loop's steps with one open grip, those that a search without
-proof needs, of the vault of 338 bricks (``--scene`` takes another: ``chain100``, ``wall``, or a
-name of `seqopt.load_scene`; ``--pairs`` takes all steps). One process and two take turns, then
-comes Dask's local cluster of two, in one run and each from a new engine; starting the processes
-counts, the cluster is started before. Load is what waited for the cores of the machine when the run
-began.
+proof needs, of the vault of 338 bricks. One process and two take turns, then comes Dask's local
+cluster of two, each from a new engine; starting the processes counts, the cluster is started
+before. Load is what waited for the cores of the machine when the run began.
 
-Inputs: none. Command: ``python -m experiments parallel [--quick] [--scene NAME]
-[--pairs]``; stored rows of other scenes stay.
+Inputs: the shipped scene. Command: ``python -m experiments parallel [--quick]``.
 """
 
 import os
 import resource
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
@@ -26,9 +23,7 @@ from importlib.util import find_spec
 import numpy as np
 import pandas as pd
 
-from experiments.harness.claim import Claim, Finding, Option, Options
-from experiments.harness.results import RESULTS
-from experiments.harness.scenes import half_circle, running_bond
+from experiments.harness.claim import Claim, Finding, Options
 from seqopt import Network, Schedule, build_network, load_scene, make_engine, three_robot_loop
 from seqopt.engines.rigid._extremes import can_compile
 from seqopt.responses import _choices
@@ -39,9 +34,7 @@ from seqopt.work._workers import hire, map_ordered
 
 TWO = 1.6  # times as fast as one process that two have to be
 WANTED = frozenset({"T_max", "M_sup", "D_max", "F_largest"})
-ROUNDS = 1
-SMALL = "chain30"  # too small for compiled loops
-STORE = RESULTS / "parallel.csv"
+SCENE, SMALL = "vault338", "chain:bricks=30"  # the latter too small for compiled loops
 
 
 @dataclass(frozen=True)
@@ -52,13 +45,6 @@ class Run:
     models: int
     seconds: float
     cpu: float
-
-
-def network_of(name: str) -> Network:
-    """Return the network of a scene by name; ``chain`` and a number is a half circle."""
-    if name.startswith("chain"):
-        return half_circle(int(name.removeprefix("chain")))
-    return build_network(running_bond(12, 8) if name == "wall" else load_scene(name))
 
 
 def cpu() -> float:
@@ -117,50 +103,28 @@ def loops(kind: str) -> Iterator[None]:
         _choices.COMPILED = usual
 
 
-def measured(name: str, rounds: int, *, single: bool) -> pd.DataFrame:
-    """Return a row per way, by fields and, where they are installed and used, by compiled loops."""
-    kinds = ("fields", "compiled") if can_compile() and name != SMALL else ("fields",)
-    tables = []
-    for kind in kinds:
-        with loops(kind):
-            tables.append(by_ways(name, rounds, single=single).assign(loops=kind))
-    return pd.concat(tables, ignore_index=True)
-
-
-def by_ways(name: str, rounds: int, *, single: bool) -> pd.DataFrame:
-    """Return a row per way, the ways having taken turns."""
-    network, load = network_of(name), os.getloadavg()[0]
-    schedule, most = three_robot_loop(network), 1 if single else 2  # grips that are open
-    steps = tuple(step for step in schedule.steps if len(step.moves) <= most)
-    schedule = replace(schedule, steps=steps)
-    runs: dict[str, list[Run]] = {}
-    sent: dict[str, float] = {}
-
-    def _take_turns(ways: Mapping[str, Resources]) -> None:
-        for _ in range(rounds):
-            for way, resources in ways.items():
-                runs.setdefault(way, []).append(run(network, schedule, resources))
-        sent.update({way: overhead(resources) for way, resources in ways.items()})
-
-    _take_turns(HERE)
-    with cluster() as ways:
-        _take_turns(ways)
-    alone = runs["one process"]
-    rows = []
-    for way, mine in runs.items():
-        took, base = (
-            np.array([[each.seconds, each.cpu] for each in some]) for some in (mine, alone)
-        )
-        if "dask" in way:
-            took[:, 1] = np.nan  # its processes go on: what they computed is not known
-        clock, computed = np.median(base / took, axis=0)
-        row = {"scene": name, "states": "single moves" if single else "all", "way": way}
-        row |= {"models": mine[0].models}
-        row |= dict(zip(("seconds", "cpu_s"), np.median(took, axis=0), strict=True))
-        row |= {"times_as_fast_by_clock": clock}
-        row |= {"times_as_fast_by_cpu": (1 if way == "one process" else 2) * computed}
-        row |= {"call_s": sent[way], "same": all(own.steps == alone[0].steps for own in mine)}
-        rows.append(row | {"load": load, "cores": os.cpu_count()})
+def measured(name: str, kind: str) -> pd.DataFrame:
+    """Return a row per way, extremes being found by fields or by compiled loops."""
+    network, load = build_network(load_scene(name)), os.getloadavg()[0]
+    schedule = three_robot_loop(network)
+    steps = tuple(step for step in schedule.steps if len(step.moves) <= 1)  # of grips that are open
+    schedule, found = replace(schedule, steps=steps), dict[str, tuple[Run, float]]()
+    with loops(kind):
+        for way, resources in HERE.items():
+            found[way] = run(network, schedule, resources), overhead(resources)
+        with cluster() as others:
+            for way, resources in others.items():
+                found[way] = run(network, schedule, resources), overhead(resources)
+    alone, rows = found["one process"][0], []
+    for way, (own, sent) in found.items():
+        computed = np.nan if "dask" in way else own.cpu  # what its processes computed is not known
+        row = {"scene": name, "states": "single moves", "way": way, "models": own.models}
+        row |= {"seconds": own.seconds, "cpu_s": computed}
+        row |= {"times_as_fast_by_clock": alone.seconds / own.seconds}
+        cores = 1 if way == "one process" else 2
+        row |= {"times_as_fast_by_cpu": cores * alone.cpu / computed}
+        row |= {"call_s": sent, "same": own.steps == alone.steps}
+        rows.append(row | {"load": load, "cores": os.cpu_count(), "loops": kind})
     return pd.DataFrame(rows)
 
 
@@ -170,19 +134,13 @@ def holds(table: pd.DataFrame) -> bool:
 
 
 def experiment(options: Options) -> Finding:
-    name = SMALL if options.quick else options.scene
-    table = measured(name, 1 if options.quick else ROUNDS, single=not options.pairs)
+    kinds = ("fields", "compiled") if can_compile() and not options.quick else ("fields",)
+    name = SMALL if options.quick else SCENE
+    table = pd.concat([measured(name, kind) for kind in kinds], ignore_index=True)
     print(table.to_string(index=False, float_format="%.4g"))
-    old = pd.read_csv(STORE) if STORE.exists() else table[:0]
-    kept = old[(old["scene"] != name) | (old["states"] != table["states"][0])]
-    merged = pd.concat([kept, table]) if len(kept) else table
-    return Finding(holds(table), tables={"parallel": merged})
+    return Finding(holds(table), tables={"parallel": table})
 
 
 CLAIM = Claim(
-    experiment,
-    digits=4,
-    quick="a chain of 30 bricks in one round, too few to gain",
-    timed=True,
-    options=(Option("--scene", "which scene", "vault338"), Option("--pairs", "all steps")),
+    experiment, digits=4, quick="a chain of 30 bricks, which are too few to gain", timed=True
 )

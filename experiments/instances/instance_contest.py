@@ -5,18 +5,21 @@ proven: no value is below a proven bound, no bound is above a value. Where costs
 where a worst step comes first, the best is proven without a scene within a second. What is open is
 what no certificate closes: sums over states within budgets, and totals over scenarios.
 
-Method: every formulation that fits an instance, HiGHS on the MPS file and CP-SAT on its
-text, one after the other with 4 s each; what is
-given to outside solvers has 20,000 arcs at most. Values and bounds are of the first goal. Seconds
-are of the processor, reading and writing of files included. The best paths are kept in
-``known.json``, a better one that was known before stays.
+Method: every formulation that fits an instance, HiGHS on the MPS file and CP-SAT on its text, one
+after the other with 4 s each; what is given to outside solvers has 20,000 arcs at most. Values and
+bounds are of the first goal. Seconds are of the processor, reading and writing of files included.
+The best paths are kept in ``known.json``, a better one that was known before stays.
 
 Inputs: ``experiments/instances/library``. Command: ``python -m
 experiments instance_contest [--quick] [--only-of NAME,NAME]``.
 """
 
 import json
+import math
+import time
 from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
@@ -27,12 +30,115 @@ from scipy.optimize import isotonic_regression
 from experiments.harness.charts import note, subplots
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
 from experiments.harness.results import drawn, markdown, stored, two
-from experiments.instances.parts.contest_run import OUTSIDE, run, solvers
 from experiments.instances.parts.library import KNOWN, MADE, command, instance, known
-from seqopt import judge_instance
+from formulations.solvers import _solve_file
+from seqopt import judge_instance, save_instance, solve
 from seqopt.arrays import Floats
+from seqopt.errors import SeqoptError
+from seqopt.graph.formulation import find_formulation
+from seqopt.graph.instance import Instance
+from seqopt.graph.paths import fewest_moves, reached
+from seqopt.plan._paths import _claims
 from seqopt.report import _style as inks
 from seqopt.report._style import dress, name_panels, plain, styled
+
+OUTSIDE = ("HiGHS", "CP-SAT")
+MOST_ARCS = 20_000  # of what outside solvers are given
+
+
+def solvers(one: Instance) -> tuple[str, ...]:
+    """Return the ways to solve an instance: formulations that fit, then outside solvers."""
+    return (*one.fitting, *(OUTSIDE if one.arcs <= MOST_ARCS else ()))
+
+
+def run(name: str, solver: str, seconds: float) -> dict[str, object]:
+    """Return a row: values and bounds of the first goal, and the path."""
+    one = instance(name)
+    start = time.process_time()
+    try:
+        found = _outside(one, solver, seconds) if solver in OUTSIDE else _own(one, solver, seconds)
+    except SeqoptError as error:
+        found = {"end": str(error)[:60]}
+    row = {"instance": name, "solver": solver, "value": math.nan, "bound": math.nan}
+    row |= {"proven": math.nan, "end": "", "nodes": [], "claims": []} | found
+    return row | {"seconds": time.process_time() - start}
+
+
+def _own(one: Instance, solver: str, seconds: float) -> dict[str, object]:
+    formulation = find_formulation(solver)
+    timed = formulation.watched or "seconds" in formulation.options
+    plan = solve(one, formulation, time_limit=seconds if timed else math.inf)
+    proof = plan.certificate
+    return {
+        "value": proof.objective,
+        "values": [*proof.values],  # noqa: PD011  # no frame
+        "bound": max(plan.selection.bound[0], proof.bounds[0]),
+        "proven": proof.bounds[0],
+        "bounds": [*proof.bounds],
+        "end": str(plan.status),
+        "nodes": [*plan.nodes],
+        "claims": [_plain(claim) for claim in _claims(one, plan.selection)],
+    }
+
+
+def _plain(claim) -> dict[str, object]:
+    """Return a claim as JSON holds it."""
+    out: dict[str, object] = {"prices": dict(claim.prices)} if claim.prices else {}
+    if claim.value is not None and math.isfinite(claim.value):
+        out["value"] = claim.value
+    for name in ("weights", "shares"):
+        if getattr(claim, name) is not None:
+            out[name] = getattr(claim, name).tolist()
+    if claim.labels is not None:
+        nodes, values = claim.labels
+        out["labels"] = {"nodes": nodes.tolist(), "values": values.tolist()}
+    return out
+
+
+def _outside(one: Instance, solver: str, seconds: float) -> dict[str, object]:
+    """Return what a solver finds that reads a file."""
+    with TemporaryDirectory() as folder:
+        end, bound, taken = WAYS[solver](one, Path(folder), seconds)
+    if taken is None:
+        return {"end": end, "bound": bound}
+    arcs = np.asarray(taken) > 0.5
+    if one.asks_time:
+        arcs = np.isin(np.arange(one.arcs), one.timed.move[arcs])
+    part = one.graph.only(arcs)
+    if not part.ends[reached(part)].any():
+        return {"end": f"{end}, no path", "bound": bound}
+    nodes = fewest_moves(part)
+    proof = judge_instance(one, nodes)
+    found = {"value": proof.objective, "proven": proof.bounds[0]}
+    found |= {"values": [*proof.values]}  # noqa: PD011  # no frame
+    return {**found, "bound": bound, "end": end, "nodes": [*map(int, nodes)]}
+
+
+def _highs(one: Instance, folder: Path, seconds: float):
+    save_instance(one, folder / "x.mps")
+    end, value, bound, found = _solve_file(str(folder / "x.mps"), seconds)
+    count = one.arcs if not one.asks_time else len(one.timed.move)
+    known = math.isfinite(value) and len(found) > 0 and abs(value) < 1e30
+    return end.removeprefix("k"), bound, found[:count] if known else None
+
+
+def _cp_sat(one: Instance, folder: Path, seconds: float):
+    from google.protobuf import text_format  # noqa: PLC0415  # comes with OR-tools, an extra
+    from ortools.sat.python import cp_model  # noqa: PLC0415
+
+    save_instance(one, folder / "x.pbtxt")
+    model, solver = cp_model.CpModel(), cp_model.CpSolver()
+    text_format.Parse((folder / "x.pbtxt").read_text("utf-8"), model.Proto())
+    solver.parameters.max_time_in_seconds = seconds
+    solver.parameters.num_workers = 1
+    status = solver.solve(model)
+    known = status in (cp_model.OPTIMAL, cp_model.FEASIBLE)
+    count = one.arcs if not one.asks_time else len(one.timed.move)
+    found = [*solver.response_proto.solution][:count] if known else None
+    return solver.status_name(status).capitalize(), solver.best_objective_bound, found
+
+
+WAYS = {"HiGHS": _highs, "CP-SAT": _cp_sat}
 
 BEST = "best of ours"
 PART = 1 / 3  # of the instances: ways that fit fewer are in the best of ours alone
