@@ -18,8 +18,8 @@ import numpy as np
 import pandas as pd
 
 from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.results import best
 from experiments.harness.scenes import arch25, grip_sets
-from experiments.harness.timing import best
 from seqopt import build_network, load_scene
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want

@@ -30,9 +30,8 @@ from matplotlib.figure import Figure
 
 from experiments.harness.charts import note, subplots
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.results import drawn, two
+from experiments.harness.results import best, drawn, two
 from experiments.harness.scenes import arch25, grip_sets
-from experiments.harness.timing import best
 from seqopt import DRY, ArchShape, Scene, arch_scene, build_network, sequential
 from seqopt.arrays import Floats, Ints, Vector
 from seqopt.engines._auto import AutoEngine

@@ -38,7 +38,7 @@ from matplotlib.figure import Figure
 
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
-from experiments.harness.results import RESULTS
+from experiments.harness.results import stored
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt import EPOXY, Scene, Step, build_network, load_scene
 from seqopt._cli.main import main
@@ -143,7 +143,6 @@ def chart() -> Figure:
     return figure
 
 
-STORE = RESULTS / "outside_assemblies.csv"
 PLAN, LACKS = "plan", "lacks"
 TRIED = 12  # steps of a plan that are put to the certificate, beside the last
 NEAR = ((120, 0), (300, 6))  # bricks up to which candidates are all, or so many joints away
@@ -238,15 +237,13 @@ def holds(table: pd.DataFrame, least: int = LEAST) -> bool:
     )
 
 
-def store(table: pd.DataFrame) -> None:
-    """Store rows of files that were read beside those of the others, in the order of the list."""
-    if STORE.exists():
-        both = pd.concat([table, pd.read_csv(STORE)], ignore_index=True)
-        table = both.drop_duplicates(["source", "file"])  # the new row comes first
+def beside_stored(table: pd.DataFrame) -> pd.DataFrame:
+    """Return rows of files that were read beside stored ones of others, in the list's order."""
+    both = pd.concat([table, stored("outside_assemblies")], ignore_index=True)
+    table = both.drop_duplicates(["source", "file"])  # the new row comes first
     listed = [(one.source, one.path) for one in (*SAMPLES, *ELSEWHERE)]
     places = [listed.index(pair) for pair in zip(table["source"], table["file"], strict=True)]
-    table = table.iloc[np.argsort(places)]
-    table.to_csv(STORE, index=False, float_format="%.6g", lineterminator="\n")
+    return table.iloc[np.argsort(places)]
 
 
 def experiment(options: Options) -> Finding:
@@ -259,15 +256,15 @@ def experiment(options: Options) -> Finding:
         with tempfile.TemporaryDirectory() as folder:
             rows.append(row_of(outside, path, Path(folder)))
         print(f"{outside.name:60} {rows[-1]['outcome']}: {rows[-1]['said']}", flush=True)
-        if options.store:
-            store(pd.DataFrame(rows))  # file by file: a run that ends early keeps what it found
-    table = pd.read_csv(STORE) if options.store else pd.DataFrame(rows)
+    table = pd.DataFrame(rows) if options.quick else beside_stored(pd.DataFrame(rows))
     plans = int((table["outcome"] == PLAN).sum())
-    return Finding(holds(table, 1 if options.quick else LEAST), f": {plans} of {len(table)} plans")
+    good, note = holds(table, 1 if options.quick else LEAST), f": {plans} of {len(table)} plans"
+    return Finding(good, note, {"outside_assemblies": table})
 
 
 CLAIM = Claim(
     experiment,
+    digits=6,
     quick="three samples",
     options=(Option("--files", "folder of clones of the repositories named", ""),),
     needs=(Extra("compas_cra", "pip install 'seqopt[witness]'"),),

@@ -1,4 +1,4 @@
-"""Where results are, how figures are stored and tables read again; numbers and tables on pages."""
+"""Where results are, how they are stored, read again and timed; numbers and tables on pages."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import math
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -88,3 +89,13 @@ def two(value: float) -> str:
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(cells)} |" for cells in [head, ["---"] * len(head), *rows])
+
+
+def best(call: Callable[[], object], rounds: int) -> float:
+    """Return the shortest of several runs, s."""
+    times = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - start)
+    return min(times)

@@ -25,9 +25,8 @@ from numpy.typing import ArrayLike
 
 from experiments.harness.charts import note, subplots
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.results import drawn
+from experiments.harness.results import best, drawn
 from experiments.harness.scenes import arch25
-from experiments.harness.timing import best
 from experiments.peers.parts.models import LOOPS, Answer, OpenSees, Peer, chain_of, loop, open_sees
 from seqopt import Network, pose, solve, three_robot_loop
 from seqopt.arrays import Ints
