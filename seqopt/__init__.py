@@ -48,7 +48,7 @@ _HOMES = {
     "sequence.rules": ("FreeRules",),
     "plan.pose": ("pose",),
     "plan.solve": ("solve",),
-    "workflow": ("Search", "optimize"),
+    "workflow": ("Robust", "Search", "optimize"),
     "scene.scenarios": ("scenarios",),
     "plan.plan": ("Plan",),
     "instances._files": ("read_instance", "save_instance"),

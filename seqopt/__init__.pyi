@@ -47,6 +47,7 @@ from seqopt.sequence.two_robots import sequential as sequential
 from seqopt.stability.assessment import Stability as Stability
 from seqopt.stability.steps import assess_steps as assess_steps
 from seqopt.study.published import CRITERIA as CRITERIA
+from seqopt.workflow import Robust as Robust
 from seqopt.workflow import Search as Search
 from seqopt.workflow import optimize as optimize
 
