@@ -39,7 +39,6 @@ from seqopt.responses.resources import Resources
 from seqopt.responses.table import analyze
 
 if TYPE_CHECKING:
-    from seqopt.responses._calibration import StiffnessFit, calibrate
     from seqopt.responses._staged import analyze_staged
 
 __all__ = [
@@ -48,13 +47,8 @@ __all__ = [
     "Resources",
     "Response",
     "StepChoices",
-    "StiffnessFit",
     "analyze",
     "analyze_staged",
-    "calibrate",
     "responses_of",
 ]
-__getattr__, __dir__ = later(
-    __name__,
-    {"StiffnessFit": "_calibration", "calibrate": "_calibration", "analyze_staged": "_staged"},
-)
+__getattr__, __dir__ = later(__name__, {"analyze_staged": "_staged"})

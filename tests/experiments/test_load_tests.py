@@ -10,9 +10,9 @@ import pytest
 from scipy.optimize import minimize
 
 from experiments.calibration.parts import barrel_vaults as barrel
+from experiments.calibration.parts.load_tests import calibrate
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
-from seqopt.responses import calibrate
 from seqopt.scene.arch import ArchShape, arch_scene
 
 SHIFT, TURN = 1.7, 0.4  # factors that are to be found
