@@ -57,7 +57,13 @@ def engines_of(plan: Plan) -> Sequence[Engine]:
 
 def measured(plan: Plan, clock: Clock) -> Plan:
     """Return a plan with its largest displacement, if it can be computed in time."""
-    moved = clock.spare(RANGE, lambda: most_moved(engines_of(plan), plan.steps), None)
+    known = {} if plan.search is None or plan.graph.scenarios else plan.search.fields
+
+    def largest() -> Moved | None:
+        each = (most_moved(engine, plan.steps, known) for engine in engines_of(plan))
+        return max(each, key=lambda moved: moved.share)
+
+    moved = clock.spare(RANGE, largest, None)
     if moved is None and clock.left_out[RANGE] == INTERRUPT:
         return interrupted(plan)
     return replace(plan, moved=moved)

@@ -244,7 +244,7 @@ class Front(Terse):
 def _moved(front: Front) -> tuple[Moved, ...]:
     """Return the largest displacement of every plan, over the limit of the linear range."""
     pairs = zip(front.engines, front.steps, strict=True)
-    return tuple(most_moved((engine,), steps) for engine, steps in pairs)
+    return tuple(most_moved(engine, steps, {}) for engine, steps in pairs)
 
 
 def find_front(

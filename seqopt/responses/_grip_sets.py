@@ -6,7 +6,7 @@ For searches that need few of many sets: the sets of a request are solved in bat
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import cached_property, partial
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.interface import Engine, linear_limit
+from seqopt.engines.interface import Engine, Fields, linear_limit
 from seqopt.errors import MechanismError
 from seqopt.responses._blocks import (
     BLOCK,
@@ -32,6 +32,7 @@ from seqopt.responses._blocks import (
     unpacked,
     work,
 )
+from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.resources import HERE, Resources
 from seqopt.sequence.steps import Step
 from seqopt.work._workers import hire, map_ordered
@@ -39,24 +40,21 @@ from seqopt.work.progress import Progress
 
 
 class KnownRows:
-    """Cached rows of values by a key and a code; ``count``: the number computed.
+    """Cached rows of values by a key and a code.
+
+    ``count``: the number computed; ``nbytes``: what they and their codes take, bytes.
 
     >>> rows = KnownRows()
     >>> codes = np.array([3, 1, 3])
     >>> rows.of("squares", codes, lambda places: codes[places, None] ** 2.0).ravel()
     array([9., 1., 9.])
-    >>> rows.count
-    2
+    >>> rows.count, rows.nbytes
+    (2, 32)
     """
 
     def __init__(self) -> None:
         self._known: dict[object, tuple[Ints, Floats]] = {}
-        self.count = 0
-
-    @property
-    def nbytes(self) -> int:
-        """Memory of the rows, bytes."""
-        return sum(codes.nbytes + values.nbytes for codes, values in self._known.values())
+        self.count = self.nbytes = 0
 
     def known(self, key: object, codes: Ints) -> Floats:
         """Return the first values (n,) of cached rows; NaN of others."""
@@ -84,6 +82,7 @@ class KnownRows:
             known, values = known[order], values[order]
             self._known[key] = known, values
             self.count += len(fresh)
+            self.nbytes += codes[fresh].nbytes + computed.nbytes
         return np.asarray(values[np.searchsorted(known, codes)])
 
 
@@ -307,23 +306,23 @@ class Moved(NamedTuple):
     step: int
 
 
-def most_moved(engines: Iterable[Engine], steps: Sequence[Step]) -> Moved:
-    """Return the largest displacement of any node in any step, over engines of several scenes.
+def most_moved(engine: Engine, steps: Sequence[Step], known: Mapping[int, Fields]) -> Moved:
+    """Return the largest displacement of any node in any step.
 
-    Only displacements are computed, in single precision, in batches of equal numbers of bricks and
-    grips.
+    ``known``: fields of steps, by number. Of others only displacements are computed, in single
+    precision, in batches of equal numbers of bricks and grips.
     """
-    return max((_most_moved(engine, steps) for engine in engines), key=lambda moved: moved.share)
-
-
-def _most_moved(engine: Engine, steps: Sequence[Step]) -> Moved:
-    scene, found = engine.network.scene, [Moved(0.0, 0)]
+    scene, moved = engine.network.scene, RESPONSES["D_max"]
     alike = defaultdict[tuple[int, int], dict[tuple[int, ...], int]](dict)
-    for step in steps:
-        grips = scene.grip_numbers(step.grips, step.bricks)
-        if step.bricks:
-            alike[step.bricks, len(grips)].setdefault(grips, step.number)
     far = linear_limit(scene)
+    found = [Moved(0.0, 0)]
+    for step in steps:
+        if step.number in known:
+            shift = moved.of(engine.network, known[step.number])
+            found.append(Moved(float(shift[0]) / far, step.number))
+        elif step.bricks:
+            grips = scene.grip_numbers(step.grips, step.bricks)
+            alike[step.bricks, len(grips)].setdefault(grips, step.number)
     for (bricks, count), numbers in alike.items():
         sets = np.array([*numbers], dtype=np.int64).reshape(len(numbers), count)
         shift = solve_sets(engine, Block(bricks, sets, ("D_max",)))[:, 0]

@@ -164,9 +164,9 @@ def test_scenarios_count_beside_the_scene_itself():
     scene = between(KINDS["scenarios"][0], None)
     problem = posed(scene, goals="minmax", scenarios=2, limits=[LIFTED])
     plan = seqopt.solve(problem)
-    alone = [most_moved([engine], plan.steps).share for engine in plan.states.scenarios]
+    alone = [most_moved(engine, plan.steps, {}).share for engine in plan.states.scenarios]
     assert plan.moved.share == max(alone)
-    own = most_moved([plan.engine], plan.steps).share
+    own = most_moved(plan.engine, plan.steps, {}).share
     assert own != plan.moved.share
     stiffer = replace(plan, moved=plan.moved._replace(share=own * 0.5))  # were they softer alone
     softer = replace(plan, moved=plan.moved._replace(share=2.0))
