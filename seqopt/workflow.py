@@ -64,8 +64,10 @@ class Search:
         As of `seqopt.solve`.
     time_limit : float, optional
         Seconds of choosing; the best choice by then has a lower bound.
-    workers, executor, cache, max_memory : optional
+    workers, executor, max_memory : optional
         As of `seqopt.responses.Resources`.
+    cache : str or pathlib.Path, optional
+        A folder that keeps the postures of arms.
     options : mapping of str to object, optional
         What the formulation has options for, as ``{"width": 10}``.
 
@@ -212,7 +214,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     find_postures(found, search.cache, progress)
     own = make_engine(engine, build_network(found), mortar)
     moves = _find_moves(own.network, schedule, robots, candidates, rules)
-    shared = Resources(search.workers, search.executor, search.cache)
+    shared = Resources(search.workers, search.executor)
     options, tell = dict(search.options), progress
     asked = parse_limits(limits, own.network.scene)
     states = _chooses_states(moves, formulation, asked, (aim, stands, sought))

@@ -175,7 +175,7 @@ def parse_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
 def parse_resources(asked: Chosen, progress: Tell | None = None) -> Resources:
     """Return the computing resources of the options."""
     most = None if asked.max_memory is None else parse_size(asked.max_memory)
-    return Resources(asked.workers, None, asked.cache, most, progress)
+    return Resources(asked.workers, None, most, progress)
 
 
 def parse_size(text: str) -> float:

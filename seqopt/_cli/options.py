@@ -386,7 +386,7 @@ class Chosen(Ranks, Timed, Moves):
     workers : N
         processes to share the work among; pays from about ten seconds (default: {default})
     cache : DIR
-        keep answers there and use what is there: a run that was ended goes on
+        where robots have arms: keep their postures there, and use what is there
     max_memory : SIZE
         what responses and costs may take, as 500MB or 2GB (default: four fifths of what is free);
         of a free schedule states and moves, with a bound where it ends

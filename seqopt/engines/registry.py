@@ -1,23 +1,17 @@
 """The engines by name, how one was made, and what a result came from.
 
-A recipe is enough to make an engine again elsewhere, and to know its answers by content.
+A recipe is enough to make an engine again elsewhere.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import platform
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property
 from importlib.metadata import PackageNotFoundError, requires, version
-from pathlib import Path
 from typing import Any
-
-import numpy as np
-import scipy
 
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines._auto import AutoEngine, find_level
@@ -29,11 +23,6 @@ from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network
 from seqopt.scene._armed import hold_alike
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import scene_to_dict
-
-_ARITHMETIC = ("arrays.py", "contact", "engines", "network", "responses/quantities.py")
-"""Files and folders of the package that answers depend on."""
-_WITHOUT_EFFECT = ("name", "provenance", "robots")  # of a scene, on answers to given grips
 
 
 @dataclass(frozen=True)
@@ -67,35 +56,6 @@ class Recipe:
     def network(self) -> Network:
         """The network of the scene; it is not sent along."""
         return build_network(self.scene)
-
-    @cached_property
-    def key(self) -> str:
-        """What answers depend on, condensed: equal for equal scenes, options and arithmetic.
-
-        Names and provenance of a scene change no answer and are left out; of robots only the
-        compliance of their grips counts.
-        """
-        scene = {k: v for k, v in scene_to_dict(self.scene).items() if k not in _WITHOUT_EFFECT}
-        grips = self.network.compliances
-        numbers = grips.compliance, grips.transmits_moment, grips.index
-        scene["grips"] = [(each.shape, each.tobytes().hex()) for each in numbers]
-        built = json.dumps(scene, sort_keys=True)
-        options = {} if self.simplest else self.options  # joints that never fail need none
-        parts = (self.name, repr(sorted(options.items())), built, _arithmetic())
-        return hashlib.sha256("\0".join(parts).encode()).hexdigest()
-
-
-@cache
-def _arithmetic() -> str:
-    """Return a mark of the code that answers come from: its text, NumPy, SciPy and numba."""
-    home = Path(__file__).parents[1]
-    found = (home / name for name in _ARITHMETIC)
-    files = [f for p in found for f in ([p] if p.is_file() else sorted(p.rglob("*.py")))]
-    loops = _version("numba", "none")  # whose loops answer where it is installed
-    mark = hashlib.sha256(f"{np.__version__} {scipy.__version__} {loops}".encode())
-    for file in files:
-        mark.update(file.relative_to(home).as_posix().encode() + file.read_bytes())
-    return mark.hexdigest()
 
 
 def _version(package: str, missing: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 
@@ -48,14 +48,6 @@ class Windows(Terse):
         for choices in self.row(move):
             costs = aim.join(costs, self.problem.step_costs(choices))
         return costs
-
-    def met(self) -> Mapping[int, Mapping[str, float]]:
-        """Return the responses that the choice meets, by step."""
-        return {
-            each.step.number: {name: float(v[now]) for name, v in each.responses.items()}
-            for move, now in enumerate(self.choice)
-            for each in self.row(move)
-        }
 
     def so_far(self) -> str:
         """Return what is chosen, in a few words."""

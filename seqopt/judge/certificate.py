@@ -2,79 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
-from itertools import chain
 from math import isfinite
 
-import numpy as np
-
 from seqopt.arrays import FrozenValue
-from seqopt.errors import FileError
-from seqopt.graph.decisions import Decisions
-from seqopt.network.network import Network
-from seqopt.responses._blocks import packed, remade
-from seqopt.responses._choices import Evaluation
-from seqopt.responses.quantities import CHOSEN_BY
-
-SAME = 1e-5  # over its largest, that a response may differ: ten times what a screen may err
-
-
-_Met = Mapping[int, Mapping[str, float]]  # responses, by step
-
-
-def _require_anew(
-    problem: Decisions, choice: Sequence[int], met: Callable[[], _Met] | None = None
-) -> None:
-    """Raise an error if a choice leads to other responses than its problem has from a cache.
-
-    ``choice``: a candidate for every move; ``met``: returns the responses that it meets, by step,
-    where those of all choices are not computed.
-    Raises `FileError` if a response of a step is another one when it is computed anew.
-    """
-    evaluation, cache = problem.evaluation, problem.evaluation.resources.cache
-    if cache is None:
-        return
-    schedule = problem.schedule
-    chosen = tuple(
-        replace(move, candidates=(move.candidates[i],))
-        for move, i in zip(schedule.moves, choice, strict=True)
-    )
-    engine = remade(packed(problem.engine))
-    anew = Evaluation(engine, replace(schedule, moves=chosen), evaluation.wanted)
-    found = dict(_met(anew, [0] * len(chosen)))
-    kept = dict(_met(evaluation, choice)) if met is None else met()
-    sizes = _sizes(engine.network, [*kept.values(), *found.values()])
-    for step, responses in found.items():
-        for name, value in responses.items():
-            there = kept[step][name]
-            if not np.isclose(there, value, rtol=0.0, atol=SAME * sizes[name], equal_nan=True):
-                raise FileError(
-                    f"cache {cache}: {name} of step {step} is {there:.6g} in a file, and "
-                    f"{value:.6g} when it is computed; delete the folder"
-                )
-
-
-def _met(
-    evaluation: Evaluation, choice: Sequence[int]
-) -> Iterator[tuple[int, Mapping[str, float]]]:
-    """Yield the responses that a choice meets, by step."""
-    for choices in chain.from_iterable(evaluation.levels()):
-        at = tuple(choice[move] for move in choices.moves)
-        yield choices.step.number, {n: float(v[at]) for n, v in choices.responses.items()}
-
-
-def _sizes(network: Network, steps: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the scale of each response: its largest value, of forces at least the whole weight."""
-    force = float(np.linalg.norm(network.weight, axis=1).sum())
-    floors = {"N": force, "Nm": force * float(np.ptp(network.node_position, axis=0).max())}
-    sizes: dict[str, float] = {}
-    for name, value in chain.from_iterable(step.items() for step in steps):
-        unit = CHOSEN_BY[name].column.split("_")[-1] if name in CHOSEN_BY else "N"
-        sizes[name] = float(np.fmax(sizes.get(name, floors.get(unit, 0.0)), abs(value)))
-    return sizes
-
 
 TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
 

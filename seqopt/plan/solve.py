@@ -22,7 +22,6 @@ from seqopt.graph.formulation import End, Formulation, Run, Solution, Watch, for
 from seqopt.graph.instance import Instance
 from seqopt.graph.states.states import States, of_decisions
 from seqopt.judge._step_checks import check_shape
-from seqopt.judge.certificate import _require_anew
 from seqopt.plan._guard import require_fit, require_proof, require_time
 from seqopt.plan._paths import Found, find_path, judged
 from seqopt.plan._range import best_within
@@ -200,8 +199,6 @@ def _by_all_costs(graph: States, decisions: Decisions, formulation: Formulation,
     proof = path.certificate
     with timed(seconds, "verify"):
         if proof is not None:
-            for each in map(decisions.of, graph.scenarios) if graph.scenarios else [decisions]:
-                _require_anew(each, choice)
             spent = {budget.name: budget.spent(choice) for budget in decisions.caps}
             proof = replace(proof, spent=spent)  # amounts below zero and without a bound as well
         steps = _checked(decisions.steps(choice), graph, decisions)
@@ -226,7 +223,6 @@ def _by_windows(graph: States, decisions: Decisions, formulation: Formulation, r
         found = walk_windows(decisions, Watch(run.left))
     with timed(seconds, "verify"):
         steps = _checked(decisions.steps(found.choice), graph, decisions)
-        _require_anew(decisions, found.choice, found.met)
     chosen = Solution(decisions.rows(found.choice), (np.nan,), (-np.inf,))
     return Found(chosen, None, steps, seconds, found)
 
@@ -253,7 +249,6 @@ def _lazily(graph: States, decisions: Decisions, formulation: Formulation, run: 
         firsts = np.cumsum([1, *map(len, decisions.candidates[:-1])])
         along = Windows(decisions, (passed - firsts).tolist())
         steps = _checked(decisions.steps(along.choice), graph, decisions)
-        _require_anew(decisions, along.choice, along.met)
     chosen = replace(claimed, states=decisions.rows(along.choice))
     return Found(chosen, certificate, steps, seconds, along, found.models)
 

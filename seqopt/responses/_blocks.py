@@ -1,41 +1,31 @@
-"""Blocks of states, and their responses: the unit of computing, of messages, and of caching.
+"""Blocks of states, and their responses: the unit of computing and of messages.
 
 A state is a brick count and the nodes held. The size of blocks depends on the schedule alone, so
 that responses are bitwise equal in any process.
 
 Other processes receive the scene, and build the engine themselves.
-
-In a cache folder every block is a file, written atomically: a checksum of the rest, the numbers,
-then the counts of the engine. Reading is limited to the size of the block's answers, and a file is
-used only if it is complete and belongs to the block: damaged ones are computed again. Against
-forged files with valid checksums there is `seqopt.judge.certificate`.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import pickle
 import threading
-import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, reduce
+from functools import lru_cache, reduce
 from itertools import groupby
 from operator import or_
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
-from seqopt._files import HIDDEN, make_folder, require_folder, write_bytes
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.engines.interface import Engine, Level, LevelChoice, Want
+from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import FileError, MemoryShortError, SceneError
+from seqopt.errors import MemoryShortError, SceneError
 from seqopt.responses._props import excess_of, with_props
 from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits
 from seqopt.responses.quantities import (
@@ -65,15 +55,6 @@ class Block(FrozenValue):
     screen: bool = True  # whether six digits are enough
     props: tuple[int, ...] = ()  # numbers of grips that all of them have beside these
     compiled: bool = False  # whether there is so much to do that compiled loops are worth loading
-
-    @cached_property
-    def key(self) -> str:
-        """Hash of its content."""
-        exact = (*(() if self.screen else ("exact",)), *self.props)
-        exact += ("compiled",) if self.compiled else ()
-        mark = hashlib.sha256(repr((self.bricks, self.names, self.grips.shape, *exact)).encode())
-        mark.update(self.grips.astype("<i8").tobytes())
-        return mark.hexdigest()
 
     @property
     def work(self) -> float:
@@ -185,97 +166,6 @@ _OF_THREAD = _Made()
 def unpacked(engine: Engine | bytes) -> Engine:
     """Return an engine unchanged, or the cached one of a `packed` form."""
     return _OF_THREAD.engine(engine) if isinstance(engine, bytes) else engine
-
-
-_LEFT = 3600.0  # s after which a file that is not complete is one that was given up
-_DIGEST = 32  # bytes of a checksum
-_WORDS = 2**16  # bytes that what an engine counted takes at most
-
-
-class Store:
-    """The cached answers of one engine in a folder.
-
-    ``folder``: created if missing; ``engine``: made by name. Raises `FileError` if the folder
-    cannot be written; `SceneError` if the engine has no recipe to form keys from.
-    """
-
-    def __init__(self, folder: Path, engine: Engine) -> None:
-        require_folder(folder)
-        recipe = _known_recipe(engine)
-        if recipe is None:
-            raise SceneError(
-                f"cache {folder}: a {type(engine).__name__} does not say what its answers depend "
-                "on; take one of seqopt.make_engine, or no cache"
-            )
-        self._recipe: Recipe = recipe
-        self._folder = folder / recipe.key[:32]
-        make_folder(self._folder)
-        _tidy(self._folder)
-
-    def path(self, block: Block) -> Path:
-        """Return the file of a block."""
-        return self._folder / f"{block.bricks}-{self._key(block)[:48]}.answers"
-
-    def _key(self, block: Block) -> str:
-        """Return the key of a block; tolerances depend on payloads as well."""
-        if not any(map(is_tolerance, block.names)):
-            return block.key
-        payloads = self._recipe.scene.grip_kinds.payload.tolist()
-        return hashlib.sha256(f"{block.key} {payloads}".encode()).hexdigest()
-
-    def find(self, block: Block) -> Answers | None:
-        """Return the cached answers to a block; None if they are missing or damaged."""
-        sets, columns = len(block.grips), len(block.names) + block.grips.shape[1]
-        words = _DIGEST + 8 * sets * columns
-        try:
-            with self.path(block).open("rb") as file:
-                content = file.read(words + _WORDS + 1)
-            whole = words <= len(content) <= words + _WORDS
-            if not whole or content[:_DIGEST] != self._checksum(block, content[_DIGEST:]):
-                return None
-            rows = json.loads(content[words:])
-            tally = tuple((LevelChoice(Level(level), why), int(n)) for level, why, n in rows)
-        except (ArithmeticError, OSError, RecursionError, TypeError, ValueError):
-            return None  # not there, or checked and yet false
-        numbers = np.frombuffer(content[_DIGEST:words], "<f8").reshape(columns, sets).astype(float)
-        if not np.isfinite(numbers).all():
-            return None
-        values = dict(zip(block.names, numbers, strict=False))
-        return Answers(values, numbers[len(values) :].T.copy(), tally)
-
-    def keep(self, block: Block, answers: Answers) -> None:
-        """Write the answers to a block. Raises `FileError` if the file cannot be written."""
-        numbers = np.array([*(answers.values[name] for name in block.names), *answers.forces.T])
-        rows = []
-        for what, count in answers.tally:
-            if not isinstance(what, LevelChoice):
-                known = f"cache: an engine that counts {what!r} cannot be kept"
-                raise SceneError(f"{known}; take no cache")
-            rows.append([what.level.value, what.reason, count])
-        content = numbers.astype("<f8").tobytes() + json.dumps(rows).encode()
-        write_bytes(self.path(block), self._checksum(block, content) + content)
-
-    def _checksum(self, block: Block, content: bytes) -> bytes:
-        """Return the checksum of a block's answers, with its key."""
-        return hashlib.sha256(f"{self._recipe.key} {self._key(block)} ".encode() + content).digest()
-
-
-def open_store(folder: Path | str | None, engine: Engine) -> Store | None:
-    """Return the store of an engine's answers; None without a folder."""
-    return None if folder is None else Store(Path(folder), engine)
-
-
-def _tidy(folder: Path) -> None:
-    """Delete temporary files of killed runs."""
-    for path in folder.glob(f"{HIDDEN}*"):
-        try:
-            if time.time() - path.stat().st_mtime > _LEFT:
-                path.unlink()
-        except FileNotFoundError:  # another run was faster
-            continue
-        except OSError as error:
-            why = error.strerror
-            raise FileError(f"cannot tidy {folder}: {why}; name another cache") from error
 
 
 BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache

@@ -37,7 +37,6 @@ from seqopt.responses._blocks import (
     combinations,
     distinct,
     no_node_twice,
-    open_store,
     require_memory,
     steps_of_batches,
     work,
@@ -67,7 +66,7 @@ class Evaluation(Terse):
     wanted : Wanted
         Which responses every move needs; no others are computed.
     resources : Resources, optional
-        Processes, memory and a folder for answers; by default this process alone.
+        Processes and memory; by default this process alone.
     more_work : float, optional
         About how much more work is to come, as `seqopt.responses._blocks.work` has it.
     """
@@ -196,8 +195,7 @@ def _by_level(evaluation: Evaluation) -> Generator[tuple[list[StepChoices], int]
 
     total = evaluation.work
     engine, resources = evaluation.engine, evaluation.resources
-    store = open_store(resources.cache, engine)
-    with closing(answer_blocks(engine, blocks(), total, resources, store)) as answers:
+    with closing(answer_blocks(engine, blocks(), total, resources)) as answers:
         for first in answers:  # blocks, and so `under_way`, are taken no earlier
             groups, here = under_way.popleft(), chain([first], answers)
             yield (  # in no variable: what is not kept is free while the next ones are computed

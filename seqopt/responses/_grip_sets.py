@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import chain
 from typing import NamedTuple
 
@@ -23,10 +23,8 @@ from seqopt.responses._blocks import (
     COMPILED,
     Answers,
     Block,
-    Store,
     answer,
     join_answers,
-    open_store,
     packed,
     tally_of,
     unpacked,
@@ -120,10 +118,6 @@ class GripSets:
     def __repr__(self) -> str:
         return f"<GripSets of {self._engine}: {self.solved} solved>"
 
-    @cached_property
-    def _store(self) -> Store | None:
-        return open_store(self._resources.cache, self._engine)
-
     @property
     def solved(self) -> int:
         """Number of distinct grip sets solved."""
@@ -162,7 +156,7 @@ class GripSets:
             self._work += work(len(grips), bricks)
             compiled = self._work >= COMPILED
             sets = Block(bricks, grips, self.names, self._screen, props, compiled)
-            return solve_sets(self._engine, sets, self._resources, self._store)
+            return solve_sets(self._engine, sets, self._resources)
 
         codes = np.zeros(len(nodes), dtype=np.int64)  # a number for every set of its own
         for column in nodes.T:
@@ -170,20 +164,18 @@ class GripSets:
         return self._known.of((bricks, nodes.shape[1]), codes, solve)
 
 
-def solve_sets(
-    engine: Engine, sets: Block, resources: Resources = HERE, store: Store | None = None
-) -> Floats:
+def solve_sets(engine: Engine, sets: Block, resources: Resources = HERE) -> Floats:
     """Return responses and grip forces of grip sets; infinite for mechanisms.
 
-    ``sets``: of one brick count; ``resources``: workers; ``store``: cached answers. Result
-    (S, R + r): SI units. Raises `SolverError`, `WorkerError`.
+    ``sets``: of one brick count; ``resources``: workers. Result (S, R + r): SI units. Raises
+    `SolverError`, `WorkerError`.
     """
     grips, alone = sets.grips, resources.executor is None and resources.workers == 1
     shared = max(64, len(grips) // 32)  # sets of a task
-    most = BLOCK if alone and store is None else min(BLOCK, shared)
+    most = BLOCK if alone else min(BLOCK, shared)
     parts = [replace(sets, grips=grips[at : at + most]) for at in range(0, len(grips), most)]
     quiet = replace(resources, progress=None) if len(parts) > 1 else resources.alone()
-    found = answer_blocks(engine, parts, sets.work, quiet, store, loose=True)
+    found = answer_blocks(engine, parts, sets.work, quiet, loose=True)
     none = np.zeros((0, len(sets.names) + grips.shape[1]))
     return np.concatenate([none, *(_columns(sets, part) for part in found)])
 
@@ -196,67 +188,40 @@ _SEVERAL = 4  # portions' work that states of one brick count may be before they
 _CHUNKS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
 
 
-class _Chunk(NamedTuple):
-    """Blocks of one task, with their answers if they are cached."""
-
-    blocks: tuple[Block, ...]
-    stored: list[Answers] | None = None
-
-    @property
-    def work(self) -> float:
-        """Estimated work, cached or not."""
-        return sum(block.work for block in self.blocks)
-
-
 def answer_blocks(
     engine: Engine,
     blocks: Iterable[Block],
     total: float,
     resources: Resources,
-    store: Store | None = None,
     *,
     loose: bool = False,
 ) -> Generator[Answers, None, None]:
     """Return the answers to blocks of states, in their order.
 
-    ``blocks``: consumed lazily; ``total``: their estimated work; ``store``: cached answers;
-    ``loose``: whether mechanisms have infinite answers, which are not cached, instead of raising a
-    `MechanismError`.
+    ``blocks``: consumed lazily; ``total``: their estimated work; ``loose``: whether mechanisms have
+    infinite answers instead of raising a `MechanismError`.
     """
     tally = tally_of(engine)
     progress = Progress("responses", total, resources.progress)
 
-    def count(answers: list[Answers]) -> None:
-        for what, sets in chain.from_iterable(found.tally for found in answers):
-            tally[what] = tally.get(what, 0) + sets
-
-    def stored(portion: _Chunk) -> list[Answers] | None:
-        if portion.stored is not None:
-            count(portion.stored)
-            progress.add(portion.work)
-        return portion.stored
-
-    def done(portion: _Chunk, answers: list[Answers]) -> None:
-        if store is not None:
-            for block, found in zip(portion.blocks, answers, strict=True):
-                if not loose or np.isfinite(_columns(block, found)).all():
-                    store.keep(block, found)
+    def done(blocks: Sequence[Block], answers: list[Answers]) -> None:
         if crew is not None:  # else the engine itself has counted
-            count(answers)
-        progress.add(portion.work)
+            for what, sets in chain.from_iterable(found.tally for found in answers):
+                tally[what] = tally.get(what, 0) + sets
+        progress.add(sum(block.work for block in blocks))
 
     with hire(resources.executor, resources.workers) as crew:
         task = partial(_answer_all, engine if crew is None else packed(engine), loose=loose)
         enough = None if crew is None else total / (_CHUNKS * crew.workers)
-        portions = _split_work(blocks, store, enough)
-        with closing(map_ordered(task, portions, crew, stored, done)) as results:
+        portions = _split_work(blocks, enough)
+        with closing(map_ordered(task, portions, crew, done)) as results:
             for answers in results:
                 yield from answers
 
 
-def _answer_all(engine: Engine | bytes, portion: _Chunk, *, loose: bool) -> list[Answers]:
+def _answer_all(engine: Engine | bytes, blocks: Sequence[Block], *, loose: bool) -> list[Answers]:
     solve = _answer_loose if loose else answer
-    return [solve(unpacked(engine), block) for block in portion.blocks]
+    return [solve(unpacked(engine), block) for block in blocks]
 
 
 def _answer_loose(engine: Engine, block: Block) -> Answers:
@@ -272,10 +237,8 @@ def _answer_loose(engine: Engine, block: Block) -> Answers:
     return join_answers([_answer_loose(engine, replace(block, grips=half)) for half in halves])
 
 
-def _split_work(
-    blocks: Iterable[Block], store: Store | None, enough: float | None
-) -> Iterator[_Chunk]:
-    """Split blocks into chunks of consecutive ones, of about equal work; cached blocks apart.
+def _split_work(blocks: Iterable[Block], enough: float | None) -> Iterator[list[Block]]:
+    """Split blocks into chunks of consecutive ones, of about equal work.
 
     Engines that grow with the structure are fastest for ascending brick counts, and factorize once
     for all states of one: chunks keep the order of blocks, and end between brick counts unless one
@@ -283,20 +246,18 @@ def _split_work(
 
     ``enough``: work of a chunk; None for a chunk per block.
     """
+    if enough is None:
+        yield from ([block] for block in blocks)
+        return
     mine: list[Block] = []
     for block in blocks:
-        found = None if store is None else store.find(block)
-        if mine and enough is not None:
-            several = 1 if block.bricks != mine[-1].bricks else _SEVERAL
-            if found is not None or sum(each.work for each in mine) >= several * enough:
-                yield _Chunk(tuple(mine))
-                mine = []
-        if found is not None or enough is None:
-            yield _Chunk((block,), None if found is None else [found])
-        else:
-            mine.append(block)
+        several = 1 if mine and block.bricks != mine[-1].bricks else _SEVERAL
+        if mine and sum(each.work for each in mine) >= several * enough:
+            yield mine
+            mine = []
+        mine.append(block)
     if mine:
-        yield _Chunk(tuple(mine))
+        yield mine
 
 
 class Moved(NamedTuple):

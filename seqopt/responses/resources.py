@@ -1,10 +1,9 @@
-"""What a computation may use: processes or other machines, a folder for results, memory."""
+"""What a computation may use: processes or other machines, memory."""
 
 from __future__ import annotations
 
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from seqopt.errors import ProblemError
 from seqopt.scene._checks import as_float
@@ -21,8 +20,6 @@ class Resources:
         Processes to share the work among; with an executor, how many tasks it works on at once.
     executor : concurrent.futures.Executor, optional
         Any executor, instead of processes of our own. The caller ends it.
-    cache : str or pathlib.Path, optional
-        A folder that keeps the answers to states by content; it is made if it is not there.
     max_memory : float, optional
         Bytes that responses and costs may take; by default four fifths of the free memory.
     progress : callable, optional
@@ -41,7 +38,6 @@ class Resources:
 
     workers: int = 1
     executor: Executor | None = None
-    cache: Path | str | None = None
     max_memory: float | None = None
     progress: Tell | None = None
 
@@ -53,8 +49,6 @@ class Resources:
                 f"executor: a {type(self.executor).__name__} is not an executor; "
                 "give one of concurrent.futures, or workers"
             )
-        if not (self.cache is None or (isinstance(self.cache, str | Path) and str(self.cache))):
-            raise ProblemError(f"cache is {self.cache!r}; give the path of a folder")
         most = self.max_memory
         if not (most is None or (as_float(most) > 0)):  # NaN is not
             raise ProblemError(f"max_memory is {most!r}; give a number of bytes above zero")
@@ -65,4 +59,4 @@ class Resources:
 
 
 HERE = Resources()
-"""This process alone, nothing kept, four fifths of the free memory."""
+"""This process alone, four fifths of the free memory."""

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from seqopt.arrays import Bools, Ints, Terse
+from seqopt.errors import ProblemError
 from seqopt.scene.arm import from_arms
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
@@ -44,6 +45,8 @@ class PlanPostures(Terse):
 
 def find_postures(scene: Scene, cache: Path | str | None = None, tell: Tell | None = None) -> None:
     """Compute the postures of arms, or read them from a folder, before they are asked for."""
+    if not (cache is None or (isinstance(cache, str | Path) and str(cache))):
+        raise ProblemError(f"cache is {cache!r}; give the path of a folder")
     if scene.has_arms:
         from_arms("find_postures")(scene, cache, tell)
 

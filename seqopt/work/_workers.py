@@ -255,7 +255,6 @@ def map_ordered(
     function: Callable[[_Task], _Result],
     tasks: Iterable[_Task],
     crew: Crew | None = None,
-    known: Callable[[_Task], _Result | None] | None = None,
     done: Callable[[_Task, _Result], None] | None = None,
 ) -> Generator[_Result, None, None]:
     """Return what a function makes of every task, in their order.
@@ -268,8 +267,6 @@ def map_ordered(
         Taken as they are needed.
     crew : Crew, optional
         From `hire`; by default this process.
-    known : callable, optional
-        Returns the result of a task that needs no work, or None.
     done : callable, optional
         Told here of every task and its result, as soon as there is one.
 
@@ -290,15 +287,13 @@ def map_ordered(
     ...     list(map_ordered(abs, [-3, 2], crew))
     [3, 2]
     """
-    known, done = known or _nothing, done or _nothing
+    done = done or _nothing
     if crew is not None:
-        yield from _Course(function, crew, known, done).run(iter(tasks))
+        yield from _Course(function, crew, done).run(iter(tasks))
         return
     for task in tasks:
-        result = known(task)
-        if result is None:
-            result = function(task)
-            done(task, result)
+        result = function(task)
+        done(task, result)
         yield result
 
 
@@ -308,7 +303,6 @@ class _Course(Generic[_Task, _Result]):
 
     function: Callable[[_Task], _Result]
     crew: Crew
-    known: Callable[[_Task], _Result | None]
     done: Callable[[_Task, _Result], None]
     waiting: dict[int, _Task] = field(default_factory=dict)  # to be given out
     running: dict[Future[Any], tuple[int, _Task]] = field(default_factory=dict)
@@ -337,14 +331,10 @@ class _Course(Generic[_Task, _Result]):
             self.crew.drop(self.running)
 
     def _take(self, number: int, tasks: Iterator[_Task]) -> bool:
-        """Start the next task unless its result is known; return whether there was one."""
+        """Start the next task; return whether there was one."""
         for task in tasks:
-            result = self.known(task)
-            if result is None:
-                self.waiting[number] = task
-                self._give_out()
-            else:
-                self.ready[number] = True, result
+            self.waiting[number] = task
+            self._give_out()
             return True
         return False
 
@@ -406,4 +396,4 @@ def _attempt(function: Callable[[_Task], _Result], task: _Task) -> tuple[bool, _
 
 
 def _nothing(*arguments: object) -> None:
-    """Do nothing, and know no result."""
+    """Do nothing."""

@@ -57,15 +57,10 @@ def contents(folder):
 
 
 @pytest.mark.slow
-def test_results_do_not_depend_on_workers_cache_and_memory(tmp_path):
+def test_results_do_not_depend_on_workers_and_memory(tmp_path):
     scene = tmp_path / "scene.json"
     save_scene(small_arch(9), scene)
-    more = {
-        "plain": [],
-        "workers": ["--workers", "2"],
-        "cache": ["--cache", str(tmp_path / "answers")],
-        "again": ["--cache", str(tmp_path / "answers"), "--max-memory", "1 GB"],
-    }
+    more = {"plain": [], "workers": ["--workers", "2"], "memory": ["--max-memory", "1 GB"]}
     for name, words in more.items():
         out = ["--out", str(tmp_path / name)]
         assert main([*WORDS, "overlap_dp", str(scene), *out, *words]) == 0
@@ -79,7 +74,6 @@ def test_results_do_not_depend_on_workers_cache_and_memory(tmp_path):
         (["--workers", "two"], "--workers two: give"),
         (["--max-memory", "much"], "--max-memory much: give a size, as 500MB or 2GB"),
         (["--max-memory", "0GB"], "--max-memory 0GB: give a size"),
-        (["--cache", "/dev/null/x"], "cannot make folder"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_a_line(capsys, tmp_path, words, said):
@@ -144,16 +138,26 @@ def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path, workers, limits):
     assert statuses == {0, 4}
 
 
+def hired(run, count):
+    """Return the workers of a run, once there are so many."""
+    command = ["ps", "-ww", "-o", "pid,args", "--ppid", str(run.pid)]
+    until = time.monotonic() + 60
+    while time.monotonic() < until:
+        shown = subprocess.run(command, capture_output=True, text=True, check=False).stdout
+        workers = [line.split()[0] for line in shown.splitlines() if "spawn_main" in line]
+        if len(workers) == count:
+            return workers
+        time.sleep(0.02)
+    raise AssertionError(f"no {count} workers:\n{shown}")
+
+
 @pytest.mark.slow
 @posix
-@pytest.mark.parametrize("workers", [pytest.param("1", marks=pytest.mark.long), "2"])
-def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
+def test_an_interrupt_names_what_was_chosen(tmp_path):
     """A search without proof by the slow engine, ended on its way; every process is interrupted."""
     words = [*WORDS, "cascade", "--no-proof", "--engine", "frame", "--out", tmp_path / "out"]
-    run = start(*words, "--cache", tmp_path / "answers", "--workers", workers)
-    until = time.monotonic() + 60
-    while len(list(tmp_path.glob("answers/*/*.answers"))) < 6 and time.monotonic() < until:
-        time.sleep(0.02)
+    run = start(*words, "--workers", "2")
+    hired(run, 2)
     os.killpg(run.pid, signal.SIGINT)
     out, err = run.communicate(timeout=60)
     assert (run.returncode, out) == (130, "")
@@ -172,27 +176,14 @@ def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
 @pytest.mark.slow
 @posix
 def test_a_killed_worker_is_replaced(tmp_path):
-    """By the slow engine: most of the work is still to be done when the first answer is there."""
+    """By the slow engine: most of the work is still to be done when both workers are there."""
     scene = tmp_path / "scene.json"
     save_scene(small_arch(13), scene)
     words = [*WORDS, "cascade", str(scene), "--no-proof", "--engine", "frame"]
     words += ["--candidates", "near:6"]
-    run = start(
-        *words, "--out", tmp_path / "out", "--workers", "2", "--cache", tmp_path / "answers"
-    )
+    run = start(*words, "--out", tmp_path / "out", "--workers", "2")
     try:
-        until = time.monotonic() + 60
-        while not list(tmp_path.glob("answers/*/*.answers")) and time.monotonic() < until:
-            time.sleep(0.002)
-        shown = subprocess.run(
-            ["ps", "-ww", "-o", "pid,args", "--ppid", str(run.pid)],
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        workers = [line.split()[0] for line in shown.stdout.splitlines() if "spawn_main" in line]
-        assert len(workers) == 2
-        os.kill(int(workers[0]), signal.SIGKILL)
+        os.kill(int(hired(run, 2)[0]), signal.SIGKILL)
         _, err = run.communicate(timeout=120)
     finally:
         run.kill()

@@ -26,7 +26,6 @@ from seqopt.arms._tables import _read as read_postures
 from seqopt.errors import SeqoptError
 from seqopt.exchange.exports import export_plan
 from seqopt.exchange.imports import import_scene, read_content, read_measured
-from seqopt.responses._blocks import Answers, Block, Store
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence._parts import read_site
 from seqopt.sequence.rules import with_robots
@@ -139,7 +138,6 @@ def _of_imports() -> Iterator[tuple[str, File]]:
 
 
 def _of_caches() -> Iterator[tuple[str, File]]:
-    engine = seqopt.make_engine("compliance", small_arch(3))
     arms = two_arms(3)
     site = ArmSite.of(arms)
     p, r, n, b = 4, len(site.robots), len(site.nodes), len(site.bricks)
@@ -162,23 +160,6 @@ def _of_caches() -> Iterator[tuple[str, File]]:
     }
     assert {*table} == {each.name for each in fields(PostureTable)}
     yield "postures", ("postures.npz", _npz(**table), lambda path: read_postures(path, site))
-
-    with TemporaryDirectory() as folder:
-        yield "answers", _answers(Path(folder), engine)
-
-
-def _answers(folder: Path, engine: seqopt.engines.interface.Engine) -> File:
-    block = Block(2, np.array([[1, 2], [1, 3]]), ("T_max",))
-    store = Store(folder / "kept", engine)
-    store.keep(block, Answers({"T_max": np.ones(2)}, np.ones((2, 2)), ()))
-    content = store.path(block).read_bytes()
-
-    def found(path: Path) -> object:
-        store.path(block).parent.mkdir(parents=True, exist_ok=True)
-        store.path(block).write_bytes(path.read_bytes())
-        return store.find(block)
-
-    return "x.answers", content, found
 
 
 @cache

@@ -130,7 +130,7 @@ def test_a_program_that_is_killed_leaves_nothing_or_a_whole(number):
 KINDS = (
     *("instance", "timed instance", "answer", "answer as text", "bound 1", "bound 2", "bound 3"),
     *("scene", "plan", "schedule", "state", "measured", "summary", "compas_assembly", "boxes"),
-    *("obj", "glb", "ply", "stl", "postures", "answers"),
+    *("obj", "glb", "ply", "stl", "postures"),
 )
 
 

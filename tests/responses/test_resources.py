@@ -1,4 +1,4 @@
-"""Processes, executors, stored answers and little memory: the same results to the last bit."""
+"""Processes, executors and little memory: the same results to the last bit."""
 
 from __future__ import annotations
 
@@ -79,16 +79,16 @@ def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, m
     groups = [batches.batch_of(single, steps, everything) for level in levels for steps in level]
     every = [block for group in groups for block in group.blocks()]
     total = sum(block.work for block in every)
-    shared = [*division._split_work(every, None, total / (2 * portions))]
-    assert [block for portion in shared for block in portion.blocks] == every
+    shared = [*division._split_work(every, total / (2 * portions))]
+    assert [block for portion in shared for block in portion] == every
     assert portions / 2 < len(shared) <= 2 * portions
     if portions == 3:
-        counts = [{block.bricks for block in portion.blocks} for portion in shared]
+        counts = [{block.bricks for block in portion} for portion in shared]
         assert all(a.isdisjoint(b) for a, b in itertools.pairwise(counts))
     most = division._SEVERAL * total / (2 * portions) + max(block.work for block in every)
-    assert all(portion.work <= most for portion in shared)
-    alone = [*division._split_work(every, None, None)]
-    assert [len(portion.blocks) for portion in alone] == [1] * len(every)
+    assert all(sum(block.work for block in portion) <= most for portion in shared)
+    alone = [*division._split_work(every, None)]
+    assert [len(portion) for portion in alone] == [1] * len(every)
 
 
 BUILT = arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, 7).tolist(), pattern="V"))  # in a plane
@@ -160,7 +160,7 @@ def test_an_engine_is_made_once_for_a_worker(small_blocks, loop25, monkeypatch):
     )
     with ThreadPoolExecutor(1) as executor:
         for block in blocks()[:3]:
-            asked = division._Chunk((Block(1, np.array([[1]]), block.names),))
+            asked = [Block(1, np.array([[1]]), block.names)]
             sent = executor.submit(send, asked).result()
             assert len(sent) == 1
     assert len(made) == 1
@@ -189,8 +189,6 @@ def test_a_network_that_is_not_its_scenes_is_not_made_anew(loop25):
     found = evaluation(engine, loop25, workers=2).steps
     assert found == evaluation(make_engine("compliance", heavier), loop25).steps
     assert found != evaluation(make_engine("compliance", network), loop25).steps
-    with pytest.raises(SceneError, match="does not say what its answers depend on"):
-        _ = evaluation(engine, loop25, cache="never made").steps
 
 
 @pytest.mark.parametrize(

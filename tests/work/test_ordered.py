@@ -52,17 +52,6 @@ def test_tasks_are_taken_as_they_are_needed():
         results.close()
 
 
-def test_what_is_known_is_not_worked_on():
-    done = []
-    known = {4: 0, 5: 0}.get
-    with ThreadPoolExecutor(2) as executor:
-        for mine in (None, executor):
-            with hire(mine) as crew:
-                found = map_ordered(square, range(8), crew, known, lambda *pair: done.append(pair))
-                assert list(found) == [0, 1, 4, 9, 0, 0, 36, 49]
-    assert sorted(done) == sorted([(n, n * n) for n in (0, 1, 2, 3, 6, 7)] * 2)
-
-
 def test_the_first_error_is_raised_whoever_works():
     for workers in (1, 2):
         found, crew = [], hire(workers=workers)
