@@ -10,7 +10,6 @@ import pytest
 
 import seqopt
 from seqopt._cli.main import main
-from seqopt.engines.registry import Recipe
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.report.page import Build, report_page
 from seqopt.scene import Load, load_scene
@@ -101,20 +100,6 @@ def test_a_load_far_from_its_brick_is_doubted(tmp_path):
     save_scene(far, tmp_path / "own.json")
     with pytest.warns(SceneWarning, match=r"load on brick 1: it lies 8\.\d+ m from brick 1"):
         load_scene(tmp_path / "own.json")
-
-
-def test_answers_are_known_by_their_loads():
-    keys = {
-        Recipe("compliance", replace(loaded(), **change)).key
-        for change in (
-            {},
-            {"loads": ()},
-            {"wind": (0.0, 0.0, 0.0)},
-            {"weight_factor": 1.0},
-            {"grounds": six_bricks().grounds},
-        )
-    }
-    assert len(keys) == 5
 
 
 def test_scenarios_take_loads_along():
