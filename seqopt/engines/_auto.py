@@ -1,9 +1,9 @@
 """The engine that chooses the simplest sufficient model for each grip set, and says why.
 
-There are three levels, and the cheapest whose condition a grip set meets is used: planar, if
-everything lies in one plane; exactly rigid bricks, if joints stay within their elastic limits; and
-discrete elements otherwise. Where their condition holds, the first two give the same answer as the
-next level, to rounding.
+There are three levels, and the cheapest whose condition holds is used: planar, if the whole scene
+lies in one plane; exactly rigid bricks, if joints stay within their elastic limits; and discrete
+elements for the grip sets with which one would not. Where their condition holds, the first two give
+the same answer as the next level, to rounding.
 
 Who chooses among many grip sets takes one of the first two for all of them (`find_level`), and asks
 of what was chosen alone whether joints stay within their elastic limits.
@@ -17,11 +17,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Bools, Floats
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._grip_compliance import compliance_by_kind, read_compliance
-from seqopt.engines._planar import _leaves_plane, _mixes, find_plane, off_plane
+from seqopt.engines._grip_compliance import compliance_by_kind
+from seqopt.engines._planar import PlanarEngine, _mixes, find_plane, off_plane
 from seqopt.engines.interface import (
     Fields,
     Level,
@@ -29,7 +28,6 @@ from seqopt.engines.interface import (
     NamedEngine,
     OpeningEngine,
     Want,
-    grip_columns,
     keep_wanted,
     merge_sets,
     select_sets,
@@ -42,6 +40,7 @@ from seqopt.scene.scene import Scene
 _IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity, loads and grips lie in one plane")
 _OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
 _GIVING = LevelChoice(Level.RIGID, "grips give way out of the plane of the bricks")
+_MOVED = LevelChoice(Level.RIGID, "grips are moved, which may be out of the plane of the bricks")
 _BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
 
 
@@ -54,62 +53,6 @@ def find_level(network: Network) -> LevelChoice:
         return _OFF_PLANE
     matrix = compliance_by_kind(network)
     return _GIVING if _mixes(plane, matrix).any() else _IN_PLANE
-
-
-class _RigidBricks(NamedEngine):
-    """Bricks on springs that never break, in the plane for the grip sets that lie in it.
-
-    ``in_space``: of grip sets that do not, the level and why.
-    """
-
-    def __init__(self, network: Network | Scene) -> None:
-        super().__init__(network)
-        plane, self.in_space = find_plane(self.network), _OFF_PLANE
-        self._stiff = self.network.scene.grip_kinds.rigid
-        self._flat: Bools = np.zeros(2 * len(self.network.inner), dtype=bool)  # by node
-        if isinstance(plane, str):
-            self.in_space = LevelChoice(Level.RIGID, plane)
-        else:
-            self._mirror, self._plane = plane, ComplianceEngine(self.network, plane.basis)
-            self._flat = off_plane(self.network, plane) == 0
-
-    @cached_property
-    def _space(self) -> ComplianceEngine:
-        """Where all grips lie in the plane, none is needed."""
-        return ComplianceEngine(self.network)
-
-    def solve(
-        self,
-        bricks: int,
-        grips: ArrayLike,
-        want: Want = Want.RESPONSES,
-        moved: ArrayLike | None = None,
-    ) -> Fields:
-        """Return the fields of a partial structure for grip sets (S, r)."""
-        if not self._flat.any():
-            return self._space.solve(bricks, grips, want, moved)
-        if self._flat.all() and moved is None and self._stiff:
-            return self._plane.solve(bricks, grips, want)
-        flat, sets = self.lies_flat(bricks, grips, moved), np.asarray(grips)
-        inside = self._plane.solve(bricks, sets[flat], want, _of(moved, flat))
-        if flat.all():
-            return inside
-        outside = self._space.solve(bricks, sets[~flat], want, _of(moved, ~flat))
-        return merge_sets(flat, inside, outside)
-
-    def lies_flat(self, bricks: int, grips: ArrayLike, moved: ArrayLike | None = None) -> Bools:
-        """Return which grip sets (S,) lie in the plane of the structure, and stay in it."""
-        if not self._flat.any() or (self._flat.all() and moved is None and self._stiff):
-            return np.full(len(np.asarray(grips)), self._flat[0])
-        columns = grip_columns(self.network, bricks, grips)
-        flat = np.asarray(self._flat[columns].all(axis=1))
-        compliance = read_compliance(self.network, columns, grips, moved)
-        return flat & ~_leaves_plane(self._mirror, compliance, columns)
-
-
-def _of(moved: ArrayLike | None, which: Bools) -> Floats | None:
-    """Return how grips of some sets are moved."""
-    return None if moved is None else np.asarray(moved, dtype=float)[which]
 
 
 class AutoEngine(NamedEngine):
@@ -129,9 +72,10 @@ class AutoEngine(NamedEngine):
         return find_level(self.network)
 
     @cached_property
-    def rigid(self) -> _RigidBricks:
+    def rigid(self) -> ComplianceEngine:
         """Bricks on springs that never break."""
-        return _RigidBricks(self.network)
+        planar = self.choice.level is Level.PLANAR
+        return PlanarEngine(self.network) if planar else ComplianceEngine(self.network)
 
     @cached_property
     def _discrete(self) -> OpeningEngine:
@@ -165,16 +109,18 @@ class AutoEngine(NamedEngine):
     ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         asked = want if self.limits is None else want | Want.JOINTS
-        fields = self.rigid.solve(bricks, grips, asked, moved)
-        flat = self.rigid.lies_flat(bricks, grips, moved)
-        beyond = np.zeros(len(flat), dtype=bool)
+        rigid, choice = self.rigid, self.choice
+        if moved is not None and isinstance(rigid, PlanarEngine):
+            rigid, choice = rigid.in_space, _MOVED
+        fields = rigid.solve(bricks, grips, asked, moved)
+        beyond = np.zeros(len(fields.grip_force), dtype=bool)
         if self.limits is not None:
             beyond = self.limits.exceeded(fields.joint_wrench)
         if beyond.any():
-            sets, far = np.asarray(grips)[beyond], _of(moved, beyond)
+            sets = np.asarray(grips)[beyond]
+            far = None if moved is None else np.asarray(moved, dtype=float)[beyond]
             found = self._discrete.solve(bricks, sets, asked, far)
             fields = merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
-        in_space = self.rigid.in_space
-        levels = (_IN_PLANE, flat & ~beyond), (in_space, ~flat & ~beyond), (_BEYOND, beyond)
+        levels = (choice, ~beyond), (_BEYOND, beyond)
         self.tally.update({level: int(mine.sum()) for level, mine in levels if mine.any()})
         return keep_wanted(fields, want)

@@ -146,9 +146,9 @@ def _linear(engine: Engine) -> Engine:
             f"tolerance: a {type(engine).__name__} is not linear in where grips are; take the "
             "engine compliance or auto"
         )
-    if isinstance(engine, PlanarEngine):  # grips may be off in any direction
-        return engine.in_space
-    return engine.rigid if isinstance(engine, AutoEngine) else engine
+    engine = engine.rigid if isinstance(engine, AutoEngine) else engine
+    # grips may be off in any direction
+    return engine.in_space if isinstance(engine, PlanarEngine) else engine
 
 
 def _groups(
