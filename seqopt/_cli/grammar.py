@@ -8,7 +8,7 @@ from dataclasses import replace
 from math import radians
 from typing import Any
 
-from seqopt._cli.options import Chosen, Cured, Number, Numbers, Ranks, Stands, Words
+from seqopt._cli.options import Cured, Number, Numbers, Ranks, Stands, Words
 from seqopt.contact.curing import _find_curing
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
@@ -16,12 +16,10 @@ from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.problem.criteria import Ranked, RankSum
 from seqopt.problem.requirements import LARGEST, NEVER, Criterion, number_word, split_word
 from seqopt.problem.standing import Standing
-from seqopt.responses.resources import Resources
 from seqopt.scene._checks import short
 from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene
 from seqopt.study.published import CRITERIA, find_criterion
-from seqopt.work.progress import Tell
 
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 NAMED = (None, *CRITERIA)
@@ -170,12 +168,6 @@ def parse_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
         value: Any = Ranked(text) if name == "ranked" else NEVER if crown is None else crown
         criterion = replace(criterion, **{name: value})
     return criterion
-
-
-def parse_resources(asked: Chosen, progress: Tell | None = None) -> Resources:
-    """Return the computing resources of the options."""
-    most = None if asked.max_memory is None else parse_size(asked.max_memory)
-    return Resources(asked.workers, None, most, progress)
 
 
 def parse_size(text: str) -> float:

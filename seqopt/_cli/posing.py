@@ -13,6 +13,7 @@ from seqopt.network.build import build_network
 from seqopt.problem.filters import parse_limits
 from seqopt.problem.problem import Problem, parse_budgets, parse_robust
 from seqopt.problem.standing import Standing
+from seqopt.responses.resources import Resources
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, Direction, FreeRules
@@ -69,7 +70,9 @@ def pose_problem(asked: options.Moves, change: Change | None = None) -> PosedPro
     find_postures(scene, choice.cache, asked.tell)
     limits = parse_limits(asked.limits, scene, "--limit")
     parse_budgets(choice.budgets, of_states=of_states)  # said before anything is built
-    resources = grammar.parse_resources(choice, None if of_states else asked.tell)
+    most = None if choice.max_memory is None else grammar.parse_size(choice.max_memory)
+    tell = None if of_states else asked.tell
+    resources = Resources(choice.workers, None, most, tell)
     robust, known, unseen = _scenarios(choice, scene)
     engine = inputs.find_engine(asked, build_network(scene))
     named, rules = grammar.parse_robots(robots) or None, asked.rules or None

@@ -9,16 +9,23 @@ from typing import Any
 
 from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
+from seqopt._cli.terminal import wrapped
+from seqopt._files import csv_text
+from seqopt._showing import PAGE
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar
-from seqopt.engines.registry import versions
+from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.problem.requirements import number_word
 from seqopt.responses.quantities import _steps_in_words
 from seqopt.sequence.steps import Step
 from seqopt.stability._step_verdicts import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import Verdict
+from seqopt.stability.failure_map import AXES, failure_map
 from seqopt.work.progress import with_progress
+
+STEEPEST = 45.0  # degrees
 
 
 class Assess(options.Fixed):
@@ -94,9 +101,7 @@ def run(asked: Assess) -> Answer:
     seqopt assess arch:span=2,rise=0.8 --map friction --out map
     """
     if asked.map is not None:
-        from seqopt._cli.commands.mapping import answer_map  # noqa: PLC0415  # for maps only
-
-        return answer_map(asked, asked.map, str(asked.holds or "dry,epoxy").split(","))
+        return _map(asked, asked.map, str(asked.holds or "dry,epoxy").split(","))
     outputs.keep_apart(asked, asked.path)
     scene, mortars = inputs.find_scene(asked), _mortars(asked)
     network = build_network(scene)
@@ -178,3 +183,54 @@ def _margins(asked: Assess, steps: Sequence[Step]) -> tuple[tuple[str, ...], ran
     if end < start:
         raise ProblemError(f"--steps {asked.steps}: the first is after the last; exchange them")
     return margins, range(start, end + 1)
+
+
+def _map(asked: Assess, over: str, holds: Sequence[str]) -> Answer:
+    """Return the failure map of builds over an axis and the mortar of joints."""
+    from seqopt.report._failures import failure_blocks, failure_page, usual_builds  # noqa: PLC0415  # verdicts load no pages
+
+    scene = inputs.find_scene(asked)
+    axis, values = _axis(over)
+    for name in holds:
+        grammar.parse_mortar(name, "--holds")
+    outputs.require_out(asked)
+    network = build_network(scene)
+    if asked.method is None and inputs.given_plan(asked) is None:
+        builds, notes = usual_builds(scene, asked.tell)
+    else:
+        name, steps, _ = inputs.find_steps(asked, network)
+        builds, notes = {name: steps}, []
+    found = failure_map(scene, builds, holds, axis, values, asked.tell)
+
+    def files() -> dict[str, bytes | str]:
+        page = failure_page(make_engine(USUAL, network, None), builds, found)
+        tables = {"map.csv": csv_text(found.cases), "map_steps.csv": csv_text(found.steps)}
+        picture = outputs.picture("map", lambda charts: charts.failure_figure(found))
+        return {**tables, PAGE: page, **picture}
+
+    written = outputs.write_outputs(asked, files)
+    blocks = failure_blocks(scene, found, wrapped)
+    where = outputs.written_to(asked.path, tables="tables, a picture", what="how steps fall")
+    falls = found.cases["fall"].any()
+    return Answer(
+        facts={"versions": versions(), "cases": found.cases, "steps": found.steps},
+        text="\n\n".join([*blocks, wrapped(where)]),
+        written=written,
+        scene=scene,
+        value=found.cases,
+        notes=(*notes, *outputs.figure_notes(written)),
+        status=Status.DOES_NOT_HOLD if falls else Status.DONE,
+    )
+
+
+def _axis(text: str) -> tuple[str, tuple[float, ...]]:
+    """Return the axis of a map, and its values; none for the usual ones."""
+    axis, _, values = text.partition("=")
+    where = f"--map {text}"
+    if axis not in AXES:
+        raise ProblemError(f"{where}: give {' or '.join(AXES)}, with values as friction=0.3,0.6")
+    numbers = {number_word(value, where, zero=True) for value in values.split(",") if values}
+    steep = [number for number in numbers if axis == "tilt" and number > STEEPEST]
+    if steep:
+        raise ProblemError(f"{where}: {max(steep):g} is too much; give tilt from 0 to {STEEPEST:g}")
+    return axis, tuple(sorted(numbers))

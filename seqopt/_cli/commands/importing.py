@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from seqopt._cli import options, remarks
@@ -100,23 +101,15 @@ def run(asked: Import) -> Answer:
 
 def _given(asked: Import) -> Given:
     """Return the options that complete the data of the file."""
-    keys, law = asked.supports, None
-    if asked.stiffness is not None:
-        pair, where = asked.stiffness.split(","), f"--stiffness {asked.stiffness}"
-        if len(pair) != 2:
-            raise ProblemError(f"{where}: give two numbers, as 1.5e9,1.5e8")
-        along, across = (number_word(number, where) for number in pair)
-        law = JointLaw(translational=(along, across, across))
-    return Given(
-        unit=asked.unit,
-        up=asked.up,
-        density=asked.density,
-        supports=None if keys is None else [key.strip() for key in keys.split(",") if key.strip()],
-        law=law,
-        gap=asked.gap,
-        detect=asked.detect,
-        accept_overlaps=asked.accept_overlaps,
-        robots=asked.robots,
-        name=asked.name,
-        progress=asked.tell,
-    )
+    same = ("unit", "up", "density", "gap", "detect", "accept_overlaps", "robots", "name")
+    given = Given(**{name: getattr(asked, name) for name in same}, progress=asked.tell)
+    if asked.supports is not None:
+        keys = [key.strip() for key in asked.supports.split(",") if key.strip()]
+        given = replace(given, supports=keys)
+    if asked.stiffness is None:
+        return given
+    pair, where = asked.stiffness.split(","), f"--stiffness {asked.stiffness}"
+    if len(pair) != 2:
+        raise ProblemError(f"{where}: give two numbers, as 1.5e9,1.5e8")
+    along, across = (number_word(number, where) for number in pair)
+    return replace(given, law=JointLaw(translational=(along, across, across)))
