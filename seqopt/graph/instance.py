@@ -16,7 +16,6 @@ from seqopt.graph.formulation import Formulation, as_formulation, formulations
 from seqopt.graph.graph import Graph, Rows
 from seqopt.problem.problem import Aim
 from seqopt.problem.resources import Resource, StepArrays
-from seqopt.responses._tolerance import values_text
 from seqopt.scene.scene import Order
 
 if TYPE_CHECKING:
@@ -120,7 +119,8 @@ class Instance(FrozenValue, Shown):
         capped = "".join(f", {cap.name} <= {cap.most:g}" for cap in self.caps)
         return f"<Instance {self.name!r}: {self.nodes} nodes, {self.arcs} arcs, {asked}{capped}>"
 
-    title, candidates, scenarios, models, standing, begin = "", (), (), 0, None, None  # of no scene
+    title, among, candidates, scenarios = "", "", (), ()  # of no scene
+    models, standing, begin = 0, None, None
 
     @property
     def alone_in_scene(self) -> NoReturn:
@@ -179,11 +179,6 @@ class Instance(FrozenValue, Shown):
     def settles(self, *, exact: bool) -> bool:
         """Return whether a judged plan is optimal though it has a gap: never."""
         return False
-
-    def said(self, objective: Mapping[str, float], gap: float | None, status: str) -> str:
-        """Return objective, gap and status of a plan in words."""
-        within = f" within {gap:.2g}" if gap and gap < np.inf else ""
-        return f"{values_text(objective)}, {status}{within}"
 
     @property
     def nodes(self) -> int:

@@ -207,17 +207,6 @@ def _first_path(graph: Graph, costs: Floats, after: Floats) -> tuple[int, ...]:
     return tuple(path)
 
 
-def _less(values: Floats, others: Floats) -> Bools:
-    """Return which rows come before others, the first column counting most."""
-    out = np.zeros(len(values), dtype=bool)
-    open_ = np.ones(len(values), dtype=bool)
-    for value, other in zip(values.T, others.T, strict=True):
-        slack = 1e-12 * np.where(np.isfinite(other), np.abs(other), 0.0)
-        out |= open_ & (value < other - slack)
-        open_ &= (value <= other + slack) & (value >= other - slack)
-    return out
-
-
 PASSES, FAILS = 1, -1
 Ask = Callable[[int, Ints], Ints]
 """Returns of states (n,) of a part, given by its number, which pass: 1, -1, or 0: not known."""

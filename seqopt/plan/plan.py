@@ -27,6 +27,7 @@ from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, o
 from seqopt.problem.standing import Standing
 from seqopt.responses._choices import window_models
 from seqopt.responses._grip_sets import Moved
+from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import (
     FAR_OFF,
     OUTSIDE,
@@ -251,8 +252,10 @@ class Plan(ShownBuild):
 
     @property
     def _value(self) -> str:
-        gap = None if self.certificate is None else _known_gap(self.certificate.gap)
-        return self.graph.said(self.objective, gap, str(self.status))
+        within = f" within {self.gap:.2g}" if self.gap else ""
+        among = f" among candidates {self.graph.among}" if self.graph.among else ""
+        values = values_text(self.objective) or "not compared with the optimum"
+        return f"{values}, {self.status}{within}{among}"
 
     @property
     def choice(self) -> tuple[int, ...]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from numbers import Real
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -42,25 +42,6 @@ from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 
 
-class _Costs(Protocol):
-    """Costs of choices, of which an aim takes the sum or the largest."""
-
-    def cost(self, choice: Sequence[int]) -> float: ...
-    def worst(self, choice: Sequence[int]) -> float: ...
-
-
-Found_co = TypeVar("Found_co", bound=_Costs, covariant=True)
-
-
-class _Costed(Protocol[Found_co]):
-    """What has costs to be summed up, and costs whose largest counts."""
-
-    @property
-    def sums(self) -> Found_co: ...
-    @property
-    def peaks(self) -> Found_co: ...
-
-
 class Aim(Enum):
     """What to minimize over the build: the sum of costs or the largest cost."""
 
@@ -72,13 +53,13 @@ class Aim(Enum):
         """How costs go together."""
         return np.add if self is Aim.SUM else np.maximum
 
-    def value_of(self, costs: _Costs, choice: Sequence[int]) -> float:
-        """Return the value of a choice: its total, or its largest cost."""
-        return costs.cost(choice) if self is Aim.SUM else costs.worst(choice)
+    def value_of(self, costs: Any, choice: Sequence[int]) -> float:
+        """Return the value of a choice by costs of candidates: its total, or its largest cost."""
+        return float(costs.cost(choice) if self is Aim.SUM else costs.worst(choice))
 
-    def costs(self, problem: _Costed[Found_co]) -> Found_co:
-        """Return the costs of a problem that this aim is about: its sums or its peaks."""
-        return problem.sums if self is Aim.SUM else problem.peaks
+    def costs(self, decisions: Any) -> Any:
+        """Return the costs of candidates that this aim is about: sums or peaks."""
+        return decisions.sums if self is Aim.SUM else decisions.peaks
 
 
 class RobustKind(Enum):

@@ -36,7 +36,7 @@ from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.resources import Resource
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets, _near
-from seqopt.responses._tolerance import is_tolerance, values_text
+from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
@@ -245,13 +245,6 @@ class States(Shown):
         """Return whether a judged exact search is optimal, up to the proven width of margins."""
         beside = self.budgets or self.totals or self.is_timed or self.paths or self.decisions
         return exact and not beside
-
-    def said(self, objective: Mapping[str, float], gap: float | None, status: str) -> str:
-        """Return objective, gap and status of a plan in words."""
-        within = f" within {gap:.2g}" if gap and gap < np.inf else ""
-        among = f" among candidates {self.among}" if self.among else ""
-        values = values_text(objective) or "not compared with the optimum"
-        return f"{values}, {status}{within}{among}"
 
     def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
         """Return the settings of the problem for a summary; ``limits``: bounds by name."""
