@@ -253,7 +253,7 @@ class Plan(ShownBuild):
     @property
     def _value(self) -> str:
         within = f" within {self.gap:.2g}" if self.gap else ""
-        among = f" among candidates {self.graph.among}" if self.graph.among else ""
+        among = f", among these: {self.graph.among}" if self.graph.among else ""
         values = values_text(self.objective) or "not compared with the optimum"
         return f"{values}, {self.status}{within}{among}"
 

@@ -199,7 +199,7 @@ def test_fewer_candidates_are_a_heuristic_that_says_so(capsys, tmp_path):
     whole, near = tmp_path / "whole", tmp_path / "near"
     assert main([*words, "--out", str(whole)]) == 0
     assert main([*words, "--out", str(near), "--candidates", "near:6"]) == 0
-    assert "heuristic: near:6 keeps" in capsys.readouterr().out
+    assert "optimal, among these: near:6 keeps" in capsys.readouterr().out
     first, second = contents(whole)["summary.json"], contents(near)["summary.json"]
     assert (first["status"], first["candidates"]) == ("optimal", "all")
     assert second["status"] == "optimal among these"
