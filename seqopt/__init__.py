@@ -55,7 +55,6 @@ _HOMES = {
     "instances.compiled": ("compile_instance",),
     "instances.answers": ("judge_instance",),
     "plan.build": ("GivenSequence",),
-    "judge.certificate": ("Certificate",),
     "contact.mortar": ("DRY", "EPOXY"),
     "stability.assessment": ("Stability",),
     "stability.steps": ("assess_steps",),
