@@ -11,9 +11,8 @@ import numpy as np
 from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines._twice import add_products
 from seqopt.engines.interface import Fields
-from seqopt.engines.rigid._mixed import Solution, respond
+from seqopt.engines.rigid._mixed import Solution, add_products, respond
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import build_statics, node_motion
 from seqopt.network.network import GROUND, Network

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg, sparse
 
-from seqopt.engines._twice import add_products
+from seqopt.engines.rigid._mixed import add_products
 
 
 def _reach(arm):

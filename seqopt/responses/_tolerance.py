@@ -265,39 +265,18 @@ def each_tolerance(
 ) -> Floats:
     """Return the tolerance of grips of every step, m.
 
-    Steps of equal numbers of grips are solved as one batch, equal states once. ``known``: cache by
-    bricks and grips, updated in place.
+    Steps of equal numbers of bricks and grips are solved as one batch, equal states once.
+    ``known``: cache by bricks and grips, updated in place.
     """
     known = {} if known is None else known
-    new = {(len(held), bricks, held) for _, bricks, held in steps if (bricks, held) not in known}
-    for count, same in groupby(sorted(new), key=itemgetter(0)):
-        mine = [*same]
-        found = _misfits_of(engine, mine) if count else np.zeros(len(mine))
-        for (_, bricks, held), misfit in zip(mine, found.tolist(), strict=True):
+    new = {(bricks, len(held), held) for _, bricks, held in steps if (bricks, held) not in known}
+    for (bricks, count), same in groupby(sorted(new), key=itemgetter(0, 1)):
+        sets = [held for *_, held in same]
+        grips = np.array(sets, dtype=np.int64).reshape(len(sets), count)
+        for held, misfit in zip(sets, misfits(engine, bricks, grips).tolist(), strict=True):
             off = np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
             known[bricks, held] = off
     return np.array([known[bricks, held] for _, bricks, held in steps], dtype=float)
-
-
-def _misfits_of(engine: Engine, keys: Sequence[tuple[int, int, tuple[int, ...]]]) -> Floats:
-    """Return the `misfits` of grip sets of all brick counts, with equal numbers of grips."""
-    out, rows = np.zeros(len(keys)), [np.arange(0)]
-    groups: list[_Group] = []
-    for bricks, same in groupby(range(len(keys)), key=lambda i: keys[i][1]):
-        mine = np.array([*same])
-        grips = np.array([keys[i][2] for i in mine], dtype=np.int64)
-        tied = _tied(engine, bricks, grips)
-        out[mine[tied]] = NO_TOLERANCE
-        if not tied.all():
-            left = grips[~tied]
-            payload = _payloads(engine.network, left)
-            groups += _groups(engine, bricks, left, payload, ROBOTS_ALONE)
-            rows.append(mine[~tied])
-    if groups:
-        each = zip(*((group.own, group.change, group.most) for group in groups), strict=True)
-        rates, _ = _Group("payload", *map(np.concatenate, each)).rates()
-        out[np.concatenate(rows)] = rates.max(axis=1)
-    return np.minimum(out, NO_TOLERANCE)
 
 
 _SOFTEST, _STIFFEST = 1e2, 1e12  # N/m, between which a stiffness is sought

@@ -10,10 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
 
-from seqopt.engines._twice import add_products
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid import _mixed as mixed
-from seqopt.engines.rigid._mixed import solve_mixed
+from seqopt.engines.rigid._mixed import add_products, solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError
 from seqopt.network.build import build_network

@@ -23,7 +23,6 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
-from seqopt.engines._twice import add_products
 from seqopt.engines.interface import Fields, join_sets, no_sets
 from seqopt.engines.rigid._mechanism import Ungripped, require_resistance, ungripped_system
 from seqopt.errors import SolverError
@@ -367,3 +366,36 @@ def _sizes(parts: Ungripped, states: Floats) -> Floats:
     both = np.split(states, [len(parts.wrench_unit)], axis=1)
     kinds = [part.reshape(len(states), part.shape[1] // 6, 2, 3) for part in both]
     return np.hstack([np.abs(part).max(axis=(1, 3), initial=0.0) for part in kinds])
+
+
+_SPLIT = 2.0**27 + 1.0  # halves the 53 digits of a double
+
+
+def add_products(start: Floats, matrix: sparse.csr_array, factors: Floats) -> Floats:
+    """Return ``start + matrix @ factors``, of vectors, with twice the digits before it is rounded.
+
+    Residuals of a solution ``x`` are those of a load with the factors ``-x``. In plain doubles they
+    are mostly rounding, which differs between processors. Here the rounding errors of all products
+    and sums are summed too, by operations that every processor rounds alike (``Dot2`` of Ogita,
+    Rump and Oishi, SIAM Journal on Scientific Computing 26 (2005) 1955-1988).
+    """
+    count = np.diff(matrix.indptr)
+    total, lost = start.copy(), np.zeros_like(start)
+    for place in range(int(count.max(initial=0))):
+        rows = np.flatnonzero(count > place)
+        at = matrix.indptr[rows] + place
+        a, b = matrix.data[at], factors[matrix.indices[at]]
+        product, (a1, a2), (b1, b2) = a * b, _halves(a), _halves(b)
+        rounded = a2 * b2 - (((product - a1 * b1) - a2 * b1) - a1 * b2)  # exact (Dekker)
+        before = total[rows]
+        total[rows] = after = before + product
+        part = after - before
+        lost[rows] += (before - (after - part)) + (product - part) + rounded  # exact (Knuth)
+    return total + lost
+
+
+def _halves(a: Floats) -> tuple[Floats, Floats]:
+    """Return two parts of 26 digits that add up to doubles (Veltkamp)."""
+    wide = _SPLIT * a
+    first = wide - (wide - a)
+    return first, a - first
