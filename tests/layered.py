@@ -7,8 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from seqopt.graph.compiled import compile_costs
-from seqopt.graph.decision_costs import Budget, LayeredCosts
+from seqopt.graph.decision_costs import Budget, LayeredCosts, compile_costs
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, as_formulation
 from seqopt.plan._guard import require_fit
 from seqopt.plan._paths import find_path

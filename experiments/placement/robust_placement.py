@@ -41,8 +41,7 @@ from experiments.harness.scenes import half_circle
 from formulations.scenario_program import solve_program
 from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
 from seqopt.arrays import Floats
-from seqopt.graph.compiled import best_in_order, compile_totals
-from seqopt.graph.decision_costs import Joined, LayeredCosts
+from seqopt.graph.decision_costs import Joined, LayeredCosts, best_in_order, compile_totals
 from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.graph.formulation import Watch
 from seqopt.graph.states.states import States, of_decisions, over_scenarios

@@ -30,8 +30,7 @@ from seqopt.graph.paths import (
     tied,
 )
 from seqopt.graph.space import Space
-from seqopt.graph.states._margins import best_margin
-from seqopt.graph.states.explored import build_space, explore, floors_of_goals
+from seqopt.graph.states.explored import best_margin, build_space, explore, floors_of_goals
 from seqopt.graph.states.states import States
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Stage, Tell

@@ -18,9 +18,8 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._labels import Asked, Carried, Joint, Sums, Sweep, Swept
 from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
-from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import HELD, NOW, Graph, TimedGraph
 from seqopt.graph.paths import distances, fewest_moves, moves_along
 from seqopt.problem.resources import Resource, StepArrays
 

@@ -21,8 +21,17 @@ from seqopt._showing import Shown
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
-from seqopt.graph.compiled import Compiled, best_in_order, compile_costs, compile_totals
-from seqopt.graph.decision_costs import Budget, Joined, LayeredCosts, ScenarioCosts, largest_of
+from seqopt.graph.decision_costs import (
+    Budget,
+    Compiled,
+    Joined,
+    LayeredCosts,
+    ScenarioCosts,
+    best_in_order,
+    compile_costs,
+    compile_totals,
+    largest_of,
+)
 from seqopt.problem.criteria import Ranked, RankSum, _counts_every_step
 from seqopt.problem.problem import WORST_PEAK, Aim, AskedBudget, RobustAim
 from seqopt.problem.requirements import (

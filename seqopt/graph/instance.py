@@ -19,7 +19,7 @@ from seqopt.problem.resources import Resource, StepArrays
 from seqopt.scene.scene import Order
 
 if TYPE_CHECKING:
-    from seqopt.graph._timed import TimedGraph
+    from seqopt.graph.graph import TimedGraph
 
 SUM, PEAK, TAIL, TIME = "sum", "peak", "tail", "time"
 

@@ -15,8 +15,7 @@ import numpy as np
 from seqopt._archives import Archive
 from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
 from seqopt.errors import FileError, ProblemError
-from seqopt.graph._timed import NOW, TimedGraph
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import NOW, Graph, TimedGraph
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _by_goal, _Cap, _Target
 from seqopt.instances._texts import as_cp_sat, as_lp, as_mps
 from seqopt.scene._checks import short

@@ -18,7 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph._timed import HELD, NOW, TimedGraph
+from seqopt.graph.graph import HELD, NOW, TimedGraph
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target
 from seqopt.graph.paths import distances
 

@@ -13,10 +13,9 @@ from seqopt._registry import offered
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._explore import Explorer
-from seqopt.graph._timed import TimedGraph
-from seqopt.graph.compiled import on_paths
+from seqopt.graph.decision_costs import on_paths
 from seqopt.graph.formulation import as_formulation
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import Graph, TimedGraph
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States

@@ -15,7 +15,7 @@ import numpy as np
 from seqopt._registry import registered
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph._timed import TimedGraph
+from seqopt.graph.graph import TimedGraph
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, Amount, MoveArrays, StateArrays
 from seqopt.problem.requirements import Limit

@@ -17,8 +17,7 @@ from seqopt.graph._explore import Explorer
 from seqopt.graph._orders import TooManySetsError
 from seqopt.graph.instance import Instance, _Cap
 from seqopt.graph.paths import distances, least_sum, tied
-from seqopt.graph.states._margins import STEPS, WORST, with_margin
-from seqopt.graph.states.explored import barred
+from seqopt.graph.states.explored import STEPS, WORST, barred, with_margin
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import is_kept, least_within
 from seqopt.judge._proof import Proof, TooManyPartsError

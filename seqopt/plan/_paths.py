@@ -30,7 +30,7 @@ from seqopt.sequence.steps import Step
 from seqopt.work._clock import INTERRUPT
 
 if TYPE_CHECKING:
-    from seqopt.graph._windows import Windows
+    from seqopt.graph._decision_search import Windows
 
 PROOF = "the proof"  # what it is called where there was no time for it
 

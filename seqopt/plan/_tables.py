@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.graph._windows import Windows
+from seqopt.graph._decision_search import Windows
 from seqopt.graph.decisions import Decisions, move_costs, rank_of
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices

@@ -15,8 +15,7 @@ import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.compiled import best_in_order
-from seqopt.graph.decision_costs import LayeredCosts, ScenarioCosts
+from seqopt.graph.decision_costs import LayeredCosts, ScenarioCosts, best_in_order
 from seqopt.graph.states.states import States, over_scenarios
 from seqopt.judge._schedules import plan_values
 from seqopt.plan.plan import Plan

@@ -43,7 +43,7 @@ from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
 
 if TYPE_CHECKING:
-    from seqopt.graph._windows import Windows
+    from seqopt.graph._decision_search import Windows
 
 
 @dataclass(frozen=True, repr=False)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from seqopt.errors import ProblemError, SolverError, StepError
-from seqopt.graph._windows import Windows, walk_windows
+from seqopt.graph._decision_search import Windows, walk_windows
 from seqopt.graph.decisions import Decisions
 from seqopt.graph.formulation import End, Formulation, Run, Solution, Watch, formulations, timed
 from seqopt.graph.instance import Instance
@@ -231,7 +231,7 @@ def _lazily(graph: States, decisions: Decisions, formulation: Formulation, run: 
     """Choose by only the models that the optimality proof needs; the answer is certified."""
     if run.options:
         raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
-    from seqopt.graph._lazy_pairs import prove_lazily  # noqa: PLC0415  # few ask for it
+    from seqopt.graph._decision_search import prove_lazily  # noqa: PLC0415  # few ask for it
 
     seconds, watch = dict[str, float](), Watch(run.left, run.progress)
     with timed(seconds, "search"):

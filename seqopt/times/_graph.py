@@ -8,8 +8,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._explore import Visited
-from seqopt.graph._timed import HELD, NOW, TimedGraph
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import HELD, NOW, Graph, TimedGraph
 from seqopt.graph.states.states import States
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind

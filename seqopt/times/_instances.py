@@ -9,8 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError
-from seqopt.graph._timed import TimedGraph
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import Graph, TimedGraph
 from seqopt.graph.instance import Instance
 from seqopt.judge._label_proof import Book, Closed, SumBook, limit_below
 from seqopt.judge.arithmetic import Claim, Labels, Stage, _sum

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph._lazy_pairs import PairBounds
-from seqopt.graph._windows import walk_windows
+from seqopt.graph._decision_search import PairBounds, walk_windows
 from seqopt.graph.decision_costs import LayeredCosts
 from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import End, Solution, Watch, find_formulation

@@ -10,7 +10,7 @@ from hypothesis import given
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError, TimeUpError
-from seqopt.graph._windows import walk_windows
+from seqopt.graph._decision_search import walk_windows
 from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import Watch
 from seqopt.network.build import build_network

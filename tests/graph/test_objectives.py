@@ -13,8 +13,7 @@ from scipy.stats import rankdata
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
-from seqopt.graph.compiled import best_in_order
-from seqopt.graph.decision_costs import LayeredCosts
+from seqopt.graph.decision_costs import LayeredCosts, best_in_order
 from seqopt.graph.decisions import move_costs, pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve

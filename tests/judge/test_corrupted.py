@@ -15,7 +15,7 @@ import pytest
 import seqopt
 from formulations.times._labels import InTime
 from seqopt.errors import SeqoptError
-from seqopt.graph.states._margins import bisected
+from seqopt.graph.states.explored import bisected
 from seqopt.graph.states.states import States
 from seqopt.problem import Amount, Filter, filters
 from seqopt.problem.amounts import BUILT_IN, find_amount, worst
@@ -114,7 +114,7 @@ def test_a_margin_that_the_search_gets_wrong_is_seen(space, amount, shift, monke
     def wrong(name, exists):
         return tuple(value + shift for value in bisected(name, exists))
 
-    monkeypatch.setattr("seqopt.graph.states._margins.bisected", wrong)
+    monkeypatch.setattr("seqopt.graph.states.explored.bisected", wrong)
     assert is_refused(posed(space, amount))
 
 

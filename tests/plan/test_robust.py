@@ -17,8 +17,7 @@ from formulations.scenario_program import solve_program
 from formulations.states._totals import by_weights, cheapest_by, least_total
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.compiled import compile_costs, compile_totals
-from seqopt.graph.decision_costs import LayeredCosts, largest_of
+from seqopt.graph.decision_costs import LayeredCosts, compile_costs, compile_totals, largest_of
 from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import Run, Watch, as_formulation
 from seqopt.plan._paths import find_path

@@ -9,7 +9,7 @@ from experiments.harness.scenes import half_circle
 from seqopt.engines.rigid._extremes import can_compile
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SolverError
-from seqopt.graph._windows import walk_windows
+from seqopt.graph._decision_search import walk_windows
 from seqopt.graph.decisions import pose_decisions, windows
 from seqopt.graph.formulation import Watch
 from seqopt.plan.solve import solve

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import seqopt
 from experiments.placement.robust_placement import least_quantile
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.compiled import best_in_order
+from seqopt.graph.decision_costs import best_in_order
 from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.states.states import build_states
 from seqopt.judge._proof import Proof

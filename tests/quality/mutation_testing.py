@@ -67,7 +67,7 @@ PROOFS = {
     ),
     "seqopt.judge._rule_moves": ("judge/test_free_proof", "judge/test_proofs"),
     "seqopt.graph._orders": ("formulations/test_order_search",),
-    "seqopt.graph._lazy_pairs": ("agreement/test_pair_search",),
+    "seqopt.graph._decision_search": ("agreement/test_pair_search",),
 }  # what says that nothing is better, or that there is nothing
 MODULES = {
     "seqopt.engines.rigid.compliance": (
@@ -78,8 +78,12 @@ MODULES = {
     "seqopt.engines.rigid._operator": RIGID,
     "seqopt.engines.rigid._grip_equations": RIGID,
     "seqopt.engines.rigid._growth": ("engines/test_operator", "engines/test_growth"),
-    "seqopt.graph.compiled": ("judge/test_certificate", "formulations/test_programs"),
-    "seqopt.graph.decision_costs": ("graph/test_costs", "plan/test_values"),
+    "seqopt.graph.decision_costs": (
+        "graph/test_costs",
+        "plan/test_values",
+        "judge/test_certificate",
+        "formulations/test_programs",
+    ),
     **PROOFS,
     "seqopt.problem.criteria": (
         *("problem/test_criteria", "problem/test_own_criterion", "problem/test_scales"),
