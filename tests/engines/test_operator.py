@@ -12,7 +12,6 @@ from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.interface import _NAMES, FLAGS, SPACE, Want, grip_columns
 from seqopt.engines.rigid._grip_equations import (
     _doubts,
-    _solve_positive,
     grip_forces,
     share_pairs,
     still_forces,
@@ -324,17 +323,3 @@ def operator_maps(net):
     own = fresh.flexibility.nbytes + fresh.twist.nbytes + fresh.wrench.nbytes
     assert fresh.nbytes == own + fresh.maps.nbytes
     return fresh.maps.nbytes
-
-
-def test_a_system_that_is_not_definite_leaves_the_others_alone():
-    rng = np.random.default_rng(0)
-    root, load = rng.standard_normal((2, 9, 9)), rng.standard_normal((2, 9))
-    matrix = root @ root.transpose(0, 2, 1) + 0.1 * np.eye(9)
-    true = np.linalg.solve(matrix[0], load[0])
-    matrix[1, 0, 0] = -1.0
-    answer, pivot = _solve_positive(
-        np.concatenate([matrix, load[:, None]], axis=1).transpose(1, 2, 0).copy()
-    )
-    assert np.abs(answer[:, 0] - true).max() <= 1e-9 * np.abs(true).max()
-    assert (pivot[:, 0] > 0).all()
-    assert not (pivot[:, 1] > 0).all()

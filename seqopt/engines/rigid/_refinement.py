@@ -39,6 +39,7 @@ from seqopt.engines.rigid._grip_equations import (
     pairs_of,
     still_forces,
 )
+from seqopt.engines.rigid._hanging import Hanging, HangingSystem
 from seqopt.engines.rigid._mechanism import (
     Shared,
     Ungripped,
@@ -157,7 +158,7 @@ _TIED = 0.1  # most that what resists loose motions may be of the springs that t
 
 
 def _held_operator(
-    system: _HeldSystem, inner: sparse.csr_array | None = None
+    system: _HeldSystem | HangingSystem, inner: sparse.csr_array | None = None
 ) -> ComplianceOperator:
     """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
 
@@ -236,15 +237,27 @@ _HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into
 class Refinement:
     """Answers grip sets of one partial structure to rounding, whatever is loose in it.
 
-    ``tied``: whether springs are known to tie every brick to the ground.
+    ``tied``: whether springs are known to tie every brick to the ground; ``hanging``: of the
+    network.
     """
 
     def __init__(
-        self, network: Network, bricks: int, shared: Shared | None = None, *, tied: bool = False
+        self,
+        network: Network,
+        bricks: int,
+        shared: Shared | None = None,
+        *,
+        tied: bool = False,
+        hanging: Hanging | None = None,
     ) -> None:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, shared)
-        self.held = _hold_loose(self.parts, tied=tied)
+        self.held: _HeldSystem | HangingSystem
+        firm = tied and bool((self.parts.stiffness >= _SOFT).all())
+        if hanging is not None and firm and bricks <= hanging.bricks:
+            self.held = HangingSystem(self.parts, hanging)
+        else:
+            self.held = _hold_loose(self.parts, tied=tied)
         self.inner = _loaded(self.parts)
 
     @cached_property
@@ -282,13 +295,14 @@ class Refinements:
     largest = LAST_CORRECTION  # after which an answer needs no other
 
     def __init__(self, network: Network) -> None:
-        self._network, self._shared = network, share(network)
+        self._network, self._shared, self.hanging = network, share(network), Hanging(network)
         self._last: Refinement | None = None
 
     def of(self, bricks: int, *, tied: bool) -> Refinement:
         """Return that of a brick count."""
         if self._last is None or self._last.bricks != bricks:
-            self._last = Refinement(self._network, bricks, self._shared, tied=tied)
+            asked = self._network, bricks, self._shared
+            self._last = Refinement(*asked, tied=tied, hanging=self.hanging)
         return self._last
 
 
