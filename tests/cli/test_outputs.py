@@ -77,11 +77,11 @@ def test_a_failure_makes_no_folder(capsys, tmp_path):
 def test_what_a_line_says_is_not_asked_again_for_the_page(monkeypatch, tmp_path):
     """Tolerances and verdicts of states, and what robots do, are found once for line and page."""
     asked, tasks = Counter(), []
-    misfits, verdicts = _tolerance._misfits_of, _builds.each_by_workers
+    misfits, verdicts = _tolerance.misfits, _builds.each_by_workers
 
-    def each(engine, keys):
-        asked.update(("off", bricks, held) for _, bricks, held in keys)
-        return misfits(engine, keys)
+    def each(engine, bricks, grips, *more):
+        asked.update(("off", bricks, tuple(held)) for held in grips.tolist())
+        return misfits(engine, bricks, grips, *more)
 
     def proven(parts, find, steps, crew):
         asked.update((find.keywords["mortar"], step.bricks, step.grips) for step in steps)
@@ -92,7 +92,7 @@ def test_what_a_line_says_is_not_asked_again_for_the_page(monkeypatch, tmp_path)
             f"seqopt.{module}.tasks_csv", lambda _: tasks.append(1) or "", raising=False
         )
     monkeypatch.setattr("seqopt.exchange._tasks.tasks_csv", lambda _: tasks.append(1) or "")
-    monkeypatch.setattr(_tolerance, "_misfits_of", each)
+    monkeypatch.setattr(_tolerance, "misfits", each)
     monkeypatch.setattr(_builds, "each_by_workers", proven)
     asked_for = ["optimize", "chain:bricks=7", "--schedule", "free", "--out", str(tmp_path / "out")]
     assert main([*asked_for, "--quiet"]) == 0

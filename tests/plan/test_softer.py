@@ -11,7 +11,7 @@ import seqopt
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan._remedies import _payload_advice, whole_load
+from seqopt.plan._softer import _payload_advice, whole_load
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit, overloads
 from seqopt.responses.table import analyze

@@ -21,7 +21,7 @@ from seqopt._showing import PAGE
 from seqopt.graph.formulation import End, Run, as_formulation, trace_rows
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._range import at_sufficient_level
-from seqopt.plan._remedies import _payload_advice
+from seqopt.plan._softer import _payload_advice
 from seqopt.plan._status import order_bound_said
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import graph_of
