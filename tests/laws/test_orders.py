@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from seqopt.engines.interface import Want
@@ -40,9 +40,9 @@ def test_the_whole_structure_does_not_know_its_order(scene, data):
 
 
 def spread(points):
-    """Whether points lie in no line."""
+    """How far points are from lying in one line, over how far they are apart."""
     apart = np.array(points) - points[0]
-    return np.linalg.svd(apart, compute_uv=False)[1] > 0.1 * np.abs(apart).max()
+    return np.linalg.svd(apart, compute_uv=False)[1] / np.abs(apart).max()
 
 
 @given(scene=scenes, data=st.data())
@@ -56,10 +56,11 @@ def test_any_order_builds_what_is_tied_or_held(scene, data):
     parts = [sorted(n for b in part for n in nodes[b]) for part in islands(engine.network, count)]
     grips = [n for part in parts for n in part if n not in scene.blocked_nodes]
     fixed = [
-        len(part) > 2 and spread([scene.node_position(n) for n in part if n in grips])
+        spread([scene.node_position(n) for n in part if n in grips]) if len(part) > 2 else 0.0
         for part in parts
     ]
-    if all(fixed):
+    assume(all(share > 0.1 or share < 1e-9 for share in fixed))  # between, an engine may say either
+    if min(fixed, default=1.0) > 0.1:
         assert np.isfinite(worst(engine, count, grips)).all()
     else:
         with pytest.raises(MechanismError):
