@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt.engines.interface import Want
@@ -59,9 +61,11 @@ def test_any_order_builds_what_is_tied_or_held(scene, data):
         spread([scene.node_position(n) for n in part if n in grips]) if len(part) > 2 else 0.0
         for part in parts
     ]
-    assume(all(share > 0.1 or share < 1e-9 for share in fixed))  # between, an engine may say either
     if min(fixed, default=1.0) > 0.1:
         assert np.isfinite(worst(engine, count, grips)).all()
-    else:
+    elif min(fixed) < 1e-9:
         with pytest.raises(MechanismError):
             worst(engine, count, grips)
+    else:  # nearly in a line: whichever an engine says, it says no number that is none
+        with suppress(MechanismError):
+            assert np.isfinite(worst(engine, count, grips)).all()

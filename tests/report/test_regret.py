@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -205,3 +206,11 @@ def test_other_references_are_refused():
     engine = seqopt.make_engine("compliance", small_arch(4))
     with pytest.raises(ProblemError, match="reference 'planer' does not exist; give one of planar"):
         measure_regret(engine, WORST, reference="planer")
+
+
+def test_without_weight_nothing_is_regretted():
+    light = small_arch(3)
+    light = replace(light, gravity=(0.0, 0.0, 0.0))
+    found = measure_regret(seqopt.make_engine("compliance", light), WORST, **ONCE)
+    assert (found.table["value"] == 0).any()
+    assert (found.table["regret"].dropna() == 0).all()

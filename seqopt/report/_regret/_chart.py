@@ -237,7 +237,7 @@ def _curves(axes: Axes, table: RegretTable) -> None:
         known = len(findings) > 1 and np.isfinite(row["regret"])
         if not known or row["engine"] != table.reference or row["without"]:
             continue
-        best = row["value"] / (1.0 + row["regret"])
+        best = float(table.table["value"].min()) or 1.0
         start = max(float(row["seconds"]) - findings[-1].seconds, 0.0)
         seconds = [start + each.seconds for each in findings]
         color = _look(str(row["engine"]), str(row["schedule"]))["color"]

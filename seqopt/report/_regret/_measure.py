@@ -191,7 +191,7 @@ class _Course:
         own = plan.objective.get("minmax", np.nan)
         exact = gap == 0 and way.without not in (NEAR, "ranks")
         row |= {"seconds": took, "value": value, "gap": gap, "exact": exact}
-        row |= {"own": own, "error": abs(own / along - 1.0)}
+        row |= {"own": own, "error": abs(own - along) / (abs(along) or 1.0)}
         return row | {"models": plan.models, "status": status, "why": why}
 
     def value(self, steps: Sequence[Step]) -> Valued:
@@ -379,6 +379,6 @@ def _formulations(kind: str) -> list[str]:
 def _with_regret(table: pd.DataFrame) -> pd.DataFrame:
     """Return rows with their regret; less than `NOTHING` is none."""
     best = table["value"].min()
-    regret = (table["value"] / best - 1.0).clip(lower=0.0)
+    regret = ((table["value"] - best) / (abs(best) or 1.0)).clip(lower=0.0)
     regret, error = (e.where(~(e < NOTHING), 0.0) for e in (regret, table["error"]))
     return table.assign(regret=regret, error=error)

@@ -160,7 +160,7 @@ class RegretTable:
 
     def lines(self) -> Iterator[str]:
         """Yield the table in at most `COLUMNS` letters: ``*`` marks what no other way beats."""
-        zero = "proven to be the best" if self.is_proven else "of the best plan known"
+        zero = "proven best of the free schedule" if self.is_proven else "of the best plan known"
         yield from _wrapped(
             f"Regret: what the worst step ({self.worst}) takes, valued by {self.valued}, above "
             f"that {zero}. Gap: to the bound that a way proves in its own model. Error: of the "
