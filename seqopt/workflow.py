@@ -159,7 +159,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     scene : Scene, str or pathlib.Path
         The scene, the name of a built-in scene, a few words, or a scene file.
     schedule : Schedule, pathlib.Path or str, optional
-        The schedule, its file, a name in `seqopt.sequence.three_robots.SCHEDULES`, or ``"free"``.
+        The schedule, its file, a name in `seqopt.sequence.methods.SCHEDULES`, or ``"free"``.
     criterion : Criterion or str, optional
         What a step costs, or a name in `seqopt.CRITERIA`.
     formulation : str, optional

@@ -18,7 +18,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import EQUATIONS
 from tests.quality.kernels import running
 

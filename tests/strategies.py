@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from experiments.harness.scenes import running_bond
 from seqopt.graph.decision_costs import Budget, LayeredCosts
-from seqopt.scene._props import Prop
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import as_vectors, vertices_of
-from seqopt.scene.parts import Anywhere, Load, Robot, Side, Sphere
+from seqopt.scene.parts import Anywhere, Load, Prop, Robot, Side, Sphere
 from seqopt.scene.shape import Polyhedron
 from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import ROBOTS

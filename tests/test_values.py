@@ -30,11 +30,10 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.exchange.contacts import flat_face, touching_faces
 from seqopt.network._mechanics import build_statics
 from seqopt.network.build import build_network
-from seqopt.scene._overlaps import _faces
 from seqopt.scene.arm import HeldPostures
-from seqopt.scene.boxes import boxes
+from seqopt.scene.boxes import _faces, boxes
 from seqopt.scene.shape import Surface
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential
 from seqopt.stability._held_states import _HoldingForces, _Known
 from seqopt.stability._load_factor import load_factor
 from seqopt.stability._prover import Prover

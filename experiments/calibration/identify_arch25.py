@@ -48,7 +48,7 @@ from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses.quantities import TO_1E_3MM, responses_of, support_forces, support_moments
 from seqopt.scene.parts import Brick
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from seqopt.study.published import PUBLISHED, ROBOTS, as_printed, printed_steps, published_plan
 
 SPAN, HEIGHT, BRICKS = 2.08, 1.93, 25  # m, section 3.1

@@ -31,7 +31,7 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.report._style import BLUE, GRAY, VERMILION, plain, styled
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
 

@@ -24,7 +24,7 @@ from experiments.harness.results import drawn
 from seqopt.report._style import GRAY, dress, looks, plain, styled
 from seqopt.report.comparison import largest
 from seqopt.report.text import UNITS
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from seqopt.study.published import published_plan
 
 ARM, RIGID = 1e6, float("inf")  # N/m

@@ -13,9 +13,8 @@ from seqopt.plan.pose import pose
 from seqopt.plan.solve import solve
 from seqopt.scene.library.arch_form import chain
 from seqopt.scene.library.wall import WallShape, wall
+from seqopt.sequence.methods import METHODS, modified_sequential, three_robot_loop
 from seqopt.sequence.steps import Step
-from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
-from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import EQUATIONS, ROBOTS, published_plan
 
 

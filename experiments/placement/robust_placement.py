@@ -49,7 +49,7 @@ from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
 
 

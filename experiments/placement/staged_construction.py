@@ -35,8 +35,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses._staged import Placing, StagedState, next_state, staged_fields, state_fields
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, TO_1E_3MM, lengths
 from seqopt.responses.table import step_fields
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, thin
-from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import PUBLISHED_BEST
 
 History = TypeVar("History")

@@ -36,8 +36,7 @@ from seqopt.network.network import GROUND
 from seqopt.report._style import GRAY, dress, looks, name_panels, plain, styled
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.parts import Spring
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS, three_robot_loop
 from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import MARGINS, bonded
 from seqopt.stability.steps import assess_steps, stability_table

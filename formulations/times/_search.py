@@ -35,8 +35,7 @@ from seqopt.graph.states._visits import seen_steps, steps_of
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.problem.amounts import MINMAX, SUM, Amount
-from seqopt.sequence._robot_kinds import node_numbers
-from seqopt.sequence._rule_space import FreeSpace
+from seqopt.sequence._rule_space import FreeSpace, node_numbers
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._fall_cuts import FallCuts
 from seqopt.times._graph import timed_graph

@@ -9,15 +9,14 @@ from math import radians
 from typing import Any
 
 from seqopt._cli.options import Cured, Number, Numbers, Ranks, Stands, Words
-from seqopt.contact.curing import _find_curing
-from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
+from seqopt.contact.mortar import MORTARS, Mortar, _find_curing, find_mortar
 from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.problem.criteria import Ranked, RankSum
 from seqopt.problem.requirements import LARGEST, NEVER, Criterion, number_word, split_word
 from seqopt.problem.standing import Standing
 from seqopt.scene._checks import short
-from seqopt.scene._props import Prop
+from seqopt.scene.parts import Prop
 from seqopt.scene.scene import Scene
 from seqopt.study.published import CRITERIA, find_criterion
 

@@ -26,13 +26,11 @@ from seqopt.plan.build import GivenSequence, ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import dump_scene, load_scene
-from seqopt.sequence._parts import read_site, what_is_left
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.schedule_file import read_plan
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import Step
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.schedule_file import _what_is_left, read_plan, read_site
+from seqopt.sequence.steps import Site, Step
 from seqopt.stability._builds import BuildProver
 from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 from seqopt.workflow import optimize
@@ -224,7 +222,7 @@ def between(moves: Schedule | FreeRules, begin: Place, end: Place) -> Schedule |
             f"schedule {moves.method}: it goes on, and ends, at a step of a plan of its own; give "
             "PLAN:STEP, or --schedule free"
         )
-    return what_is_left(moves, begin.done, end.site)
+    return _what_is_left(moves, begin.done, end.site)
 
 
 def find_scene(asked: options.Built) -> Scene:

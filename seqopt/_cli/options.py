@@ -24,9 +24,8 @@ from seqopt.problem.standing import Standing
 from seqopt.scene.scenarios import MOST
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes
+from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.three_robots import SCHEDULES
-from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import MARGINS
 from seqopt.study.published import CRITERIA, PUBLISHED
 from seqopt.work.progress import Tell

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from seqopt.arrays import Floats, frozen
-from seqopt.contact._prop_grips import applied_rows, grip_fields
 from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
-from seqopt.scene.parts import THICKEST, Brick
+from seqopt.scene.parts import THICKEST, Brick, Prop
 from seqopt.scene.shape import clip
 
 _OVERLAP = 0.05  # by which bricks may interpenetrate, over their smallest dimension
@@ -69,7 +70,7 @@ def _distance_beside(polygon: Floats) -> float:
 _SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
 
-def contact_at(network: Network, spring: int) -> tuple[str, Floats, Floats]:
+def _contact_at(network: Network, spring: int) -> tuple[str, Floats, Floats]:
     """Return name, normal (3,) and corners (m, 3) of a spring's contact; the network keeps it."""
     kept: dict[int, tuple[str, Floats, Floats]] = network.derived.setdefault("contacts", {})
     if spring not in kept:
@@ -110,7 +111,7 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     """
     pairs = zip(grips, network.scene.robots, strict=True)
     held = [(node, robot.payload) for node, robot in pairs if node is not None]
-    return replace(bare_assembly(network, bricks), **grip_fields(network, bricks, held))
+    return replace(bare_assembly(network, bricks), **_grip_fields(network, bricks, held))
 
 
 def bare_assembly(network: Network, bricks: int) -> Assembly:
@@ -131,7 +132,7 @@ def bare_assembly(network: Network, bricks: int) -> Assembly:
         If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
     """
     placed, acting = network.scene.placed, network.springs.acting(bricks)
-    contacts = [contact_at(network, spring) for spring in acting.tolist()]
+    contacts = [_contact_at(network, spring) for spring in acting.tolist()]
     return Assembly(
         block_name=tuple(brick.name for brick in placed[:bricks]),
         # of the boxes, as their faces: means of inner nodes differ from them by rounding
@@ -145,7 +146,7 @@ def bare_assembly(network: Network, bricks: int) -> Assembly:
         grip_block=np.zeros(0, dtype=np.int64),
         grip_position=np.zeros((0, 3)),
         payload=np.zeros(0),
-        applied=applied_rows(network, bricks),
+        applied=_applied_rows(network, bricks),
     )
 
 
@@ -199,3 +200,148 @@ def _face(brick: Brick, axes: Floats, point: Floats) -> Floats:
 def _polygon_area(polygon: Floats) -> float:
     x, y = polygon.T
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+class _PropGrips(NamedTuple):
+    """The grips of props on a partial structure.
+
+    ``payload`` (p,): N; ``line`` (p, 3): unit vectors, zero where any direction will do;
+    ``applied`` (B, 6): as of `seqopt.contact.assembly.Assembly`, no rows where none push.
+    """
+
+    props: tuple[Prop, ...]
+    payload: Floats
+    line: Floats
+    applied: Floats
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """The nodes that they hold."""
+        return tuple(prop.node for prop in self.props)
+
+
+def _prop_grips(network: Network, bricks: int, *, held: bool) -> _PropGrips:
+    """Return the grips of the props that hold. ``held``: whether a robot holds any.
+
+    One without a capacity bears up to the weight of the whole, with what is applied beside it.
+    """
+    scene = network.scene
+    props = scene.standing_props(bricks, held=held)
+    whole = np.linalg.norm(network.weight, axis=1).sum()
+    whole += np.linalg.norm(network.applied(len(scene.placed))[:, :3], axis=1).sum()
+    most = [float(whole) if prop.capacity is None else prop.capacity for prop in props]
+    line = np.array([prop.direction or (0.0, 0.0, 0.0) for prop in props]).reshape(-1, 3)
+    pushes = line.any(axis=1)
+    payload = np.array(most) * np.where(pushes, 0.5, 1.0)
+    applied = np.zeros((bricks if pushes.any() else 0, 6))
+    for i in np.flatnonzero(pushes).tolist():
+        brick = scene.brick_of_node[props[i].node]
+        arm = np.subtract(scene.node_position(props[i].node), brick.position)
+        force = payload[i] * line[i]
+        applied[scene.since[brick.name] - 1] += np.concatenate([force, np.cross(arm, force)])
+    return _PropGrips(props, payload, line, applied)
+
+
+def _applied_rows(network: Network, bricks: int, props: _PropGrips | None = None) -> Floats:
+    """Return `Assembly.applied` of a partial structure, with what props apply for good."""
+    applied = network.applied(bricks)
+    if props is None or not len(props.applied):
+        return applied if applied.any() else np.zeros((0, 6))
+    return applied + props.applied
+
+
+def _grip_fields(
+    network: Network, bricks: int, held: Sequence[tuple[int, float]]
+) -> dict[str, Any]:
+    """Return the fields of an assembly that depend on its grips, by name.
+
+    ``held``: node and payload (N) of every robot that holds one; props follow.
+    """
+    scene, props = network.scene, _prop_grips(network, bricks, held=bool(held))
+    nodes = [*(node for node, _ in held), *props.nodes]
+    blocks = [scene.since[scene.brick_of_node[node].name] - 1 for node in nodes]
+    return {
+        "grip_block": np.array(blocks, dtype=np.int64),
+        "grip_position": np.array([scene.node_position(n) for n in nodes]).reshape(-1, 3),
+        "payload": np.array([*(payload for _, payload in held), *props.payload]),
+        "applied": _applied_rows(network, bricks, props),
+        "grip_line": np.concatenate([np.zeros((len(held), 3)), props.line]),
+    }
+
+
+_KEPT = 3000  # bricks in all partial structures that are kept, some 5 kB each
+
+
+class PartialAssemblies:
+    """Cuts the assemblies of steps, as of `step_assembly`, from one whole.
+
+    Its maps differ by rounding, and all else in no bit. Raises a `SceneError` if bricks that share
+    a joint do not touch, even in a step that is not asked for.
+    """
+
+    def __init__(self, network: Network, bricks: int) -> None:
+        self.network, self.bricks = network, bricks
+        self._whole = whole = bare_assembly(network, bricks)
+        self._heaviest = np.maximum.accumulate(np.linalg.norm(whole.weight, axis=1))
+        lever = np.zeros(len(whole.corner))
+        for body in whole.bodies[whole.contact].T:
+            real = body != GROUND
+            arm = whole.corner[real] - whole.centroid[body[real]]
+            lever[real] = np.maximum(lever[real], np.linalg.norm(arm, axis=1))
+        self._lever = np.maximum.accumulate(lever)
+        self._map = whole.contact_map.tocsc()
+        self._turning = self._map.indices % 6 >= 3  # which entries are moments
+        self._last: dict[tuple[int, float], sparse.csr_array] = {}  # asked again by its next step
+        self._made: dict[tuple[int, tuple[int | None, ...]], Assembly] = {}
+
+    def __call__(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
+        """Return a partial structure with the grips that hold it; those made last are kept.
+
+        Grips beyond those of the scene's robots bear what the strongest of these does.
+        """
+        key = bricks, (*grips,)
+        if key not in self._made:
+            if len(self._made) >= max(_KEPT // bricks, 1):
+                self._made.clear()
+            self._made[key] = self._cut(*key)
+        return self._made[key]
+
+    def _cut(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
+        whole = self._whole
+        contacts = len(self.network.springs.acting(bricks))
+        corners = int(np.searchsorted(whole.contact, contacts))
+        payload = [robot.payload for robot in self.network.scene.robots]
+        payload += [max(payload, default=0.0)] * (len(grips) - len(payload))
+        pairs = zip(grips, payload, strict=True)
+        held = [(node, most) for node, most in pairs if node is not None]
+        part: Assembly = Assembly.__new__(Assembly)
+        part.__setstate__(  # as one that was checked before
+            {
+                "block_name": whole.block_name[:bricks],
+                "centroid": whole.centroid[:bricks],
+                "weight": whole.weight[:bricks],
+                "contact_name": whole.contact_name[:contacts],
+                "bodies": whole.bodies[:contacts],
+                "normal": whole.normal[:contacts],
+                "corner": whole.corner[:corners],
+                "contact": whole.contact[:corners],
+                **_grip_fields(self.network, bricks, held),
+                "bond": np.zeros(0),
+                "corner_area": whole.corner_area[:corners],
+                "area": whole.area[:contacts],
+                "axes": whole.axes[:contacts],
+            }
+        )
+        levers = np.linalg.norm(part.grip_position - part.centroid[part.grip_block], axis=1)
+        longest = max(self._lever[:corners].max(initial=0.0), levers.max(initial=0.0))
+        scales = float(self._heaviest[bricks - 1]) or 1.0, float(longest) or 1.0
+        key = bricks, scales[1]
+        if key not in self._last:
+            ends = self._map.indptr[: 3 * corners + 1]
+            kept = slice(0, int(ends[-1]))
+            ratio = np.where(self._turning[kept], whole.scales[1] / scales[1], 1.0)  # of levers
+            entries = self._map.data[kept] * ratio, self._map.indices[kept], ends
+            shape = 6 * bricks, 3 * corners
+            self._last = {key: sparse.csc_array(entries, shape=shape).tocsr()}
+        part.__setstate__({"scales": scales, "contact_map": self._last[key]})
+        return part

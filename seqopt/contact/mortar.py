@@ -1,12 +1,15 @@
-"""Mortars by name: what a joint carries besides compression."""
+"""Mortars: what a joint carries besides compression, and the share of its bond at an age."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
 
+from seqopt.arrays import Terse
 from seqopt.errors import SceneError, did_you_mean
-from seqopt.scene._checks import check, not_negative, short
+from seqopt.scene._checks import check, finite, not_negative, rows, settle, short
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,3 +135,166 @@ def _with_mortar(name: str) -> str:
     ('dry', 'with epoxy')
     """
     return name if name.partition(",")[0] == "dry" else f"with {name}"
+
+
+SHARES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+"""The shares of full bond at which a bond that grows in proportion to its age is counted."""
+_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+EXAMPLE = "15min, or 5min=0.4,15min=1"
+Points = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, repr=False)
+class Curing(Terse):
+    """The share of its full bond that a joint has at an age: what was reached last, never more.
+
+    A joint's age counts from when the brick that closes it is in its place. Tensile strength and
+    cohesion grow with the share; friction is there from the first.
+
+    Parameters
+    ----------
+    points : tuple of (float, float)
+        Ages, s, and the share that is reached then, both rising; the last share is 1. Before the
+        first point there is no bond. No points at all: it never cures.
+    joints : tuple of (str, tuple of (float, float))
+        Names of joints, as ``5-6``, that have points of their own.
+
+    Raises
+    ------
+    SceneError
+        If ages or shares do not rise, or the last share is not 1.
+
+    Examples
+    --------
+    >>> Curing(((300.0, 0.4), (900.0, 1.0))).share(600.0)
+    0.4
+    >>> _find_curing("15min").share(90.0)
+    0.1
+    """
+
+    points: Points = ()
+    joints: tuple[tuple[str, Points], ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        settle(self, points=_checked("curing", self.points))
+        own = rows("curing: joints", self.joints, "pairs of a joint and its points")
+        named = tuple((str(n), _checked(f"curing: joint {n}", p)) for n, p in own)
+        if bool(self.points) != all(bool(points) for _, points in named) and named:
+            raise SceneError(
+                "curing: a joint that never cures beside others that do is not modeled; give all "
+                "joints points, or none"
+            )
+        settle(self, joints=named)
+
+    def share(self, age: float) -> float:
+        """Return the share of full bond at an age, s, of a joint without points of its own."""
+        return max((share for at, share in self.points if at <= age), default=0.0)
+
+    def points_of(self, joint: str) -> Points:
+        """Return the points of a joint."""
+        return dict(self.joints).get(joint, self.points)
+
+    @property
+    def is_instant(self) -> bool:
+        """Whether every joint has its full bond from the first."""
+        return all(
+            points[:1] == ((0.0, 1.0),) for points in (self.points, *dict(self.joints).values())
+        )
+
+    def __str__(self) -> str:
+        own = [f"{name}:{_said(points)}" for name, points in self.joints]
+        return " ".join([_said(self.points), *own])
+
+
+def _said(points: Points) -> str:
+    """Return points in the words of `_find_curing`."""
+    if points and points == _linear(points[-1][0]):
+        return f"{points[-1][0]:g}s"
+    return ",".join(f"{age:g}s={share:g}" for age, share in points) or "never"
+
+
+def _checked(where: str, given: Iterable[Sequence[float]]) -> Points:
+    """Return points whose ages and shares rise, up to a share of 1."""
+    what = "pairs of an age (s) and a share"
+    pairs = [rows(where, pair, what) for pair in rows(where, given, what)]
+    if any(len(pair) != 2 for pair in pairs):
+        raise SceneError(f"{where}: points are {short(pairs)}; give {what}")
+    out = tuple(
+        (finite(f"{where}: age", age, 0.0), finite(f"{where}: share", share, 0.0))
+        for age, share in pairs
+    )
+    for before, after in pairwise(out):
+        if not (before[0] < after[0] and before[1] < after[1]):
+            raise SceneError(f"{where}: {before} comes before {after}; ages and shares must rise")
+    if out and out[-1][1] != 1.0:
+        raise SceneError(
+            f"{where}: the last share is {out[-1][1]:g}; give 1 last, and a weaker mortar for less"
+        )
+    return tuple(pair for pair in out if pair[1] > 0)
+
+
+def _linear(seconds: float) -> Points:
+    """Return points of a bond that grows in proportion to its age, from below."""
+    if seconds == 0.0:
+        return ((0.0, 1.0),)
+    return tuple((share * seconds, share) for share in SHARES)
+
+
+def _find_curing(given: Curing | str | Iterable[str]) -> Curing:
+    """Return how mortar cures: itself, or by words.
+
+    ``15min`` (or ``s``, ``h``) has full bond after that and before a share in proportion, counted
+    from below at `SHARES`; ``5min=0.4,15min=1`` what is reached when; ``never``; before any of
+    these the name of a joint and a colon, as ``5-6:30min``.
+
+    >>> _find_curing("never").share(1e9)
+    0.0
+    >>> _find_curing("5min=0.4,15min=1 1-2:1h").points_of("1-2")[-1]
+    (3600.0, 1.0)
+    """
+    if isinstance(given, Curing):
+        return given
+    words = given.split() if isinstance(given, str) else list(given)
+    common, own = list[Points](), list[tuple[str, Points]]()
+    for word in words:
+        name, colon, text = word.rpartition(":")
+        points = _in_words(word, text)
+        if colon:
+            own.append((name, points))
+        else:
+            common.append(points)
+    if len(common) != 1:
+        raise SceneError(
+            f"curing {' '.join(words)}: give one law for all joints, as {EXAMPLE}, and others with "
+            "the name of a joint, as 5-6:30min"
+        )
+    return Curing(common[0], tuple(own))
+
+
+def _in_words(word: str, text: str) -> Points:
+    if text == "never":
+        return ()
+    if "=" not in text:
+        return _linear(_seconds(word, text))
+    out = []
+    for part in text.split(","):
+        age, _, share = part.partition("=")
+        try:
+            out.append((_seconds(word, age), float(share)))
+        except ValueError:
+            raise SceneError(f"curing {word}: share {short(share)}; give {EXAMPLE}") from None
+    return _checked(f"curing {word}", out)
+
+
+def _seconds(word: str, text: str) -> float:
+    """Return an age in s; without a unit it is in s."""
+    number = text.rstrip("minhs")
+    try:
+        value = float(number) * _UNITS[text[len(number) :] or "s"]
+    except (KeyError, ValueError):
+        raise SceneError(
+            f"curing {word}: {short(text)} is no age; give {EXAMPLE}, or never"
+        ) from None
+    if not 0 <= value < math.inf:
+        raise SceneError(f"curing {word}: {short(text)} is no age; give zero or more")
+    return value

@@ -16,9 +16,8 @@ from seqopt.exchange._content import GROUND, MOST_CORNERS, UNITS, UPS, Content, 
 from seqopt.exchange._meshes import Repaired, repair_shape
 from seqopt.exchange.contacts import _Contacts, _find_contacts, _widest_gap, face_ground, face_joint
 from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
-from seqopt.scene._overlaps import find_overlaps
-from seqopt.scene.boxes import block_brick
-from seqopt.scene.library.common import MASONRY, JointLaw, a_law, mobile_robots, touching_order
+from seqopt.scene.boxes import _find_overlaps, block_brick
+from seqopt.scene.library.common import MASONRY, JointLaw, _mobile_robots, _touching_order, a_law
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import Polyhedron
@@ -63,7 +62,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         springs = _springs(touching, bricks, law)
         order = _order(touching, content, bricks, sunk, said)
         count = whole_between("robots", ROBOTS if given.robots is None else given.robots, 1)
-        robots = mobile_robots([*bricks.values()], count)
+        robots = _mobile_robots([*bricks.values()], count)
     except SceneError as error:
         raise SceneError(f"{source}: {error}") from error
     said.append(f"{len(robots)} robots reach all and bear all; z is up")
@@ -221,7 +220,7 @@ def _order(
         if known
         else "blocks are placed from the bottom up"
     )
-    order = touching_order(
+    order = _touching_order(
         [(c or 0.0 if known else 0.0, h) for c, h in zip(courses, heights, strict=True)],
         [(row[a], row[b]) for (a, b), _ in touching.faces if a != GROUND],
         [row[b] for (a, b), _ in touching.faces if a == GROUND],
@@ -255,7 +254,7 @@ def _interpenetrating(
     most = min(_widest_gap(way, bricks) for way in (given, replace(given, gap=None)))
     solids = {i: b.solid for i, b in enumerate(blocks) if isinstance(b.solid, Polyhedron)}
     places = [*solids]
-    found = find_overlaps([*solids.values()], [most] * len(solids), given.progress)
+    found = _find_overlaps([*solids.values()], [most] * len(solids), given.progress)
     pairs = (((places[o.pair[0]], places[o.pair[1]]), o) for o in islice(found, _MOST_OVERLAPS))
     overlaps = sorted(
         ((pair, each) for pair, each in pairs if {*pair} & bricks.keys()),

@@ -15,8 +15,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.exchange._content import MOST_BLOCKS, MOST_CORNERS, Content, FileBlock
 from seqopt.scene._checks import short
-from seqopt.scene._overlaps import bounds_of
-from seqopt.scene.boxes import as_vectors
+from seqopt.scene.boxes import _bounds_of, as_vectors
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
 
 if TYPE_CHECKING:
@@ -180,7 +179,7 @@ def without_repeats(content: Content) -> Content:
         return content
     from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
 
-    bounds = np.array([bounds_of(block.vertices).reshape(6) for block in blocks])
+    bounds = np.array([_bounds_of(block.vertices).reshape(6) for block in blocks])
     near = _WELD * float(np.ptp(bounds))
     first = dict[str, str]()
     for i, j in sorted(KDTree(bounds).query_pairs(near)):

@@ -18,8 +18,7 @@ from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import GROUND, Content, Given
 from seqopt.exchange._meshes import Repaired
 from seqopt.scene._checks import positive, short, units
-from seqopt.scene._overlaps import TOLERATED, bounds_of, near_pairs
-from seqopt.scene.boxes import as_vector, spring_fields
+from seqopt.scene.boxes import TOLERATED, _bounds_of, _near_pairs, _spring_fields, as_vector
 from seqopt.scene.library.common import DOWN, JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes, polygon_moments
@@ -148,8 +147,8 @@ def _found(shapes: Sequence[_Shape], gap: float, course: Progress) -> Iterator[_
         corners = tuple(shape.points[list(face)] for face in shape.faces)
         normals = units(np.array([normal_of(face) for face in corners]))
         facets.append(_Facets(corners, normals, np.array([face.mean(axis=0) for face in corners])))
-    bounds = [bounds_of(shape.points) for shape in shapes]
-    for tries, (i, j) in enumerate(near_pairs(bounds, gap)):
+    bounds = [_bounds_of(shape.points) for shape in shapes]
+    for tries, (i, j) in enumerate(_near_pairs(bounds, gap)):
         course.add(i - done)
         done = i
         if tries == _MOST_PAIRS:
@@ -260,7 +259,7 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> _FlatFace:
 def _fields(face: _FlatFace, law: JointLaw) -> dict[str, Any]:
     """Return what a joint and a ground end over a face have in common."""
     stiffness = law.stiffness(face.area, face.moments)
-    fields = spring_fields(face.center, face.axes[0], face.axes[1], stiffness)
+    fields = _spring_fields(face.center, face.axes[0], face.axes[1], stiffness)
     return {**fields, "face": tuple((x, y) for x, y in face.corners.tolist())}
 
 

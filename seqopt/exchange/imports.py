@@ -17,7 +17,7 @@ from seqopt.exchange._meshes import without_repeats
 from seqopt.scene._checks import cut, printable, short
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import warn_of
-from seqopt.sequence._parts import SAME, _are_near
+from seqopt.sequence.schedule_file import SAME, _are_near
 
 _LYING = 3  # blocks on the ground from which on it is odd if most are there
 _IN_JSON = "compas_meshes"  # what a JSON file in a folder is

@@ -24,8 +24,7 @@ from seqopt.problem.requirements import pickled
 from seqopt.responses._blocks import packed, unpacked
 from seqopt.scene._armed import can_hold
 from seqopt.scene.scene import Order, Scene
-from seqopt.sequence._robot_kinds import node_numbers
-from seqopt.sequence._rule_space import sort_entries
+from seqopt.sequence._rule_space import node_numbers, sort_entries
 from seqopt.sequence.rules import Direction, Ending
 
 MOST_PARTS = 5000  # sets of bricks with a newest one, where all are looked at

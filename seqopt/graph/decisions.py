@@ -52,8 +52,7 @@ from seqopt.responses.quantities import PROP_EXCESS, _payload_text, robot_respon
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenGrip, Schedule
-from seqopt.sequence.site import _begin_step
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, _begin_step
 
 TIED = 1e-9  # costs this close, relative to the largest, are equal
 

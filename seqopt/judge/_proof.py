@@ -38,8 +38,8 @@ from seqopt.judge.arithmetic import budget_bounds
 from seqopt.network.build import build_network
 from seqopt.scene._armed import can_hold
 from seqopt.scene.scene import Order, in_order
-from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_check import RuleBook
+from seqopt.sequence._rule_space import node_numbers
 from seqopt.sequence.rules import Ending
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest

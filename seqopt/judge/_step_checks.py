@@ -16,7 +16,7 @@ from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
 from seqopt.problem.requirements import LINEAR_RANGE, Limit
 from seqopt.problem.standing import Standing, slack
-from seqopt.scene._props import Prop
+from seqopt.scene.parts import Prop
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 from seqopt.stability._step_verdicts import each_stability, step_verdicts

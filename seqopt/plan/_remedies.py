@@ -36,11 +36,11 @@ from seqopt.responses.quantities import (
     robot_response,
 )
 from seqopt.scene.scene import Scene
-from seqopt.sequence._robot_kinds import loads
 from seqopt.sequence._rule_check import RuleBook, unbearable
+from seqopt.sequence._rule_space import loads
+from seqopt.sequence.methods import _enough_reach
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.two_robots import _enough_reach
 
 
 class LateError(Exception):

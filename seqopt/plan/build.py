@@ -20,8 +20,7 @@ from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._props import props_table
 from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, _Columns, analyze, grips_table
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import Step, _check_part
+from seqopt.sequence.steps import Site, Step, _check_part
 from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
 from seqopt.stability.steps import assess_steps, stability_table

@@ -38,8 +38,7 @@ from seqopt.responses.table import (
     _table_of,
 )
 from seqopt.scene.scene import Order
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import Step, StepKind, idle_robots
+from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
 
 if TYPE_CHECKING:

@@ -16,8 +16,7 @@ from seqopt.responses.table import analyze
 from seqopt.scene._armed import check_postures
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.rules import FreeRules, Payload
-from seqopt.sequence.site import Site, _begin_step
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Site, Step, _begin_step
 
 
 def without(

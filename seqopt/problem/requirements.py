@@ -33,10 +33,10 @@ from seqopt.responses.quantities import (
 from seqopt.responses.table import _analyzed, _Columns, _steps_in_table, force_column
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence._robot_kinds import carried, loads
+from seqopt.sequence._rule_space import carried, loads
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import AnyStep
-from seqopt.sequence.two_robots import METHODS
 
 LEVEL = 1e-9  # heights this close, over the height of the structure, are equal
 NEVER = math.inf  # the brick count of a crown that is never reached

@@ -10,8 +10,16 @@ from operator import le
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.contact.curing import Curing, _find_curing
-from seqopt.contact.mortar import DRY, Mortar, _mortar_name, _with_mortar, bond_mortar, find_mortar
+from seqopt.contact.mortar import (
+    DRY,
+    Curing,
+    Mortar,
+    _find_curing,
+    _mortar_name,
+    _with_mortar,
+    bond_mortar,
+    find_mortar,
+)
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._grip_sets import KnownRows

@@ -14,9 +14,9 @@ from seqopt.network.build import build_network
 from seqopt.report.page import Build, report_page
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
-from seqopt.sequence.two_robots import METHODS
 from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import FailureMap

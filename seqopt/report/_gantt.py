@@ -22,8 +22,7 @@ from seqopt.report._style import SMALL, new_picture, styled
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import AnyStep
+from seqopt.sequence.steps import AnyStep, Site
 from seqopt.times._curing import Waits
 from seqopt.times._steps import StepTime, step_times
 

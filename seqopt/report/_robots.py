@@ -16,9 +16,8 @@ from seqopt.arms._plan_postures import plan_postures
 from seqopt.arrays import Floats
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.exchange._grip_frames import hold
-from seqopt.scene._props import Prop
 from seqopt.scene.boxes import vertices_of
-from seqopt.scene.parts import Robot, Side, Sphere
+from seqopt.scene.parts import Prop, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 

@@ -36,12 +36,11 @@ from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import Departure, LinearRange, _steps_in_table, analyze, force_column
 from seqopt.scene.scene import Scene
+from seqopt.sequence.methods import METHODS, degeneration, modified_sequential
 from seqopt.sequence.rules import FREE, FreeRules, Newest, Payload
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import MOST, find_schedule, parse_plan
 from seqopt.sequence.steps import _idle_note
-from seqopt.sequence.three_robots import modified_sequential
-from seqopt.sequence.two_robots import METHODS, degeneration
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.study.published import PUBLISHED, paper_models, published_about, published_choice

@@ -9,8 +9,8 @@ choices in steps with open grips.
 >>> from seqopt.network.build import build_network
 >>> from seqopt.responses import RESPONSES, Evaluation, analyze
 >>> from seqopt.scene.scene_file import load_scene
->>> from seqopt.sequence.three_robots import three_robot_loop
->>> from seqopt.sequence.two_robots import sequential
+>>> from seqopt.sequence.methods import three_robot_loop
+>>> from seqopt.sequence.methods import sequential
 >>> network = build_network(load_scene("arch25"))
 >>> engine = make_engine("compliance", network)
 >>> table = analyze(engine, sequential(network))

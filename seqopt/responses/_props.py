@@ -10,7 +10,7 @@ import pandas as pd
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine, Want
 from seqopt.responses.quantities import lengths
-from seqopt.scene._props import Prop
+from seqopt.scene.parts import Prop
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 

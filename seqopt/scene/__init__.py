@@ -21,7 +21,7 @@ takes.
 from typing import TYPE_CHECKING
 
 from seqopt._later import later
-from seqopt.scene._durations import Durations
+from seqopt.scene.arm import Durations
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene

@@ -23,7 +23,7 @@ from seqopt.scene._checks import (
     stiffness,
     unless_none,
 )
-from seqopt.scene.boxes import as_vector, spring_fields
+from seqopt.scene.boxes import _spring_fields, as_vector
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
 
@@ -248,7 +248,7 @@ def _spring(shape: ArchShape, position: Floats, direction: Floats, along: Floats
     """Return what the joints and ground ends of an arch have in common."""
     stiffness = (shape.translational_stiffness, shape.rotational_stiffness)
     rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
-    fields = spring_fields(position, along, np.asarray(rest / np.linalg.norm(rest)), stiffness)
+    fields = _spring_fields(position, along, np.asarray(rest / np.linalg.norm(rest)), stiffness)
     return {**fields, "thickness": shape.thickness}
 
 

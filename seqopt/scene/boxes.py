@@ -1,23 +1,26 @@
-"""Bricks as boxes: how far they are apart, and whether two of them overlap.
+"""Bricks as solids: how far boxes are apart, and how deep two solids interpenetrate.
 
 Two boxes are apart if a plane passes between them, parallel to a face of either or to an edge of
-each.
+each. The depth of other solids is that of the largest ball in both: they are apart if a plane
+parallel to a face of either passes between them, or if they do not meet once both are eroded, all
+of their faces moved inward, so that what only touches parts. A ball is grown from where they meet.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Vector
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import frames, short, whole
+from seqopt.scene._checks import frames, short, units, whole
 from seqopt.scene.parts import Brick
-from seqopt.scene.shape import Polyhedron
+from seqopt.scene.shape import Polyhedron, normal_of, plane_axes
+from seqopt.work.progress import Progress, Tell
 
 
 def block_brick(
@@ -48,7 +51,7 @@ def block_brick(
     )
 
 
-def spring_fields(
+def _spring_fields(
     position: Floats, along: Floats, across: Floats, stiffness: tuple[Vector, Vector]
 ) -> dict[str, Any]:
     """Return the fields of a joint or ground end; stiffnesses are N/m, then N m/rad."""
@@ -146,3 +149,222 @@ def require_apart(
             f"{where}: bricks {bricks[i].name} and {bricks[j].name} interpenetrate by "
             f"{-1e3 * distance.min():.3g} mm; {remedy}"
         )
+
+
+TOLERATED = 0.05  # depth that rounding and mortar explain, over the smallest dimension
+_ERODED = (0.55, 0.45)  # of two solids, over the depth; unequal, so that no faces meet in one plane
+_ALIKE_NORMALS = 0.05  # of normals at a vertex: what they span less is not solved for
+_STARTS = 4  # points from which balls are grown
+_STUCK = 1e-4  # share by which a ball grows less once it is as large as can be
+_RAY = units(np.array([0.3490658, 0.5171023, 0.7817391]))  # along no face, most likely
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Two solids that interpenetrate.
+
+    ``pair``: their places; ``depth``: diameter of the largest ball in both, m; ``bounds``: by how
+    much their bounds overlap along x, y and z, m.
+    """
+
+    pair: tuple[int, int]
+    depth: float
+    bounds: tuple[float, float, float]
+
+    def __str__(self) -> str:
+        along = (f"{1e3 * b:.3g} mm along {a}" for a, b in zip("xyz", self.bounds, strict=True))
+        return f"by {1e3 * self.depth:.3g} mm (their bounds by {', '.join(along)})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Face(FrozenValue):
+    """A face that has an area: a corner, its normal and two axes in it, corners (m, 2) in these.
+
+    ``step`` (m, 2): from each corner to the next.
+    """
+
+    origin: Floats
+    axes: Floats
+    flat: Floats
+    step: Floats
+
+
+def _near_pairs(bounds: Sequence[Floats], gap: float) -> Iterator[tuple[int, int]]:
+    """Yield pairs of bounds, lows and highs (2, 3) in m, that are no farther apart than a gap.
+
+    A negative gap asks for bounds that overlap by as much.
+    """
+    low, high = np.moveaxis(np.reshape(bounds, (-1, 2, 3)), 1, 0)
+    for i in range(len(low)):
+        over = ((low[i + 1 :] - gap <= high[i]) & (low[i] - gap <= high[i + 1 :])).all(axis=1)
+        for j in np.flatnonzero(over):
+            yield i, i + 1 + int(j)
+
+
+def _bounds_of(points: Floats) -> Floats:
+    """Return the lows and highs (2, k) of points (n, k)."""
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def _find_overlaps(
+    solids: Sequence[Polyhedron], tolerated: Sequence[float], progress: Tell | None = None
+) -> Iterator[Overlap]:
+    """Yield pairs of solids that interpenetrate by more than what either tolerates, m.
+
+    ``progress``: called with how far it is.
+
+    Examples
+    --------
+    >>> from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
+    >>> one, other = (
+    ...     Polyhedron(tuple((x + at, y, z) for x, y, z in BOX_CORNERS), BOX_FACES)
+    ...     for at in (0, 1.8)
+    ... )
+    >>> [str(found) for found in _find_overlaps([one, other], [0.1, 0.1])]
+    ['by 200 mm (their bounds by 200 mm along x, 2e+03 mm along y, 2e+03 mm along z)']
+    """
+    bounds = [_bounds_of(solid.points) for solid in solids]
+    faces: dict[int, list[_Face]] = {}
+    course, done = Progress("looking for overlaps", len(solids), progress), 0
+    for i, j in _near_pairs(bounds, -min(tolerated, default=0.0)):
+        course.add(i - done)
+        done, deepest, pair = i, min(tolerated[i], tolerated[j]), (solids[i], solids[j])
+        for k in (i, j):
+            faces[k] = faces.get(k) or _faces(solids[k].points, solids[k])
+        axes = np.array([face.axes[0] for face in (*faces[i], *faces[j])]).T
+        if min(_shared(*(_bounds_of(solid.points @ axes) for solid in pair))) <= deepest:
+            continue
+        starts = _where_both(pair, deepest)
+        radius = max((_grown((faces[i], faces[j]), start) for start in starts), default=0.0)
+        if 2 * radius > deepest:
+            x, y, z = _shared(bounds[i], bounds[j]).tolist()
+            yield Overlap((i, j), 2 * radius, (x, y, z))
+
+
+def overlapping(bricks: Sequence[Brick]) -> list[tuple[int, int, float]]:
+    """Return the names of bricks that interpenetrate by more than `TOLERATED`, and depths, m.
+
+    The deepest come first.
+    """
+    thin = np.array([min(brick.dimensions) for brick in bricks])
+    if all(brick.shape is None for brick in bricks):
+        pairs, apart = _separations(bricks)
+        deep = -apart > TOLERATED * thin[pairs].min(axis=1)
+        found = [(i, j, -d) for (i, j), d in zip(pairs[deep], apart[deep].tolist(), strict=True)]
+    else:
+        shapes = [
+            Polyhedron(as_vectors(points), tuple(map(tuple, faces)))
+            for points, faces in map(vertices_of, bricks)
+        ]
+        overlaps = _find_overlaps(shapes, (TOLERATED * thin).tolist())
+        found = [(*each.pair, each.depth) for each in overlaps]
+    found.sort(key=lambda held: -held[2])
+    return [(bricks[i].name, bricks[j].name, depth) for i, j, depth in found]
+
+
+def _shared(some: Floats, others: Floats) -> Floats:
+    """Return by how much bounds (2, k) overlap (k,); negative where they are apart."""
+    return np.asarray(np.minimum(some[1], others[1]) - np.maximum(some[0], others[0]))
+
+
+def _faces(points: Floats, solid: Polyhedron) -> list[_Face]:
+    """Return the faces of a solid that have an area; ``points``: where its vertices are."""
+    out = []
+    for corners in (points[list(face)] for face in solid.faces):
+        normal = normal_of(corners)
+        if normal.any():
+            axes = plane_axes(units(normal))
+            flat = (corners - corners[0]) @ axes[1:].T
+            out.append(_Face(corners[0], axes, flat, np.roll(flat, -1, axis=0) - flat))
+    return out
+
+
+def _where_both(pair: Sequence[Polyhedron], deepest: float) -> Floats:
+    """Return points (k, 3), up to `_STARTS`, that lie deep in two solids: none if these are apart.
+
+    Where eroded solids meet, a vertex of one lies in the other, or an edge passes a face.
+    """
+    moved = [_eroded(solid, by * deepest) for solid, by in zip(pair, _ERODED, strict=True)]
+    faces = [_faces(points, solid) for points, solid in zip(moved, pair, strict=True)]
+    found = []
+    for mine, other in ((0, 1), (1, 0)):
+        found.append(moved[mine][_hold(faces[other], moved[mine])])
+        rims = [moved[mine][list(face)] for face in pair[mine].faces]
+        start = np.vstack(rims)
+        step = np.vstack([np.roll(rim, -1, axis=0) - rim for rim in rims])
+        for face in faces[other]:  # where edges pass it
+            slope = step @ face.axes[0]
+            share = ((face.origin - start) @ face.axes[0]) / np.where(slope == 0, np.inf, slope)
+            met = start + share[:, None] * step
+            inside = _within(face, (met - face.origin) @ face.axes[1:].T)
+            found.append(met[(share > 0) & (share < 1) & inside])
+    points = np.vstack(found)
+    return points[:: max(1, len(points) // _STARTS)][:_STARTS]
+
+
+def _eroded(solid: Polyhedron, by: float) -> Floats:
+    """Return the vertices (V, 3) of a solid whose faces are moved inward, m."""
+    normals: list[list[Floats]] = [[] for _ in solid.points]
+    for face in solid.faces:
+        normal = normal_of(solid.points[list(face)])
+        for vertex in face if normal.any() else ():
+            normals[vertex].append(units(normal))
+    shift = [
+        np.linalg.pinv(np.array(own), rcond=_ALIKE_NORMALS).sum(axis=1) if own else np.zeros(3)
+        for own in normals
+    ]
+    return np.asarray(solid.points - by * np.array(shift))
+
+
+def _foot(face: _Face, points: Floats) -> Floats:
+    """Return the points (k, 3) of a face that are nearest to others."""
+    seen = (points - face.origin) @ face.axes[1:].T
+    to, size = seen[:, None] - face.flat, (face.step**2).sum(axis=1)
+    share = np.einsum("kmi,mi->km", to, face.step) / np.where(size > 0, size, 1.0)
+    rim = face.flat + np.clip(share, 0.0, 1.0)[:, :, None] * face.step
+    away = ((seen[:, None] - rim) ** 2).sum(axis=2)
+    nearest = rim[np.arange(len(points)), away.argmin(axis=1)]
+    spot = np.where(_within(face, seen)[:, None], seen, nearest)
+    return np.asarray(face.origin + spot @ face.axes[1:])
+
+
+def _within(face: _Face, seen: Floats) -> Bools:
+    """Return which points (k, 2) of a face's plane lie in it."""
+    to = seen[:, None] - face.flat
+    crosses = (to[:, :, 1] < 0) != (to[:, :, 1] < face.step[:, 1])
+    turn = to[:, :, 0] * face.step[:, 1] - to[:, :, 1] * face.step[:, 0]
+    return np.asarray((crosses & (turn * np.sign(face.step[:, 1]) < 0)).sum(axis=1) % 2 == 1)
+
+
+def _hold(faces: Sequence[_Face], points: Floats) -> Bools:
+    """Return which points (k, 3) lie inside: a ray from there passes an odd number of faces."""
+    odd = np.zeros(len(points), dtype=bool)
+    for face in faces:
+        slope = float(face.axes[0] @ _RAY)
+        if slope != 0:
+            ahead = ((face.origin - points) @ face.axes[0]) / slope
+            met = points + ahead[:, None] * _RAY - face.origin
+            odd ^= (ahead > 0) & _within(face, met @ face.axes[1:].T)
+    return odd
+
+
+def _grown(pair: Sequence[Sequence[_Face]], center: Floats) -> float:
+    """Return the radius of a ball in two solids that is moved and grown until it is stuck; 0: none.
+
+    Each program grows it between planes through its nearest points of all faces.
+    """
+    from scipy.optimize import linprog  # noqa: PLC0415  # for solids that overlap only
+
+    radius = 0.0
+    while True:
+        feet = np.vstack([_foot(face, center[None]) for faces in pair for face in faces])
+        away = np.linalg.norm(center - feet, axis=1)
+        inside = all(_hold(faces, center[None])[0] for faces in pair)
+        if not inside or not away.min() > radius * (1 + _STUCK):
+            return radius
+        radius = float(away.min())
+        rows = np.column_stack([(feet - center) / away[:, None], np.ones(len(away))])
+        found = linprog([0, 0, 0, -1], rows, away, bounds=[(None, None)] * 3 + [(0, None)])
+        if found.status:
+            return radius
+        center = center + np.asarray(found.x)[:3]

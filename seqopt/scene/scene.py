@@ -16,10 +16,19 @@ from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, did_you_mean
 from seqopt.scene._checks import check, not_negative, printable, settle, short, vector, wholes
-from seqopt.scene._durations import _durations_in_words
-from seqopt.scene._props import Prop, settled_props
-from seqopt.scene.arm import Arm, HeldPostures, from_arms
-from seqopt.scene.parts import Brick, Ground, Joint, Load, Reach, Robot, _grip_kinds, _GripKinds
+from seqopt.scene.arm import Arm, HeldPostures, _durations_in_words, from_arms
+from seqopt.scene.parts import (
+    Brick,
+    Ground,
+    Joint,
+    Load,
+    Prop,
+    Reach,
+    Robot,
+    _grip_kinds,
+    _GripKinds,
+    _settled_props,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -175,7 +184,7 @@ class Scene(Shown):
                 raise SceneError(f"{load.label}: position is {found}; move it to its brick")
         blocked, of_node = {*self.blocked_nodes}, self.brick_of_node
         free = {node: brick for node, brick in of_node.items() if node not in blocked}
-        settle(self, props=settled_props(self.props, free))
+        settle(self, props=_settled_props(self.props, free))
         if math.hypot(*self.wind) > _STORM:
             raise SceneError(f"{where}: wind is {list(self.wind)}; give shares of the weight")
 
@@ -358,7 +367,7 @@ class Scene(Shown):
     def with_durations(self, *words: str) -> Scene:
         """Return the same scene with robots that take as long as words say.
 
-        ``*words``: as of `seqopt.scene._durations._durations_in_words`.
+        ``*words``: as of `seqopt.scene.arm._durations_in_words`.
 
         Examples
         --------

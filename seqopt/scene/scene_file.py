@@ -26,9 +26,8 @@ from seqopt._files import parse_json, read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import Reader, cut, in_words, short
-from seqopt.scene._durations import Durations
-from seqopt.scene._overlaps import overlapping
-from seqopt.scene.arm import Arm
+from seqopt.scene.arm import Arm, Durations
+from seqopt.scene.boxes import overlapping
 from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import _KINDS, Scene, in_order
 from seqopt.scene.shape import Polyhedron

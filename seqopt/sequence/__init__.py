@@ -15,14 +15,13 @@ its scene. A schedule is a sequence in which some grips are still to be chosen.
 >>> move.robot, move.step, move.candidates
 ('rob3', 3, (4, 5))
 
-Loops of two robots and of more are in `seqopt.sequence.three_robots`.
+Loops of two robots and of more are in `seqopt.sequence.methods`.
 """
 
+from seqopt.sequence.methods import cantilever, modified_sequential, sequential, three_robot_loop
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import read_plan, read_schedule
 from seqopt.sequence.steps import Step
-from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
-from seqopt.sequence.two_robots import cantilever, sequential
 
 __all__ = [
     "Schedule",

@@ -15,11 +15,10 @@ from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.scene._armed import reachable
 from seqopt.scene.scene import Scene
+from seqopt.sequence.methods import placing_node
 from seqopt.sequence.rules import FreeRules, Newest, Payload
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
-from seqopt.sequence.two_robots import placing_node
+from seqopt.sequence.steps import AnyStep, Grips, Site, Step, StepKind
 
 
 def too_heavy(scenes: Sequence[Scene], place: int, robots: Sequence[int]) -> str:

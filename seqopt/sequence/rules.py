@@ -12,8 +12,7 @@ from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Near
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.steps import Site, Step, StepKind
 
 FREE = "free"  # the schedule that is no list of steps
 MOST_ROBOTS = 5

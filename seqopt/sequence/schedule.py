@@ -24,8 +24,7 @@ from seqopt.arrays import Terse
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence.site import Site, _begin_step
-from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
+from seqopt.sequence.steps import AnyStep, Site, Step, StepKind, _begin_step, check_sequence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

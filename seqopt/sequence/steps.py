@@ -1,4 +1,7 @@
-"""Steps of a build, and the check that a sequence of them is possible in its scene."""
+"""Steps of a build, the check that a sequence of them is possible in its scene, and sites.
+
+A site is the state in which a build begins or ends: placed bricks and grips.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from numbers import Integral
 
 from seqopt.errors import StepError
 from seqopt.scene._armed import reachable
+from seqopt.scene._checks import finite, settle, short
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 
@@ -108,7 +112,7 @@ def check_sequence(
     if not steps:
         raise StepError("the sequence has no steps; give at least one")
     for before, step in zip((begin, *steps), steps, strict=False):
-        check_step(scene, before, step)
+        _check_step(scene, before, step)
     return tuple(steps)
 
 
@@ -121,7 +125,7 @@ def _check_part(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
     return tuple(steps)
 
 
-def check_step(scene: Scene, before: AnyStep | None, step: AnyStep) -> None:
+def _check_step(scene: Scene, before: AnyStep | None, step: AnyStep) -> None:
     """Require that a step is feasible after the previous one, for any choice of open grips."""
     _check_state(scene, step, f"step {step.number}")
     _check_change(scene, before or Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), step)
@@ -229,3 +233,113 @@ def _turned_round(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
             grips[robot] = then.grips[robot]
             out.append(Step(len(out) + 1, kind, then.bricks, tuple(grips)))
     return _check_part(scene, out)
+
+
+@dataclass(frozen=True)
+class Site:
+    """State of a site.
+
+    Parameters
+    ----------
+    bricks : int
+        How many bricks stand, in build order.
+    grips : tuple of (int or None), optional
+        Node that each of the scene's robots holds. By default nobody holds anything where a build
+        begins; where it ends, the rule ``ending`` says who holds.
+    stays : tuple of (int or None), optional
+        Node that each robot that is free held last, from which its travel counts.
+    regrips : int
+        How many grips were taken since the last brick, besides that which placed it.
+    step : int, optional
+        Number of the step that led there: steps are numbered on from it. By default 1, and 0 for
+        the empty site.
+    ages : tuple of float, optional
+        For how long bricks, in build order, have been in their places, s, where mortar cures; by
+        default they were placed just now.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> steps = seqopt.sequential(seqopt.build_network(seqopt.load_scene("arch25")))
+    >>> Site.after(steps, 4)
+    Site(bricks=3, grips=(4, 2, None), stays=(None, None, None), regrips=0, step=4, ages=())
+    """
+
+    bricks: int
+    grips: Grips | None = None
+    stays: Grips = ()
+    regrips: int = 0
+    step: int = -1
+    ages: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        ages = tuple(finite("site: age", age, 0.0) for age in self.ages)
+        if len(ages) > max(self.bricks, 0):
+            raise StepError(f"site: {len(ages)} ages of {self.bricks} bricks; give one for each")
+        settle(self, ages=ages, step=self.step if self.step >= 0 else int(self.bricks != 0))
+
+    @classmethod
+    def after(cls, steps: Sequence[Step], count: int) -> Site:
+        """Return the site after a number of steps of a build, 0 for the empty site."""
+        first, last = (steps[0].number - 1, steps[-1].number) if steps else (0, 0)
+        if not isinstance(count, Integral) or not (first or 0) <= count <= last:
+            raise StepError(f"step {short(count)}: the plan has {first} to {last}")
+        done = steps[: count - first]
+        if first and not done:
+            raise StepError(f"step {count}: the plan begins after it; give {first + 1} to {last}")
+        lasts: dict[int, int] = {r: n for s in done for r, n in enumerate(s.grips) if n is not None}
+        regrips = 0
+        for step in done:
+            regrips = 0 if step.kind in (StepKind.PLACE, StepKind.REMOVE) else regrips
+            regrips += step.kind is StepKind.REPOSITION
+        if not done and any(step.kind is StepKind.REMOVE for step in steps):
+            bricks = steps[0].bricks + (steps[0].kind is StepKind.REMOVE)
+            return cls(bricks, (None,) * len(steps[0].grips), step=0)
+        if not done:
+            return cls(0)
+        free = (lasts.get(r) if node is None else None for r, node in enumerate(done[-1].grips))
+        return cls(done[-1].bricks, done[-1].grips, tuple(free), regrips, done[-1].number)
+
+    @property
+    def placed(self) -> list[float]:
+        """When the placed bricks were in position, s, from their ages."""
+        return [-age for age in self.ages] + [0.0] * (self.bricks - len(self.ages))
+
+    @property
+    def held(self) -> int:
+        """Number of grips."""
+        return sum(node is not None for node in self.grips or ())
+
+    def holds(self, scene: Scene) -> Grips:
+        """Return the node that each robot holds; raise an error if the scene does not allow it."""
+        grips, most = self.grips, len(scene.placed)
+        if not isinstance(self.bricks, Integral) or not 0 <= self.bricks <= most:
+            raise StepError(
+                f"site: {short(self.bricks)} bricks; scene {scene.name} has 0 to {most}"
+            )
+        if grips is None:
+            return (None,) * len(scene.robots)
+        if self.bricks:
+            _check_state(scene, Step(0, StepKind.RELEASE, self.bricks, tuple(grips)), "site")
+        elif self.held:
+            raise StepError("site: a robot holds a brick, and none stands; give bricks")
+        for prop in scene.props:
+            if prop.node in grips:
+                raise StepError(f"site: a robot holds node {prop.node} of a prop; leave one out")
+        return grips
+
+    def described(self, scene: Scene) -> dict[str, object]:
+        """Return bricks and grips by names, ready for JSON."""
+        pairs = zip(scene.robots, self.holds(scene), strict=True)
+        held = {robot.name: node for robot, node in pairs if node is not None}
+        return {
+            "bricks": [brick.name for brick in scene.placed[: self.bricks]],
+            "grips": held if self.grips is not None else "as the rule ending says",
+        }
+
+
+def _begin_step(scene: Scene, site: Site | None) -> Step:
+    """Return the state before the first step of a build, as the step that led to it."""
+    if site is None:
+        return Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots))
+    return Step(site.step, StepKind.RELEASE, site.bricks, site.holds(scene))

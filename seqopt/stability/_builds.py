@@ -13,7 +13,7 @@ from itertools import chain
 
 import numpy as np
 
-from seqopt.contact._partial_assemblies import PartialAssemblies
+from seqopt.contact.faces import PartialAssemblies
 from seqopt.contact.mortar import DRY, EPOXY, Mortar, _is_as_strong, _with_mortar
 from seqopt.errors import SceneError
 from seqopt.network.network import Network

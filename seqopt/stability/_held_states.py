@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.contact._prop_grips import applied_rows, prop_grips
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import bare_assembly
+from seqopt.contact.faces import _applied_rows, _prop_grips, bare_assembly
 from seqopt.errors import plugins
 from seqopt.network.network import Network
 from seqopt.stability.limit_analysis import (
@@ -195,14 +194,14 @@ def node_assembly(network: Network, bricks: int, *, held: bool = True) -> Assemb
     ``held``: whether a robot holds any of these, so that props hold.
     """
     bare = bare_assembly(network, bricks)
-    nodes, props = network.inner[:bricks].ravel(), prop_grips(network, bricks, held=held)
+    nodes, props = network.inner[:bricks].ravel(), _prop_grips(network, bricks, held=held)
     line = np.zeros((len(nodes) if props.line.any() else 0, 3))
     if len(line):
         numbers = network.scene.placed_nodes
         line[[numbers.index(node) for node in props.nodes]] = props.line
     return replace(
         bare,
-        applied=applied_rows(network, bricks, props),
+        applied=_applied_rows(network, bricks, props),
         grip_line=line,
         grip_block=np.repeat(np.arange(bricks), 2),
         grip_position=network.node_position[nodes],

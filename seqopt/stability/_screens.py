@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seqopt.arrays import Bools, Floats, Ints, Vector
-from seqopt.contact._prop_grips import prop_grips
 from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import _prop_grips
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import GripError, SceneError
 from seqopt.network.build import network_of
@@ -312,7 +312,7 @@ def held_parts(
     robots = (loads > 0).any(axis=1) if last else np.ones(len(places), dtype=bool)
     for propped in (True, False):
         rows = np.flatnonzero(robots == propped)
-        props = prop_grips(network, bricks, held=propped)
+        props = _prop_grips(network, bricks, held=propped)
         at = np.tile([numbers.index(node) for node in props.nodes], (len(rows), 1))
         most = np.tile(props.payload, (len(rows), 1))
         if len(rows):

@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import PartialAssemblies
 from seqopt.contact.mortar import Mortar
 from seqopt.errors import SceneError, did_you_mean
 from seqopt.network.network import Network

@@ -18,8 +18,8 @@ import pandas as pd
 
 from seqopt._showing import display
 from seqopt.arrays import Floats
-from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import PartialAssemblies
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network

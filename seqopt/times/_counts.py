@@ -20,7 +20,7 @@ from seqopt.arrays import Floats
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import least_sum
 from seqopt.network.network import Network
-from seqopt.scene._durations import Durations
+from seqopt.scene.arm import Durations
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.times._durations import require_durations

@@ -12,11 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.curing import Curing
-from seqopt.contact.faces import contact_at
-from seqopt.contact.mortar import Mortar
+from seqopt.contact.faces import PartialAssemblies, _contact_at
+from seqopt.contact.mortar import Curing, Mortar
 from seqopt.errors import SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
@@ -38,7 +36,7 @@ class JointsInTime:
     def __init__(self, network: Network, curing: Curing) -> None:
         springs = network.springs
         self.names = tuple(
-            contact_at(network, i)[0] for i in springs.acting(len(network.inner)).tolist()
+            _contact_at(network, i)[0] for i in springs.acting(len(network.inner)).tolist()
         )
         unknown = [name for name, _ in curing.joints if name not in self.names]
         if unknown:

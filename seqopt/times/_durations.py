@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from seqopt.errors import StepError
-from seqopt.scene._durations import EXAMPLE, Durations
+from seqopt.scene.arm import EXAMPLE, Durations
 from seqopt.scene.scene import Scene
 
 

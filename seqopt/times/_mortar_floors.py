@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.contact.curing import Curing
+from seqopt.contact.mortar import Curing
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
 from seqopt.network.network import Network

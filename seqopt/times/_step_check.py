@@ -6,16 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seqopt.contact.curing import Curing
 from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import Curing
 from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
 from seqopt.judge._label_proof import BETTER
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.scene.scene import Scene
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.stability.assessment import Verdict, verdict
 
 CLOSE = 1e-9  # of a time: what rounding may take from an age

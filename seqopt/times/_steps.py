@@ -26,11 +26,10 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from seqopt.errors import StepError
-from seqopt.scene._durations import Durations
+from seqopt.scene.arm import Durations
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
-from seqopt.sequence.site import Site, _begin_step
-from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
+from seqopt.sequence.steps import AnyStep, Site, Step, StepKind, _begin_step, check_sequence
 from seqopt.times._curing import Waits
 from seqopt.times._durations import require_durations
 

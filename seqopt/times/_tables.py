@@ -14,17 +14,16 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.contact.curing import Curing
+from seqopt.contact.mortar import Curing
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence._robot_kinds import can_carry, carried
+from seqopt.sequence._rule_space import can_carry, carried
 from seqopt.sequence.schedule import Hold
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import Step, StepKind, idle_robots
+from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
 from seqopt.times._curing import JointsInTime, Waits
 from seqopt.times._steps import StepTime, reassigned_steps, step_times
 

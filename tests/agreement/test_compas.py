@@ -18,7 +18,7 @@ from seqopt.exchange.contacts import flat_face
 from seqopt.exchange.exports import export_plan
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from seqopt.stability.assessment import Verdict, assess
 
 pytestmark = [

@@ -21,11 +21,11 @@ from seqopt.graph.formulation import FormulationKind, find_formulation, formulat
 from seqopt.graph.states.states import build_states
 from seqopt.problem.problem import parse_robust
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
+from seqopt.sequence.methods import modified_sequential, three_robot_loop
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.schedule import thin
 from seqopt.sequence.schedule_file import parse_schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.stability.assessment import Verdict, verdict
 from tests.brute_force import FOUR, ONES, allowed, distance, misfit, whole_graph
 from tests.builders import small_arch

@@ -16,8 +16,7 @@ from seqopt.errors import MechanismError, SolverError
 from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.responses.table import step_fields
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS, three_robot_loop
 from seqopt.study.published import WEIGHTED, published_plan
 from tests.builders import block, hinged, scaled, six_bricks, small_arch
 from tests.direct_solve import solve_dense

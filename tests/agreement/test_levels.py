@@ -15,7 +15,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
 from tests.builders import largest_difference

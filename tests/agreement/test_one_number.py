@@ -25,7 +25,7 @@ from seqopt.problem import Amount, Filter
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim
 from seqopt.responses.quantities import RESPONSES
-from seqopt.sequence import three_robots
+from seqopt.sequence import methods as three_robots
 from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import EQUATIONS
 from tests.brute_force import ONES

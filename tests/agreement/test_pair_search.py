@@ -27,7 +27,7 @@ from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, StepCost
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
 from tests.builders import far_reaching
 from tests.layered import Costs, answer

@@ -27,8 +27,8 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, load_scene
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step
-from seqopt.sequence.two_robots import METHODS
 from tests.dense_bodies import dense_fields
 
 LARGEST = 1e-9  # difference over the largest entry of its kind

@@ -21,11 +21,10 @@ from seqopt.problem.problem import Orders
 from seqopt.problem.requirements import Limit
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import in_order
-from seqopt.sequence._parts import what_is_left
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.sequence.rules import FreeRules, with_robots
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import StepKind
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.schedule_file import _what_is_left
+from seqopt.sequence.steps import Site, StepKind
 from tests.brute_force import ONES, best_values
 from tests.builders import from_both_sides, small_arch
 
@@ -147,20 +146,20 @@ def test_loops_go_on_from_their_steps_and_end_at_them():
     for how in ("overlap_dp", "minimax", "cascade", "path_dp"):
         plan = seqopt.solve(seqopt.pose(engine, loop, ONES), how)
         for count in (1, 5, 8):
-            left = what_is_left(loop, plan.steps[:count])
+            left = _what_is_left(loop, plan.steps[:count])
             rest = seqopt.solve(seqopt.pose(engine, left, ONES), how)
             assert rest.steps[0].number == count + 1
             assert [s.kind for s in rest.steps] == [s.kind for s in plan.steps[count:]]
             if how != "minimax":  # a worst step may lie behind
                 assert [s.grips for s in rest.steps] == [s.grips for s in plan.steps[count:]]
             ends = Site.after(plan.steps, len(plan.steps) - 2)
-            part = what_is_left(loop, plan.steps[:count], ends)
+            part = _what_is_left(loop, plan.steps[:count], ends)
             short = seqopt.solve(seqopt.pose(engine, part, ONES), how)
             assert short.steps[-1].grips == ends.grips
     with pytest.raises(StepError, match="step 1 of what was done is none of schedule three-robot"):
-        what_is_left(loop, [replace(plan.steps[0], grips=(2, None, None))])
+        _what_is_left(loop, [replace(plan.steps[0], grips=(2, None, None))])
     with pytest.raises(StepError, match="none is left"):
-        what_is_left(loop, plan.steps)
+        _what_is_left(loop, plan.steps)
 
 
 @pytest.mark.parametrize(

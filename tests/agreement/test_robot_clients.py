@@ -17,7 +17,7 @@ from seqopt.exchange._tasks import FRAMES, plan_tasks
 from seqopt.exchange.exports import export_plan
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from tests.blocks import with_shapes
 from tests.builders import ROOT, six_bricks
 

@@ -17,7 +17,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
 from seqopt.responses._choices import window_models
-from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
+from seqopt.sequence.methods import SCHEDULES, three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS, WEIGHTED
 from tests.builders import far_reaching
 from tests.strategies import arches

@@ -21,7 +21,7 @@ from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.table import force_column
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import in_order
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.workflow import Robust
 from tests.arms.joints import compliances
 from tests.arms.scenes import beside, two_arms

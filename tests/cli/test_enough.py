@@ -10,7 +10,7 @@ import pytest
 import seqopt
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.scene.parts import Side
-from seqopt.sequence.two_robots import _enough_reach
+from seqopt.sequence.methods import _enough_reach
 
 ARCH = "arch:span=1.2,rise=0.5"
 CENTERS = ((0.2, -0.5, 0.4), (1.0, -0.5, 0.4), (0.6, 0.5, 0.4))

@@ -12,7 +12,7 @@ import pytest
 
 from seqopt._cli.answer import plain
 from seqopt.responses.table import analyze
-from seqopt.sequence.two_robots import cantilever
+from seqopt.sequence.methods import cantilever
 from tests.commands import beside_models
 from tests.commands import command as run
 

@@ -18,8 +18,8 @@ from seqopt._cli.arguments import request
 from seqopt._cli.main import main
 from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import save_scene
+from seqopt.sequence.methods import cantilever, sequential
 from seqopt.sequence.schedule_file import schedule_text
-from seqopt.sequence.two_robots import cantilever, sequential
 from seqopt.study.published import printed_steps
 from tests.builders import anywhere, from_both_ends
 from tests.commands import beside_models

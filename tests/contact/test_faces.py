@@ -10,7 +10,7 @@ import pytest
 from seqopt.contact.faces import step_assembly
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 
 
 def test_bricks_touch_where_their_faces_overlap(arch25):

@@ -16,7 +16,7 @@ from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import THICKEST
 from seqopt.scene.scene_file import _parse_scene, dump_scene
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential
 from seqopt.stability.steps import assess_steps
 
 WALL = running_bond(1, 2)  # two bricks 60 mm high, laid dry: nothing lies between them

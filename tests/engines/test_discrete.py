@@ -16,7 +16,7 @@ from seqopt.errors import MechanismError, SceneError
 from seqopt.network.build import build_network
 from seqopt.responses.table import step_fields
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential
 from seqopt.study.published import STUDY_BED
 from tests.builders import largest_difference
 

@@ -32,7 +32,7 @@ from seqopt.errors import MechanismError, SolverError
 from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import EQUATIONS
 from tests.builders import (
     all_nodes,

@@ -20,7 +20,7 @@ from seqopt.exchange._formats import DOCUMENTS as READERS
 from seqopt.exchange._formats import sniffed
 from seqopt.exchange.exports import export_plan
 from seqopt.network.build import build_network
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from tests.documents import DOCUMENTS as OTHERS
 
 JUNK = (None, True, -1, 0, 3, 1e308, -1e-300, 10**400, "", "x", [], {}, [[1]], {"data": 1}, [0] * 3)

@@ -17,9 +17,9 @@ from seqopt.exchange.exports import export_plan, read_folder
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import save_scene
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.sequence.two_robots import METHODS
 from tests.builders import six_bricks
 from tests.documents import DOCUMENTS
 

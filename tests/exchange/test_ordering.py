@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from seqopt.errors import SceneError
 from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene
-from seqopt.scene.library.common import touching_order
+from seqopt.scene.library.common import _touching_order
 from tests.blocks import box
 from tests.documents import obj
 
@@ -21,7 +21,7 @@ from tests.documents import obj
 )
 def test_each_touches_what_stands(count, links, rank):
     pairs = [(a, b) for a, b in links if a < count and b < count and a != b]
-    order = touching_order(rank[:count], pairs, [0])
+    order = _touching_order(rank[:count], pairs, [0])
     reached, before = {0}, set()
     while reached != before:
         before = set(reached)

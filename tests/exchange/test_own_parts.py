@@ -16,7 +16,7 @@ from seqopt.network.build import build_network
 from seqopt.problem import Amount
 from seqopt.report import Picture, picture
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential
 
 GIVEN = Given(density=2000.0)
 

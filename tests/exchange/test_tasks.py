@@ -26,8 +26,8 @@ from seqopt.scene.boxes import block_brick, vertices_of
 from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene import Scene
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind, check_sequence
-from seqopt.sequence.two_robots import METHODS
 from tests.blocks import C_SHAPE, prism
 from tests.builders import six_bricks
 from tests.strategies import builds

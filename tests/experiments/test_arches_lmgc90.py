@@ -36,7 +36,7 @@ from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.harness.yardstick import error, moved
 from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.network.network import GROUND
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential
 from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 PYTHON = python_with_lmgc90(os.environ.get("SEQOPT_LMGC90", sys.executable))

@@ -30,7 +30,7 @@ from experiments.discrete.parts.arch_pads import (
 from experiments.harness.results import RESULTS
 from experiments.harness.yardstick import STEPS, error, moved
 from seqopt.engines.interface import Want
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential
 from seqopt.study.published import STUDY_BED, STUDY_PADS, printed
 
 

@@ -18,9 +18,8 @@ from seqopt.engines.registry import make_engine
 from seqopt.exchange._tables import plan_csv
 from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
+from seqopt.sequence.methods import METHODS, three_robot_loop
 from seqopt.sequence.schedule_file import parse_plan, parse_schedule, schedule_text
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.sequence.two_robots import METHODS
 from tests.builders import small_arch
 
 NAMES = ("=cmd|'/c calc'!A1", "+1", "'@sum", "-x", "rob")

@@ -30,7 +30,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
-from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
+from seqopt.sequence.methods import SCHEDULES, three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS, WORST_RATIO
 from tests.builders import small_arch
 from tests.layered import Costs, answer

@@ -30,8 +30,8 @@ from seqopt.network.build import build_network
 from seqopt.plan.front import FrontProblem, find_front, pick, upper_bounds
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
+from seqopt.sequence.methods import modified_sequential, three_robot_loop
 from seqopt.sequence.rules import FreeRules, with_robots
-from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from tests.brute_force import FOUR, ONES, least_peak, peaks, whole_graph
 from tests.builders import small_arch
 from tests.strategies import free_builds

@@ -21,9 +21,9 @@ from seqopt.network.build import build_network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
+from seqopt.sequence.methods import modified_sequential, three_robot_loop
 from seqopt.sequence.rules import with_robots
 from seqopt.sequence.schedule_file import parse_schedule
-from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.stability.assessment import Verdict, verdict
 from tests.builders import small_arch
 

@@ -27,8 +27,8 @@ from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import NARROW, Standing, StandingSets, _without_implied, slack
 from seqopt.responses.quantities import CHOSEN_BY, lengths
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.stability._prover import Prover
 from seqopt.stability._screens import Margins
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded

@@ -13,7 +13,7 @@ from seqopt.plan._tables import choice_table
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import _mean_ranks, _ranks_of
 from seqopt.problem.requirements import SceneFacts, payload_limits
-from seqopt.sequence.three_robots import modified_sequential
+from seqopt.sequence.methods import modified_sequential
 from seqopt.study.published import CRITERIA, EQUATIONS, paper_models
 
 

@@ -20,7 +20,7 @@ from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, _ranks_of
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED
 from tests.builders import small_arch
 from tests.strategies import problems

@@ -13,10 +13,9 @@ from experiments.harness.scenes import running_bond
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import GROUND
+from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.schedule_file import parse_schedule, schedule_text
 from seqopt.sequence.steps import StepKind, check_sequence
-from seqopt.sequence.three_robots import SCHEDULES
-from seqopt.sequence.two_robots import METHODS
 from tests.builders import anywhere, branch, from_both_ends, small_arch
 from tests.strategies import builds
 

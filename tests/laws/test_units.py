@@ -14,8 +14,7 @@ from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import find_formulation
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.sequence.two_robots import cantilever
+from seqopt.sequence.methods import cantilever, three_robot_loop
 from seqopt.stability.assessment import assess
 from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import rescaled

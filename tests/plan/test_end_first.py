@@ -23,8 +23,8 @@ from seqopt.plan.front import FrontProblem, find_front
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.three_robots import three_robot_loop
 from tests.builders import small_arch
 from tests.strategies import free_builds
 

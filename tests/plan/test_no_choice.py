@@ -27,7 +27,7 @@ from seqopt.plan.solve import solve
 from seqopt.responses import _blocks as batches
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
-from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
+from seqopt.sequence.methods import modified_sequential, three_robot_loop
 from seqopt.study.published import EQUATIONS
 from tests.builders import six_bricks
 from tests.layered import Costs, answer

@@ -13,7 +13,7 @@ from seqopt.errors import InfeasibleError, ProblemError, StepError
 from seqopt.plan.pose import states_of
 from seqopt.plan.replan import compared, goes_on, without
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.site import Site
+from seqopt.sequence.steps import Site
 from tests.brute_force import ONES
 from tests.builders import small_arch
 

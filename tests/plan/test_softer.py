@@ -15,8 +15,8 @@ from seqopt.plan._softer import _payload_advice, whole_load
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit, overloads
 from seqopt.responses.table import analyze
+from seqopt.sequence.methods import sequential
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.two_robots import sequential
 from tests.builders import small_arch
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))

@@ -9,7 +9,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.plan.pose import graph_of
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from tests.builders import small_arch
 
 WORST = seqopt.CRITERIA["worst-ratio"]

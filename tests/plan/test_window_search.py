@@ -16,7 +16,7 @@ from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
 from seqopt.responses import _choices
 from seqopt.responses.table import analyze
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED
 
 

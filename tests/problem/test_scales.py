@@ -21,8 +21,8 @@ from seqopt.problem.criteria import OVER_METHODS, RankSum, WeightedSum, equal
 from seqopt.problem.requirements import NEVER, ROUNDED, SceneFacts, crown
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Sphere
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import anywhere, far_reaching, rescaled, small_arch
 from tests.strategies import arches

@@ -20,7 +20,7 @@ from seqopt.network.network import Network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, Limit
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import EQUATIONS, RESOLUTION
 from tests.layered import Costs, of_layers
 

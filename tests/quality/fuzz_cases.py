@@ -17,8 +17,8 @@ from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step
-from seqopt.sequence.two_robots import METHODS
 
 COMMANDS = ("scene", "analyze", "optimize", "assess", "compare")
 QUICK = ("compliance", "frame", "planar", "auto")  # hundreds of grip sets in a moment

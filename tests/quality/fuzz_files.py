@@ -27,8 +27,8 @@ from seqopt.errors import SeqoptError
 from seqopt.exchange.exports import export_plan
 from seqopt.exchange.imports import import_scene, read_content, read_measured
 from seqopt.scene.scene_file import dump_scene
-from seqopt.sequence._parts import read_site
 from seqopt.sequence.rules import with_robots
+from seqopt.sequence.schedule_file import read_site
 from tests.arms.scenes import two_arms
 from tests.builders import small_arch
 from tests.quality.fuzz_cases import CHANGES, _changed_plan, _noise, pick, plan_text

@@ -12,7 +12,7 @@ from seqopt.network.build import build_network
 from seqopt.report.charts import draw_responses
 from seqopt.report.draw import View, _inner_edges, draw_bricks, draw_grips, draw_network
 from seqopt.responses.table import analyze
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from tests.blocks import with_shapes
 from tests.builders import six_bricks
 

@@ -10,8 +10,8 @@ from seqopt.errors import StepError
 from seqopt.plan.build import GivenSequence
 from seqopt.plan.solve import solve
 from seqopt.report._gantt import gantt_picture
+from seqopt.sequence.methods import sequential
 from seqopt.sequence.schedule import holds
-from seqopt.sequence.two_robots import sequential
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from seqopt.problem.requirements import SceneFacts
 from seqopt.report.page import Build, report_page
 from seqopt.report.text import _deciding_step, _in_a_sentence, _worst_along
 from seqopt.responses.table import Departure, analyze
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential
 from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from tests.browser import BROWSER, PLAIN, browsed, browses

@@ -29,7 +29,7 @@ from seqopt.scene.boxes import block_brick
 from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.sequence.two_robots import cantilever, sequential
+from seqopt.sequence.methods import cantilever, sequential
 from seqopt.workflow import optimize
 from tests.blocks import L_SHAPE, prism
 from tests.browser import BROWSER, PLAIN, WORDS, browsed, browses

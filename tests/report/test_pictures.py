@@ -11,7 +11,7 @@ from seqopt._cli.main import main
 from seqopt.errors import FileError, StepError
 from seqopt.plan.build import GivenSequence
 from seqopt.report._pictures import Film, spread_steps
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential
 
 
 @pytest.fixture(scope="module")

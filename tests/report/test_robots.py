@@ -22,7 +22,7 @@ from seqopt.report._robots import Cell, arm_data
 from seqopt.report.page import Build, report_page
 from seqopt.responses.table import analyze
 from seqopt.scene.parts import Robot, Side, Sphere
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential
 from tests.browser import BROWSER, PLAIN, WORDS, browsed
 from tests.strategies import builds
 

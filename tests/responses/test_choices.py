@@ -16,7 +16,7 @@ from seqopt.responses import _blocks as batches
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.quantities import responses_of
 from seqopt.responses.table import step_fields
-from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
+from seqopt.sequence.methods import SCHEDULES, three_robot_loop
 from seqopt.study.published import EQUATIONS
 
 COMPARED = ("T_max", "M_sup", "D_max")

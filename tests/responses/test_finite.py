@@ -15,8 +15,7 @@ from seqopt.errors import SeqoptError, SolverError
 from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential, three_robot_loop
 from seqopt.study.published import EQUATIONS
 from tests.builders import six_bricks
 

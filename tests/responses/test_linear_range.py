@@ -18,7 +18,7 @@ from seqopt.report._notebook import card
 from seqopt.responses._staged import staged_fields
 from seqopt.responses.table import _STRAIN, LinearRange, analyze, response_table
 from seqopt.scene.scene_file import _scene_by_words, save_scene
-from seqopt.sequence.two_robots import cantilever, sequential
+from seqopt.sequence.methods import cantilever, sequential
 from seqopt.stability._builds import BuildProver
 from seqopt.study.published import published_plan
 from seqopt.workflow import optimize

@@ -26,7 +26,7 @@ from seqopt.responses._blocks import Block, answer, packed
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS
 
 

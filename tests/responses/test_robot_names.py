@@ -23,8 +23,7 @@ from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import save_scene
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.sequence.two_robots import sequential
+from seqopt.sequence.methods import sequential, three_robot_loop
 from seqopt.study.published import EQUATIONS, WORST_RATIO, find_criterion
 from tests.builders import six_bricks
 

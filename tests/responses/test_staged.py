@@ -18,8 +18,8 @@ from seqopt.network.build import build_network
 from seqopt.responses._staged import Placing, analyze_staged, staged_fields
 from seqopt.responses.table import analyze
 from seqopt.scene.parts import Joint
+from seqopt.sequence.methods import cantilever, sequential
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.sequence.two_robots import cantilever, sequential
 from seqopt.study.published import published_plan
 from tests.builders import (
     anywhere,

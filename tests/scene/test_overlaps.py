@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from seqopt.scene._overlaps import find_overlaps, overlapping
-from seqopt.scene.boxes import as_vectors, block_brick
+from seqopt.scene.boxes import _find_overlaps, as_vectors, block_brick, overlapping
 from tests.blocks import C_SHAPE, box, prism
 
 BRICK = (0.2, 0.1, 0.06)
@@ -21,7 +20,7 @@ TOLERATED = 0.003
 
 def found(*solids, tolerated=TOLERATED):
     """Depths in mm and overlaps of bounds in mm, by pair."""
-    out = find_overlaps(solids, [tolerated] * len(solids))
+    out = _find_overlaps(solids, [tolerated] * len(solids))
     return {e.pair: (1e3 * e.depth, tuple(1e3 * np.array(e.bounds))) for e in out}
 
 

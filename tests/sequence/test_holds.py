@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from seqopt.network.build import build_network
 from seqopt.scene.library import WallShape, wall
+from seqopt.sequence.methods import METHODS, three_robot_loop
 from seqopt.sequence.schedule import OpenGrip, holds
 from seqopt.sequence.steps import StepKind
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.sequence.two_robots import METHODS
 
 
 def unrolled(found):

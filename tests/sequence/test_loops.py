@@ -12,9 +12,15 @@ from seqopt.errors import StepError
 from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
+from seqopt.sequence.methods import (
+    SCHEDULES,
+    _two_robot_loop,
+    placing_node,
+    robot_loop,
+    sequential,
+    three_robot_loop,
+)
 from seqopt.sequence.steps import StepKind, idle_robots
-from seqopt.sequence.three_robots import SCHEDULES, _two_robot_loop, robot_loop, three_robot_loop
-from seqopt.sequence.two_robots import placing_node, sequential
 from seqopt.study.published import EQUATIONS, WEIGHTED
 from tests.builders import anywhere, small_arch
 

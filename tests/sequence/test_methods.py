@@ -11,8 +11,8 @@ from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot, Sphere
+from seqopt.sequence.methods import METHODS, cantilever, lies_along, sequential
 from seqopt.sequence.steps import StepKind, check_sequence
-from seqopt.sequence.two_robots import METHODS, cantilever, lies_along, sequential
 from seqopt.study.published import published_plan
 from tests.builders import far_reaching
 from tests.strategies import arches

@@ -8,9 +8,9 @@ import pytest
 from seqopt.errors import StepError
 from seqopt.exchange._tables import plan_csv
 from seqopt.network.build import build_network
+from seqopt.sequence.methods import sequential
 from seqopt.sequence.schedule_file import parse_plan, read_plan
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.sequence.two_robots import sequential
 
 HEADER = "step,type,bricks,rob1_brick,rob1_node,rob2_brick,rob2_node,rob3_brick,rob3_node\n"
 

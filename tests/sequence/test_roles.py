@@ -10,15 +10,18 @@ import pytest
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Robot, Sphere
-from seqopt.sequence.steps import StepKind, idle_robots
-from seqopt.sequence.three_robots import (
+from seqopt.sequence.methods import (
+    METHODS,
     SCHEDULES,
+    _take_turns,
     _two_robot_loop,
+    cast,
     modified_sequential,
     robot_loop,
+    sequential,
     three_robot_loop,
 )
-from seqopt.sequence.two_robots import METHODS, _take_turns, cast, sequential
+from seqopt.sequence.steps import StepKind, idle_robots
 from tests.builders import anywhere, from_both_ends, small_arch
 
 

@@ -10,13 +10,13 @@ import pytest
 import seqopt
 from seqopt.errors import FileError, StepError
 from seqopt.network.build import build_network
+from seqopt.sequence.methods import SCHEDULES
 from seqopt.sequence.schedule_file import (
     find_schedule,
     parse_schedule,
     read_schedule,
     schedule_text,
 )
-from seqopt.sequence.three_robots import SCHEDULES
 from tests.builders import anywhere, from_both_ends, small_arch
 
 HEADER = "step,type,bricks,rob1_node,rob2_node,rob3_node\n"

@@ -10,18 +10,19 @@ from experiments.harness.scenes import running_bond
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.sequence.schedule import OpenGrip, OpenStep, check_support, islands
-from seqopt.sequence.steps import Step, StepKind
-from seqopt.sequence.three_robots import open_schedule, three_robot_loop
-from seqopt.sequence.two_robots import (
+from seqopt.sequence.methods import (
     _begins_elsewhere,
     alternate,
     cantilever,
     degeneration,
     lies_along,
+    open_schedule,
     placing_node,
     sequential,
+    three_robot_loop,
 )
+from seqopt.sequence.schedule import OpenGrip, OpenStep, check_support, islands
+from seqopt.sequence.steps import Step, StepKind
 from tests.builders import anywhere, branch, from_both_ends, small_arch
 
 

@@ -22,8 +22,7 @@ from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
 from seqopt.responses import analyze_staged
 from seqopt.sequence.schedule_file import parse_plan
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import Step, StepKind, _turned_round, check_sequence
+from seqopt.sequence.steps import Site, Step, StepKind, _turned_round, check_sequence
 from tests.brute_force import ONES, allowed
 from tests.plain_rules import PlainBook
 

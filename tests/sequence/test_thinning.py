@@ -8,8 +8,8 @@ import pytest
 
 from experiments.harness.scenes import running_bond
 from seqopt.errors import StepError
+from seqopt.sequence.methods import SCHEDULES, three_robot_loop
 from seqopt.sequence.schedule import thin
-from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from tests.builders import from_both_sides
 
 

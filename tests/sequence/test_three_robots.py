@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
+from seqopt.sequence.methods import modified_sequential, sequential, three_robot_loop
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
-from seqopt.sequence.two_robots import sequential
 from seqopt.study.published import printed
 from tests.builders import far_reaching
 from tests.strategies import arches

@@ -18,7 +18,7 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from seqopt.stability import _prover as prover
 from seqopt.stability import _verdict_chain as chain
 from seqopt.stability import assessment, limit_analysis

@@ -9,9 +9,7 @@ import pytest
 
 import seqopt
 from seqopt import Prop
-from seqopt.contact._partial_assemblies import PartialAssemblies
-from seqopt.contact._prop_grips import prop_grips
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.faces import PartialAssemblies, _prop_grips, step_assembly
 from seqopt.errors import SceneError
 from seqopt.stability._load_factor import load_factors
 from seqopt.stability._screens import FALLS, STANDS, Margins, Screen
@@ -63,8 +61,8 @@ def test_props_are_struck_with_the_last_grip(arch25):
     screen = Screen(network, seqopt.DRY)
     sets = np.array([[0, 0, 0], [0, 0, 50]])
     assert (screen.stands(25, sets) == STANDS).all()
-    assert prop_grips(network, 25, held=False).nodes == ()
-    assert prop_grips(network, 25, held=True).nodes == (26,)
+    assert _prop_grips(network, 25, held=False).nodes == ()
+    assert _prop_grips(network, 25, held=True).nodes == (26,)
     assert screen.stands(14, sets[:1]) == STANDS
     assert screen.stands(13, sets[:1]) == FALLS  # its brick is not there
     none = step_assembly(network, 25, (None,) * 3)

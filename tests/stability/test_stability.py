@@ -12,7 +12,7 @@ from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.network.build import build_network
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from seqopt.stability._prover import Prover, sideways
 from seqopt.stability.assessment import Verdict, assess, bonded
 from seqopt.stability.limit_analysis import CAP, EXACT, Answer, Case, Claim, Sense, bound, violation

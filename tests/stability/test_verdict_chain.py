@@ -15,15 +15,14 @@ from scipy.optimize import linprog
 
 from experiments.harness.scenes import running_bond
 from formulations.contact.limit_analysis import compile_equilibrium
-from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.faces import PartialAssemblies, step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.sequence.two_robots import METHODS
 from seqopt.stability import _verdict_chain as chain
 from seqopt.stability._interior_point import Sought, approach, approach_all
 from seqopt.stability._step_verdicts import each_verdict, step_verdicts

@@ -8,9 +8,8 @@ from itertools import count
 
 import numpy as np
 
-from seqopt.contact.curing import _find_curing
 from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import EPOXY
+from seqopt.contact.mortar import EPOXY, _find_curing
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict
 from tests.plain_rules import PlainBook

@@ -13,7 +13,7 @@ from seqopt.judge._schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.site import Site
+from seqopt.sequence.steps import Site
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
 from tests.brute_force import ONES

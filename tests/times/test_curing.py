@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.contact.curing import Curing, _find_curing
+from seqopt.contact.mortar import Curing, _find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan._status import Status

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.contact.curing import _find_curing
+from seqopt.contact.mortar import _find_curing
 from seqopt.engines.interface import Want
 from seqopt.errors import SceneError
 from seqopt.sequence.steps import Step, StepKind

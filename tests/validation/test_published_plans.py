@@ -7,7 +7,7 @@ import pytest
 
 from experiments.study.parts.ranks import rank_choice
 from seqopt.graph.decisions import pose_decisions
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from seqopt.study.published import CLOSEST, printed_steps, published_choice
 
 GRIPS = [f"rob{i}_node" for i in (1, 2, 3)]

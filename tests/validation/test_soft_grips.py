@@ -12,7 +12,7 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.responses.table import _grips_of
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from tests.builders import block
 
 TABLE = {  # stiffness: largest force and displacement, sequential and cantilever

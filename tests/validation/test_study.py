@@ -9,7 +9,7 @@ import pytest
 from experiments.harness.yardstick import errors, percentiles, tension_share
 from seqopt.report.comparison import compare
 from seqopt.responses.table import analyze
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.methods import METHODS
 from seqopt.study.published import EQUATIONS, as_printed, printed, printed_steps, published_plan
 
 FITTED = {"sequential": "Table A.1", "cantilever": "Table A.2"}

@@ -28,10 +28,9 @@ from seqopt.report.comparison import Comparison, compare
 from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.methods import METHODS, modified_sequential, three_robot_loop
 from seqopt.sequence.schedule import OpenGrip, OpenStep
 from seqopt.sequence.steps import Step
-from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
-from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import (
     EQUATIONS,
     STUDY_BED,

@@ -21,8 +21,8 @@ from seqopt.graph.formulation import formulation_names
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.scene.scene import ORDERS
 from seqopt.scene.scene_file import KINDS, builtin_scenes
+from seqopt.sequence.methods import SCHEDULES
 from seqopt.sequence.rules import FREE, RULES
-from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.study.published import CRITERIA
 
 AIMS = ("minmax", "sum", "steps", "regrips", "travel", "bond", "friction", "tilt")

@@ -24,8 +24,8 @@ from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
 from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence._parts import SAME
 from seqopt.sequence.rules import FREE, _usual_grips, with_robots
+from seqopt.sequence.schedule_file import SAME
 from seqopt.study.published import CRITERIA
 
 

@@ -14,8 +14,7 @@ from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._scene_page import scene_page
-from seqopt.scene._props import Prop
-from seqopt.scene.parts import Robot
+from seqopt.scene.parts import Prop, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
 from seqopt.work.progress import with_progress

@@ -14,7 +14,7 @@ from seqopt._cli.answer import Answer
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
 from seqopt.arms._kept import arm_faults
-from seqopt.contact.curing import _find_curing
+from seqopt.contact.mortar import _find_curing
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network

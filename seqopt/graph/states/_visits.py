@@ -17,11 +17,9 @@ from seqopt.problem.amounts import NONE, STEPS, MoveArrays
 from seqopt.problem.resources import StepArrays
 from seqopt.scene.scene import Order
 from seqopt.sequence import _rule_space as free_space
-from seqopt.sequence._robot_kinds import node_numbers
-from seqopt.sequence._rule_space import FreeSpace, ScheduleSpace
+from seqopt.sequence._rule_space import FreeSpace, ScheduleSpace, node_numbers
 from seqopt.sequence.rules import Ending
-from seqopt.sequence.site import _begin_step
-from seqopt.sequence.steps import Step, StepKind, check_sequence
+from seqopt.sequence.steps import Step, StepKind, _begin_step, check_sequence
 
 
 def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:

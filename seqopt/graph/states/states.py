@@ -44,8 +44,7 @@ from seqopt.scene.scenarios import require_alike
 from seqopt.scene.scene import Order, Scene
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.site import Site
-from seqopt.sequence.steps import Grips, Step
+from seqopt.sequence.steps import Grips, Site, Step
 from seqopt.stability.assessment import Stability
 
 if TYPE_CHECKING:

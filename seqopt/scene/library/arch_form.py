@@ -31,11 +31,11 @@ from seqopt.scene.library.common import (
     MASONRY,
     JointLaw,
     _bond_pairs,
+    _few_enough,
+    _joint_width,
     _masonry,
     _running_bond,
     a_law,
-    few_enough,
-    joint_width,
 )
 from seqopt.scene.parts import THICKEST
 from seqopt.scene.scene import Scene
@@ -152,7 +152,7 @@ class ArchForm:
         check(self, "arch", span=length, rise=length, density=density)
         check(self, "arch", curve=partial(one_of, known=_CURVES), pattern=letters)
         check(self, "arch", bricks=unless_none(partial(whole_between, least=2)))
-        check(self, "arch", dimensions=sizes, gap=joint_width, law=a_law)
+        check(self, "arch", dimensions=sizes, gap=_joint_width, law=a_law)
 
     @property
     def line(self) -> _Line:
@@ -226,7 +226,7 @@ def _counts(form: ArchForm) -> list[int]:
     points = np.array([form.line(at) for at in np.linspace(0, 1, 2001)])
     way = float(np.hypot(*np.diff(points, axis=0).T).sum())
     most = math.ceil(2 * way / (form.lengths(len(form.pattern)) + form.gap).min()) + 2
-    few_enough("arch", most // 2)
+    _few_enough("arch", most // 2)
     over = np.cumsum(form.lengths(most) + form.gap) - way
     off = np.abs(over) / np.arange(1, most + 1)  # what each joint is wider, or narrower
     return [int(count) + 2 for count in np.argsort(off[1:], kind="stable")[:_TRIED]]
@@ -372,7 +372,7 @@ def _barrel(
     columns = whole_between("vault: columns", columns, 1)
     if courses is not None:
         courses = whole_between("vault: courses", courses, 2)
-    few_enough("vault", columns * (courses or 1))
+    _few_enough("vault", columns * (courses or 1))
     long, width, thickness = sizes("vault: dimensions", dimensions)
     form = ArchForm(
         span=span,
@@ -387,7 +387,7 @@ def _barrel(
 
 
 def _vault(form: ArchForm, columns: int, courses: int) -> Scene:
-    few_enough("vault", columns * courses)
+    _few_enough("vault", columns * courses)
     _, points = _laid(form, courses)
     step = np.diff(points, axis=0)
     tangents = np.insert(step / np.linalg.norm(step, axis=1)[:, None], 1, 0.0, axis=1)

@@ -24,7 +24,7 @@ from seqopt.scene._checks import (
     unless_none,
 )
 from seqopt.scene.arch import STANDARD_GRAVITY
-from seqopt.scene.boxes import as_vector, spring_fields
+from seqopt.scene.boxes import _spring_fields, as_vector
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import clip, polygon_moments
@@ -101,17 +101,17 @@ def _masonry(
         joints=_joints_between(bricks, pairs, law, normals),
         grounds=tuple(_ground_under(brick, down, law) for brick, down in feet),
         build_order=tuple(brick.name for brick in bricks),
-        robots=mobile_robots(bricks),
+        robots=_mobile_robots(bricks),
     )
 
 
-def mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
+def _mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
     """Return robots that reach everything, each of which can bear all bricks."""
     weight = STANDARD_GRAVITY * math.fsum(brick.mass for brick in bricks)
     return tuple(Robot(name=f"rob{i}", payload=weight) for i in range(1, count + 1))
 
 
-def touching_order(
+def _touching_order(
     rank: Sequence[float | tuple[float, ...]],
     pairs: Iterable[tuple[int, int]],
     starts: Iterable[int],
@@ -136,13 +136,13 @@ def touching_order(
     return order
 
 
-def few_enough(where: str, bricks: int) -> None:
+def _few_enough(where: str, bricks: int) -> None:
     """Require a structure of at most `MOST_BRICKS`."""
     if bricks > MOST_BRICKS:
         raise SceneError(f"{where}: {bricks} bricks; give numbers that make at most {MOST_BRICKS}")
 
 
-def joint_width(where: str, value: float) -> float:
+def _joint_width(where: str, value: float) -> float:
     """Return the width of a joint, which may be none."""
     return 0.0 if as_float(value) == 0 else positive(where, value, "m, or 0")
 
@@ -289,7 +289,7 @@ def _joints_between(
         widest = float(heights[1] - heights[0]) + taper
         thin = min(min(brick.dimensions) for brick in ends)
         place = middle + 0.5 * (heights[0] + heights[1]) * along
-        fields = spring_fields(place, along, sides[0], law.stiffness(found.area, found.moments))
+        fields = _spring_fields(place, along, sides[0], law.stiffness(found.area, found.moments))
         thickness = widest if widest > THICKEST * thin else None
         out.append(Joint(bricks=(ends[0].name, ends[1].name), thickness=thickness, **fields))
     return tuple(out)
@@ -302,5 +302,5 @@ def _ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = _STUB
     place = corners.mean(axis=0)
     side, other = (axis + 1) % 3, (axis + 2) % 3
     stiff = law.over_rectangle(brick.dimensions[side], brick.dimensions[other])
-    fields = spring_fields(place, -out, brick.frame[side], stiff)
+    fields = _spring_fields(place, -out, brick.frame[side], stiff)
     return Ground(brick=brick.name, anchor=as_vector(place + stub * out), **fields)

@@ -18,12 +18,12 @@ from seqopt.scene.library.common import (
     DOWN,
     MASONRY,
     JointLaw,
+    _few_enough,
+    _joint_width,
     _masonry,
     _shares,
+    _touching_order,
     a_law,
-    few_enough,
-    joint_width,
-    touching_order,
 )
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
@@ -60,9 +60,9 @@ class DomeShape:
     def __post_init__(self) -> None:
         check(self, "dome", courses=partial(whole_between, least=1))
         check(self, "dome", around=partial(whole_between, least=3))
-        few_enough("dome", self.courses * self.around)
+        _few_enough("dome", self.courses * self.around)
         check(self, "dome", span=length, rise=length, opening=length, thickness=length)
-        check(self, "dome", gap=joint_width)
+        check(self, "dome", gap=_joint_width)
         check(self, "dome", density=density, law=a_law)
         if self.rise > 0.5 * self.span:
             raise SceneError(
@@ -119,7 +119,7 @@ def dome(shape: DomeShape) -> Scene:
     kept = np.flatnonzero(_shares(loose, pairs, normals) >= _LEAST_SHARE)
     pairs, normals = [pairs[k] for k in kept], normals[kept]
     grounded = [i for i, place in enumerate(places) if not place.low]
-    order = touching_order(range(len(places)), pairs, grounded)
+    order = _touching_order(range(len(places)), pairs, grounded)
     if len(order) < len(places):
         raise SceneError(
             f"dome: {len(places) - len(order)} of {len(places)} bricks lie on no other; "

@@ -16,11 +16,11 @@ from seqopt.scene.library.common import (
     MASONRY,
     JointLaw,
     _bond_pairs,
+    _few_enough,
+    _joint_width,
     _masonry,
     _running_bond,
     a_law,
-    few_enough,
-    joint_width,
 )
 from seqopt.scene.scene import Scene
 
@@ -55,11 +55,11 @@ class WallShape:
 
     def __post_init__(self) -> None:
         count = partial(whole_between, least=1)
-        check(self, "wall", dimensions=sizes, gap=joint_width, density=density, law=a_law)
+        check(self, "wall", dimensions=sizes, gap=_joint_width, density=density, law=a_law)
         self._count("columns", "length", self.dimensions[0])
         self._count("courses", "height", self.dimensions[2])
         check(self, "wall", columns=count, courses=count)
-        few_enough("wall", self.columns * self.courses)
+        _few_enough("wall", self.columns * self.courses)
         if self.gap >= 0.5 * self.dimensions[0]:
             raise SceneError(
                 f"wall: gap is {self.gap:g} m, half a brick or more; give less than "

@@ -19,9 +19,8 @@ from seqopt.scene.boxes import _separations
 from seqopt.scene.library import ArchForm, DomeShape, JointLaw, WallShape, arch, chain, dome, wall
 from seqopt.scene.library.common import _joints_between
 from seqopt.scene.scene_file import _find_warnings, _scene_by_words
+from seqopt.sequence.methods import cantilever, sequential, three_robot_loop
 from seqopt.sequence.schedule import islands
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.sequence.two_robots import cantilever, sequential
 from tests.builders import largest_difference
 from tests.direct_solve import solve_dense
 
