@@ -76,6 +76,10 @@ class OneSchedule:
         """Return the level of a part, and what evaluates its states."""
         return part, self.evaluator
 
+    def evaluators(self) -> tuple[StateEvaluator, ...]:
+        """Return all that evaluated states so far."""
+        return (self.evaluator,)
+
     def to_part(self, part: Any, evaluator: StateEvaluator, states: Ints) -> Ints:
         """Return states that are passed from part to part as rows of one."""
         return states
@@ -123,6 +127,9 @@ class AllOrders(OneSchedule):
                 raise TooManyPartsError(f"more than {MOST} sets of bricks; nothing is proven")
             self._known[part] = StateEvaluator(self._problem.at(self._order(part)))
         return len(part[0]), self._known[part]
+
+    def evaluators(self) -> tuple[StateEvaluator, ...]:
+        return self.evaluator, *self._known.values()
 
     def to_part(self, part: Key, evaluator: StateEvaluator, states: Ints) -> Ints:
         rows = self._renumbered(self._order(part), states, back=True)
@@ -301,6 +308,11 @@ class Proof:
         given = hint if problem.orders is None else None
         self._hint = {} if given is None else as_rows(problem, self.evaluator, given)
         self.states = 0
+
+    @property
+    def models(self) -> int:
+        """How many models the proof solved."""
+        return sum(each.models for each in self._space.evaluators())
 
     def rebuilt(self, asked: Filter, *, hinted: bool = True) -> Rebuilt:
         """Return the states that pass a filter."""

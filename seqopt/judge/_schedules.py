@@ -139,7 +139,7 @@ def _proven(
     claimed = _closed(values, tuple(map(max, bounds, claimed)))
     gap, left = (_gap(problem.goals, values, each) for each in (bounds, claimed))
     bounds = (*bounds, *values[aims:])
-    return Certificate(values, bounds, gap, left, {}, proof.states, Basis.REBUILT)
+    return Certificate(values, bounds, gap, left, {}, proof.states, proof.models, Basis.REBUILT)
 
 
 def _closed(values: Sequence[float], bounds: Sequence[float]) -> Bounds:

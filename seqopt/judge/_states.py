@@ -37,12 +37,14 @@ class Answers(NamedTuple):
     """What the engine answers of grip sets.
 
     ``values`` (S, g): of every goal; zero of one that is about moves or margins; ``forces`` (S, r):
-    of the grips, N; ``fit`` (S,): which hang together and are within all limits.
+    of the grips, N; ``fit`` (S,): which hang together and are within all limits; ``models``: how
+    many were solved for them.
     """
 
     values: Floats
     forces: Floats
     fit: Bools
+    models: int
 
 
 def ask(
@@ -56,13 +58,14 @@ def ask(
     if not problem.each:
         return _ask_engine(problem, bricks, grips, low_precision=low_precision)
     out = np.zeros((len(grips), len(problem.goals)))
-    forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
+    forces, fit, models = np.zeros(grips.shape), np.ones(len(grips), dtype=bool), 0
     for number, each in enumerate(problem.each):
         rows = np.flatnonzero(fit & (out[:, 0] <= most))
         found = ask(each, bricks, grips[rows], low_precision=low_precision)
         out[rows] = problem.joined(out[rows], found.values, number)
         forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
-    return Answers(out, forces, fit)
+        models += found.models
+    return Answers(out, forces, fit, models)
 
 
 def _ask_engine(problem: States, bricks: int, grips: Ints, *, low_precision: bool) -> Answers:
@@ -88,7 +91,7 @@ def _ask_engine(problem: States, bricks: int, grips: Ints, *, low_precision: boo
     values = np.column_stack([state_values(goal, seen) for goal in problem.goals])
     if problem.spares and bricks == len(problem.network.inner) and not grips.shape[1]:
         values[:] = 0.0  # the whole that nobody holds, where a take-down begins
-    return Answers(values, forces, fit & np.isfinite(values).all(axis=1))
+    return Answers(values, forces, fit & np.isfinite(values).all(axis=1), len(grips))
 
 
 def state_values(goal: Amount, states: StateArrays) -> Floats:
@@ -152,6 +155,7 @@ class StateEvaluator:
         self._beyond = len(nodes) * kinds.of_robot[list(self.tables.team)]
         self._known, self._standing = KnownRows(), dict[Standing, tuple[StandingSets, ...]]()
         self._exact = not _six_digits_do(problem)
+        self.models = 0  # how often the engine was asked of a grip set, in any scenario
 
     def least(self) -> tuple[float, ...]:
         """Return lower bounds of goals, from the one end that builds have and from counted steps.
@@ -333,17 +337,22 @@ class StateEvaluator:
         Six digits are enough where no value or payload that decides is close.
         """
         exact = asked.exact or self._exact or len(grips) <= FEW
-        found: Floats = np.column_stack(
-            ask(self.problem, bricks, grips, below, low_precision=not exact)
-        )
+        found = self._asked(bricks, grips, below, low_precision=not exact)
         if not exact:
             goals = len(self.problem.goals)
             close = _near(found[:, goals:-1], self._most)
             for k, value in enumerate(asked.values):
                 if self.problem.goals[k].is_peak:
                     close |= _near(found[:, [k]], np.array([value]))
-            found[close] = np.column_stack(ask(self.problem, bricks, grips[close], below))
+            found[close] = self._asked(bricks, grips[close], below)
         return found
+
+    def _asked(
+        self, bricks: int, grips: Ints, below: float, *, low_precision: bool = False
+    ) -> Floats:
+        *found, models = ask(self.problem, bricks, grips, below, low_precision=low_precision)
+        self.models += models
+        return np.column_stack(found)
 
     def amounts(self, values: Floats, found: Transitions) -> Floats:
         """Return the values (m, g) of goals of moves to states with such values."""

@@ -46,6 +46,8 @@ class Certificate(FrozenValue):
         The amount that the plan uses of each budget.
     states : int
         Number of states in the proof, where it is about states.
+    models : int
+        Number of models that the judge solved for the proof; none where costs are given.
     basis : Basis
         What proven bounds rest on.
 
@@ -63,6 +65,7 @@ class Certificate(FrozenValue):
     claimed_gap: float
     spent: Mapping[str, float] = field(default_factory=dict)
     states: int = 0
+    models: int = 0
     basis: Basis = Basis.GIVEN
 
     def __repr__(self) -> str:

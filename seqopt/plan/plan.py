@@ -366,7 +366,8 @@ class Plan(ShownBuild):
         the end, ``regrips``, ``makespan`` (s, if it is known how long robots take),
         ``idle_robots``, which never grip; limits of the linear range that are left, which model was
         ``enough``, what is known of ``arms``, and payloads that are exceeded;
-        ``models_evaluated``, ``states_in_proof``, ``seconds``;
+        ``models_evaluated``, ``models_in_six_digits`` of them, ``models_in_proof`` (None without
+        one), ``states_in_proof``, ``seconds``;
         of an order that was sought ``order``, ``orders`` (among which), ``order_status``,
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
@@ -421,11 +422,20 @@ def _summarized(plan: Plan) -> dict[str, object]:
         **({} if plan.arms is None else plan.arms.described()),
         "payload_exceeded": [str(excess) for excess in plan.overloads],
         "models_evaluated": plan.models,
+        "models_in_six_digits": graph.six_digit_models,
+        "models_in_proof": _models_in_proof(plan),
         "states_in_proof": 0 if proof is None else proof.states,
         **(order_facts(plan) if plan.order else {}),
         "seconds": dict(plan.seconds),
         **provenance(plan.engine),
     }
+
+
+def _models_in_proof(plan: Plan) -> int | None:
+    """Return how many models prove the plan: those solved anew, or all where costs are given."""
+    if plan.gap is None or plan.certificate is None:
+        return None
+    return plan.certificate.models or plan.models
 
 
 def _bounds(plan: Plan) -> dict[str, float | None]:

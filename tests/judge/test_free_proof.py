@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import seqopt
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import build_states
@@ -15,7 +18,10 @@ from seqopt.judge._rule_moves import RuleTables
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.steps import StepKind
+from tests.builders import first
 from tests.plain_rules import PlainBook
 from tests.strategies import free_builds
 
@@ -84,3 +90,16 @@ def test_bounds_are_the_values_of_the_best_plan(aim, build, told):
     assert not Proof(problem, hint).is_impossible()
     worse = (1.1 * best.objective[0] + 1, *best.objective[1:])
     assert Proof(problem, hint).bounds(worse)[0] == pytest.approx(best.objective[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_models_of_a_proof_are_those_that_engines_solved(count):
+    engines = [seqopt.make_engine("auto", build_network(first(load_scene("arch25"), 9)))]
+    engines += [seqopt.make_engine("auto", engines[0].network) for _ in range(1, count)]
+    problem = build_states(engines[0], FreeRules(), ONES, "minmax")
+    problem = replace(problem, scenarios=tuple(engines) if count > 1 else ())
+    value = solve(problem).objective["minmax"]
+    before = sum(engine.tally.total() for engine in engines)
+    proof = Proof(problem)
+    proof.bounds((value,))
+    assert proof.models == sum(engine.tally.total() for engine in engines) - before > 0

@@ -327,18 +327,23 @@ def _value(found: Found) -> str:
     return f"{value}; over unseen ones {others}"
 
 
+def _counted(count: int, what: str) -> str:
+    return f"{count:,} {what}{'s' * (count != 1)}"
+
+
 def _proof(plan: Plan) -> str:
     """Describe the proof of optimality, and its limits."""
-    proof, looked = plan.certificate, f"{plan.models:,} models"
+    proof = plan.certificate
     if proof is None and plan.ended is End.STOPPED:
         return "left out, time is over; values and bounds are claimed"
     if proof is None or plan.gap is None:
         return "none; how much better another plan may be is not known"
-    if proof.states:
-        looked += f" and {proof.states:,} state{'s' * (proof.states > 1)}"
+    looked = _counted(proof.models or plan.models, "model")
+    looked += f" and {_counted(proof.states, 'state')}" if proof.states else ""
+    looked += " prove it" + f", {plan.models:,} models were searched" * bool(proof.models)
     other = "no other plan among these" if plan.among else "no other plan"
     other = f"{OUTSIDE}, where {other}" if plan.is_far else other
     better = (
         "is better" if plan.gap <= TOLERANCE else f"is better by more than {100 * plan.gap:.3g} %"
     )
-    return f"{looked} were enough; {other} {better if isfinite(plan.gap) else 'is looked at'}"
+    return f"{looked}; {other} {better if isfinite(plan.gap) else 'is looked at'}"

@@ -367,7 +367,16 @@ class States(Shown):
             return sum(costs.models for costs in found)
         if self.each:
             return sum(problem.models for problem in self.each)
-        return self.sets.solved + self.screened.solved * (self.screened is not self.sets)
+        return self.sets.solved + self.six_digit_models
+
+    @property
+    def six_digit_models(self) -> int:
+        """How many of them were solved in single precision: enough to search by."""
+        if self.decisions is not None:
+            return 0
+        if self.each:
+            return sum(problem.six_digit_models for problem in self.each)
+        return self.screened.solved * (self.screened is not self.sets)
 
     @property
     def nbytes(self) -> int:
