@@ -14,10 +14,10 @@ from seqopt.exchange._content import MOST_BLOCKS, Content, Given
 from seqopt.exchange._formats import JSON, of_ending, read_file
 from seqopt.exchange._mesh_files import counted
 from seqopt.exchange._meshes import without_repeats
-from seqopt.scene._checks import cut, printable, short
+from seqopt.scene._checks import LARGEST_NUMBER, cut, printable, short
+from seqopt.scene.scenarios import SAME
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import warn_of
-from seqopt.sequence.schedule_file import SAME, _are_near
 
 _LYING = 3  # blocks on the ground from which on it is odd if most are there
 _IN_JSON = "compas_meshes"  # what a JSON file in a folder is
@@ -157,7 +157,7 @@ def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:
             values = [float(row[name]) for name in columns]
         except (TypeError, ValueError):
             values = [math.nan]
-        if not _are_near(values) or values[0] % 1:
+        if not all(abs(v) <= LARGEST_NUMBER for v in values) or values[0] % 1:
             raise StepError(f"{path}, line {number}: give numbers for {', '.join(columns)}")
         out[int(values[0])] = tuple(values[1:])
     return out

@@ -131,6 +131,7 @@ def as_built(scene: Scene, measured: Mapping[int, Sequence[float]]) -> Scene:
     )
 
 
+SAME = 1e-9  # m; closer than this a brick is where it was planned
 MOST = 100_000  # scenarios; more are a slip of the finger
 _LARGEST_FACTOR = 1e6
 _ALIKE = (1.0, 1.0)  # factors of what does not vary

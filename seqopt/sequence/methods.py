@@ -1,6 +1,7 @@
 """Methods: rules that turn a scene into the steps that build it, with given or with open grips.
 
-Roles (which robot places and which holds) are filled by reach or by name.
+Roles (which robot places and which holds) are filled by reach or by name. A method lists its acts,
+and `_steps` makes steps of them.
 """
 
 from __future__ import annotations
@@ -8,16 +9,14 @@ from __future__ import annotations
 import math
 import typing
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import replace
-from functools import wraps
+from functools import cache, wraps
 from itertools import permutations
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from seqopt.arrays import Bools
 from seqopt.errors import StepError, did_you_mean
@@ -27,11 +26,17 @@ from seqopt.scene._armed import reachable, within_reach
 from seqopt.scene.parts import Anywhere, Brick, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
-from seqopt.sequence.steps import Step, StepKind, check_sequence
+from seqopt.sequence.steps import Step, StepKind
 
 _Make = TypeVar("_Make", bound=Callable[..., Any])
+_Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
+_Way = tuple[int, tuple[_Pair, ...]]  # changes so far, pairs so far
+_Grip = int | OpenGrip | None
+_Act = tuple[StepKind, int, Mapping[int, _Grip]]  # kind, brick count, and grips that change
+
 ASKS = "extend a reach"  # of errors: what says so is answered by the reach that is enough
 _MM = 1000.0
+_NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 
 def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str]:
@@ -64,17 +69,13 @@ def _least(
 
     Only lengths at which a further node is reached are tried. ``reaches``: by robot.
     """
-    points = [brick.node_position(node) for brick in scene.placed for node in brick.nodes]
+    points = [scene.node_position(node) for node in scene.placed_nodes]
     lacks = (reach.lack(point) for reach in reaches.values() for point in points)
     steps = sorted({math.ceil(_MM * lack - 1e-6) / _MM for lack in lacks if lack > 0})
 
     def is_enough(more: float) -> bool:
-        robots = (
-            replace(robot, reach=reaches[robot.name].longer(more))
-            if robot.name in reaches
-            else robot
-            for robot in scene.robots
-        )
+        longer = {name: reach.longer(more) for name, reach in reaches.items()}
+        robots = (replace(r, reach=longer.get(r.name, r.reach)) for r in scene.robots)
         return exists(scene.with_robots(*robots))
 
     if not steps or not is_enough(steps[-1]):
@@ -107,8 +108,9 @@ def _says_reach(make: _Make) -> _Make:
     return typing.cast(_Make, made)
 
 
-_Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
-_Way = tuple[int, tuple[_Pair, ...]]  # changes so far, pairs so far
+def _in_words(number: int) -> str:
+    """Return a small number in words, a larger one in digits."""
+    return _NUMBERS[number] if number < len(_NUMBERS) else str(number)
 
 
 def _find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> list[int]:
@@ -117,12 +119,10 @@ def _find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) ->
     By default all robots of the scene, which must be at least as many as roles.
     """
     known = [robot.name for robot in scene.robots]
-    if not names:
-        if len(known) < roles:
-            raise StepError(
-                f"scene {scene.name}: {len(known)} robots; this method needs {in_words(roles)}"
-            )
-        return list(range(len(known)))
+    if not names and len(known) < roles:
+        raise StepError(
+            f"scene {scene.name}: {len(known)} robots; this method needs {_in_words(roles)}"
+        )
     for name in names:
         if name not in known:
             why = f"does not exist{did_you_mean(name, known)}; give some of {', '.join(known)}"
@@ -130,9 +130,9 @@ def _find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) ->
     listed = f"robots {', '.join(names)}"
     if len({*names}) < len(names):
         raise StepError(f"{listed}: one occurs twice; name different ones")
-    if len(names) != roles:
-        raise StepError(f"{listed}: {len(names)} named; {method} takes {in_words(roles)}")
-    return [known.index(name) for name in names]
+    if names and len(names) != roles:
+        raise StepError(f"{listed}: {len(names)} named; {method} takes {_in_words(roles)}")
+    return [known.index(name) for name in names or known]
 
 
 def _take_turns(
@@ -179,16 +179,15 @@ def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepEr
     return StepError(f"{why}; extend a reach, or let another robot place it")
 
 
-def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list[int]:
+def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list[int]:
     """Assign a robot to every role that reaches all bricks which the role places.
 
     Bricks are indices in build order; of all assignments the lexicographically first, by role.
     """
     reach = {r: within_reach(scene, scene.robots[r]) for r in robots}
     fits = [[r for r in robots if all(reach[r][b] for b in role)] for role in roles]
-    found = _first_match(fits)
-    if found:
-        return found
+    if (found := _first_match(fits)) is not None:
+        return list(found)
     role = min(range(len(roles)), key=lambda r: len(fits[r]))
     names, fit = (", ".join(scene.robots[r].name for r in some) for some in (robots, fits[role]))
     bricks = ", ".join(str(scene.placed[b].name) for b in sorted(roles[role]))
@@ -199,23 +198,19 @@ def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list
     )
 
 
-def _first_match(fits: Sequence[Sequence[int]]) -> list[int]:
+def _first_match(fits: Sequence[Sequence[int]]) -> tuple[int, ...] | None:
     """Return the lexicographically first assignment of robots to roles; None if there is none."""
-    for robot in fits[0] if fits else ():
-        rest = [[other for other in fit if other != robot] for fit in fits[1:]]
-        if not all(rest):
-            continue
-        count = 1 + max(map(max, rest), default=0)
-        able = np.array([np.isin(np.arange(count), fit) for fit in rest], bool).reshape(-1, count)
-        if (maximum_bipartite_matching(csr_array(able), perm_type="column") >= 0).all():
-            return [robot, *_first_match(rest)]
-    return []
 
+    @cache  # as many calls as there are sets of robots, not orders
+    def match(role: int, taken: frozenset[int]) -> tuple[int, ...] | None:
+        if role == len(fits):
+            return ()
+        for robot in fits[role]:
+            if robot not in taken and (rest := match(role + 1, taken | {robot})) is not None:
+                return (robot, *rest)
+        return None
 
-def in_words(number: int) -> str:
-    """Return a small number in words, a larger one in digits."""
-    words = ("no", "one", "two", "three", "four", "five", "six")
-    return words[number] if number < len(words) else str(number)
+    return match(0, frozenset())
 
 
 def lies_along(network: Network) -> frozenset[int]:
@@ -251,34 +246,26 @@ def _begins_elsewhere(network: Network) -> frozenset[int]:
 def degeneration(network: Network, method: str) -> str:
     """Return why a method of `METHODS` degenerates to another one on a structure; else empty.
 
-    Examples
-    --------
     >>> import seqopt
     >>> shape = seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V")
     >>> degeneration(seqopt.build_network(seqopt.arch_scene(shape)), "cantilever")
     'every brick lies along the structure: it is the sequential method here'
     """
-    between = {brick.name for brick in network.scene.placed[1:-1]}  # after the last all let go
     if method != "cantilever":
         return ""
-    if not between:
-        return "no bricks lie between the first and the last: it is the sequential method here"
+    between = {brick.name for brick in network.scene.placed[1:-1]}  # after the last all let go
     along = lies_along(network)
-    if along >= between:
-        return "every brick lies along the structure: it is the sequential method here"
     swaps = along | _begins_elsewhere(network)
     if swaps >= between:
-        return (
-            "no brick extends one that is held: each begins elsewhere or lies along; "
-            "it is the sequential method here"
-        )
-    if swaps & between:
-        return ""
+        why = "no brick extends one that is held, as each begins elsewhere or lies along"
+        if along >= between:
+            why = "every brick lies along the structure"
+        if not between:
+            why = "no bricks lie between the first and the last"
+        return f"{why}: it is the sequential method here"
     first = network.scene.placed[0].name
-    return f"no brick lies along the structure: brick {first} is held until the end"
-
-
-_Grip = TypeVar("_Grip")
+    held = f"no brick lies along the structure: brick {first} is held until the end"
+    return "" if swaps & between else held
 
 
 def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
@@ -299,6 +286,66 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
         toward = np.array(robot.reach.toward)
         return max(free, key=lambda node: float(toward @ np.array(brick.node_position(node))))
     return brick.placing_node if brick.placing_node in free else free[0]
+
+
+def _steps(scene: Scene, acts: Iterable[_Act]) -> list[OpenStep]:
+    """Return the steps of acts, numbered from 1; an act that changes no grip is none."""
+    grips: tuple[_Grip, ...] = (None,) * len(scene.robots)
+    out: list[OpenStep] = []
+    for kind, bricks, changes in acts:
+        before = grips
+        grips = tuple(changes.get(robot, grip) for robot, grip in enumerate(before))
+        if grips != before:
+            out.append(OpenStep(len(out) + 1, kind, bricks, grips))
+    return out
+
+
+def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> Schedule:
+    """Return the schedule of open steps, with the candidates of every move.
+
+    Open to a move is every free node within reach when it is made that no given grip holds while
+    it lasts; to a move that places a brick, the nodes of this brick alone. Moves are numbered from
+    0 in the order in which they are made.
+    """
+    scene, moves = network.scene, list[Move]()
+    for number in range(1 + max((move for step in steps for move in step.moves), default=-1)):
+        present = [step for step in steps if number in step.moves]
+        first = present[0]
+        robot = scene.robots[first.grips.index(OpenGrip(number))]
+        nodes = reachable(scene, robot, first.bricks)
+        if first.kind is StepKind.PLACE:  # what places a brick holds it
+            nodes = tuple(n for n in nodes if n in scene.placed[first.bricks - 1].nodes)
+        held = {grip for step in present for grip in step.grips}
+        free = tuple(node for node in nodes if node not in held)
+        if not free:
+            raise StepError(
+                f"step {first.number} ({first.kind.value}): no node is open to {robot.name}: of "
+                f"those that it may hold it reaches {len(nodes)}, and others hold these; extend "
+                "its reach or let another robot take this grip"
+            )
+        moves.append(Move(robot.name, first.number, first.bricks, free))
+    check_support(network, steps, moves)
+    return Schedule(method, scene, tuple(steps), tuple(moves))
+
+
+def _alternate(
+    network: Network, method: str, swaps: Set[int], robots: Sequence[str], *, open_: bool = False
+) -> list[OpenStep]:
+    """Return the steps in which two robots place and hold by turns, at placing or at open nodes.
+
+    After each brick one of the two releases, if it holds anything; after the last one both do.
+    ``swaps``: names of bricks after which the robot that placed them holds on.
+    """
+    scene, acts = network.scene, list[_Act]()
+    chosen = _find_robots(scene, robots, method, 2)
+    pairs = _take_turns(network, swaps, chosen, [(chosen[0], chosen[1])] if robots else [])
+    for count, (brick, (placer, holder)) in enumerate(zip(scene.placed, pairs, strict=True), 1):
+        node = None if open_ else placing_node(network, scene.robots[placer], brick)
+        acts.append((StepKind.PLACE, count, {placer: OpenGrip(count - 1) if open_ else node}))
+        stays = placer if count == 1 or brick.name in swaps else holder
+        leave = {*range(len(scene.robots))} - {stays if count < len(pairs) else -1}
+        acts.append((StepKind.RELEASE, count, dict.fromkeys(leave)))
+    return _steps(scene, acts)
 
 
 @_says_reach
@@ -336,8 +383,8 @@ def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     (None, 2, 1)
     """
     network = network_of(network)
-    every = {brick.name for brick in network.scene.bricks}
-    return _two_robots(network, "sequential", every, robots)
+    steps = _alternate(network, "sequential", {*network.scene.build_order}, robots)
+    return open_schedule("sequential", network, steps).fill(())
 
 
 @_says_reach
@@ -370,7 +417,8 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     """
     network = network_of(network)
     swaps = lies_along(network) | _begins_elsewhere(network)
-    return _two_robots(network, "cantilever", swaps, robots)
+    steps = _alternate(network, "cantilever", swaps, robots)
+    return open_schedule("cantilever", network, steps).fill(())
 
 
 METHODS: dict[str, Callable[..., tuple[Step, ...]]] = {
@@ -379,97 +427,21 @@ METHODS: dict[str, Callable[..., tuple[Step, ...]]] = {
 }
 
 
-def alternate(
-    network: Network,
-    method: str,
-    swap_after: Set[int],
-    robots: Sequence[str],
-    grip: Callable[[int, int], _Grip],
-) -> Iterator[tuple[StepKind, int, tuple[_Grip | None, ...]]]:
-    """Yield the steps in which two robots place and hold by turns.
-
-    After each brick one of the two releases, if it holds anything; after the last one both do.
-    ``grip`` says what a robot, by its index, holds of the brick that it places, by the brick count.
-    """
-    placed = network.scene.placed
-    chosen = _find_robots(network.scene, robots, method, 2)
-    pairs = _take_turns(network, swap_after, chosen, [(chosen[0], chosen[1])] if robots else [])
-    grips: list[_Grip | None] = [None] * len(network.scene.robots)
-    for count, (brick, (placer, holder)) in enumerate(zip(placed, pairs, strict=True), start=1):
-        grips[placer] = grip(placer, count)
-        before = tuple(grips)
-        yield StepKind.PLACE, count, before
-        stays = placer if count == 1 or brick.name in swap_after else holder
-        last = count == len(placed)
-        grips = [None if last or i != stays else held for i, held in enumerate(grips)]
-        if tuple(grips) != before:
-            yield StepKind.RELEASE, count, tuple(grips)
-
-
-def _two_robots(
-    network: Network, method: str, swap_after: Set[int], robots: Sequence[str]
-) -> tuple[Step, ...]:
-    """Return the sequence in which holder and placer swap after placing some of the bricks."""
-    scene = network.scene
-
-    def node(robot: int, count: int) -> int:
-        return placing_node(network, scene.robots[robot], scene.placed[count - 1])
-
-    parts = alternate(network, method, swap_after, robots, node)
-    steps = [Step(number, *part) for number, part in enumerate(parts, start=1)]
-    check_support(network, steps)
-    return check_sequence(scene, steps)
-
-
-def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> Schedule:
-    """Return the schedule of open steps, with the candidates of every move.
-
-    Open to a move is every free node within reach when it is made that no given grip holds while
-    it lasts; to a move that places a brick, the nodes of this brick alone. Moves are numbered from
-    0 in the order in which they are made.
-    """
-    scene, moves = network.scene, list[Move]()
-    for number in range(1 + max((move for step in steps for move in step.moves), default=-1)):
-        present = [step for step in steps if number in step.moves]
-        first = present[0]
-        robot = scene.robots[first.grips.index(OpenGrip(number))]
-        nodes = reachable(scene, robot, first.bricks)
-        if first.kind is StepKind.PLACE:  # what places a brick holds it
-            nodes = tuple(n for n in nodes if n in scene.placed[first.bricks - 1].nodes)
-        held = {grip for step in present for grip in step.grips}
-        free = tuple(node for node in nodes if node not in held)
-        if not free:
-            raise StepError(
-                f"step {first.number} ({first.kind.value}): no node is open to {robot.name}: of "
-                f"those that it may hold it reaches {len(nodes)}, and others hold these; extend "
-                "its reach or let another robot take this grip"
-            )
-        moves.append(Move(robot.name, first.number, first.bricks, free))
-    check_support(network, steps, moves)
-    return Schedule(method, scene, tuple(steps), tuple(moves))
-
-
 @_says_reach
 def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the loop of two robots: the sequential method with every grip open.
 
-    While one robot holds the newest brick the other places the next one, at a node that is to be
-    chosen among those of this brick, and holds it there until the brick after is placed; then the
-    first one releases. A move lasts from its placing to the release after the next placing; it
-    shares that placing with the move after it. At least one robot grips, and the newest brick is
-    held, at every step before the last. Robots are those of `seqopt.sequential`.
+    A move lasts from its placing to the release after the next placing, which it shares with the
+    move after it; its candidates are the nodes of the brick that it places.
 
     >>> import seqopt
     >>> schedule = _two_robot_loop(seqopt.build_network(seqopt.load_scene("arch25")))
     >>> [(step.kind.value, step.moves) for step in schedule.steps[1:4]]
     [('place', (0, 1)), ('release', (1,)), ('place', (1, 2))]
-    >>> [move.candidates for move in schedule.moves[:3]]
-    [(1,), (2,), (4,)]
     """
     network = network_of(network)
-    every = {brick.name for brick in network.scene.bricks}
-    parts = alternate(network, "two-robot", every, robots, lambda _, count: OpenGrip(count - 1))
-    steps = [OpenStep(number, *part) for number, part in enumerate(parts, start=1)]
+    every = {*network.scene.build_order}
+    steps = _alternate(network, "two-robot", every, robots, open_=True)
     return open_schedule("two-robot", network, steps)
 
 
@@ -486,71 +458,51 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
 
     ``robots``: how many take part, or their names in the order in which they place the first
     bricks; by default all robots of the scene. Which of them takes which role follows from reach.
-
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> robot_loop(network, 3).steps == seqopt.three_robot_loop(network).steps
-    True
-    >>> robot_loop(network, 2).method
-    'two-robot'
     """
     scene = (network := network_of(network)).scene
     names = () if isinstance(robots, int) else tuple(robots)
     count = robots if isinstance(robots, int) else len(names) or len(scene.robots)
     if count <= 2:
         return _two_robot_loop(network, names)
-    if len(scene.robots) < count or len(scene.placed) < count + 1:
+    bricks = len(scene.placed)
+    if len(scene.robots) < count or bricks < count + 1:
         raise StepError(
-            f"scene {scene.name}: {len(scene.robots)} robots and {len(scene.placed)} bricks; "
-            f"this method needs {in_words(count)} robots and {in_words(count + 1)} bricks"
+            f"scene {scene.name}: {len(scene.robots)} robots and {bricks} bricks; "
+            f"this method needs {_in_words(count)} robots and {_in_words(count + 1)} bricks"
         )
     longest = [*range(1, count - 1), 0, count - 1]  # who has held longest, again and again
-    turns = [
-        _Turn(*(longest[(k - ago) % count] for ago in (1, 2, 0)))
-        for k in range(len(scene.placed) - count)
-    ]
-    chosen = _find_robots(scene, names, f"the loop of {count}", count)
-    roles = [{role} for role in range(count)]
-    for brick, turn in enumerate(turns, start=count):
-        roles[turn.placer].add(brick)
-    steps = _loop(network, chosen if names else cast(scene, roles, chosen), turns)
-    return open_schedule(f"{in_words(count)}-robot", network, steps)
+    turns = [[longest[(k - ago) % count] for ago in (1, 2, 0)] for k in range(bricks - count)]
+    order = _find_robots(scene, names, f"the loop of {count}", count)
+    if not names:
+        placing = [*range(count), *(placer for _, placer, _ in turns)]  # roles, brick by brick
+        roles = [{b for b, own in enumerate(placing) if own == role} for role in range(count)]
+        order = _cast(scene, roles, order)
+    steps = _steps(scene, _loop(network, order, turns))
+    return open_schedule(f"{_in_words(count)}-robot", network, steps)
 
 
-class _Turn(NamedTuple):
-    """The roles of one turn of the loop, each named by the first brick that it places.
+def _loop(network: Network, order: Sequence[int], turns: Sequence[Sequence[int]]) -> Iterator[_Act]:
+    """Yield the acts of a loop.
 
-    The robot with the longest grip moves in the next turn, and places in the one after.
+    ``order``: the robot of every role, named by the first brick that it places; ``turns``: the
+    roles that take a new grip, place the next brick, and have held longest.
     """
-
-    mover: int
-    placer: int
-    oldest: int
-
-
-def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> list[OpenStep]:
     scene = network.scene
-    grips: list[int | OpenGrip | None] = [None] * len(scene.robots)
-    steps: list[OpenStep] = []
 
-    def add(kind: StepKind, bricks: int, role: int, grip: int | OpenGrip | None) -> None:
-        grips[order[role]] = grip
-        steps.append(OpenStep(len(steps) + 1, kind, bricks, tuple(grips)))
-
-    def place(role: int, bricks: int) -> None:
-        robot, brick = scene.robots[order[role]], scene.placed[bricks - 1]
-        add(StepKind.PLACE, bricks, role, placing_node(network, robot, brick))
+    def place(role: int, bricks: int) -> _Act:
+        robot, brick = order[role], scene.placed[bricks - 1]
+        node = placing_node(network, scene.robots[robot], brick)
+        return StepKind.PLACE, bricks, {robot: node}
 
     for role in range(len(order) - 1):
-        place(role, role + 1)
-    for move, turn in enumerate(turns):
+        yield place(role, role + 1)
+    for move, (mover, placer, oldest) in enumerate(turns):
         bricks = len(order) + move
-        kind = StepKind.PLACE if move == 0 else StepKind.REPOSITION
-        add(kind, bricks, turn.mover, OpenGrip(move))
-        add(StepKind.RELEASE, bricks, turn.placer, None)
-        place(turn.placer, bricks + 1)
-        add(StepKind.RELEASE, bricks + 1, turn.oldest, None)
-    return steps
+        kind = StepKind.REPOSITION if move else StepKind.PLACE
+        yield kind, bricks, {order[mover]: OpenGrip(move)}
+        yield StepKind.RELEASE, bricks, {order[placer]: None}
+        yield place(placer, bricks + 1)
+        yield StepKind.RELEASE, bricks + 1, {order[oldest]: None}
 
 
 @_says_reach
@@ -635,25 +587,18 @@ def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) ->
     chosen = _find_robots(network.scene, robots, "modified-sequential", 3)
     plain = sequential(network, robots[:2])
     helpers = chosen[2:] if robots else chosen
-    steps: list[OpenStep] = []
-    moves, helper = 0, helpers[0]
-
-    def add(kind: StepKind, step: Step, support: OpenGrip | None) -> None:
-        grips = [support if i == helper and support else g for i, g in enumerate(step.grips)]
-        steps.append(OpenStep(len(steps) + 1, kind, step.bricks, tuple(grips)))
-
+    acts, support, moves = list[_Act](), dict[int, _Grip](), 0
     for k, step in enumerate(plain):
-        support = OpenGrip(moves - 1) if moves and step.held else None
-        add(step.kind, step, support)
+        given: dict[int, _Grip] = dict(enumerate(step.grips))
+        acts.append((step.kind, step.bricks, given | support if step.held else given))
         if step.kind is StepKind.RELEASE:
             continue
-        if support is not None:
-            add(StepKind.RELEASE, step, None)
+        acts.append((StepKind.RELEASE, step.bricks, given))
         if 1 < step.bricks < len(network.scene.placed):
-            moves += 1
-            helper = _free(network.scene, plain[k : k + 3], [helper, *helpers])
-            add(StepKind.REPOSITION, step, OpenGrip(moves - 1))
-    return open_schedule("modified-sequential", network, steps)
+            helper = _free(network.scene, plain[k : k + 3], [*support, *helpers])
+            support, moves = {helper: OpenGrip(moves)}, moves + 1
+            acts.append((StepKind.REPOSITION, step.bricks, given | support))
+    return open_schedule("modified-sequential", network, _steps(network.scene, acts))
 
 
 def _free(scene: Scene, window: Sequence[Step], helpers: Sequence[int]) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -79,71 +79,98 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     reverse, from its last step to 1, is the take-down that passes the same states.
     """
     steps: list[Step] = []
-    for line, row in _read_rows(scene, text, f"plan {source}"):
-        where = f"plan {source}, line {line}"
-        cells = _read_cells(row, where)
-        grips = tuple(_read_grip(scene, robot, row, where) for robot in scene.robots)
-        steps.append(Step(*cells, grips))
+    for line, _, step in _read_steps(scene, text, f"plan {source}"):
+        if step.moves:
+            raise StepError(
+                f"plan {source}, line {line}: a grip is ?, open; give its node, or optimize the "
+                "file as a schedule"
+            )
+        nodes = (grip if isinstance(grip, int) else None for grip in step.grips)
+        steps.append(Step(step.number, step.kind, step.bricks, tuple(nodes)))
     turned = len(steps) > 1 and steps[0].number == len(steps) and steps[-1].number == 1
     steps = steps[::-1] if turned else steps
     first = 1
     if steps and (steps[0].kind, steps[0].bricks) != (StepKind.PLACE, 1):  # a part of a plan
         first = max(1, steps[0].number)
     for expected, step in enumerate(steps, start=first):
-        if step.number != expected:
-            raise StepError(
-                f"plan {source}: step {step.number} should be {expected}; number steps from 1"
-            )
+        _require_number(f"plan {source}", step.number, expected)
     if first > 1 or any(step.kind is StepKind.REMOVE for step in steps):
         return _check_part(scene, steps)
     checked = check_sequence(scene, steps)
     return _turned_round(scene, checked) if turned else checked
 
 
-def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
-    """Return the rows of a table of steps: the number of the line, and its cells by column."""
+def _require_number(where: str, number: int, expected: int) -> None:
+    if number != expected:
+        raise StepError(f"{where}: step {number} should be {expected}; number steps from 1")
+
+
+def _read_steps(scene: Scene, text: str, what: str) -> Iterator[tuple[int, Row, OpenStep]]:
+    """Yield the number of each line of a table of steps, its cells by column, and its step."""
     wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
     columns, rows = read_table(text, what, StepError)
     if lacking := [column for column in wanted if column not in columns]:
         raise StepError(f"{what}: column {lacking[0]} is missing; give {', '.join(wanted)}")
     if twice := [column for column in wanted if columns.count(column) > 1]:
         raise StepError(f"{what}: column {twice[0]} occurs twice; keep one")
-    return rows
-
-
-def _read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
-    """Return step number, kind and brick count of a row."""
     kinds = {kind.value: kind for kind in StepKind}
-    if row["type"] not in kinds:
-        raise StepError(f"{where}: type is {short(row['type'])}; give one of {', '.join(kinds)}")
-    number, bricks = (_integer(row, column, where) for column in ("step", "bricks"))
-    return number, kinds[row["type"]], bricks
+    grips: ScheduledGrips = (None,) * len(scene.robots)
+    opened = 0
+    for line, row in rows:
+        where = f"{what}, line {line}"
+        kind = row["type"]
+        if kind not in kinds:
+            raise StepError(f"{where}: type is {short(kind)}; give one of {', '.join(kinds)}")
+        number, bricks = (_integer(row[name], f"{where}: {name}") for name in ("step", "bricks"))
+        now: list[int | OpenGrip | None] = []
+        for robot, held in zip(scene.robots, grips, strict=True):
+            now.append(_read_grip(scene, robot, row, where, held, opened))
+            opened += isinstance(now[-1], OpenGrip) and now[-1] != held
+        grips = tuple(now)
+        yield line, row, OpenStep(number, kinds[kind], bricks, grips)
 
 
-def _read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
-    """Return the node that a robot holds; a brick named with it must be the node's."""
-    if not row[f"{robot.name}_node"].strip():
+def _read_grip(
+    scene: Scene, robot: Robot, row: Row, where: str, held: object, opened: int
+) -> int | OpenGrip | None:
+    """Return what a robot holds; a mark continues the open grip that it held, or is a new move.
+
+    ``opened``: moves so far. A brick named with a node must be the node's.
+    """
+    column = f"{robot.name}_node"
+    cell = row[column].strip()
+    if not cell:
         return None
-    node = _integer(row, f"{robot.name}_node", where)
-    if row.get(f"{robot.name}_brick", "").strip() and node in scene.brick_of_node:
-        named = _integer(row, f"{robot.name}_brick", where)
-        actual = scene.brick_of_node[node].name
-        if named != actual:
+    if (mark := _MARK.fullmatch(cell)) is not None:
+        grip = held if isinstance(held, OpenGrip) else OpenGrip(opened)
+        if mark[1] and int(mark[1]) != grip.move + 1:
             raise StepError(
-                f"{where}: {robot.name} holds node {node} of brick {named}; it is on brick {actual}"
+                f"{where}: {column} is {cell!r}, but this is open grip {grip}: open grips are "
+                f"numbered as they are taken, and last until the robot lets go; give {grip}, or "
+                f"let {robot.name} release first"
+            )
+        return grip
+    node = _integer(cell, f"{where}: {column}", "a node, ? for an open grip, or nothing")
+    named = row.get(f"{robot.name}_brick", "").strip()
+    if named and node in scene.brick_of_node:
+        brick, actual = _integer(named, f"{where}: brick"), scene.brick_of_node[node].name
+        if brick != actual:
+            raise StepError(
+                f"{where}: {robot.name} holds node {node} of brick {brick}; it is on brick {actual}"
             )
     return node
 
 
-def _integer(row: Row, column: str, where: str) -> int:
+def _integer(cell: str, where: str, wanted: str = "a whole number") -> int:
     """Parse an integer; also 48.0, as tables with empty cells are often written."""
-    text = row[column].strip()
+    text = cell.strip()
     try:
-        return whole(column, int(text.removesuffix(".0")))
+        return whole(where, int(text.removesuffix(".0")))
     except ValueError as error:
-        raise StepError(f"{where}: {column} is {short(text)}; give a whole number") from error
+        raise StepError(f"{where} is {short(text)}; give {wanted}") from error
 
 
+KEYS = ("bricks", "grips", "last", "regrips", "step", "measured", "ages")
 _MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
 MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.
 
@@ -196,19 +223,26 @@ def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
     """
     network = network_of(where)
     scene, what = network.scene, f"schedule {source}"
-    rows = _read_rows(scene, text, what)
-    if not rows:
-        raise StepError(f"{what}: it has no steps; give at least one")
     known = [f"{robot.name}_node" for robot in scene.robots]
-    for column in filter(None, rows[0][1]):  # None stands for cells without a column
-        if column.endswith("_node") and column not in known:
-            raise StepError(
-                f"{what}: column {column}: no robot of scene {scene.name} is called so; "
-                f"give {', '.join(known)}"
-            )
     steps: list[OpenStep] = []
-    for line, row in rows:
-        steps.append(_step(scene, row, steps, f"{what}, line {line}"))
+    for line, row, step in _read_steps(scene, text, what):
+        at = f"{what}, line {line}"
+        for column in filter(None, row):  # None stands for cells without a column
+            if column.endswith("_node") and column not in known:
+                raise StepError(
+                    f"{what}: column {column}: no robot of scene {scene.name} is called so; "
+                    f"give {', '.join(known)}"
+                )
+        _require_number(at, step.number, len(steps) + 1)
+        if None in row:
+            raise StepError(f"{at}: it has more cells than there are columns; leave out the rest")
+        try:
+            _check_step(scene, steps[-1] if steps else None, step)
+        except StepError as error:
+            raise StepError(f"{at}: {error}") from error
+        steps.append(step)
+    if not steps:
+        raise StepError(f"{what}: it has no steps; give at least one")
     try:
         return open_schedule(Path(source).stem, network, steps)
     except StepError as error:
@@ -268,53 +302,6 @@ def find_schedule(
     return read_schedule(network, path)
 
 
-def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> OpenStep:
-    """Return the step of a row, which must be feasible after the previous ones."""
-    number, kind, bricks = _read_cells(row, where)
-    if number != len(before) + 1:
-        raise StepError(f"{where}: step {number} should be {len(before) + 1}; number steps from 1")
-    if None in row:
-        raise StepError(f"{where}: it has more cells than there are columns; leave out the rest")
-    step = OpenStep(number, kind, bricks, _grips(scene, row, before, where))
-    try:
-        _check_step(scene, before[-1] if before else None, step)
-    except StepError as error:
-        raise StepError(f"{where}: {error}") from error
-    return step
-
-
-def _grips(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> ScheduledGrips:
-    """Return the grips of a row: a mark continues an open grip, or is a new move."""
-    last = before[-1].grips if before else (None,) * len(scene.robots)
-    count = len({move for step in before for move in step.moves})
-    grips: list[int | OpenGrip | None] = []
-    for robot, held in zip(scene.robots, last, strict=True):
-        column = f"{robot.name}_node"
-        cell = row[column].strip()
-        mark = _MARK.fullmatch(cell)
-        if mark is None:
-            if not re.fullmatch(r"([+-]?\d+)?", cell):
-                raise StepError(
-                    f"{where}: {column} is {cell!r}; give a node, ? for an open grip, or nothing"
-                )
-            grips.append(_read_grip(scene, robot, row, where))
-            continue
-        grip = held if isinstance(held, OpenGrip) else OpenGrip(count)
-        count += grip is not held
-        if mark[1] and int(mark[1]) != grip.move + 1:
-            raise StepError(
-                f"{where}: {column} is {cell!r}, but this is open grip {grip}: open grips are "
-                f"numbered as they are taken, and last until the robot lets go; give {grip}, or "
-                f"let {robot.name} release first"
-            )
-        grips.append(grip)
-    return tuple(grips)
-
-
-SAME = 1e-9  # m; closer than this a brick is where it was planned
-KEYS = ("bricks", "grips", "last", "regrips", "step", "measured", "ages")
-
-
 def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
     """Return a site from a JSON file, and the scene in an order that begins with its bricks."""
     where = f"state {path}"
@@ -345,18 +332,16 @@ def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
 
 
 def _measured(scene: Scene, told: object, where: str) -> Scene:
-    """Return a scene with bricks at measured positions, m."""
+    """Return a scene with bricks at measured positions, m.
+
+    Coordinates beyond `LARGEST_NUMBER` are refused: their products lose precision.
+    """
     points: Mapping[str, Any] = told if isinstance(told, Mapping) else {"": told}
     for name, point in points.items():
-        right = isinstance(point, list) and len(point) == 3 and _are_near(point)
-        if not (name.isdecimal() and right):
+        right = name.isdecimal() and isinstance(point, list) and len(point) == 3
+        if not (right and all(abs(as_float(value)) <= LARGEST_NUMBER for value in point)):
             raise StepError(f"{where}: measured {short(told)}; give x, y, z by brick, m")
     return as_built(scene, {int(n): tuple(map(as_float, at)) for n, at in points.items()})
-
-
-def _are_near(values: Sequence[object]) -> bool:
-    """Return whether coordinates are within `LARGEST_NUMBER`: larger products lose precision."""
-    return all(abs(as_float(value)) <= LARGEST_NUMBER for value in values)
 
 
 def _standing(scene: Scene, told: object, where: str) -> tuple[Scene, int]:

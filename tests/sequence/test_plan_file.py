@@ -75,5 +75,5 @@ def test_a_plan_that_pandas_wrote_again_is_the_same(tmp_path, arch25):
 
 @pytest.mark.parametrize("cell", ["1.5", "1e3", "1.0.0", "nan", "inf"])
 def test_what_is_not_whole_is_refused(arch25, cell):
-    with pytest.raises(StepError, match=f"rob1_node is '{cell}'; give a whole number"):
+    with pytest.raises(StepError, match=f"rob1_node is '{cell}'; give a node"):
         parse_plan(arch25, HEAD + f"1,place,1,{cell},,\n", "plan.csv")

@@ -13,9 +13,9 @@ from seqopt.scene.parts import Robot, Sphere
 from seqopt.sequence.methods import (
     METHODS,
     SCHEDULES,
+    _cast,
     _take_turns,
     _two_robot_loop,
-    cast,
     modified_sequential,
     robot_loop,
     sequential,
@@ -172,10 +172,10 @@ def test_casting_takes_the_first_robots_that_fit():
     scene = small_arch(4)
     robots = (*anywhere(1), near(scene, "low", 1, 2), Robot(name="any", payload=1.0))
     cast_of = replace(scene, robots=robots)
-    assert cast(cast_of, [{0}, {3}, {1}], [0, 1, 2]) == [0, 2, 1]
-    assert cast(cast_of, [{0}, {3}], [2, 1, 0]) == [2, 0]
+    assert _cast(cast_of, [{0}, {3}, {1}], [0, 1, 2]) == [0, 2, 1]
+    assert _cast(cast_of, [{0}, {3}], [2, 1, 0]) == [2, 0]
     with pytest.raises(StepError, match="one places bricks 4, all within reach of rob1, any;"):
-        cast(cast_of, [{3}, {3}, {3}], [0, 1, 2])
+        _cast(cast_of, [{3}, {3}, {3}], [0, 1, 2])
 
 
 def test_turns_change_as_seldom_as_can_be():

@@ -21,11 +21,10 @@ from seqopt.exchange.imports import read_measured
 from seqopt.plan.replan import compared, without
 from seqopt.responses._tolerance import is_tolerance, values_text
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
-from seqopt.scene.scenarios import as_built
+from seqopt.scene.scenarios import SAME, as_built
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.rules import FREE, _usual_grips, with_robots
-from seqopt.sequence.schedule_file import SAME
 from seqopt.study.published import CRITERIA
 
 
