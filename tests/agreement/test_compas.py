@@ -30,7 +30,9 @@ compas = pytest.importorskip("compas")
 compas_cra = pytest.importorskip("compas_cra")
 FOLDER = Path(compas_cra.SAMPLE)
 SNAKE = pytest.param("snake", marks=pytest.mark.slow)
-SMALL = [*sorted(set(SAMPLES) - {"armadillo_cra", "snake"}), SNAKE]
+CURVED = [pytest.param(n, marks=pytest.mark.slow) for n in sorted(SAMPLES) if "curve" in n]
+OTHERS = {n for n in SAMPLES if "curve" not in n} - {"armadillo_cra", "snake"}
+SMALL = [*sorted(OTHERS), *CURVED, SNAKE]
 
 
 theirs_of = cache(sample_scene)

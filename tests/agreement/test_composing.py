@@ -230,8 +230,14 @@ def costs_in_each(name, _grips_of):
     return np.array([(each / SCALES).max() for each in found])
 
 
-@pytest.mark.parametrize("over", ["worst-total", "cvar=0.5"])
-@pytest.mark.parametrize("name", ["free", "own", "modified-sequential"])
+@pytest.mark.parametrize(
+    ("name", "over"),
+    [
+        ("modified-sequential", "cvar=0.5"),
+        pytest.param("own", "cvar=0.5", marks=pytest.mark.slow),
+        pytest.param("free", "worst-total", marks=pytest.mark.slow),
+    ],
+)
 def test_totals_over_scenarios_are_the_least_of_every_path(name, over):
     words = tuple(f"sum in {k}" for k in range(3))
     totals = np.array([*every_path(name, "", lambda *each: costs_in_each(name, each), words)])

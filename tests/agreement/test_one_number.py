@@ -100,8 +100,7 @@ def of_steps(problem, aim):
 
 
 @pytest.mark.parametrize("aim", Aim)
-@pytest.mark.parametrize("criterion", CRITERIA)
-@pytest.mark.parametrize("schedule", SCHEDULES)
+@pytest.mark.parametrize(("schedule", "criterion"), [*zip(SCHEDULES, CRITERIA, strict=True)])
 def test_sums_and_worst_values_of_responses_are_one_number(schedule, criterion, aim):
     problem = posed(schedule, criterion)
     found = dict(of_steps(problem, aim))
@@ -245,8 +244,8 @@ RULES = FreeRules(ending="held")
 
 
 def in_scene(free, payload=None):
-    """A loop of five bricks, or the free schedule of four."""
-    scene = small_arch(4 if free else 5)
+    """A loop of five bricks, or the free schedule of three."""
+    scene = small_arch(3 if free else 5)
     if payload is not None:
         scene = scene.with_robots(*(replace(robot, payload=payload) for robot in scene.robots))
     engine = seqopt.make_engine("compliance", scene)

@@ -71,7 +71,7 @@ class Clock:
 
 @every_aim
 @given(problem=problems())
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_answers_are_certified_or_refused_as_infeasible(name, aim, problem):
     best = problem.best(aim)
     if not np.isfinite(best):
@@ -109,7 +109,7 @@ def test_a_beam_never_does_worse_than_the_cascade(problem, width):
 
 @every_aim
 @given(problem=problems(), data=st.data())
-@settings(max_examples=8)
+@settings(max_examples=4)
 def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, aim, problem, data):
     heuristic = ALL[name].kind is FormulationKind.HEURISTIC
     if heuristic or not np.isfinite(problem.best(aim)):
@@ -169,7 +169,7 @@ def test_budgets_are_kept_or_refused(name):
 
 @timely
 @given(problem=st.one_of(problems(), budgeted()), limit=st.integers(0, 60))
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, limit):
     """On a clock that moves on whenever it is looked at."""
     formulation = ALL[name]
@@ -298,7 +298,7 @@ def test_budgets_against_brute_force(name, examples):
 
 @takers
 @given(problem=budgeted(most_budgets=2))
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_prices_are_slopes_of_the_bound(name, problem):
     """With prices p the bound falls by at most p for every unit that there is more."""
     try:
@@ -348,12 +348,13 @@ def test_all_exact_ones_equal_brute_force_on_small_arches(count, criterion):
     assert valued(problem, "minimax") == pytest.approx(Costs(problem.peaks).best(Aim.PEAK))
 
 
-def test_options_are_checked(problem25):
+def test_options_are_checked(problem25, monkeypatch):
+    monkeypatch.setattr("formulations.rank_search.MOST", 20_000)
     for name, options, named in (
         ("cascade", {"charge": "both"}, "charge is 'both'; give one of later, earlier"),
         ("beam", {"width": 0}, "width is 0"),
         ("rank_search", {"horizon": 0}, "horizon is 0"),
-        ("rank_search", {"horizon": 22}, "lower the horizon"),
+        ("rank_search", {"horizon": 9}, "lower the horizon"),
         ("labels", {"most": 0}, "most is 0"),
         ("cascade", {"width": 3}, "option width: cascade has "),
     ):

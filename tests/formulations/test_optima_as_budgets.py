@@ -25,7 +25,7 @@ from tests.brute_force import ONES
 from tests.builders import small_arch
 from tests.times.builders import engine_of
 
-FACTORS = (1.0, 1.000001, 1.02, 1.1)
+FACTORS = (1.0, 1.02)
 SUMS = ("sum(T_max)", "sum(M_sup)", "travel", "steps", "regrips")
 UP, DOWN = FreeRules(), FreeRules(direction="take-down")
 slow = pytest.mark.slow
@@ -44,12 +44,12 @@ def words(name, cap):
     return f"{name}={cap!r}{'m' if name == 'travel' else 's' if name == 'makespan' else ''}"
 
 
-def check(problem, name, formulation, factors=FACTORS):
+def check(problem, name, formulation):
     """The optimum is a budget that a plan keeps; a tenth less is one that none does."""
     best = seqopt.solve(problem.but(goals=name))
     assert best.status == "optimal"
     least = best.objective[name]
-    for factor in factors:
+    for factor in FACTORS:
         capped = problem.but(budgets=words(name, factor * least))
         plan = seqopt.solve(capped, formulation)
         assert plan.objective[name] <= factor * least * (1 + 1e-6)
@@ -58,30 +58,39 @@ def check(problem, name, formulation, factors=FACTORS):
             seqopt.solve(problem.but(budgets=words(name, 0.9 * least)), formulation)
 
 
-@pytest.mark.parametrize("formulation", ["schedule_search", "path_beam"])
-@pytest.mark.parametrize("name", SUMS)
 @pytest.mark.parametrize(
-    ("bricks", "moves"), [(5, UP), (4, DOWN), (5, "loop")], ids=["up", "down", "loop"]
+    ("name", "formulation"),
+    [*((name, "schedule_search") for name in SUMS), ("sum(T_max)", "path_beam")],
+)
+@pytest.mark.parametrize(
+    ("bricks", "moves"), [(4, UP), (4, DOWN), (5, "loop")], ids=["up", "down", "loop"]
 )
 def test_states_have_a_plan_within_every_optimum(bricks, moves, name, formulation):
     check(posed(bricks, moves), name, formulation)
 
 
 @pytest.mark.parametrize("name", SUMS)
-@pytest.mark.parametrize("aim", ["sum", "steps,minmax", "sum(D_max)"])
+@pytest.mark.parametrize("aim", ["sum", pytest.param("steps,minmax", marks=slow)])
 def test_so_they_have_for_any_aim(name, aim):
     """Where a sum is to be small, prices of budgets have to find a plan at the edge of them."""
-    problem = posed(5, UP).but(goals=aim)
+    problem = posed(4, UP).but(goals=aim)
     least = seqopt.solve(problem.but(goals=name)).objective[name]
     for factor in FACTORS:
         plan = seqopt.solve(problem.but(budgets=words(name, factor * least)))
         assert plan.objective[name] <= factor * least * (1 + 1e-6)
 
 
-@pytest.mark.parametrize("formulation", ["order_search", "path_beam"])
-@pytest.mark.parametrize("name", ["sum(T_max)", "travel", "steps", "regrips"])
+@pytest.mark.parametrize(
+    ("name", "formulation"),
+    [
+        ("regrips", "order_search"),
+        ("steps", "path_beam"),
+        pytest.param("sum(T_max)", "order_search", marks=slow),
+        pytest.param("travel", "order_search", marks=slow),
+    ],
+)
 def test_orders_have_a_plan_within_every_optimum(name, formulation):
-    check(posed(3, UP, "tied"), name, formulation, factors=FACTORS[::3])
+    check(posed(3, UP, "tied"), name, formulation)
 
 
 @pytest.mark.parametrize("name", ["makespan", "sum(T_max)", "regrips"])
@@ -101,17 +110,17 @@ def test_builds_in_time_have_a_plan_within_every_optimum(name, formulation):
         assert plan.objective[name] <= factor * least * (1 + 1e-6)
 
 
-@pytest.mark.parametrize("name", ["travel", "steps", "regrips"])
+@pytest.mark.parametrize("name", ["travel", "steps"])
 def test_scenarios_have_a_plan_within_every_optimum(name):
     scene = small_arch(4)
     drawn = seqopt.scenarios(scene, count=2, seed=1).scenes
-    check(posed(4, UP).but(scenarios=drawn), name, "schedule_search", factors=FACTORS[::3])
+    check(posed(4, UP).but(scenarios=drawn), name, "schedule_search")
 
 
 @pytest.mark.parametrize(
     ("bricks", "name", "orders"),
     [
-        (3, "sum(M_sup)", None),
+        pytest.param(3, "sum(M_sup)", None, marks=slow),
         pytest.param(4, "sum(T_max)", None, marks=slow),
         pytest.param(3, "sum(M_sup)", "tied", marks=slow),
     ],
@@ -156,8 +165,8 @@ def least_spent(problem, budget):
 
 def test_pairs_of_optima_have_the_plans_that_they_are_of():
     """What two sums take of one plan is kept by it, whatever mixtures of others do."""
-    problem = posed(5, UP)
-    for aim in ("sum(M_sup),travel", "travel,sum(T_max)", "sum(T_max),sum(M_sup)"):
+    problem = posed(4, UP)
+    for aim in ("sum(M_sup),travel", "sum(T_max),sum(M_sup)"):
         one = seqopt.solve(problem.but(goals=aim)).objective
         for factor in FACTORS:
             caps = [words(name, factor * value) for name, value in one.items()]

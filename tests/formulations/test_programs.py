@@ -117,7 +117,7 @@ def beamed(problem, width):
 
 
 @given(problem=problems(), data=st.data())
-@settings(max_examples=150)
+@settings(max_examples=40)
 def test_heuristics_do_what_they_display(problem, data):
     """Also where the shared step, once the choice before is made, is ranked otherwise."""
     own = ranked(problem)

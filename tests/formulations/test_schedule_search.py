@@ -80,7 +80,7 @@ def check_against_brute_force(scene, rules):
 
 
 @given(build=free_builds(most_bricks=4, most_robots=3))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_it_equals_brute_force(build):
     check_against_brute_force(*build)
 
@@ -243,6 +243,7 @@ def arch(engine25):
     return build_states(engine25, FreeRules(), seqopt.CRITERIA["worst-ratio-published"], "minmax")
 
 
+@pytest.mark.slow
 def test_the_arch_of_the_paper(arch):
     """0.8401 against 1.185 of the loop; 50 steps with the one in which all let go."""
     plan = seqopt.solve(replace(arch, goals=pose_goals("minmax,steps,regrips")), "schedule_search")
@@ -252,6 +253,7 @@ def test_the_arch_of_the_paper(arch):
     assert not plan.overloads
 
 
+@pytest.mark.slow
 def test_fewest_steps_that_beat_every_published_maximum(arch, engine25):
     limits = [Limit(name, bound) for name, bound in arch.criterion.limits]
     problem = build_states(engine25, FreeRules(), arch.criterion, "steps,regrips,minmax", limits)
@@ -319,6 +321,7 @@ def test_travel_is_that_of_the_steps():
     assert plan.certificate.values[1] == pytest.approx(ways)
 
 
+@pytest.mark.slow
 def test_what_opens_a_way_is_asked_of_rigid_bricks(arch25):
     """Far beyond what joints carry, discrete elements would take seconds a state."""
     engine = AutoEngine(arch25)
@@ -390,6 +393,7 @@ def test_the_front_of_the_arch_rounded(arch):
         pick(front.table, "speed")
 
 
+@pytest.mark.slow
 def test_steps_can_be_among_what_is_to_be_small(arch, engine25):
     problem = build_states(engine25, FreeRules(), arch.criterion, "F_largest,M_sup,steps")
     front = find_front(FrontProblem(problem, {"F_largest": 10.0, "M_sup": 2.0}))
@@ -400,6 +404,7 @@ def test_steps_can_be_among_what_is_to_be_small(arch, engine25):
         FrontProblem(build_states(engine25, FreeRules(), arch.criterion, "steps,travel"))
 
 
+@pytest.mark.slow
 def test_the_front_of_the_loop_holds_its_best_peak(engine25):
     loop = three_robot_loop(engine25.network)
     posed = build_states(engine25, loop, ONES, "F_largest,M_sup")
@@ -412,7 +417,7 @@ def test_the_front_of_the_loop_holds_its_best_peak(engine25):
     assert front.table["F_largest"].min() == pytest.approx(least)
 
 
-@pytest.mark.parametrize("count", [5, 6])
+@pytest.mark.parametrize("count", [5, pytest.param(6, marks=pytest.mark.slow)])
 def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force(count):
     """Where a step without an open grip decides, less in the open ones is worth nothing."""
     engine = ComplianceEngine(build_network(small_arch(count)))

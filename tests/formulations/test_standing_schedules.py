@@ -182,7 +182,7 @@ def leaning(scale=1.0, stands=None, aim="bond"):
     return build_states(engine, FreeRules(), ONES, aim, stands=stands)
 
 
-@pytest.mark.parametrize("aim", ["bond,minmax", "friction,minmax", TILTS])
+@pytest.mark.parametrize("aim", [pytest.param("bond,minmax", marks=slow), "friction,minmax", TILTS])
 def test_a_margin_is_sought_among_what_stands_as_demanded(aim):
     """The demand was forgotten for the margin: plans were found that do not meet it."""
     with pytest.raises(InfeasibleError, match=r"brick 2 \(2 of 3\) is never placed.*a bond of"):
@@ -197,7 +197,7 @@ def test_a_second_margin_is_that_of_the_mortar_alone():
         seqopt.solve(leaning(aim="bond,tilt"), "schedule_search")
 
 
-@pytest.mark.parametrize("scale", [1.0, 1e-3, 1e3])
+@pytest.mark.parametrize("scale", [1e-3, pytest.param(1e3, marks=slow)])
 def test_a_bond_is_found_to_its_share_at_every_size(scale):
     """Fifty pascals were left open, whatever the size; the gap says what is."""
     problem = leaning(scale)

@@ -193,9 +193,10 @@ def test_renumbering_changes_nothing(state, seed):
     assert_same(scalars(scene, bricks, grips), scalars(other, bricks, same))
 
 
-@pytest.mark.parametrize("factor", [1e-3, 1e3])
-@pytest.mark.parametrize("what", ["length", "density", "stiffness"])
-@settings(max_examples=20)
+@pytest.mark.parametrize(
+    ("what", "factor"), [("length", 1e3), ("density", 1e-3), ("stiffness", 1e3)]
+)
+@settings(max_examples=12)
 @given(state=states(any_scene))
 def test_scaling(what, factor, state):
     """Forces follow the weight, moments weight times length, motions weight over stiffness."""
