@@ -1,11 +1,10 @@
-"""The orders of a scene's bricks: which are sought, the states of all of them, and trying one."""
+"""The orders of a scene's bricks: which are sought, and the states of all of them."""
 
 from __future__ import annotations
 
-import pickle
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
-from functools import cached_property, partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -13,15 +12,11 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError
-from seqopt.graph._explore import Explorer
-from seqopt.graph.paths import keep_best
 from seqopt.graph.space import Found, Moves, Space
 from seqopt.graph.states._visits import StateSpace, move_amounts, scenario_peaks
 from seqopt.graph.states.states import States
 from seqopt.problem.amounts import LARGEST, STEPS, StateArrays
 from seqopt.problem.problem import Orders
-from seqopt.problem.requirements import pickled
-from seqopt.responses._blocks import packed, unpacked
 from seqopt.scene._armed import can_hold
 from seqopt.scene.scene import Order, Scene
 from seqopt.sequence._rule_space import node_numbers, sort_entries
@@ -337,52 +332,3 @@ def _renumbered(old: States, new: States, states: Ints) -> Ints:
     for first, end in new.space.slots:
         sort_entries(out, first, end)
     return out
-
-
-NARROW = 50  # states of a brick count with which an order is tried first
-
-
-@dataclass(frozen=True)
-class Trial:
-    """An order to be tried.
-
-    ``order``: names of all bricks; ``ceiling``: a value of the first goal that it must beat.
-    """
-
-    order: Order
-    ceiling: float
-
-
-def order_value(problem: States, trial: Trial) -> float:
-    """Return the first goal of the best plan of an order; infinite if none is below the ceiling."""
-    judged, ceiling, found = _of_first_goal(problem).at(trial.order), trial.ceiling, np.inf
-    for width in (NARROW, None):
-        space = StateSpace(judged, regrips=width is None, standing=bool(judged.demands))
-        visited = Explorer(space, width)
-        if visited.rise(ceiling):
-            visited.refine()
-            found = ceiling = keep_best(visited.graph().graph, 0)[1]
-    return found
-
-
-def trying(problem: States, *, elsewhere: bool) -> Callable[[Trial], float]:
-    """Return the function that tries orders.
-
-    ``elsewhere``: whether it is to be sent to other processes: then with the scene, not with an
-    engine. Result: takes a trial, returns its `order_value`. Raises `ProblemError`, `SceneError` if
-    a criterion or an engine of one's own cannot be sent.
-    """
-    if not elsewhere:
-        return partial(order_value, problem)
-    free = replace(problem, resources=problem.resources.alone())
-    sent = ("engine", "scenarios")
-    rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name not in sent}
-    others = tuple(map(packed, free.scenarios))
-    content = pickled((rest, others), free.criterion)
-    return partial(_sent, packed(free.engine), content)
-
-
-def _sent(shipment: bytes, content: bytes, trial: Trial) -> float:
-    rest, others = pickle.loads(content)  # our own, from `trying`
-    rest["scenarios"] = tuple(map(unpacked, others))
-    return order_value(States(engine=unpacked(shipment), **rest), trial)

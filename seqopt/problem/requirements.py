@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pickle
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -498,17 +497,6 @@ def _response_along(scene: Scene, table: _Columns, name: str) -> np.ndarray:
     asked = columns.values() if name == "F_largest" else [columns[name]]
     forces = np.abs([np.asarray(table[column], dtype=float) for column in asked])
     return np.asarray(np.fmax.reduce(forces))
-
-
-def pickled(content: object, criterion: Criterion) -> bytes:
-    """Return what is sent to other processes; a `ProblemError` if the criterion cannot be."""
-    try:
-        return pickle.dumps(content)
-    except Exception as error:  # whatever objects of others may raise
-        raise ProblemError(
-            f"criterion {criterion.name}: it cannot be sent to other processes ({error}); "
-            "define it in a module, or let this process work alone"
-        ) from error
 
 
 def number_word(text: str, where: str, *, zero: bool = False) -> float:
