@@ -14,6 +14,7 @@ from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step, StepKind, _check_part
 
 ROOT = Path(__file__).parents[1]
 HERE = np.zeros((1, 0), dtype=int)  # one set of no grips
@@ -294,3 +295,22 @@ def first(scene, count):
         grounds=tuple(ground for ground in scene.grounds if ground.brick in names),
         build_order=scene.build_order[:count],
     )
+
+
+def turned_round(scene, steps):
+    """Return the take-down that passes the states of a build in reverse, from 1.
+
+    It begins at the end of the build; simultaneous releases become successive grips.
+    """
+    out = []
+    before = [Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), *steps]
+    for now, then in zip(before[::-1], before[-2::-1], strict=False):
+        if now.kind is StepKind.PLACE:
+            out.append(Step(len(out) + 1, StepKind.REMOVE, then.bricks, then.grips))
+            continue
+        kind = StepKind.REPOSITION if now.kind is StepKind.RELEASE else StepKind.RELEASE
+        grips = list(now.grips)
+        for robot in (r for r, node in enumerate(then.grips) if node != grips[r]):
+            grips[robot] = then.grips[robot]
+            out.append(Step(len(out) + 1, kind, then.bricks, tuple(grips)))
+    return _check_part(scene, out)

@@ -97,13 +97,14 @@ def sort_robots(
     alike: dict[tuple[object, ...], RobotKind] = {}
     for i in rules.team(scene):
         robot = scene.robots[i]
-        own = {*chain.from_iterable(within_reach(scene, robot))}
-        reach = np.array([node in own for node in node_numbers(network)])
-        newest = reach if rules.newest is not Newest.PLACING else _placing(network, robot, reach)
+        reach = np.isin(scene.placed_nodes, [*chain.from_iterable(within_reach(scene, robot))])
+        newest = reach if rules.newest is not Newest.PLACING else np.zeros_like(reach)
+        for k, brick in enumerate(scene.placed if newest is not reach else ()):
+            with suppress(StepError):  # it reaches none
+                newest[2 * k + brick.nodes.index(placing_node(network, robot, brick))] = True
         places = can_carry((scene, *worlds), i) if kept else np.ones(len(scene.placed), dtype=bool)
         places &= not rules.placers or robot.name in rules.placers
-        cap = robot.payload if kept else np.inf
-        cap = min(cap, (caps or {}).get(robot.name, np.inf))
+        cap = min(robot.payload if kept else np.inf, (caps or {}).get(robot.name, np.inf))
         alone = (robot.arm and robot.name, scene.grip_kinds.of_robot[i], timed and robot.durations)
         key = (reach.tobytes(), newest.tobytes(), places.tobytes(), cap, *alone)
         first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
@@ -114,15 +115,6 @@ def sort_robots(
 def node_numbers(network: Network) -> list[int]:
     """Return the scene's numbers of all inner nodes (2B,), brick by brick in build order."""
     return [*network.scene.placed_nodes]
-
-
-def _placing(network: Network, robot: Robot, reach: Bools) -> Bools:
-    """Return the mask (2B,) of the nodes at which a robot places bricks."""
-    out = np.zeros_like(reach)
-    for k, brick in enumerate(network.scene.placed):
-        with suppress(StepError):  # it reaches none
-            out[2 * k + brick.nodes.index(placing_node(network, robot, brick))] = True
-    return out
 
 
 class Moves(NamedTuple):
@@ -211,31 +203,26 @@ class StateRows(Terse):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FreeSpace(StateRows):
-    """The states of a free schedule and the moves between them."""
+    """The states of a free schedule and the moves between them; a level is a brick count."""
 
     network: Network
     rules: FreeRules
     kinds: tuple[RobotKind, ...]
     parks: bool = False  # free robots stay where they were, for their travel
 
-    @property
-    def first(self) -> int:
-        """Brick count at the beginning of the build."""
-        return self._span[0]
-
-    @property
-    def levels(self) -> int:
-        """Brick count at the end of the build: states of one brick count are a level."""
-        return self._span[1]
-
     @cached_property
     def _span(self) -> tuple[int, int]:
         return self.rules.span(self.network.scene)
 
     @property
-    def held_first(self) -> int:
-        """Number of grips at the beginning of the build."""
-        return self.rules.begin.held if self.rules.begin else 0
+    def first(self) -> int:
+        """Level at the beginning of the build."""
+        return self._span[0]
+
+    @property
+    def levels(self) -> int:
+        """Level at the end of the build."""
+        return self._span[1]
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand on a level."""
@@ -267,9 +254,12 @@ class FreeSpace(StateRows):
     def within(
         self, level: int, states: Ints, *, regrips: bool = True
     ) -> tuple[tuple[Moves, bool], ...]:
-        """Return the moves that place no brick, and whether they are regrips."""
-        releases = (self.releases(level, states), False)
-        return (releases, (self.holds(level, states), True)) if regrips else (releases,)
+        """Return the moves that change no brick, and whether they are regrips."""
+        bricks = self.bricks_at(level)
+        if not bricks and level:
+            return ()
+        releases = (self._releases(bricks, states), False)
+        return (releases, (self._holds(bricks, states), True)) if regrips else (releases,)
 
     def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves that place the next brick: none of them is a regrip."""
@@ -279,9 +269,7 @@ class FreeSpace(StateRows):
     def _distance(self) -> Floats:
         """Distances of nodes, (2B + 1, 2B + 1), m; none from or to node 0."""
         at = self.network.node_position[self.network.inner.ravel()]
-        out = np.zeros((len(at) + 1,) * 2)
-        out[1:, 1:] = np.linalg.norm(at[:, None] - at[None], axis=2)
-        return frozen(out)
+        return frozen(np.pad(np.linalg.norm(at[:, None] - at[None], axis=2), ((1, 0), (1, 0))))
 
     def start(self) -> Ints:
         """Return the initial state, (1, c).
@@ -302,16 +290,14 @@ class FreeSpace(StateRows):
         held, out = site.holds(self.network.scene), np.zeros((1, self.robots), dtype=np.int64)
         for kind, (first, end) in zip(self.kinds, self.slots, strict=True):
             for column, robot in enumerate(kind.robots, start=first):
-                node, stay = held[robot], site.stays[robot] if site.stays else None
-                if node is not None:
-                    out[0, column] = self._place[node]
-                elif stay is not None and self.parks:
-                    out[0, column] = -self._place[stay]
+                stay = site.stays[robot] if site.stays and self.parks else None
+                out[0, column] = self._place.get(held[robot], -self._place.get(stay, 0))
             sort_entries(out, first, end)
         return np.asarray(out[0])
 
-    def may_place(self, bricks: int, states: Ints) -> Bools:
-        """Return which states (n, c) allow a placement, (n,); the initial one may break rules."""
+    def may_place(self, level: int, states: Ints) -> Bools:
+        """Return which states (n, c) allow the next move of a brick, (n,); the first may not."""
+        bricks = self.bricks_at(level)
         if self.rules.begin is None or bricks != self._span[0] or not bricks:
             return np.ones(len(states), dtype=bool)
         return self.lawful(bricks, states)
@@ -323,25 +309,27 @@ class FreeSpace(StateRows):
         moves.states[:, self.robots :] = 0
         return self._lawful_only(bricks + 1, moves)
 
-    def holds(self, bricks: int, states: Ints) -> Moves:
+    def _holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot grips a placed brick."""
         begins = self.rules.begin is not None and bricks == self._span[0]
         begins &= not self.rules.lets_go_one_by_one(bricks, self._span)
         able = np.ones(len(states), dtype=bool) if begins else self.lawful(bricks, states)
         if self.rules.regrips is not None:
             able &= states[:, -1] < self.rules.regrips
-        rows, near = np.flatnonzero(able), self._near(bricks)
+        rows, near = np.flatnonzero(able), np.arange(2 * bricks)
+        if self.rules.candidates:
+            near = np.flatnonzero(np.isin(self.network.scene.placed_nodes, self._near[bricks]))
         moves = self._takes(states[rows], [near[kind.reach[near]] for kind in self.kinds])
         moves.states[:, self.robots :] += 1
         ok = self.for_arms(bricks, moves.states)
         return Moves(rows[moves.source[ok]], moves.states[ok], moves.way[ok])
 
-    def releases(self, bricks: int, states: Ints) -> Moves:
+    def _releases(self, bricks: int, states: Ints) -> Moves:
         """Return the feasible moves in which one robot releases, or at the end all do."""
         moves = self._lets_go(states, states[:, : self.robots] > 0)
         if not self.rules.lets_go_one_by_one(bricks, self._span):
             moves = self._lawful_only(bricks, moves)
-        if bricks != self._span[1] or self.rules.how_it_ends is Ending.HELD:
+        if bricks != self._span[1] or not self.ends_bare:
             return moves
         if self.rules.how_it_ends is Ending.RELEASED:
             rows = np.flatnonzero(self.grips(states))
@@ -392,7 +380,7 @@ class FreeSpace(StateRows):
 
     def ended(self, states: Ints) -> Bools:
         """Return which states of the last level end the build, (n,)."""
-        if self.rules.how_it_ends is not Ending.HELD:
+        if self.ends_bare:
             return np.asarray(self.grips(states) == 0)
         if self.rules.finish is None or self.rules.finish.grips is None:
             return self.lawful(self._span[1], states)
@@ -401,26 +389,18 @@ class FreeSpace(StateRows):
             sort_entries(held, first, end)
         return np.asarray((held == self._row(self.rules.finish).clip(min=0)).all(axis=1))
 
-    def _near(self, bricks: int) -> Ints:
-        """Return the nodes of placed bricks that may be gripped, from 0."""
-        if not self.rules.candidates:
-            return np.arange(2 * bricks)
-        if bricks not in self._near_of:
-            near = self.rules.near(self.network.scene, bricks)
-            numbers = node_numbers(self.network)[: 2 * bricks]
-            self._near_of[bricks] = np.flatnonzero([node in near for node in numbers])
-        return self._near_of[bricks]
-
     @cached_property
-    def _near_of(self) -> dict[int, Ints]:
-        return {}
+    def _near(self) -> tuple[list[int], ...]:
+        """By brick count the nodes of placed bricks that may be gripped."""
+        counts = range(len(self.network.inner) + 1)
+        return tuple([*self.rules.near(self.network.scene, count)] for count in counts)
 
     @cached_property
     def _loose(self) -> tuple[list[list[int]], ...]:
         """By brick count the parts without joints to the ground: indices in build order."""
-        at = {brick.name: i for i, brick in enumerate(self.network.scene.placed)}
+        since = self.network.scene.since
         parts = ((), *(islands(self.network, count + 1) for count in range(max(self._span))))
-        return tuple([[at[name] for name in part] for part in level] for level in parts)
+        return tuple([[since[name] - 1 for name in part] for part in level] for level in parts)
 
     def _takes(self, states: Ints, nodes_of: Sequence[Ints]) -> Moves:
         """Return the moves in which a free robot grips one of the given nodes of its kind."""
@@ -478,23 +458,9 @@ class _TakeDownSpace(FreeSpace):
         removed = self.levels - level
         return removed + np.maximum(0.0, removed - self.grips(states))
 
-    def within(
-        self, level: int, states: Ints, *, regrips: bool = True
-    ) -> tuple[tuple[Moves, bool], ...]:
-        """Return the moves that remove no brick: grips, which precede removals, and releases."""
-        bricks = self.bricks_at(level)
-        return super().within(bricks, states) if bricks else ()
-
     def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
-        """Return the moves that remove the newest brick: none of them is a regrip."""
-        return ((self.removes(self.bricks_at(level), states), False),)
-
-    def may_place(self, level: int, states: Ints) -> Bools:
-        """Return which states (n, c) allow a removal, (n,); the initial one may break rules."""
-        return super().may_place(self.bricks_at(level), states)
-
-    def removes(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which the only robot that holds the newest brick removes it."""
+        bricks = self.bricks_at(level)
         held = states[:, : self.robots].astype(np.int64)
         may = (held + 1) // 2 == bricks
         may[may.sum(axis=1) != 1] = False
@@ -503,7 +469,7 @@ class _TakeDownSpace(FreeSpace):
             may[:, own] &= kind.places[bricks - 1] & kind.newest[held[:, own].clip(min=1) - 1]
         moves = self._lets_go(states, may)
         moves.states[:, self.robots :] = 0
-        return self._lawful_only(bricks - 1, moves) if bricks > 1 else moves
+        return ((self._lawful_only(bricks - 1, moves) if bricks > 1 else moves, False),)
 
 
 def free_space(
@@ -551,18 +517,18 @@ class ScheduleSpace(StateRows):
 
     @property
     def levels(self) -> int:
-        """Number of steps."""
+        """Number of steps, equal for all builds."""
         return len(self.schedule.steps)
+
+    @property
+    def fewest_steps(self) -> int:
+        """Number of steps."""
+        return self.levels
 
     @property
     def ends_bare(self) -> bool:
         """Whether the last step has no grips."""
         return all(grip is None for grip in self.schedule.steps[-1].grips)
-
-    @property
-    def fewest_steps(self) -> int:
-        """Number of steps, equal for all builds."""
-        return self.levels
 
     def steps_to_go(self, level: int, states: Ints) -> Floats:
         """Return the number of steps to the end, (n,)."""
@@ -582,13 +548,10 @@ class ScheduleSpace(StateRows):
 
     @cached_property
     def kinds(self) -> tuple[RobotKind, ...]:  # type: ignore[override]  # no field here
-        """A kind per robot: robots of a schedule are not interchangeable."""
+        """A kind per robot: robots of a schedule are not interchangeable, steps say who carries."""
         every = np.ones(2 * len(self.network.inner), dtype=bool)
-        carries = every[: len(self.network.inner)]  # each step says by itself who carries which
-        return tuple(
-            RobotKind((i,), every, every, carries, self.caps.get(robot.name, np.inf))
-            for i, robot in enumerate(self.network.scene.robots)
-        )
+        caps = [self.caps.get(robot.name, np.inf) for robot in self.network.scene.robots]
+        return tuple(RobotKind((i,), every, every, every[::2], c) for i, c in enumerate(caps))
 
     @cached_property
     def _too_heavy(self) -> frozenset[int]:

@@ -17,7 +17,6 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from seqopt._showing import Shown, display
 from seqopt.arrays import Terse
@@ -227,31 +226,6 @@ class Schedule(Shown):
         nodes = f" from {min(counts)} to {max(counts)} nodes" if counts else ""
         what = f"{len(self.steps)} steps, {len(counts)} grips to choose{nodes}"
         return f"<Schedule {self.method} of {self.scene.name}: {what}>"
-
-    def table(self) -> pd.DataFrame:
-        """Return the open grips, a row each.
-
-        Columns: ``move`` (from 1), ``robot``, ``step`` in which it takes the grip, ``to_step``, the
-        last before it lets go, ``bricks`` that stand, ``newest``, the brick placed last,
-        ``places``, whether the robot places it with this grip, ``candidates``, how many nodes it
-        may take, and these ``nodes``.
-        """
-        open_holds = {hold.move: hold for hold in holds(self.scene, self.steps)}
-        rows = [
-            {
-                "move": k + 1,
-                "robot": move.robot,
-                "step": move.step,
-                "to_step": open_holds[k].last,
-                "bricks": move.bricks,
-                "newest": self.scene.placed[move.bricks - 1].name,
-                "places": open_holds[k].places is not None,
-                "candidates": len(move.candidates),
-                "nodes": move.candidates,
-            }
-            for k, move in enumerate(self.moves)
-        ]
-        return pd.DataFrame(rows)
 
     def gantt(self, first: int | None = None, last: int | None = None) -> Figure:
         """Draw the grips over some steps, a lane per robot; those to be chosen are hatched."""

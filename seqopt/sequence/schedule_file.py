@@ -21,15 +21,7 @@ from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.methods import SCHEDULES, open_schedule, robot_loop
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrips
-from seqopt.sequence.steps import (
-    Site,
-    Step,
-    StepKind,
-    _check_part,
-    _check_step,
-    _turned_round,
-    check_sequence,
-)
+from seqopt.sequence.steps import Site, Step, StepKind, _check_part, _check_step, check_sequence
 
 
 def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
@@ -75,8 +67,7 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
 
     The text is CSV with the columns ``step``, ``type``, ``bricks`` and, for every robot,
     ``NAME_node`` and, if present, ``NAME_brick``; an empty cell means that the robot does not grip.
-    Other columns are ignored. A take-down may begin with any bricks; the table of a build in
-    reverse, from its last step to 1, is the take-down that passes the same states.
+    Other columns are ignored. A take-down may begin with any bricks.
     """
     steps: list[Step] = []
     for line, _, step in _read_steps(scene, text, f"plan {source}"):
@@ -87,8 +78,6 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
             )
         nodes = (grip if isinstance(grip, int) else None for grip in step.grips)
         steps.append(Step(step.number, step.kind, step.bricks, tuple(nodes)))
-    turned = len(steps) > 1 and steps[0].number == len(steps) and steps[-1].number == 1
-    steps = steps[::-1] if turned else steps
     first = 1
     if steps and (steps[0].kind, steps[0].bricks) != (StepKind.PLACE, 1):  # a part of a plan
         first = max(1, steps[0].number)
@@ -96,8 +85,7 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
         _require_number(f"plan {source}", step.number, expected)
     if first > 1 or any(step.kind is StepKind.REMOVE for step in steps):
         return _check_part(scene, steps)
-    checked = check_sequence(scene, steps)
-    return _turned_round(scene, checked) if turned else checked
+    return check_sequence(scene, steps)
 
 
 def _require_number(where: str, number: int, expected: int) -> None:

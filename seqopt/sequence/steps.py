@@ -28,6 +28,9 @@ class StepKind(Enum):
     REMOVE = "remove"  # one brick fewer, taken away by the only robot that holds it
 
 
+_CHANGES = (StepKind.PLACE, StepKind.REMOVE)  # of bricks
+
+
 @dataclass(frozen=True)
 class AnyStep:
     """A step, or one with grips that are still open: anything but a node or None."""
@@ -73,15 +76,7 @@ class Step(AnyStep):
 
 
 def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
-    """Return the names of the robots of a scene that never grip, in its order.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> scene = seqopt.load_scene("arch25")
-    >>> idle_robots(scene, seqopt.sequential(seqopt.build_network(scene)))
-    ('rob3',)
-    """
+    """Return the names of the robots of a scene that never grip, in its order."""
     busy = {i for step in steps for i, grip in enumerate(step.grips) if grip is not None}
     return tuple(robot.name for i, robot in enumerate(scene.robots) if i not in busy)
 
@@ -210,31 +205,6 @@ def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
         )
 
 
-def _turned_round(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Return the take-down that passes the states of a build in reverse, from 1.
-
-    It begins at the end of the build; simultaneous releases become successive grips.
-
-    >>> import seqopt
-    >>> scene = seqopt.load_scene("arch25")
-    >>> steps = _turned_round(scene, seqopt.sequential(seqopt.build_network(scene)))
-    >>> steps[0].bricks, steps[-1].kind.value, steps[-1].bricks
-    (25, 'remove', 0)
-    """
-    out: list[Step] = []
-    before = [Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), *steps]
-    for now, then in zip(before[::-1], before[-2::-1], strict=False):
-        if now.kind is StepKind.PLACE:
-            out.append(Step(len(out) + 1, StepKind.REMOVE, then.bricks, then.grips))
-            continue
-        kind = StepKind.REPOSITION if now.kind is StepKind.RELEASE else StepKind.RELEASE
-        grips = list(now.grips)
-        for robot in (r for r, node in enumerate(then.grips) if node != grips[r]):
-            grips[robot] = then.grips[robot]
-            out.append(Step(len(out) + 1, kind, then.bricks, tuple(grips)))
-    return _check_part(scene, out)
-
-
 @dataclass(frozen=True)
 class Site:
     """State of a site.
@@ -282,22 +252,21 @@ class Site:
     def after(cls, steps: Sequence[Step], count: int) -> Site:
         """Return the site after a number of steps of a build, 0 for the empty site."""
         first, last = (steps[0].number - 1, steps[-1].number) if steps else (0, 0)
-        if not isinstance(count, Integral) or not (first or 0) <= count <= last:
+        if not isinstance(count, Integral) or not first <= count <= last:
             raise StepError(f"step {short(count)}: the plan has {first} to {last}")
         done = steps[: count - first]
         if first and not done:
             raise StepError(f"step {count}: the plan begins after it; give {first + 1} to {last}")
-        lasts: dict[int, int] = {r: n for s in done for r, n in enumerate(s.grips) if n is not None}
-        regrips = 0
-        for step in done:
-            regrips = 0 if step.kind in (StepKind.PLACE, StepKind.REMOVE) else regrips
-            regrips += step.kind is StepKind.REPOSITION
-        if not done and any(step.kind is StepKind.REMOVE for step in steps):
+        if not done:  # before a build, or before a take-down
+            if all(step.kind is not StepKind.REMOVE for step in steps):
+                return cls(0)
             bricks = steps[0].bricks + (steps[0].kind is StepKind.REMOVE)
             return cls(bricks, (None,) * len(steps[0].grips), step=0)
-        if not done:
-            return cls(0)
+        lasts = {r: n for s in done for r, n in enumerate(s.grips) if n is not None}
         free = (lasts.get(r) if node is None else None for r, node in enumerate(done[-1].grips))
+        kinds = [step.kind for step in done]
+        moved = [k for k, kind in enumerate(kinds, start=1) if kind in _CHANGES]
+        regrips = kinds[max(moved, default=0) :].count(StepKind.REPOSITION)
         return cls(done[-1].bricks, done[-1].grips, tuple(free), regrips, done[-1].number)
 
     @property
@@ -323,9 +292,8 @@ class Site:
             _check_state(scene, Step(0, StepKind.RELEASE, self.bricks, tuple(grips)), "site")
         elif self.held:
             raise StepError("site: a robot holds a brick, and none stands; give bricks")
-        for prop in scene.props:
-            if prop.node in grips:
-                raise StepError(f"site: a robot holds node {prop.node} of a prop; leave one out")
+        if taken := [prop.node for prop in scene.props if prop.node in grips]:
+            raise StepError(f"site: a robot holds node {taken[0]} of a prop; leave one out")
         return grips
 
     def described(self, scene: Scene) -> dict[str, object]:
@@ -340,6 +308,5 @@ class Site:
 
 def _begin_step(scene: Scene, site: Site | None) -> Step:
     """Return the state before the first step of a build, as the step that led to it."""
-    if site is None:
-        return Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots))
+    site = site or Site(0)
     return Step(site.step, StepKind.RELEASE, site.bricks, site.holds(scene))

@@ -19,8 +19,9 @@ from seqopt.scene.arm import Arm
 from seqopt.sequence._rule_check import check_carried, too_heavy
 from seqopt.sequence._rule_space import can_carry, loads
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.steps import StepKind, _turned_round
+from seqopt.sequence.steps import StepKind
 from tests.brute_force import ONES, best_values
+from tests.builders import turned_round
 from tests.commands import command
 
 LIGHT = 23.544  # N; of a brick of the wall
@@ -232,7 +233,7 @@ def test_steps_that_are_given_are_reported():
     assert max(each.largest for each in found) == pytest.approx(HEAVY)
     assert sum(len(each.steps) for each in found) == len(heavy)
     assert _carrying_excesses(wall(400.0, 400.0), steps) == ()
-    down = _carrying_excesses(scene, _turned_round(scene, steps))
+    down = _carrying_excesses(scene, turned_round(scene, steps))
     assert sum(len(each.steps) for each in down) == len(heavy)
 
 

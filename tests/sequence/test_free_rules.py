@@ -89,7 +89,7 @@ def all_of_space(space):
             keep = [i for i, name in enumerate(named(space, bricks, entry)) if name in fresh]
             entry = entry[keep]
             level = np.concatenate([level, entry])
-            parts = [space.releases(bricks, entry), space.holds(bricks, entry)] if bricks else []
+            parts = [moves for moves, _ in space.within(bricks, entry)] if bricks else []
             for moves in parts:
                 ends = zip(
                     named(space, bricks, entry[moves.source]),

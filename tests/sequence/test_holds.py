@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from seqopt.network.build import build_network
 from seqopt.scene.library import WallShape, wall
-from seqopt.sequence.methods import METHODS, three_robot_loop
+from seqopt.sequence.methods import METHODS
 from seqopt.sequence.schedule import OpenGrip, holds
 from seqopt.sequence.steps import StepKind
 
@@ -61,15 +61,3 @@ def test_a_grip_that_is_left_out_is_seen(arch25, engine25):
     steps[3] = replace(steps[3], grips=(None, None, None))
     found = holds(arch25, METHODS["sequential"](engine25.network))
     assert unrolled(found) != as_listed(steps)
-
-
-def test_the_table_of_a_schedule_names_every_open_grip(loop25):
-    table = loop25.table()
-    assert table["move"].tolist() == list(range(1, len(loop25.moves) + 1))
-    for move, row in zip(loop25.moves, table.to_dict("records"), strict=True):
-        assert (row["robot"], row["step"], row["nodes"]) == (move.robot, move.step, move.candidates)
-        assert row["candidates"] == len(move.candidates)
-        assert row["newest"] == loop25.scene.placed[move.bricks - 1].name
-        open_in = [s.number for s in loop25.steps if row["move"] - 1 in s.moves]
-        assert (open_in[0], open_in[-1]) == (row["step"], row["to_step"])
-    assert three_robot_loop(build_network(loop25.scene)).table().equals(table)

@@ -22,8 +22,9 @@ from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
 from seqopt.responses import analyze_staged
 from seqopt.sequence.schedule_file import parse_plan
-from seqopt.sequence.steps import Site, Step, StepKind, _turned_round, check_sequence
+from seqopt.sequence.steps import Site, Step, StepKind, check_sequence
 from tests.brute_force import ONES, allowed
+from tests.builders import turned_round
 from tests.plain_rules import PlainBook
 
 ARCH = seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V")
@@ -133,7 +134,7 @@ def test_take_down_is_worth_what_its_build_is_in_reverse(made):
     one = seqopt.FreeRules(ending="one-by-one")
     build, down = (seqopt.solve(posed(engine, "minmax,steps", rules)) for rules in (one, DOWN))
     bare = peak_of(engine, [build.steps[-1]])  # counts in builds: it is where take-downs begin
-    reverse = _turned_round(engine.network.scene, build.steps)
+    reverse = turned_round(engine.network.scene, build.steps)
     check_free(engine.network, DOWN, reverse)
     assert down.selection.objective[0] == pytest.approx(peak_of(engine, down.steps))
     assert max(bare, down.selection.objective[0]) == pytest.approx(build.selection.objective[0])
@@ -240,7 +241,7 @@ def test_judge_finds_a_better_take_down():
     engine = arch()
     problem = build_states(engine, DOWN, ONES, "minmax")
     build = seqopt.solve(posed(engine, "steps", seqopt.FreeRules(ending="one-by-one")))
-    steps = _turned_round(engine.network.scene, build.steps)
+    steps = turned_round(engine.network.scene, build.steps)
     worst, least = peak_of(engine, steps), seqopt.solve(posed(engine, "minmax")).selection
     assert worst > least.objective[0] * (1 + 1e-6)
     told = replace(least, objective=(worst,), bound=(worst,), visited=())
@@ -287,15 +288,10 @@ def test_removal_is_by_who_alone_holds(who, match):
         check_sequence(scene, [Step(2, StepKind.REMOVE, 3, held)], two)
 
 
-def test_plans_are_read_back_and_a_build_turned_round():
+def test_plans_are_read_back():
     scene = seqopt.load_scene("arch25")
-    build = seqopt.sequential(seqopt.build_network(scene))
-    down = _turned_round(scene, build)
+    down = turned_round(scene, seqopt.sequential(seqopt.build_network(scene)))
     assert parse_plan(scene, plan_csv(scene, down), "down") == down
-    head, *rows = plan_csv(scene, build).splitlines()
-    assert parse_plan(scene, "\n".join([head, *rows[::-1]]), "turned") == down
-    passed = [(s.bricks, {*s.grips}) for s in build]
-    assert [(s.bricks, {*s.grips}) for s in down][-len(build) :][:-1] == passed[:-1][::-1]
     table = seqopt.analyze(seqopt.make_engine("auto", scene), down)
     assert table["bricks"].iloc[-1] == 0
     assert not table[["F_max_N", "D_max_1e-3mm"]].iloc[-1].any()
