@@ -9,8 +9,7 @@ import numpy as np
 
 from seqopt.graph.decision_costs import Budget, LayeredCosts, compile_costs
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, as_formulation
-from seqopt.plan._guard import require_fit
-from seqopt.plan._paths import find_path
+from seqopt.plan._answers import find_path, require_fit
 from seqopt.problem.problem import Aim
 
 

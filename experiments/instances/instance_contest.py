@@ -38,7 +38,7 @@ from seqopt.errors import SeqoptError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instance import Instance
 from seqopt.graph.paths import fewest_moves, reached
-from seqopt.plan._paths import _claims
+from seqopt.plan._answers import _claims
 from seqopt.report import _style as inks
 from seqopt.report._style import dress, name_panels, plain, styled
 

@@ -2,27 +2,58 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from itertools import chain, combinations
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain, combinations, islice
 
 import numpy as np
 
 from seqopt.arrays import Ints
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
 from seqopt.graph._orders import TooManySetsError
 from seqopt.graph.instance import Instance, _Cap
-from seqopt.graph.paths import distances, least_sum, tied
-from seqopt.graph.states.explored import STEPS, WORST, barred, with_margin
+from seqopt.graph.paths import distances, least_peak, least_sum, tied
+from seqopt.graph.states.explored import (
+    STEPS,
+    WORST,
+    StandingLook,
+    barred,
+    bisected,
+    explore,
+    with_margin,
+)
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import is_kept, least_within
 from seqopt.judge._proof import Proof, TooManyPartsError
-from seqopt.plan._remedies import LateError, Look, Remedies, stops_of
-from seqopt.problem.amounts import Amount
+from seqopt.network.network import Network
+from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, Amount, worst
+from seqopt.problem.filters import IGNORED, STANDING
+from seqopt.problem.requirements import Excess, Limit, overloads
+from seqopt.problem.standing import Standing
+from seqopt.responses._tolerance import is_tolerance
+from seqopt.responses.quantities import (
+    PROP_EXCESS,
+    _payload_text,
+    _plain,
+    _rounded_up,
+    length_text,
+    robot_response,
+)
+from seqopt.responses.table import analyze
+from seqopt.scene.scene import Scene
+from seqopt.sequence._rule_check import RuleBook, unbearable
+from seqopt.sequence._rule_space import loads
+from seqopt.sequence.methods import _enough_reach
+from seqopt.sequence.rules import FREE, FreeRules, Payload
+from seqopt.sequence.steps import Step
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
 
@@ -178,7 +209,7 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
         state = barred(steps)
         finished = state is not None and _is_bare_end(problem, *state)
         if state is None:
-            where = stops_of(problem).where(look(steps).reached)
+            where = _where(problem, look(steps).reached)
         else:
             where = _barred_said(problem, *state)
         return f"{problem.title}: {where}{Remedies(problem, look).said(finished=finished)}"
@@ -223,3 +254,343 @@ def _excess_said(problem: States, level: int, state: Ints) -> str:
             falls = each.refuted(states).any()
             return f"{'does not' if falls else 'is not proven to'} pass the filter {each.name}"
     return f"has {' and '.join(over)}" if over else "asks more of robots than they carry"
+
+
+class LateError(Exception):
+    """The time limit of a search for remedies is reached."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """Explores the reachable states of a problem, until ``end``, a time of `time.perf_counter`."""
+
+    end: float = np.inf
+
+    def tell(self, _: Explorer) -> None:
+        """Raise a `LateError` after the time limit."""
+        if time.perf_counter() > self.end:
+            raise LateError
+
+    def __call__(self, problem: States) -> Explorer:
+        """Return the explored states of a problem."""
+        return explore(problem, tell=self.tell)
+
+    def exists(self, problem: States) -> bool:
+        """Return whether a problem is feasible; stability is proven only of the states needed."""
+        problem = replace(problem, goals=STEPS)
+        if not problem.demands:
+            return self(problem).whole
+        return barred(problem) is None and self.standing(problem).exists(problem)
+
+    def standing(self, problem: States) -> StandingLook:
+        """Return the states without the stability requirement, which is checked lazily."""
+        return StandingLook(replace(problem, goals=STEPS, standing=None, settled=()), self.tell)
+
+
+LOOK = Look()
+
+
+def worst_least(problem: States, response: str, look: Look = LOOK) -> float:
+    """Return the least peak of a response over all plans, SI units; infinite if infeasible.
+
+    ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``.
+    """
+    found = look(replace(problem, goals=(BUILT_IN.get(response) or worst(response),)))
+    return least_peak(found.graph().graph, 0) if found.whole else np.inf
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """A relaxation that makes the problem feasible.
+
+    ``name``: the constraint; ``enough``: returns the least sufficient relaxation in words, empty
+    if robots would carry more than all loads; ``rules``: as command-line words, if it is of rules.
+    """
+
+    name: str
+    enough: Callable[[], str]
+    rules: tuple[str, ...] = ()
+    of_arms: bool = False
+
+    def beside(self, rule: str) -> Remedy:
+        """Return the remedy combined with a relaxed rule."""
+        name, rules = f"{rule} together with {self.name}", (rule, *self.rules)
+        typed = f"{name} (--rule {' --rule '.join(rules)})" if self.rules else name
+        return Remedy(name, lambda: typed, rules if self.rules else ())
+
+
+@dataclass(frozen=True)
+class Remedies:
+    """The remedies of an infeasible problem; ``look`` decides feasibility."""
+
+    problem: States
+    look: Look
+
+    def said(self, *, finished: bool) -> str:
+        """Describe the remedies, as the end of a line.
+
+        ``finished``: whether the finished structure without grips is infeasible.
+        """
+        if finished:  # no robot can do anything about it
+            ways = [*self._stronger(), *self._limits()]
+            if not ways:
+                return (
+                    "; no robot helps: it needs more bond or friction, less load, or other limits"
+                )
+        else:
+            ways = [*self._alone()]
+            if all(way.of_arms for way in ways):  # of the same arms two rules may ask less
+                ways += [*islice(self._in_pairs(ways), 1)]
+            if not ways:
+                return ", whatever two rules or limits are loosened; extend a reach or add a robot"
+        enough = dict.fromkeys(text for way in ways if (text := way.enough()))
+        if enough:
+            return f"; it becomes possible with {' or '.join(enough)}"
+        return f"; robots would have to carry more than all weights and loads; {HARD}"
+
+    def _alone(self) -> Iterator[Remedy]:
+        """Yield every single relaxation that suffices; of each rule only the least."""
+        done: set[str] = set()
+        for _, text, problem in self._ways("rules"):
+            rule, _, _ = text.partition("=")
+            if rule not in done and self.look.exists(problem):
+                done.add(rule)
+                enough = partial(str, f"{text} (--rule {text})")
+                if text == IGNORED:
+                    enough = partial(self._payload_if_ignored, problem)
+                yield Remedy(text, enough, (text,))
+        yield from self._stronger()
+        arms = (text for _, text, problem in self._ways("arms") if self.look.exists(problem))
+        yield from (_as_it_is(text, of_arms=True) for text in islice(arms, 1))
+        scene = self._scene
+        if self._is_made and not (scene.has_arms or self.problem.scenarios):
+            yield from map(_as_it_is, _enough_reach(scene, self._exists_in))
+        yield from self._limits()
+        moves = ground_moves(scene) and not self.problem.scenarios
+        if moves and (soft := self._softer()):
+            yield _as_it_is(soft)
+
+    def _in_pairs(self, alone: list[Remedy]) -> Iterator[Remedy]:
+        """Yield pairs of a relaxed rule and a remedy; other arms only if insufficient alone."""
+        for _, text, problem in self._ways("rules"):
+            for other in Remedies(problem, self.look)._alone():
+                if not (alone and other.of_arms):
+                    yield other.beside(text)
+
+    def _ways(self, *names: str) -> Iterator[tuple[str, str, States]]:
+        """Yield relaxations of a kind of filter: name, words, and the relaxed problem."""
+        for each in self.problem.every_filter:
+            if each.name in names:
+                yield from ((each.name, *way) for way in each.ways(self.problem))
+
+    def _payload_if_ignored(self, problem: States) -> str:
+        """Return the least payload, as the peak force of a problem without payloads; in words."""
+        held = worst_least(problem, LARGEST, self.look)
+        if held > whole_load(problem.network):
+            return self._softer()
+        return _payload_said(max(held, _heaviest(self.problem)))
+
+    def _stronger(self) -> Iterator[Remedy]:
+        """Yield relaxations of stability and payload that suffice alone."""
+        enough = {"stands": self._enough_bond}
+        if self._held_within_payloads or _unbearable(self.problem):
+            enough["payload"] = self._enough_payload
+        for name, text, problem in self._ways(*enough):
+            if self.look.exists(problem):
+                yield Remedy(text, enough[name])
+
+    def _limits(self) -> Iterator[Remedy]:
+        """Yield the limits, and filters of plug-ins, whose removal alone suffices."""
+        labels = {limit.label: limit for limit in self.problem.limits}
+        for name, text, problem in self._ways(*labels, *map(str, self.problem.filters)):
+            if self.look.exists(problem):
+                raised = partial(self._enough_limit, labels[name]) if name in labels else None
+                yield _as_it_is(text) if raised is None else Remedy(text, raised)
+
+    def _softer(self) -> str:
+        """Describe the stiffest sufficient grips; empty if none suffice."""
+        return softer_grips(self.problem.engine, self._exists_in)
+
+    def _enough_bond(self) -> str:
+        """Return the least bond, Pa, with which a plan exists, in words; found by bisection."""
+        if any(demand.tilt for demand in self.problem.demands):
+            return STANDING
+        own, bare = (
+            self.problem.standing or Standing(),
+            replace(self.problem, settled=(), goals=STEPS),
+        )
+        states = self.look.standing(bare)
+
+        def exists(bond: float) -> bool:
+            asked = states.proving(replace(bare, standing=own.demanding("bond", bond)))
+            return barred(asked) is None and states.exists(asked)
+
+        try:
+            return f"a bond of {_rounded_up(bisected('bond', exists)[1]):.10g} Pa"
+        except InfeasibleError:
+            return STANDING
+
+    def _enough_payload(self) -> str:
+        """Return the least common payload with which a plan exists, to three digits, in words."""
+
+        def exists(payload: float) -> bool:
+            return self.look.exists(self.problem.carrying(payload))
+
+        low = min(robot.payload for robot in self._scene.robots)
+        high = 2 * low
+        while not exists(high):
+            low, high = high, 2 * high
+        step = 10.0 ** max(0, math.floor(math.log10(high)) - 2)
+        least, most = math.floor(low / step), math.ceil(high / step)
+        while most - least > 1:
+            middle = (least + most) // 2
+            least, most = (least, middle) if exists(middle * step) else (middle, most)
+        if self._is_free and most * step > max(
+            whole_load(self.problem.network), _heaviest(self.problem)
+        ):
+            return ""
+        return _payload_said(most * step)
+
+    def _enough_limit(self, limit: Limit) -> str:
+        """Return the least feasible bound of all limits with a label, in words."""
+        found = [each for each in self.problem.limits if each.label == limit.label]
+        name, bound = found[0].response, found[0].bound
+        if not (name in STATE_RESPONSES or is_tolerance(name)):
+            bears = "props that bear any force, both ways"
+            return bears if limit.label == PROP_EXCESS else f"no limit on {limit.label}"
+        rest = tuple(each for each in self.problem.limits if each not in found)
+        least = worst_least(replace(self.problem, limits=rest), name, self.look)
+        forces = (LARGEST, *(robot_response(r.name) for r in self._scene.robots))
+        if name in forces and least > whole_load(self.problem.network):
+            return self._softer()
+        if is_tolerance(limit.label):
+            return f"a tolerance of {length_text(1 / least)} instead of {length_text(bound)}"
+        most = _rounded_up(found[0].shown(least))
+        return f"{limit.label}={most:.6g} instead of {found[0].shown(bound):g}"
+
+    @property
+    def _is_free(self) -> bool:
+        return self.problem.rules.method == FREE
+
+    @property
+    def _held_within_payloads(self) -> bool:
+        """Whether states must stand, held by what robots carry."""
+        kept = self._is_free and self.problem.free_rules.payload is Payload.KEPT
+        return kept and bool(self.problem.demands)
+
+    @property
+    def _scene(self) -> Scene:
+        return self.problem.network.scene
+
+    @property
+    def _is_made(self) -> bool:
+        """Whether the engine can be rebuilt for another scene."""
+        return recipe_of(self.problem.engine) is not None
+
+    def _exists_in(self, scene: Scene) -> bool:
+        return self.look.exists(self.problem.in_scene(scene))
+
+
+def _as_it_is(words: str, *, of_arms: bool = False) -> Remedy:
+    return Remedy(words, lambda: words, of_arms=of_arms)
+
+
+def _payload_said(newton: float) -> str:
+    said = _payload_text(newton)
+    return f"a payload of {said} N (--payload {said})"
+
+
+def _unbearable(problem: States) -> dict[int, str]:
+    """Return the steps in which a robot cannot bear its brick, and why; of rules there are none."""
+    rules = problem.rules
+    return {} if rules.method == FREE else unbearable(_scenes(problem), rules.steps, rules.begin)
+
+
+def _scenes(problem: States) -> tuple[Scene, ...]:
+    return problem.network.scene, *problem.worlds
+
+
+def _heaviest(problem: States) -> float:
+    """Return the heaviest brick of a build by rules, with the tool of any robot of the team, N."""
+    rules, scenes = problem.free_rules, _scenes(problem)
+    bricks = slice(*sorted(rules.span(scenes[0])))
+    pairs = ((scene, scene.robots[r]) for scene in scenes for r in rules.team(scenes[0]))
+    return max(float(loads(scene, robot)[bricks].max()) for scene, robot in pairs)
+
+
+def _where(problem: States, reached: int) -> str:
+    """Name the step or the brick at which builds stop, and what is too heavy there."""
+    if problem.rules.method == FREE:
+        return _where_rules_stop(problem, problem.free_rules, reached)
+    heavy = "".join(f": in step {n} {why}" for n, why in [*_unbearable(problem).items()][:1])
+    last = problem.space.levels
+    return f"step {reached + 1} of {last} has no state that is allowed{heavy}"
+
+
+def _where_rules_stop(problem: States, rules: FreeRules, reached: int) -> str:
+    """Name the brick that is never placed or removed, and the next that is too heavy."""
+    placed, space = problem.network.scene.placed, problem.space
+    end, down = space.bricks_at(space.levels), rules.takes_down
+    if reached == space.levels:
+        return f"after brick {placed[end - 1].name} the build cannot end"
+    at = space.bricks_at(reached) + (not down)
+    left = range(at, end, -1) if down else range(at, end + 1)
+    done = "removed" if down else "placed"
+    where = f"brick {placed[at - 1].name} ({at} of {len(placed)}) is never {done}"
+    book = RuleBook(problem.network, rules, problem.worlds)
+    for bricks in left:
+        near = [r for r in book.team if book.named(r) and book.newest_nodes[r, bricks]]
+        heavy = book.too_heavy(bricks, near)
+        if heavy and (bricks == left[0] or not any(book.places(r, bricks) for r in near)):
+            return f"{where}: {heavy}"  # the next brick, or one that no robot can lift
+    return where
+
+
+STIFFNESSES = (1e8, 1e7, 1e6, 1e5, 1e4, 1e3)  # of grips, N/m, the stiffest that helps first
+
+
+def whole_load(network: Network) -> float:
+    """Return the sum of the sizes of all weights, loads and wind, N: the most any robot carries."""
+    applied = network.applied(len(network.inner))[:, :3]
+    return float(np.linalg.norm(np.concatenate([network.weight, applied]), axis=1).sum())
+
+
+def payload_advice(engine: Engine, steps: Sequence[Step], over: Sequence[Excess]) -> str:
+    """Describe remedies of the exceeded payloads of a plan, as of `overloads`."""
+    network = engine.network
+    held = max((each.largest for each in over if each.brick is None), default=0.0)
+    if held <= whole_load(network):
+        least = _payload_text(max(each.largest for each in over))
+        how = f"--payload {least}, or payload of its robots in the scene file"
+        return f"payload of {least} N is enough for this plan: {how}"
+
+    def kept(scene: Scene) -> bool:
+        found = overloads(scene, analyze(engine_for(engine, scene), steps))
+        return all(each.brick is not None for each in found)  # what is carried stays as heavy
+
+    still = " that hold nodes in place while the ground moves" * ground_moves(network.scene)
+    why = f"stiff grips{still}"
+    what = f"{held:,.0f} N, {_plain(held / whole_load(network), 3)} times all weights and loads,"
+    helps = softer_grips(engine, kept)
+    return f"no payload helps: {what} come of {why}; {f'{helps} are enough' if helps else HARD}"
+
+
+HARD = "softer grips were not found to help; ground that moves less, or softer supports, may"
+
+
+def ground_moves(scene: Scene) -> bool:
+    """Return whether any ground end has a movement."""
+    return any(any(ground.movement or ()) for ground in scene.grounds)
+
+
+def softer_grips(engine: Engine, exists: Callable[[Scene], bool]) -> str:
+    """Describe the stiffest sufficient grips below those of the scene; empty if there are none."""
+    scene = engine.network.scene
+    own = [float(np.min(robot.stiffness)) for robot in scene.robots if robot.stiffness]
+    if recipe_of(engine) is None or scene.has_arms:
+        return ""
+    for stiffness in (each for each in STIFFNESSES if each < min(own, default=np.inf)):
+        if exists(scene.with_grips(stiffness)):
+            said = f"{stiffness:.0e}".replace("e+0", "e")
+            return f"grips of {said} N/m (--grips {said})"
+    return ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import partial
 from math import inf, isfinite
 from typing import Any
@@ -15,16 +15,14 @@ from seqopt.graph.states._visits import steps_in_hands
 from seqopt.graph.states.explored import barred
 from seqopt.graph.states.states import States
 from seqopt.judge._schedules import judge_schedule, ordered
-from seqopt.plan._guard import called, require_proof, with_numbers
+from seqopt.plan._answers import Found, called, proven, require_proof, with_numbers
 from seqopt.plan._infeasible import claimed, confirmed
-from seqopt.plan._paths import Found, proven
-from seqopt.responses.resources import HERE
 from seqopt.work._workers import keep
 
 COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know what was computed
 
 
-def find_states(graph: States, formulation: Formulation, run: Run) -> Found:
+def find_states(problem: States, formulation: Formulation, run: Run) -> Found:
     """Find states of a build by a formulation, certified if a proof is requested.
 
     Raises `InfeasibleError`, naming the brick at which builds stop, and the rule or limit to relax;
@@ -33,21 +31,22 @@ def find_states(graph: States, formulation: Formulation, run: Run) -> Found:
     formulation.require_options(run.options)
     if run.lazy:  # it is at any rate
         require_proof(run.proof)
-    with keep(graph.resources.executor, graph.resources.workers):
-        return _found(graph, formulation, run)
+    with keep(problem.resources.executor, problem.resources.workers):
+        return _found(problem, formulation, run)
 
 
 def _found(problem: States, formulation: Formulation, run: Run) -> Found:
-    start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
+    start = time.perf_counter()
     told = {} if run.progress is None else {"progress": run.progress}
     limit = {"seconds": run.left} if isfinite(run.left) else {}
-    options = {**run.options, **told, **limit}
     with run.clock.needed("finding a first plan"):
-        selection = _selected(formulation, (problem, twin), options, explain=run.explains)
+        options = {**run.options, **told, **limit}
+        selection = _selected(formulation, problem, options, explain=run.explains)
     selection = replace(selection, stopped=run.clock.why(selection.stopped))
     solved = time.perf_counter()
     if run.proof and run.progress is not None:
         run.progress("proving that no plan is better")
+    twin = replace(problem)  # which knows nothing that was computed for the search
     steps = steps_in_hands(ordered(twin, selection.order).space, selection.states, selection.grips)
     hint = dict(enumerate(selection.visited, start=twin.space.first))
     exact = formulation.kind is FormulationKind.EXACT
@@ -59,33 +58,27 @@ def _found(problem: States, formulation: Formulation, run: Run) -> Found:
 
 
 def _selected(
-    formulation: Formulation,
-    problems: tuple[States, States],
-    options: Mapping[str, Any],
-    *,
-    explain: bool,
+    formulation: Formulation, problem: States, options: Mapping[str, Any], *, explain: bool
 ) -> Solution:
     """Return the formulation's solution, converted to numbers; raise why there is none."""
-    (problem, twin), start, name = problems, time.perf_counter(), formulation.name
+    start, name, exact = time.perf_counter(), formulation.name, formulation.looks_at_all
     limit = float(options.get("seconds", inf))
-    solve = partial(formulation.solve, problem, **options)
     if barred(problem) is not None:  # what every plan passes is asked before any is sought
-        raise confirmed(twin, name, limit, explain=explain)
-    judged = partial(replace, problem, resources=HERE)  # who works for a formulation may change
+        raise confirmed(replace(problem), name, limit, explain=explain)
+    own = replace(problem)  # the formulation's: what it changes or leaves behind is its own
+    vars(own).update({key: vars(problem)[key] for key in COUNTED if key in vars(problem)})
     try:
-        selection = called(name, judged, Solution, solve)
+        selection = called(name, Solution, partial(formulation.solve, own, **options))
     except InfeasibleError as error:
         left = limit - (time.perf_counter() - start)
-        why = confirmed(twin, name, left, exact=formulation.looks_at_all, explain=explain)
+        why = confirmed(replace(problem), name, left, exact=exact, explain=explain)
         standing = problem.standing
         if type(why) is SolverError and standing is not None and standing.curing is not None:
             said = (
                 f"{error} in which all states stand while mortar cures, though some are once it "
                 "has; more robots may help, or mortar with some bond from 0 s on"
             )
-            why = claimed(name, said, exact=formulation.looks_at_all)
+            why = claimed(name, said, exact=exact)
         raise why from None
-    for kept in [*vars(problem)]:  # whatever it left behind, but counts of what was computed
-        if kept not in (*(f.name for f in fields(problem)), *COUNTED):
-            del vars(problem)[kept]
+    vars(problem).update({key: vars(own)[key] for key in COUNTED if key in vars(own)})
     return with_numbers(name, selection, len(problem.goals))

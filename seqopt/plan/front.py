@@ -10,7 +10,7 @@ from functools import cached_property, partial
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats, Ints, Terse
+from seqopt.arrays import Floats, Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
 from seqopt.graph._explore import Explorer, Visited
@@ -18,21 +18,19 @@ from seqopt.graph.formulation import Formulation, Solution, as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
 from seqopt.graph.space import Space
-from seqopt.graph.states._visits import steps_of, steps_with, with_held
+from seqopt.graph.states._visits import steps_of
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import States
 from seqopt.judge._schedules import ordered, plan_values
-from seqopt.plan._guard import called, readable, with_numbers
+from seqopt.plan._answers import PROOF, called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
-from seqopt.plan._paths import PROOF
-from seqopt.plan._range import INTERRUPTED, RANGE, keeping, leaves
 from seqopt.plan.pose import states_of
-from seqopt.problem.amounts import REGRIPS, STEPS, Amount
+from seqopt.plan.solve import INTERRUPTED, RANGE, keeping, leaves
+from seqopt.problem.amounts import REGRIPS, STEPS
 from seqopt.problem.problem import Problem
 from seqopt.responses._grip_sets import Moved, most_moved
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene import Order
-from seqopt.sequence.rules import Ending
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.work._clock import INTERRUPT, Clock
 from seqopt.work._workers import free_memory
@@ -58,18 +56,18 @@ def _rounded_up(values: Floats, steps: Floats) -> Floats:
 class FrontProblem:
     """A multi-objective problem: the input of formulations of Pareto sets.
 
-    ``problem``: its goals are responses, margins of stability, and of a free schedule steps and
+    ``problem``: its goals are responses, margins of stability, and of a free schedule steps or
     regrips; ``rounding``: steps to whose multiples values are rounded up, by goal, SI units; none
     by default. Raises `ProblemError` for other goals, or a step that is no positive number.
     """
 
     def __init__(self, problem: States, rounding: Mapping[str, float] | None = None) -> None:
         self._problem = problem
-        for goal in problem.goals:
-            if not goal.is_peak and goal not in (STEPS, REGRIPS):
-                raise ProblemError(
-                    f"pareto: {goal} adds up along a plan; give responses, steps and regrips"
-                )
+        adds_up = [goal for goal in problem.goals if not goal.is_peak]
+        if len(adds_up) > 1 or not all(goal in (STEPS, REGRIPS) for goal in adds_up):
+            raise ProblemError(
+                f"pareto: {adds_up[-1]} adds up along a plan; give responses, and steps or regrips"
+            )
         for name, step in (rounding or {}).items():
             if name not in self.names or not 0 < step < np.inf:
                 raise ProblemError(
@@ -83,7 +81,7 @@ class FrontProblem:
         return f"<FrontProblem of {self._problem}>"
 
     def anew(self) -> FrontProblem:
-        """Return a copy with an empty cache, for the judge."""
+        """Return a copy with an empty cache, for a formulation: what it changes is its own."""
         return FrontProblem(replace(self._problem), self._rounding)
 
     @property
@@ -112,77 +110,37 @@ class FrontProblem:
     def _visited(self) -> Visited:
         return self._explored[0]
 
-    @cached_property
-    def _counted(self) -> list[int]:
-        """Indices of goals that add up over moves: their bounds constrain paths, not states."""
-        return [k for k, goal in enumerate(self._problem.goals) if not goal.is_peak]
+    @property
+    def _counted(self) -> int | None:
+        """Index of the goal that adds up over moves, if any: its bound constrains paths."""
+        return next((k for k, goal in enumerate(self._problem.goals) if not goal.is_peak), None)
 
     def best_below(self, bounds: Floats) -> Solution | None:
         """Return a non-dominated plan with values below bounds (k,), SI units, if there is any."""
-        below = self._below(bounds)
-        if not below.ends[reached(below)].any():
+        graph = self._below(bounds)
+        if not graph.ends[reached(graph)].any():
             return None
-        graph = self._fewest(below, bounds) if len(self._counted) > 1 else below
         point = np.zeros(len(bounds))
-        for k in sorted(range(len(bounds)), key=lambda k: k not in self._counted):
-            if graph is None:
-                return None
+        for k in sorted(range(len(bounds)), key=lambda k: k != self._counted):
             graph, point[k] = keep_best(graph, k)
             if not point[k] < bounds[k]:
                 return None
-        assert graph is not None
         order, states = self._explored[1].path(self._visited.of(fewest_moves(graph)))
         values = tuple(point.tolist())
         return Solution(states, values, values, order=order)
 
     def _below(self, bounds: Floats) -> Graph:
         """Return the subgraph of the moves to states whose peaks are all below bounds."""
-        graph, kept = self._visited.graph, np.ones(len(self._visited.graph.source), dtype=bool)
-        bounds = bounds.copy()
-        bounds[self._counted] = np.inf
-        for amounts, bound in zip(graph.amounts.T, bounds, strict=True):
-            kept &= amounts < bound
-        return graph.only(kept)
-
-    def _fewest(self, graph: Graph, bounds: Floats) -> Graph | None:
-        """Return the subgraph of the number of grips at the end that minimizes (steps, regrips)."""
-        steps, regrips = self._of(STEPS), self._of(REGRIPS)
-        found = []
-        for held in range(self._problem.space.robots + 1):
-            part = with_held(self._problem, graph, self._held == held)
-            least = distances(part, part.amounts[:, regrips], back=True)[:1]
-            count = steps_with(self._problem, least, np.array([held]))
-            if least[0] < bounds[regrips] and count[0] < bounds[steps]:
-                found.append((count[0], least[0], part))
-        return min(found, key=lambda each: each[:2])[2] if found else None
-
-    def _of(self, amount: Amount) -> int:
-        return self._problem.goals.index(amount)
+        graph = self._visited.graph
+        return graph.only(((graph.amounts < bounds) | ~np.array(graph.peaks)).all(axis=1))
 
     def is_empty_below(self, bounds: Floats) -> bool:
         """Return whether no plan is below bounds (k,), by distances from the empty site."""
         graph = self._below(bounds)
-        if not self._counted:
+        if self._counted is None:
             return not graph.ends[reached(graph)].any()
-        if [self._problem.goals[k] for k in self._counted] == [STEPS]:
-            steps = distances(graph, np.ones(len(graph.source)))
-            return not steps[graph.ends].min(initial=np.inf) < bounds[self._counted[0]]
-        regrips = graph.amounts[:, self._of(REGRIPS)]
-        least = distances(graph, 1.0 + graph.states * regrips)
-        least[np.isfinite(least)] //= graph.states
-        last = np.flatnonzero(graph.ends)
-        if self._problem.free_rules.how_it_ends is not Ending.HELD:
-            last = np.unique(graph.source[graph.ends[graph.target]])
-        found, held = least[last], self._held[last]
-        room = found < bounds[self._of(REGRIPS)]
-        if len(self._counted) > 1:
-            room &= steps_with(self._problem, found, held) < bounds[self._of(STEPS)]
-        return not room.any()
-
-    @cached_property
-    def _held(self) -> Ints:
-        grips = [self._problem.space.grips(rows) for _, _, rows in self._visited.states]
-        return np.concatenate(grips)
+        least = distances(graph, graph.amounts[:, self._counted])[graph.ends]
+        return not least.min(initial=np.inf) < bounds[self._counted]
 
     def steps(self, plan: Solution) -> tuple[Step, ...]:
         """Return the checked steps of a plan."""
@@ -299,12 +257,12 @@ def _front_of(
 ) -> Front:
     """Return the Pareto set of a problem, its points recomputed, with the proof of completeness."""
     start = time.perf_counter()
-    twin, name = problem.anew(), formulation.name  # which no formulation can reach
+    name = formulation.name
     limit = min(seconds, clock.left)
-    solve = partial(formulation.solve, problem, seconds=limit, progress=progress)
+    solve = partial(formulation.solve, problem.anew(), seconds=limit, progress=progress)
     with clock.needed("finding a first plan"):
-        found = _found(name, (problem, twin), solve)
-    solved, problem = time.perf_counter(), twin
+        found = _found(name, problem, solve)
+    solved = time.perf_counter()
     chosen = sorted(found, key=lambda plan: plan.objective)
     points = np.array([plan.objective for plan in chosen])
     with readable(name):
@@ -329,22 +287,19 @@ def _front_of(
     return Front(found_points, plans, engines, not stopped, spent, stopped=stopped)
 
 
-def _found(
-    name: str, problems: tuple[FrontProblem, FrontProblem], solve: Callable[[], object]
-) -> list[Solution]:
+def _found(name: str, problem: FrontProblem, solve: Callable[[], object]) -> list[Solution]:
     """Return the plans of a formulation; raise `InfeasibleError` if infeasibility is proven."""
-    twin = problems[1]
     try:
-        plans = called(name, lambda: problems, tuple, solve)
+        plans = called(name, tuple, solve)
     except InfeasibleError:
         plans = ()
     with readable(name):
-        found = [with_numbers(name, plan, len(twin.names)) for plan in plans]
+        found = [with_numbers(name, plan, len(problem.names)) for plan in plans]
         if not np.isfinite([plan.objective for plan in found]).all():
             raise ValueError("a value is no number")
     if found:
         return found
-    if not twin.is_empty_below(np.full(len(twin.names), np.inf)):
+    if not problem.is_empty_below(np.full(len(problem.names), np.inf)):
         raise SolverError(f"formulation {name} found no plan, and some are allowed")
     raise InfeasibleError("pareto: no plan is within the limits; relax one")
 

@@ -2,32 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cached_property
+from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 
+from seqopt.arrays import Floats
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
-from seqopt.graph.decisions import Decisions
+from seqopt.graph._decision_search import Windows
+from seqopt.graph.decisions import Decisions, move_costs, rank_of
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Solution
 from seqopt.graph.instance import Instance
 from seqopt.graph.states.states import States
 from seqopt.judge._step_checks import certified
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
-from seqopt.plan._status import ENDS, Status, bare_summary, order_facts, rests_on
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.problem import Problem
+from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
 from seqopt.problem.standing import Standing
-from seqopt.responses._choices import window_models
+from seqopt.responses._choices import StepChoices, window_models
 from seqopt.responses._grip_sets import Moved
-from seqopt.responses._tolerance import values_text
+from seqopt.responses._tolerance import is_tolerance, values_text
+from seqopt.responses.quantities import length_text
 from seqopt.responses.table import (
     FAR_OFF,
     OUTSIDE,
@@ -43,6 +48,19 @@ from seqopt.stability.steps import stability_table
 
 if TYPE_CHECKING:
     from seqopt.graph._decision_search import Windows
+
+
+ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
+
+
+class Status(StrEnum):
+    """Optimality status of a plan."""
+
+    OPTIMAL = "optimal"  # proven
+    OUTSIDE = "optimal in the linear model alone"  # or claimed so; it does not hold of the plan
+    CLAIMED = "claimed optimal"  # the formulation says so; less is proven
+    FEASIBLE = "feasible"  # it ended early, is a heuristic, or its bound leaves something open
+    UNPROVEN = "unproven"  # no proof was asked for, or it was left out
 
 
 @dataclass(frozen=True, repr=False)
@@ -288,6 +306,13 @@ class Plan(ShownBuild):
         return window_models(self.decisions.schedule, self.choice)
 
     @property
+    def _models_in_proof(self) -> int | None:
+        """How many models prove it: those solved anew, or all where costs are given."""
+        if self.gap is None or self.certificate is None:
+            return None
+        return self.certificate.models or self.models
+
+    @property
     def regrips(self) -> int:
         """Number of grips taken besides those that place a brick."""
         return sum(step.kind is StepKind.REPOSITION for step in self.steps)
@@ -317,33 +342,6 @@ class Plan(ShownBuild):
         columns.update(self._of_scene.step_columns(self.steps))
         return columns
 
-    def table(self) -> pd.DataFrame:
-        """Return the choice: moves with their costs, or grips if states were chosen.
-
-        Result: a row per move: ``move``, ``step``, ``to_step`` (the last in which the node is
-        held), ``bricks``, ``robot``, ``brick``, ``node``, ``largest_force_N``, ``candidates`` (how
-        many there were); then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or without
-        proof ``cost`` and the ``margin`` to the next candidate. Of states as of `grips`.
-        """
-        if not self.graph.candidates:
-            return self.grips()
-        from seqopt.plan import _tables  # noqa: PLC0415  # only where files are written
-
-        aim = self.formulation.aim
-        if aim is None or self.graph.scenarios:
-            return _tables.moves_table(self.decisions, self.choice, self.grips())
-        return _tables.chosen_table(self.decisions, self.choice, aim, self.search, self.grips())
-
-    def alternatives(self) -> pd.DataFrame:
-        """Return the responses and the cost of every evaluated choice.
-
-        Result: a row per choice, by step; ``second_node`` where two moves are open. SI units. Where
-        the responses of all choices are not kept, those that go with the plan's choices before.
-        """
-        from seqopt.plan import _tables  # noqa: PLC0415  # few ask for it
-
-        return _tables.alternatives(self.decisions, self.choice, self.search)
-
     def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
         """Return whether every step stands and by which margins, by the cone program.
 
@@ -372,79 +370,203 @@ class Plan(ShownBuild):
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
-        return _summarized(self) if self.steps else bare_summary(self)
+        if not self.steps:
+            known: dict[str, object] = getattr(self.problem, "facts_of", dict)()
+            spent = {} if self.certificate is None else dict(self.certificate.spent)
+            whole = {**self._named(), **known, **self._answer(), "budgets": spent}
+            return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}
+        graph, proof, scene = self._of_scene, self.certificate, self.engine.network.scene
+        asked = self.problem if isinstance(self.problem, Problem) else graph
+        return {
+            "scene": scene.name,
+            "schedule": self.method,
+            **self._named(),
+            **graph.described(self.formulation.aim, _said_limits(asked.limits)),
+            "candidates": f"heuristic: {self.among}" if self.among else "all",
+            **self._answer(),
+            "budgets": graph.spent(self.objective, self.selection),
+            "steps": len(self.steps),
+            "steps_before_release": len(self.steps) - graph.letting_go(self.steps),
+            "regrips": self.regrips,
+            "makespan": self.makespan,
+            "idle_robots": list(idle_robots(scene, self.steps)),
+            "outside_linear_range": [str(departure) for departure in self.departures],
+            "enough": self.enough.facts(),
+            **({} if self.arms is None else self.arms.described()),
+            "payload_exceeded": [str(excess) for excess in self.overloads],
+            "models_evaluated": self.models,
+            "models_in_six_digits": graph.six_digit_models,
+            "models_in_proof": self._models_in_proof,
+            "states_in_proof": 0 if proof is None else proof.states,
+            **self._of_order(),
+            "seconds": dict(self.seconds),
+            **provenance(self.engine),
+        }
 
     def brief(self) -> dict[str, object]:
         """Return the entries of the summary that need no responses."""
+        own = {"scene": self.scene_name, "schedule": self.method, **self._named()}
+        return {**own, **self._answer(), "steps": len(self.steps)}
+
+    def _named(self) -> dict[str, object]:
+        return {"formulation": self.formulation.name, "kind": self.formulation.kind.value}
+
+    def _answer(self) -> dict[str, object]:
+        """Return the entries of a summary about values and what is proven of them."""
+        proof, names = self.certificate, self.graph.names_of(self.formulation.aim)
+        rests_on = () if proof is None else self.graph.bounded(proof.rests_on)
+        narrowed = self.graph.among and "optimal" in self.status
+        claimed = None if proof is None or self.gap is None else _known_gap(proof.claimed_gap)
         return {
-            "scene": self.scene_name,
-            "schedule": self.method,
-            "formulation": self.formulation.name,
-            "kind": self.formulation.kind.value,
-            "status": str(self.status),
+            "status": f"{self.status} among these" if narrowed else str(self.status),
             "ended": self.ended.value,
             "stopped": self.stopped,
             "objective": self.objective,
-            "bound": _bounds(self),
+            "bound": self._bounds(),
+            "bound_rests_on": dict(zip(names, map(str, rests_on), strict=False)),
             "gap": self.gap,
-            "steps": len(self.steps),
+            "claimed_gap": claimed,
         }
 
+    def _bounds(self) -> dict[str, float | None]:
+        """Return the lower bound of each goal; the claimed one if the search stopped early."""
+        proof, chosen = self.certificate, self.selection
+        bounds: tuple[float, ...] = () if proof is None else proof.bounds
+        if proof is None and self.objective:  # of a search without models nothing is known
+            bounds = chosen.bound
+        elif proof is not None and chosen.stopped and not isfinite(proof.gap):
+            bounds = tuple(map(max, chosen.bound, bounds))
+        found = self.in_display_units(self.graph.bounded(bounds))
+        return {name: bound if isfinite(bound) else None for name, bound in found.items()}
 
-def _summarized(plan: Plan) -> dict[str, object]:
-    """Return the summary of a plan, with a fixed set of keys."""
-    graph, proof, scene = plan._of_scene, plan.certificate, plan.engine.network.scene
-    asked = plan.problem if isinstance(plan.problem, Problem) else plan._of_scene
-    narrowed = plan.among and "optimal" in plan.status
-    return {
-        "scene": scene.name,
-        "schedule": plan.method,
-        "formulation": plan.formulation.name,
-        "kind": plan.formulation.kind.value,
-        **graph.described(plan.formulation.aim, _said_limits(asked.limits)),
-        "candidates": f"heuristic: {plan.among}" if plan.among else "all",
-        "status": f"{plan.status} among these" if narrowed else str(plan.status),
-        "ended": plan.ended.value,
-        "stopped": plan.stopped,
-        "objective": plan.objective,
-        "bound": _bounds(plan),
-        "bound_rests_on": rests_on(plan),
-        "gap": plan.gap,
-        "claimed_gap": None if proof is None or plan.gap is None else _known_gap(proof.claimed_gap),
-        "budgets": graph.spent(plan.objective, plan.selection),
-        "steps": len(plan.steps),
-        "steps_before_release": len(plan.steps) - graph.letting_go(plan.steps),
-        "regrips": plan.regrips,
-        "makespan": plan.makespan,
-        "idle_robots": list(idle_robots(scene, plan.steps)),
-        "outside_linear_range": [str(departure) for departure in plan.departures],
-        "enough": plan.enough.facts(),
-        **({} if plan.arms is None else plan.arms.described()),
-        "payload_exceeded": [str(excess) for excess in plan.overloads],
-        "models_evaluated": plan.models,
-        "models_in_six_digits": graph.six_digit_models,
-        "models_in_proof": _models_in_proof(plan),
-        "states_in_proof": 0 if proof is None else proof.states,
-        **(order_facts(plan) if plan.order else {}),
-        "seconds": dict(plan.seconds),
-        **provenance(plan.engine),
-    }
+    def _order_bound(self) -> tuple[float, bool]:
+        """Return the lower bound of the first goal over all orders, and whether that is proven."""
+        proof, claimed = self.certificate, self.selection.bound[0]
+        if proof is None or not isfinite(proof.bounds[0]):
+            return claimed, False
+        return proof.bounds[0], True
+
+    def _of_order(self) -> dict[str, object]:
+        """Return the entries of a summary about the optimized order, if one was sought."""
+        if not self.order:
+            return {}
+        bound, proven = self._order_bound()
+        return {
+            "order": [*self.order],
+            "orders": self.problem.orders.value,  # type: ignore[union-attr]  # one was sought
+            "order_status": str(self.status),
+            "order_bound": bound if isfinite(bound) else None,
+            "order_bound_proven": proven,
+            "order_evaluated": self.selection.effort[0],
+            "order_stopped": self.stopped,
+        }
+
+    @property
+    def order_bound_said(self) -> str:
+        """The lower bound over all orders in words, and whether it is proven."""
+        bound, proven = self._order_bound()
+        if not isfinite(bound):
+            return "others are not looked at yet"
+        claimed, goal = "" if proven else " (claimed, not proven)", self.states.goals[0]
+        if is_tolerance(goal.name):  # of which more is better
+            return f"no order above {length_text(goal.shown(bound))}{claimed}"
+        return f"no order below {bound:.6g}{claimed}"
+
+    def table(self) -> pd.DataFrame:
+        """Return the choice: moves with their costs, or grips if states were chosen.
+
+        Result: a row per move: ``move``, ``step``, ``to_step`` (the last in which the node is
+        held), ``bricks``, ``robot``, ``brick``, ``node``, ``largest_force_N``, ``candidates`` (how
+        many there were); then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or without
+        proof ``cost`` and the ``margin`` to the next candidate. Of states as of `grips`.
+        """
+        if not self.graph.candidates:
+            return self.grips()
+        table = _moves_table(self.decisions, self.choice, self.grips())
+        if self.formulation.aim is None or self.graph.scenarios:
+            return table
+        aim = self.formulation.aim
+        return table.join(_move_costs(self.decisions, self.choice, aim, self.search))
+
+    def alternatives(self) -> pd.DataFrame:
+        """Return the responses and the cost of every evaluated choice.
+
+        Result: a row per choice, by step; ``second_node`` where two moves are open. SI units. Where
+        the responses of all choices are not kept, those that go with the plan's choices before.
+        """
+        parts = []
+        for choices, before in _looked_at(self.decisions, self.choice, self.search):
+            table = choice_table(self.decisions, choices)
+            columns = ["node", "second_node"] if before is None else ["second_node"]
+            columns = columns[: table.index.nlevels]
+            nodes = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
+            if before is not None:
+                nodes.insert(0, "node", before)
+            nodes.insert(0, "step", choices.step.number)
+            parts.append(pd.concat([nodes, table.reset_index(drop=True)], axis=1))
+        return pd.concat(parts).sort_values("step", kind="stable", ignore_index=True)
 
 
-def _models_in_proof(plan: Plan) -> int | None:
-    """Return how many models prove the plan: those solved anew, or all where costs are given."""
-    if plan.gap is None or plan.certificate is None:
-        return None
-    return plan.certificate.models or plan.models
+def _move_costs(
+    problem: Decisions, choice: tuple[int, ...], aim: Aim, search: Windows | None
+) -> pd.DataFrame:
+    """Return costs of the choice, move by move; ``search``: the models, if not all were solved."""
+    rows = []
+    for k, (before, now) in enumerate(pairwise((0, *choice))):
+        if search is not None:
+            costs = search.costs(k)
+            margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
+            rows.append({"cost": costs[now], "margin": margin})
+        else:
+            layered = aim.costs(problem)
+            rank = rank_of(move_costs(problem, k, before), now)
+            single, shared = layered.single[k][now], layered.shared[k][before, now]
+            rows.append({"single_cost": single, "shared_cost": shared, "rank_in_window": rank})
+    return pd.DataFrame(rows)
 
 
-def _bounds(plan: Plan) -> dict[str, float | None]:
-    """Return the lower bound of each goal; the claimed one if the search stopped early."""
-    proof, chosen = plan.certificate, plan.selection
-    bounds: tuple[float, ...] = () if proof is None else proof.bounds
-    if proof is None and plan.objective:  # of a search without models nothing is known
-        bounds = chosen.bound
-    elif proof is not None and chosen.stopped and not isfinite(proof.gap):
-        bounds = tuple(map(max, chosen.bound, bounds))
-    found = plan.in_display_units(plan.graph.bounded(bounds))
-    return {name: bound if isfinite(bound) else None for name, bound in found.items()}
+def _moves_table(problem: Decisions, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:
+    """Return the choice, a row per move, as of `seqopt.plan.plan.Plan.table` without costs.
+
+    ``grips``: of the plan, as of `seqopt.responses.table.grips_table`.
+    """
+    moves, nodes = problem.schedule.moves, problem.nodes(choice)
+    brick_of = problem.schedule.scene.brick_of_node
+    held = {(row["robot"], row["from_step"]): row for row in grips.to_dict("records")}
+    own = [held[move.robot, move.step] for move in moves]
+    return pd.DataFrame(
+        {
+            "move": range(1, len(moves) + 1),
+            "step": [move.step for move in moves],
+            "to_step": [row["to_step"] for row in own],
+            "bricks": [move.bricks for move in moves],
+            "robot": [move.robot for move in moves],
+            "brick": [brick_of[node].name for node in nodes],
+            "node": nodes,
+            "largest_force_N": [row["largest_force_N"] for row in own],
+            "candidates": [len(move.candidates) for move in moves],
+        }
+    )
+
+
+def choice_table(problem: Decisions, choices: StepChoices) -> pd.DataFrame:
+    """Return responses and cost of every choice of a step, by its nodes, SI units."""
+    axes = next(iter(choices.responses.values())).ndim
+    moves = [problem.schedule.moves[m] for m in choices.moves[-axes:]]
+    names = [f"{move.robot}_node" for move in moves]
+    index = pd.MultiIndex.from_product([move.candidates for move in moves], names=names)
+    columns: Mapping[str, Floats] = {**choices.responses, "cost": problem.step_costs(choices)}
+    return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
+
+
+def _looked_at(
+    problem: Decisions, choice: tuple[int, ...], search: Windows | None
+) -> Iterator[tuple[StepChoices, int | None]]:
+    """Yield the evaluated steps and, if the earlier move is fixed, its node."""
+    if search is None and not problem.evaluation.streams:
+        yield from ((each, None) for each in problem.evaluation.steps)
+        return
+    nodes, found = problem.nodes(choice), search or Windows(problem, [*choice])
+    for k in range(len(problem.schedule.moves)):
+        for choices in found.row(k):
+            yield choices, nodes[k - 1] if len(choices.moves) == 2 else None

@@ -9,31 +9,48 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from seqopt.errors import ProblemError, SolverError, StepError
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import _chooser_of
+from seqopt.errors import (
+    InfeasibleError,
+    ProblemError,
+    SeqoptError,
+    SolverError,
+    StepError,
+    message_of,
+)
 from seqopt.graph._decision_search import Windows, walk_windows
 from seqopt.graph.decisions import Decisions
 from seqopt.graph.formulation import End, Formulation, Run, Solution, Watch, formulations, timed
 from seqopt.graph.instance import Instance
 from seqopt.graph.states.states import States, of_decisions
 from seqopt.judge._step_checks import check_shape
-from seqopt.plan._guard import require_fit, require_proof, require_time
-from seqopt.plan._paths import Found, find_path, judged
-from seqopt.plan._range import best_within
+from seqopt.plan._answers import Found, find_path, judged, require_fit, require_proof, require_time
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import AIMS, chooses_moves, graph_of, in_layers
 from seqopt.problem.amounts import Amount
 from seqopt.problem.problem import Aim, Problem
+from seqopt.problem.requirements import LIMIT_TOLERANCE
+from seqopt.responses._grip_sets import Moved, most_moved
 from seqopt.scene._armed import check_postures
 from seqopt.scene.arm import from_arms
 from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.steps import Step
+from seqopt.work._clock import INTERRUPT, Clock
 
+RANGE = "how far it leaves the linear range"  # what it is called where there was no time for it
+JOINT_LIMITS = "whether joints stay within their elastic limits"
+MOST_MODELS = 250  # up to which a problem is solved again: one may take a second where joints open
+NONE_KEEPS = "no plan keeps it"
+UNKNOWN = "whether any plan keeps it is not known"
+INTERRUPTED = f"{UNKNOWN} (interrupted)"
+Kept = TypeVar("Kept")
 EFFORT = ("seconds", "max_memory")  # of any formulation; responses have a memory of their own
 
 
@@ -271,3 +288,89 @@ def on_the_way(plan: Plan) -> Plan:
     if plan.ended is End.INTERRUPTED:
         raise KeyboardInterrupt
     return plan
+
+
+def leaves(moved: Moved) -> bool:
+    """Return whether displacements exceed the linear range."""
+    return moved.share > 1 + LIMIT_TOLERANCE
+
+
+def keeping(found: Kept, moved: Moved, again: Callable[[], Kept]) -> tuple[Kept, str]:
+    """Return a result within the linear range, and a reason if there is none.
+
+    ``moved``: displacements of ``found``; ``again``: solves with the range as a constraint. If it
+    raises an error, ``found`` is returned, with the reason in words.
+    """
+    if not leaves(moved):
+        return found, ""
+    try:
+        return again(), ""
+    except InfeasibleError:
+        return found, NONE_KEEPS
+    except SeqoptError as error:
+        return found, f"{UNKNOWN} ({message_of(error)})"
+
+
+def engines_of(plan: Plan) -> Sequence[Engine]:
+    """Return the engines whose responses are constrained: of all scenarios, or of the scene."""
+    return plan.graph.scenarios or (plan.engine,)
+
+
+def measured(plan: Plan, clock: Clock) -> Plan:
+    """Return a plan with its largest displacement, if it can be computed in time."""
+    known = {} if plan.search is None or plan.graph.scenarios else plan.search.fields
+
+    def largest() -> Moved | None:
+        each = (most_moved(engine, plan.steps, known) for engine in engines_of(plan))
+        return max(each, key=lambda moved: moved.share)
+
+    moved = clock.spare(RANGE, largest, None)
+    if moved is None and clock.left_out[RANGE] == INTERRUPT:
+        return interrupted(plan)
+    return replace(plan, moved=moved)
+
+
+def interrupted(plan: Plan) -> Plan:
+    """Return a plan marked as stopped by an interrupt."""
+    return replace(plan, selection=replace(plan.selection, stopped=INTERRUPT))
+
+
+def best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:
+    """Return the best plan within the linear range, or the best of all if none is feasible.
+
+    ``solved``: solves the problem, with or without the constraint; ``clock``: shared by both
+    solves. If the second is interrupted, the first plan is returned.
+    """
+    plan = measured(solved(problem), clock)
+    if problem.says_range or plan.moved is None:
+        return plan
+    if plan.ended is End.INTERRUPTED:
+        return replace(plan, beyond=INTERRUPTED * leaves(plan.moved))
+    try:
+        found, why = keeping(
+            plan, plan.moved, lambda: measured(solved(problem.within_range(1.0)), clock)
+        )
+    except KeyboardInterrupt:
+        found, why = interrupted(plan), INTERRUPTED
+    return replace(found, beyond=why)
+
+
+def at_sufficient_level(plan: Plan, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:
+    """Return a plan, or that of the next engine if steps exceed the elastic limits of joints.
+
+    Candidates are compared with joints that never fail; within the limits a more detailed engine
+    gives the same responses. The plan stays if solving again is much work or fails: it reports
+    the limits that its steps exceed.
+    """
+    chooser, problem = _chooser_of(plan.engine), plan.problem
+    if chooser is None or not isinstance(problem, Problem) or plan.ended is End.INTERRUPTED:
+        return plan
+
+    def found() -> Plan:
+        kept = plan.models > MOST_MODELS or plan._within.keeps_limits(plan.steps)
+        return plan if kept else solved(problem.but(engine=chooser))
+
+    try:
+        return clock.spare(JOINT_LIMITS, found, plan)
+    except SeqoptError:
+        return plan

@@ -20,10 +20,9 @@ from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
 from seqopt.graph.decision_costs import TINY
 from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation, formulations
-from seqopt.plan._range import keeping
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import pose
-from seqopt.plan.solve import on_the_way, solve
+from seqopt.plan.solve import keeping, on_the_way, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum, WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import LINEAR_RANGE, Criterion, Limit, _prop_faults, overloads

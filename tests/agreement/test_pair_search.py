@@ -22,7 +22,7 @@ from seqopt.graph.formulation import End, Solution, Watch, find_formulation
 from seqopt.graph.paths import lexicographic
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.network.build import build_network
-from seqopt.plan._paths import judged
+from seqopt.plan._answers import judged
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, StepCost
 from seqopt.problem.problem import Aim

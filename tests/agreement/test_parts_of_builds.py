@@ -15,7 +15,7 @@ from seqopt.errors import InfeasibleError, SolverError, StepError
 from seqopt.graph._orders import order_rules
 from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.judge._schedules import judge_schedule
-from seqopt.plan._status import Status
+from seqopt.plan.plan import Status
 from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import Orders
 from seqopt.problem.requirements import Limit

@@ -18,7 +18,8 @@ from seqopt._cli.commands import analyze, replan
 from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
 from seqopt.graph.formulation import End
-from seqopt.plan import _paths, _states
+from seqopt.plan import _answers as _paths
+from seqopt.plan import _states
 from seqopt.plan.front import find_front
 from seqopt.plan.plan import Status
 from seqopt.sequence.schedule_file import read_plan

@@ -19,7 +19,7 @@ from seqopt.graph._orders import among_orders, order_rules, whole_bound
 from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.states.states import build_states, over_scenarios, within
 from seqopt.judge._proof import Proof
-from seqopt.plan._status import Status, order_bound_said
+from seqopt.plan.plan import Status
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import WORST_TOTAL, Orders, cvar
@@ -385,17 +385,17 @@ def test_a_bound_that_is_not_proven_is_claimed(monkeypatch):
     problem = posed(small_arch(5), aim="F_largest")
     found = seqopt.solve(problem, FORMULATION, proof=False)
     assert (found.status, found.summary()["order_bound_proven"]) == ("unproven", False)
-    assert "claimed, not proven" in order_bound_said(found)
+    assert "claimed, not proven" in found.order_bound_said
     monkeypatch.setattr("seqopt.judge._proof.MOST", 3)
     few = seqopt.solve(problem, FORMULATION)
     assert (few.status, few.summary()["order_bound_proven"]) == ("claimed optimal", False)
     assert few.gap is None
     assert "claimed optimal" in repr(few)
-    assert "claimed, not proven" in order_bound_said(few)
+    assert "claimed, not proven" in few.order_bound_said
     monkeypatch.undo()
     proven = seqopt.solve(problem, FORMULATION)
     assert (proven.status, proven.summary()["order_bound_proven"]) == ("optimal", True)
-    assert "claimed" not in order_bound_said(proven)
+    assert "claimed" not in proven.order_bound_said
 
 
 def test_a_wall_is_as_bad_as_it_is_whole_in_any_order():

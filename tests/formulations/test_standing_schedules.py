@@ -21,7 +21,7 @@ from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneEr
 from seqopt.graph.states.states import build_states
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
-from seqopt.plan._remedies import worst_least
+from seqopt.plan._infeasible import worst_least
 from seqopt.plan.front import FrontProblem, find_front
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE

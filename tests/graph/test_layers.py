@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import rankdata
 
 from seqopt.graph.decisions import pose_decisions
-from seqopt.plan._tables import choice_table
+from seqopt.plan.plan import choice_table
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import _mean_ranks, _ranks_of
 from seqopt.problem.requirements import SceneFacts, payload_limits

@@ -19,7 +19,7 @@ from seqopt.responses.table import analyze
 from tests.builders import small_arch
 
 BRICKS = 4
-AIMS = ["T_max,F_largest", "D_max,steps,regrips"]
+AIMS = ["T_max,F_largest", "D_max,steps"]
 RULES = seqopt.FreeRules()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 
 import pytest
@@ -139,6 +140,6 @@ def test_the_command_solves_again_by_joints_that_open_if_that_is_little(
     assert ("discrete" in levels) == (opens is True)
     assert bool(found["outside_linear_range"]) == (opens is None)  # dry, it does not come to rest
     if opens:
-        monkeypatch.setattr("seqopt.plan._range.MOST_MODELS", 0)
+        monkeypatch.setattr(sys.modules["seqopt.plan.solve"], "MOST_MODELS", 0)
         assert main(asked) == 0
         assert json.loads(capsys.readouterr().out)["outside_linear_range"]

@@ -14,10 +14,10 @@ from seqopt.engines.interface import linear_limit
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError, TimeUpError
 from seqopt.judge._schedules import judge_schedule
 from seqopt.judge._step_checks import check_shape
-from seqopt.plan._range import NONE_KEEPS, UNKNOWN, keeping
-from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
+from seqopt.plan.plan import Status
 from seqopt.plan.pose import states_of
+from seqopt.plan.solve import NONE_KEEPS, UNKNOWN, keeping
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.filters import parse_limits
 from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits

@@ -72,16 +72,17 @@ def unlocking(problem, **_):
 
 
 def replacing(problem, **_):
+    vars(problem).pop("graph", None), vars(problem).pop("asked", None)
     object.__setattr__(problem, "amounts", np.zeros_like(problem.amounts))
     return seqopt.formulations()["overlap_dp"].solve(problem)
 
 
 @pytest.mark.parametrize("cheat", [unlocking, replacing])
-def test_a_formulation_that_changes_what_it_is_judged_by_is_refused(cheat):
-    cheater = replace(seqopt.formulations()["overlap_dp"], solve=cheat)
-    with pytest.raises(SolverError, match="changed the problem that it is judged by"):
-        seqopt.solve(small(), cheater)
-    assert seqopt.solve(small(), "overlap_dp").certificate.objective == 3.0
+def test_what_a_formulation_changes_is_not_what_it_is_judged_by(cheat):
+    cheater, problem = replace(seqopt.formulations()["overlap_dp"], solve=cheat), small()
+    with pytest.raises(SolverError, match="not 0 as claimed"):
+        seqopt.solve(problem, cheater)
+    assert seqopt.solve(problem, "overlap_dp").certificate.objective == 3.0
 
 
 def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):

@@ -20,7 +20,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.decision_costs import LayeredCosts, compile_costs, compile_totals, largest_of
 from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import Run, Watch, as_formulation
-from seqopt.plan._paths import find_path
+from seqopt.plan._answers import find_path
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust

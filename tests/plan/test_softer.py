@@ -11,7 +11,7 @@ import seqopt
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan._softer import _payload_advice, whole_load
+from seqopt.plan._infeasible import payload_advice, whole_load
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit, overloads
 from seqopt.responses.table import analyze
@@ -36,7 +36,7 @@ def advice(scene):
     engine = seqopt.make_engine("compliance", scene)
     steps = sequential(engine.network)
     over = overloads(scene, analyze(engine, steps))
-    return _payload_advice(engine, steps, over), over
+    return payload_advice(engine, steps, over), over
 
 
 def grips(said):

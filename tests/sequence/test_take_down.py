@@ -18,8 +18,8 @@ from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import judge_schedule
-from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
+from seqopt.plan.plan import Status
 from seqopt.responses import analyze_staged
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Site, Step, StepKind, check_sequence

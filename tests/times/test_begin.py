@@ -10,7 +10,7 @@ import pytest
 import seqopt
 from seqopt.errors import ProblemError, SceneError, SolverError
 from seqopt.judge._schedules import judge_schedule
-from seqopt.plan._status import Status
+from seqopt.plan.plan import Status
 from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.steps import Site

@@ -6,7 +6,7 @@ import pytest
 
 import seqopt
 from seqopt.errors import ProblemError
-from seqopt.plan._status import Status
+from seqopt.plan.plan import Status
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.times.builders import RULES, engine_of, least_makespan

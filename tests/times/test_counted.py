@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.errors import InfeasibleError
 from seqopt.judge._schedules import judge_schedule
-from seqopt.plan._status import Status
+from seqopt.plan.plan import Status
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.times._counts import least_by_counts
 from seqopt.times._steps import step_times

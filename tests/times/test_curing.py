@@ -13,7 +13,7 @@ import seqopt
 from seqopt.contact.mortar import Curing, _find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
 from seqopt.judge._schedules import judge_schedule
-from seqopt.plan._status import Status
+from seqopt.plan.plan import Status
 from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.times._curing import CuringBuilds, JointsInTime

@@ -13,7 +13,7 @@ from seqopt.errors import SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation
 from seqopt.graph.graph import LabelProof
 from seqopt.judge._schedules import judge_schedule
-from seqopt.plan._status import Status
+from seqopt.plan.plan import Status
 from seqopt.sequence.rules import FreeRules, with_robots
 from tests.brute_force import ONES
 from tests.times.builders import RULES, WORDS, engine_of

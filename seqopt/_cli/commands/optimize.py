@@ -20,12 +20,9 @@ from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.graph.formulation import End, Run, as_formulation, trace_rows
 from seqopt.judge.certificate import TOLERANCE
-from seqopt.plan._range import at_sufficient_level
-from seqopt.plan._softer import _payload_advice
-from seqopt.plan._status import order_bound_said
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import graph_of
-from seqopt.plan.solve import _solve_run
+from seqopt.plan.solve import _solve_run, at_sufficient_level
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import values_text
@@ -288,7 +285,9 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
         yield wrapped(", ".join(map(str, plan.order)), first="order: ")
     yield from (f"payload exceeded: {excess}" for excess in over)
     if over and (loads := overloads(scene, plan._columns)):
-        yield _payload_advice(plan.engine, plan.steps, loads)
+        from seqopt.plan._infeasible import payload_advice  # noqa: PLC0415  # with all proofs
+
+        yield payload_advice(plan.engine, plan.steps, loads)
 
 
 def _notes(asked: Optimize, found: Found) -> Iterator[str]:
@@ -315,7 +314,7 @@ def _value(found: Found) -> str:
     """Describe objective, bound and gap of a plan."""
     plan = found.plan
     if plan.order:
-        return f"{values_text(plan.objective)}, {plan.status}, {order_bound_said(plan)}"
+        return f"{values_text(plan.objective)}, {plan.status}, {plan.order_bound_said}"
     known = found.posed.known
     if known is None or not plan.graph.candidates:
         return plan._value

@@ -61,7 +61,7 @@ class Pareto(options.Written, options.Moves):
         for --pick: only plans below it, as F_largest=250 (SI units)
 
     aim : NAME,NAME
-        what is to be small: responses and, of the free schedule, steps and regrips (default:
+        what is to be small: responses and, of the free schedule, steps or regrips (default:
         {default})
     rounding : NAME=STEP
         round a number up to multiples of a step (SI units)

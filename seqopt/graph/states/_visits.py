@@ -10,7 +10,6 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.graph._explore import Visited
-from seqopt.graph.graph import Graph
 from seqopt.graph.space import Found, Moves, Space
 from seqopt.graph.states.states import States
 from seqopt.problem.amounts import NONE, STEPS, MoveArrays
@@ -18,7 +17,6 @@ from seqopt.problem.resources import StepArrays
 from seqopt.scene.scene import Order
 from seqopt.sequence import _rule_space as free_space
 from seqopt.sequence._rule_space import FreeSpace, ScheduleSpace, node_numbers
-from seqopt.sequence.rules import Ending
 from seqopt.sequence.steps import Step, StepKind, _begin_step, check_sequence
 
 
@@ -127,29 +125,6 @@ def _follow(
         grips[robot] = node
         stays[robot] = wanted[node]
     return bool(fresh)
-
-
-def steps_with(problem: States, regrips: Floats, held: Ints) -> Floats:
-    """Return how many steps plans have.
-
-    ``regrips`` (n,): infinite where there is no plan; ``held`` (n,): how many grips are held at the
-    end, or before the last step where that lets all go. Result (n,).
-    """
-    released = problem.free_rules.how_it_ends is not Ending.HELD
-    begin, space = problem.free_rules.begin, problem.space
-    at_first = 0 if begin is None else begin.held
-    placed = 0 if problem.free_rules.takes_down else space.levels - space.first
-    return np.asarray(2 * placed + at_first + 2 * regrips - held + released)
-
-
-def with_held(problem: States, graph: Graph, held: Bools) -> Graph:
-    """Return a graph whose paths end in some states, or let all go in them last.
-
-    ``held`` (n,): which states hold as many grips as wanted.
-    """
-    if problem.free_rules.how_it_ends is Ending.HELD:
-        return replace(graph, ends=graph.ends & held)
-    return graph.only(~graph.ends[graph.target] | held[graph.source])
 
 
 @dataclass(frozen=True)

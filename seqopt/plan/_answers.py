@@ -1,18 +1,35 @@
-"""Find a path through a graph, of an instance or of layers of candidates, and certify it."""
+"""Answers of formulations: called, read as numbers, and judged for what they claim.
+
+A formulation gets a copy of what it is judged by: nothing that it changes counts. What it raises or
+returns that cannot be read is its failure, never a verdict.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from contextlib import nullcontext
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from copy import deepcopy
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from numbers import Real
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from seqopt._interrupts import answered
-from seqopt.errors import InfeasibleError, NothingFoundError, SolverError, TimeUpError
+from seqopt.arrays import Ints
+from seqopt.errors import (
+    InfeasibleError,
+    NothingFoundError,
+    ProblemError,
+    SeqoptError,
+    SolverError,
+    TimeUpError,
+    message_of,
+)
+from seqopt.graph.decision_costs import Budget
 from seqopt.graph.formulation import (
     Finding,
     Formulation,
@@ -20,19 +37,24 @@ from seqopt.graph.formulation import (
     Run,
     Solution,
     Watch,
+    formulations,
     timed,
 )
+from seqopt.graph.graph import LabelProof
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
 from seqopt.judge.arithmetic import Answer, Claim, OverCapError, judge_path
 from seqopt.judge.certificate import TOLERANCE, Certificate
-from seqopt.plan._guard import called, with_numbers
+from seqopt.problem.problem import AskedBudget
+from seqopt.scene._checks import LARGEST_NUMBER, short
 from seqopt.sequence.steps import Step
 from seqopt.work._clock import INTERRUPT
 
 if TYPE_CHECKING:
     from seqopt.graph._decision_search import Windows
 
+CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 PROOF = "the proof"  # what it is called where there was no time for it
+Result = TypeVar("Result")
 
 
 class Found(NamedTuple):
@@ -47,6 +69,123 @@ class Found(NamedTuple):
     seconds: dict[str, float]
     search: Windows | None = None
     looked_at: int | None = None
+
+
+def called(name: str, kind: type[Result], solve: Callable[[], object]) -> Result:
+    """Call ``solve`` of the formulation ``name`` and return its answer, of type ``kind``.
+
+    Raises `SolverError` if it raises anything but an error of seqopt or an interrupt, or returns
+    another type.
+    """
+    try:
+        found = solve()
+    except (SeqoptError, MemoryError, KeyboardInterrupt):
+        raise
+    except BaseException as error:  # whatever a formulation of others may raise, exits too
+        raise SolverError(f"formulation {name} failed: {message_of(error)}") from error
+    if not isinstance(found, kind):
+        raise SolverError(
+            f"formulation {name} returned a {type(found).__name__}, not a {kind.__name__}"
+        )
+    return found
+
+
+@contextmanager
+def readable(name: str) -> Iterator[None]:
+    """Raise a `SolverError` for errors of reading the answer of the formulation ``name``."""
+    try:
+        yield
+    except (TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
+        raise SolverError(f"formulation {name} returned nonsense: {message_of(error)}") from error
+
+
+def with_numbers(name: str, found: Solution, goals: int) -> Solution:
+    """Return the answer of the formulation ``name`` with all entries converted to numbers.
+
+    Raises `SolverError` if one cannot be converted, or values and bounds are not one per goal.
+    """
+    with readable(name):
+        states = tuple(tuple(map(_whole, state)) for state in found.states)
+        objective, bound = (tuple(map(float, part)) for part in (found.objective, found.bound))
+        if not len(objective) == len(bound) == goals or not states:
+            raise ValueError(
+                f"{len(states)} states, {len(objective)} values and {len(bound)} bounds for "
+                f"{goals} goals"
+            )
+        if not all(b <= v + CLOSE * abs(v) for v, b in zip(objective, bound, strict=True)):
+            raise ValueError("a value or bound is NaN, or a bound is above its value")
+        if not isinstance(found.stopped, str):
+            raise TypeError(f"{type(found.stopped).__name__} where a text belongs")
+        if not 0 <= (seconds := float(found.compile_seconds)) < np.inf:
+            raise ValueError(f"compile_seconds is {seconds}")
+        sets, models = map(_whole, found.effort)
+        motions = tuple(np.array(each, dtype=float) for each in found.motions)
+        if any(each.ndim != 2 or each.shape[1] != 6 or not len(each) for each in motions):
+            raise ValueError("motions are none: give rows of six numbers")
+        return Solution(
+            states,
+            objective,
+            bound,
+            visited=tuple(map(_wholes, found.visited)),
+            prices=tuple(tuple(map(float, each)) for each in found.prices),
+            stopped=found.stopped,
+            grips=tuple(tuple(map(_whole, row)) for row in found.grips),
+            proofs=tuple(
+                LabelProof(_wholes(rows), *(np.array(each, dtype=float) for each in numbers))
+                for rows, *numbers in found.proofs
+            ),
+            starts=tuple(map(float, found.starts)),
+            ends=float(found.ends),
+            motions=motions,
+            compile_seconds=seconds,
+            order=tuple(map(_whole, found.order)),
+            effort=(sets, models),
+        )
+
+
+def _whole(given: object) -> int:
+    """Return an integer within the range of int64; raise a `ValueError` otherwise."""
+    number = operator.index(given)  # type: ignore[arg-type]  # raises what `readable` tells
+    if abs(number) > LARGEST_NUMBER:
+        raise ValueError(f"{short(number)} stands for no node or brick")
+    return number
+
+
+def _wholes(given: object) -> Ints:
+    """Return an integer array of rows; raise a `ValueError` if an entry is no integer."""
+    out = np.asarray(given)
+    whole = out.dtype.kind in "iuf" and out.ndim == 2
+    if not whole or not ((np.abs(out) <= LARGEST_NUMBER) & (out % 1 == 0)).all():
+        raise ValueError(f"{out.dtype} of shape {out.shape} where rows of whole numbers belong")
+    return out.astype(np.int64)
+
+
+def require_fit(
+    budgets: Sequence[Budget | AskedBudget], formulation: Formulation, options: Mapping[str, object]
+) -> None:
+    """Raise a `ProblemError` unless a formulation supports the budgets and options given."""
+    if budgets and not formulation.takes_budgets:
+        able = [name for name, other in formulations("costs").items() if other.takes_budgets]
+        raise ProblemError(
+            f"{formulation.name}: the budget {budgets[0].name!r} couples all moves; "
+            f"use {' or '.join(able)}"
+        )
+    formulation.require_options(options)
+
+
+def require_time(formulation: Formulation, time_limit: float) -> None:
+    """Raise a `ProblemError` unless a time limit is a number from 0, s, and is supported."""
+    if not isinstance(time_limit, Real) or not time_limit >= 0:
+        raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
+    limited = formulation.watched or "seconds" in formulation.options
+    if np.isfinite(time_limit) and not limited:
+        raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
+
+
+def require_proof(proof: object) -> None:
+    """Raise a `ProblemError` if a lazy search, which solves models for its proof, has none."""
+    if not proof:
+        raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")
 
 
 def proven(
@@ -92,11 +231,14 @@ def _selected(
     """Return the formulation's solution, converted to numbers; raise why there is none."""
     name = formulation.name
     limit = {} if math.isinf(run.left) else {"seconds": run.left}
-    told = {"watch": watch} if formulation.watched else limit
-    solve = partial(formulation.solve, instance, **run.options, **told)
+    told: dict[str, Any] = {"watch": watch} if formulation.watched else limit
+    own = deepcopy(replace(instance, resources=()))  # resources are code: they have no data
+    solve = partial(
+        formulation.solve, replace(own, resources=instance.resources), **run.options, **told
+    )
     try:
         with answered(watch.interrupt) if formulation.watched else nullcontext():
-            found = called(name, lambda: instance, Solution, solve)
+            found = called(name, Solution, solve)
     except InfeasibleError as error:
         if instance.resources:
             raise InfeasibleError(f"claimed by {name}, and not proven: {error}") from None
