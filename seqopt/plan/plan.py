@@ -496,7 +496,7 @@ class Plan(ShownBuild):
         """
         parts = []
         for choices, before in _looked_at(self.decisions, self.choice, self.search):
-            table = choice_table(self.decisions, choices)
+            table = _choice_table(self.decisions, choices)
             columns = ["node", "second_node"] if before is None else ["second_node"]
             columns = columns[: table.index.nlevels]
             nodes = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
@@ -549,7 +549,7 @@ def _moves_table(problem: Decisions, choice: Sequence[int], grips: pd.DataFrame)
     )
 
 
-def choice_table(problem: Decisions, choices: StepChoices) -> pd.DataFrame:
+def _choice_table(problem: Decisions, choices: StepChoices) -> pd.DataFrame:
     """Return responses and cost of every choice of a step, by its nodes, SI units."""
     axes = next(iter(choices.responses.values())).ndim
     moves = [problem.schedule.moves[m] for m in choices.moves[-axes:]]

@@ -134,7 +134,7 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
         plan = solved(asked)
         return from_arms("with_postures")(asked, plan, solved) if asked.scene.has_arms else plan
 
-    return replace(best_within(problem, best, run.clock), problem=problem)
+    return replace(_best_within(problem, best, run.clock), problem=problem)
 
 
 def _fitting(problem: Problem, formulation: Formulation) -> tuple[bool, Formulation]:
@@ -311,47 +311,47 @@ def keeping(found: Kept, moved: Moved, again: Callable[[], Kept]) -> tuple[Kept,
         return found, f"{UNKNOWN} ({message_of(error)})"
 
 
-def engines_of(plan: Plan) -> Sequence[Engine]:
+def _engines(plan: Plan) -> Sequence[Engine]:
     """Return the engines whose responses are constrained: of all scenarios, or of the scene."""
     return plan.graph.scenarios or (plan.engine,)
 
 
-def measured(plan: Plan, clock: Clock) -> Plan:
+def _measured(plan: Plan, clock: Clock) -> Plan:
     """Return a plan with its largest displacement, if it can be computed in time."""
     known = {} if plan.search is None or plan.graph.scenarios else plan.search.fields
 
     def largest() -> Moved | None:
-        each = (most_moved(engine, plan.steps, known) for engine in engines_of(plan))
+        each = (most_moved(engine, plan.steps, known) for engine in _engines(plan))
         return max(each, key=lambda moved: moved.share)
 
     moved = clock.spare(RANGE, largest, None)
     if moved is None and clock.left_out[RANGE] == INTERRUPT:
-        return interrupted(plan)
+        return _interrupted(plan)
     return replace(plan, moved=moved)
 
 
-def interrupted(plan: Plan) -> Plan:
+def _interrupted(plan: Plan) -> Plan:
     """Return a plan marked as stopped by an interrupt."""
     return replace(plan, selection=replace(plan.selection, stopped=INTERRUPT))
 
 
-def best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:
+def _best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:
     """Return the best plan within the linear range, or the best of all if none is feasible.
 
     ``solved``: solves the problem, with or without the constraint; ``clock``: shared by both
     solves. If the second is interrupted, the first plan is returned.
     """
-    plan = measured(solved(problem), clock)
+    plan = _measured(solved(problem), clock)
     if problem.says_range or plan.moved is None:
         return plan
     if plan.ended is End.INTERRUPTED:
         return replace(plan, beyond=INTERRUPTED * leaves(plan.moved))
     try:
         found, why = keeping(
-            plan, plan.moved, lambda: measured(solved(problem.within_range(1.0)), clock)
+            plan, plan.moved, lambda: _measured(solved(problem.within_range(1.0)), clock)
         )
     except KeyboardInterrupt:
-        found, why = interrupted(plan), INTERRUPTED
+        found, why = _interrupted(plan), INTERRUPTED
     return replace(found, beyond=why)
 
 

@@ -16,7 +16,7 @@ import pytest
 from seqopt._cli.grammar import parse_size
 from seqopt._cli.main import main
 from seqopt.errors import ProblemError
-from seqopt.plan import _paths as paths
+from seqopt.plan import _answers as paths
 from seqopt.scene.scene_file import save_scene
 from tests.builders import ROOT, small_arch
 from tests.commands import beside_models

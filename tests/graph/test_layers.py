@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import rankdata
 
 from seqopt.graph.decisions import pose_decisions
-from seqopt.plan.plan import choice_table
+from seqopt.plan.plan import _choice_table
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import _mean_ranks, _ranks_of
 from seqopt.problem.requirements import SceneFacts, payload_limits
@@ -78,7 +78,7 @@ def test_better_responses_never_cost_more(engine25, criterion):
 
 def test_tables_are_labeled(problem25):
     for state in (problem25.evaluation.steps[0], problem25.evaluation.steps[-4]):
-        table = choice_table(problem25, state)
+        table = _choice_table(problem25, state)
         moves = [problem25.schedule.moves[m] for m in state.moves]
         assert list(table.index.names) == [f"{m.robot}_node" for m in moves]
         assert "cost" in table
