@@ -12,12 +12,10 @@ import math
 import os
 import shlex
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
-from functools import partial
 from importlib import resources
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,7 +26,7 @@ from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import Reader, cut, in_words, short
 from seqopt.scene.arm import Arm, Durations
 from seqopt.scene.boxes import overlapping
-from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Robot, Side, Sphere
+from seqopt.scene.parts import Anywhere, Ground, Joint, Reach, Side, Sphere
 from seqopt.scene.scene import _KINDS, Scene, in_order
 from seqopt.scene.shape import Polyhedron
 
@@ -41,7 +39,7 @@ _PULL = 100.0  # m/s²; ten times that of the earth
 
 def _find_warnings(scene: Scene) -> tuple[str, ...]:
     """Return what looks wrong in a scene, one line each; most scenes have none."""
-    return (*_of_units(scene), *_find_overlapping(scene), *_of_joints(scene))
+    return (*_of_units(scene), *_find_overlapping(scene), *_of_places(scene))
 
 
 def warn_of(scene: Scene, name: str) -> None:
@@ -51,18 +49,19 @@ def warn_of(scene: Scene, name: str) -> None:
 
 
 def _of_units(scene: Scene) -> Iterator[str]:
+    """Yield what may be meant in other units, of the first brick that is so."""
     pull = math.hypot(*scene.gravity)
     if pull > _PULL:
         yield f"gravity is {pull:g} m/s²: give it in meters, if it is meant in millimeters"
-    thick = [brick for brick in scene.bricks if min(brick.dimensions) > _THICK_BRICK]
-    if thick:
-        yield (
-            f"{_named(thick)}: dimensions of {list(thick[0].dimensions)} m look like millimeters; "
-            "give meters"
-        )
+    large = [brick for brick in scene.bricks if min(brick.dimensions) > _THICK_BRICK]
     odd = [brick for brick in scene.bricks if not _DENSITIES[0] <= brick.density <= _DENSITIES[1]]
-    if odd:
-        yield f"{_named(odd)}: a density of {odd[0].density:g} kg/m³ is odd; check its unit"
+    for found, said in (
+        (large, "dimensions of {0.dimensions} m look like millimeters; give meters"),
+        (odd, "a density of {0.density:g} kg/m³ is odd; check its unit"),
+    ):
+        if found:
+            more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+            yield f"brick {found[0].name}{more}: {said.format(found[0])}"
 
 
 def _find_overlapping(scene: Scene) -> Iterator[str]:
@@ -85,28 +84,23 @@ def _find_overlapping(scene: Scene) -> Iterator[str]:
         yield f"{len(lines) - _SHOWN} more pairs of bricks interpenetrate"
 
 
-def _of_joints(scene: Scene) -> Iterator[str]:
+def _of_places(scene: Scene) -> Iterator[str]:
     """Yield joints, ground ends and loads that lie far from their bricks."""
     bricks = {brick.name: brick for brick in scene.bricks}
     springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
     placed = [(spring.label, spring.position, end) for spring in springs for end in spring.ends]
     placed += [(load.label, load.position, load.brick) for load in scene.loads if load.position]
     for label, position, end in placed:
-        at = np.abs(bricks[end].frame @ (np.array(position) - np.array(bricks[end].position)))
-        away = float(np.linalg.norm(np.maximum(at - 0.5 * np.array(bricks[end].dimensions), 0.0)))
+        at = np.abs(bricks[end].frame @ np.subtract(position, bricks[end].position))
+        away = np.linalg.norm(np.maximum(at - 0.5 * np.array(bricks[end].dimensions), 0.0))
         if away > _FAR_AWAY * max(bricks[end].dimensions):
             yield f"{label}: it lies {away:.4g} m from brick {end}"
-
-
-def _named(bricks: list[Brick]) -> str:
-    more = f" and {len(bricks) - 1} more" if len(bricks) > 1 else ""
-    return f"brick {bricks[0].name}{more}"
 
 
 _VERSION = 1
 _SAID = ("blocked_nodes", "gravity", "provenance", "closes_with")  # in files by default as well
 _REACHES: dict[str, type[Reach]] = {"anywhere": Anywhere, "side": Side, "sphere": Sphere}
-_ANYWHERE = MappingProxyType({"kind": "anywhere"})
+_WITHIN: dict[str, type] = {"shape": Polyhedron, "arm": Arm, "durations": Durations}
 _DATA = resources.files("seqopt").joinpath("data")
 
 
@@ -128,7 +122,6 @@ _GENERATED = {"dome163": "dome:courses=10,around=22,rise=0.7,opening=0.6,thickne
 _MESHES = {".obj": True, ".ply": True, ".stl": True, ".3dm": False, ".glb": False}
 """By ending, whether one has to say the unit."""
 
-
 KINDS = {
     "arch": "an arch by span and rise: arch:span=2,rise=0.7,curve=catenary",
     "barrel": "one of the eight tested barrel vaults: barrel:test=3",
@@ -140,22 +133,6 @@ KINDS = {
     ),
 }
 """What each kind of scene is, with an example."""
-
-
-def _maker(kind: str) -> tuple[Callable[..., Scene], type | None]:
-    """Return what makes a kind of scene, and the shape that this takes, if it takes one."""
-    from seqopt.scene import library as of  # noqa: PLC0415  # a scene from a file needs none
-    from seqopt.scene.library.arch_form import _barrel  # noqa: PLC0415
-
-    makers: dict[str, tuple[Callable[..., Scene], type | None]] = {
-        "arch": (of.arch, of.ArchForm),
-        "barrel": (of.barrel_vault, None),
-        "chain": (of.chain, None),
-        "dome": (of.dome, of.DomeShape),
-        "vault": (_barrel, None),
-        "wall": (of.wall, of.WallShape),
-    }
-    return makers[kind]
 
 
 def _vector(text: str) -> Vector:
@@ -176,32 +153,14 @@ _READ: dict[Any, Reader] = {
 
 
 def _scene_by_words(words: str) -> Scene:
-    """Return the scene of a key of `KINDS`, a colon, and ``name=value`` parted by commas."""
-    name, given = words.partition(":")[0], _in_words(words)
-    order = given.pop(ORDER, None)
-    try:
-        scene = _made_of_words(name, given)
-    except OverflowError as error:
-        raise SceneError(f"scene {words}: its numbers are too large; give smaller ones") from error
-    made = in_order(scene, order)
-    return replace(made, provenance=f"{scene.provenance} In words: {words}.")
-
-
-def _made_of_words(name: str, given: Mapping[str, Any]) -> Scene:
-    """Return the scene of a key of `KINDS` with the numbers that it takes."""
-    make, shape = _maker(name)
-    return make(shape(**given)) if shape else make(**given)
-
-
-def _in_words(words: str) -> dict[str, Any]:
-    """Return the numbers that words give a scene, by name.
+    """Return the scene of a key of `KINDS`, a colon, and ``name=value`` parted by commas.
 
     Three lengths are ``0.2x0.1x0.06``; lengths in m, angles in rad, densities in kg/m³.
     """
+    from seqopt.scene.library import MAKERS  # noqa: PLC0415  # a scene from a file needs none
+
     name, _, rest = words.partition(":")
-    if name not in KINDS:
-        raise SceneError(f"scene {words}: {name!r} is not known; give one of {', '.join(KINDS)}")
-    make, shape = _maker(name)
+    make, shape = MAKERS[name]
     takes = inspect.signature(shape or make, eval_str=True).parameters
     numbers = {key: number for key, number in takes.items() if number.annotation in _READ}
     known = {key: _READ[number.annotation] for key, number in numbers.items()}
@@ -210,7 +169,13 @@ def _in_words(words: str) -> dict[str, Any]:
     needed = {key for key, number in numbers.items() if number.default is number.empty}
     if lacking := ", ".join(needed - given.keys()):
         raise SceneError(f"scene {words}: {lacking} is missing; {KINDS[name]}")
-    return given
+    order = given.pop(ORDER, None)
+    try:
+        scene = make(shape(**given)) if shape else make(**given)
+    except OverflowError as error:
+        raise SceneError(f"scene {words}: its numbers are too large; give smaller ones") from error
+    made = in_order(scene, order)
+    return replace(made, provenance=f"{scene.provenance} In words: {words}.")
 
 
 def builtin_scenes() -> tuple[str, ...]:
@@ -225,15 +190,14 @@ def _stored() -> tuple[str, ...]:
 def _refuse_mesh(path: Path) -> None:
     """Raise an error that says how a mesh becomes a scene."""
     within = [path] if path.is_file() else path.glob("*.*") if path.is_dir() else ()
-    suffixes = {file.suffix.lower() for file in within} & _MESHES.keys()
-    if suffixes:
-        asked = any(_MESHES[suffix] for suffix in suffixes)
+    if suffixes := {file.suffix.lower() for file in within} & _MESHES.keys():
+        unit = any(_MESHES[suffix] for suffix in suffixes)
         what = "a folder of meshes" if path.is_dir() else "a mesh"
-        out = f"{path.resolve().stem}.json"
-        words = f"{'--unit m ' if asked else ''}--density 2400 --out {shlex.quote(out)}"
+        out = shlex.quote(f"{path.resolve().stem}.json")
+        words = f"{shlex.quote(str(path))} {'--unit m ' * unit}--density 2400 --out {out}"
         raise SceneError(
-            f"scene {path}: {what}; seqopt import {shlex.quote(str(path))} {words} makes a scene "
-            f"of it, with its own {'unit and ' if asked else ''}density"
+            f"scene {path}: {what}; seqopt import {words} makes a scene of it, with its own "
+            f"{'unit and ' * unit}density"
         )
 
 
@@ -273,11 +237,11 @@ def load_scene(name: str | Path) -> Scene:
     if name in _stored():
         text = _DATA.joinpath("scenes", f"{name}.json").read_text("utf-8")
         return _scene_from_dict(json.loads(text))  # ours obey the schema: a test asks
-    if ":" in name and name.partition(":")[0] in KINDS:
+    kind, colon, _ = name.partition(":")
+    if colon and kind in KINDS:
         return _scene_by_words(name)
     path = Path(name)
     if not path.suffix and not os.path.lexists(path):
-        kind, colon, _ = name.partition(":")
         hint = did_you_mean(kind, KINDS) if colon else did_you_mean(name, builtin_scenes())
         raise SceneError(
             f"scene {name}: no such built-in scene or file{hint}; "
@@ -291,15 +255,13 @@ def load_scene(name: str | Path) -> Scene:
 
 def _with_models(scene: Scene, found: Callable[[str], Path]) -> Scene:
     """Return a scene whose arms have their models, if they are files, where these are found."""
-
-    def placed(robot: Robot) -> Robot:
-        if robot.arm is None or robot.arm.in_package:
-            return robot
-        return replace(robot, arm=replace(robot.arm, urdf=str(found(robot.arm.urdf))))
-
-    if all(robot.arm is None for robot in scene.robots):
-        return scene
-    return replace(scene, robots=tuple(map(placed, scene.robots)))
+    robots = tuple(
+        robot
+        if robot.arm is None or robot.arm.in_package
+        else replace(robot, arm=replace(robot.arm, urdf=str(found(robot.arm.urdf))))
+        for robot in scene.robots
+    )
+    return scene if robots == scene.robots else replace(scene, robots=robots)
 
 
 def _parse_scene(text: str, source: str = "text") -> Scene:
@@ -325,24 +287,25 @@ def _parse_scene(text: str, source: str = "text") -> Scene:
 def _scene_from_dict(document: dict[str, Any]) -> Scene:
     """Return the scene of a document that obeys the schema."""
     content = {key: value for key, value in document.items() if key not in ("format", "version")}
-    for kind, make in {**_KINDS, "bricks": _brick, "robots": _robot}.items():
-        content[kind] = [make(**entry) for entry in content.get(kind, ())]
+    for kind, make in _KINDS.items():
+        content[kind] = [_part(make, entry) for entry in content.get(kind, ())]
     return Scene(**content)
 
 
-def _brick(shape: dict[str, Any] | None = None, **entry: Any) -> Brick:
-    try:
-        solid = None if shape is None else Polyhedron(**shape)
-    except SceneError as error:
-        raise SceneError(f"brick {short(entry['name'])}: {error}") from error
-    return Brick(**entry, shape=solid)
-
-
-def _robot(reach: Mapping[str, Any] = _ANYWHERE, **entry: Any) -> Robot:
-    within = {key: value for key, value in reach.items() if key != "kind"}
-    for name, kind in (("arm", Arm), ("durations", Durations)):
-        entry[name] = kind(**entry[name]) if entry.get(name) else None
-    return Robot(**entry, reach=_REACHES[reach["kind"]](**within))
+def _part(make: type, entry: dict[str, Any]) -> Any:
+    """Return a part of a scene with the values that it holds."""
+    own = dict(entry)
+    if "reach" in own:
+        reach = dict(own["reach"])
+        own["reach"] = _REACHES[reach.pop("kind")](**reach)
+    for name, kind in _WITHIN.items():
+        if own.get(name):
+            try:
+                own[name] = kind(**own[name])
+            except SceneError as error:
+                where = f"brick {short(own['name'])}: " if name == "shape" else ""
+                raise SceneError(f"{where}{error}") from error
+    return make(**own)
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
@@ -370,8 +333,14 @@ def dump_scene(scene: Scene, folder: Path | None = None) -> str:
     ``folder``: where it will be, from which models of arms in it are named; others, and all where
     it is not known, are named from the root.
     """
+
+    def near(model: str) -> Path:
+        place = Path(os.path.abspath(model))  # noqa: PTH100
+        within = folder is not None and place.is_relative_to(folder)
+        return place.relative_to(folder) if within and folder else place
+
     lines = []
-    for key, value in scene_to_dict(_with_models(scene, partial(_from, folder))).items():
+    for key, value in scene_to_dict(_with_models(scene, near)).items():
         if isinstance(value, tuple) and value and isinstance(value[0], dict):
             rows = ",\n    ".join(json.dumps(item, ensure_ascii=False) for item in value)
             lines.append(f"  {json.dumps(key)}: [\n    {rows}\n  ]")
@@ -399,10 +368,3 @@ def save_scene(scene: Scene, path: Path) -> None:
     """
     folder = Path(os.path.abspath(path)).parent  # noqa: PTH100  # links are not followed
     write_text(path, dump_scene(scene, folder))
-
-
-def _from(folder: Path | None, model: str) -> Path:
-    place = Path(os.path.abspath(model))  # noqa: PTH100
-    if folder is None or not place.is_relative_to(folder):
-        return place
-    return place.relative_to(folder)

@@ -34,7 +34,7 @@ ODD = {
     "bricks 2 and 4 interpenetrate by 89.6 mm": with_part(
         "bricks", 3, position=SCENE.bricks[1].position
     ),
-    "brick 1: dimensions of [246.0, 116.0, 53.0] m look like millimeters": with_part(
+    "brick 1: dimensions of (246.0, 116.0, 53.0) m look like millimeters": with_part(
         "bricks", 0, dimensions=(246.0, 116.0, 53.0)
     ),
     "brick 3: a density of 2.42 kg/m³ is odd": with_part("bricks", 2, density=2.42),
