@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Real
+from operator import mul
 
 import numpy as np
 
@@ -87,10 +88,6 @@ _STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square 
 _SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
 
 
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 def _convex_polygon(
     where: str, corners: Iterable[Iterable[float]]
 ) -> tuple[tuple[float, float], ...]:
@@ -126,8 +123,20 @@ class Anywhere:
         return "anywhere"
 
 
+class _Limited:
+    """A reach that ends somewhere."""
+
+    def lack(self, point: Vector) -> float:
+        """Return how far a point is out of reach, m; negative within."""
+        raise NotImplementedError
+
+    def covers(self, point: Vector) -> bool:
+        """Return whether a point is within reach."""
+        return self.lack(point) <= 0
+
+
 @dataclass(frozen=True, kw_only=True)
-class Side:
+class Side(_Limited):
     """A robot beside the structure reaches every point of a half-space.
 
     ``toward``: unit vector to the robot's side; ``point``: of the plane that bounds the reach, m.
@@ -138,16 +147,13 @@ class Side:
 
     def __post_init__(self) -> None:
         check(self, "reach", toward=vector, point=vector)
-        if abs(_dot(self.toward, self.toward) - 1) > _UNIT:
+        if abs(math.fsum(x * x for x in self.toward) - 1) > _UNIT:
             raise SceneError(f"reach: toward is {list(self.toward)}; give a unit vector")
 
-    def covers(self, point: Vector) -> bool:
-        """Return whether a point is within reach."""
-        return _dot(self.toward, point) >= _dot(self.toward, self.point)
-
     def lack(self, point: Vector) -> float:
-        """Return how far a point is out of reach, m."""
-        return float(np.dot(self.toward, np.subtract(self.point, point)))
+        """Return how far a point is out of reach, m; negative within."""
+        bound, at = (sum(map(mul, self.toward, place)) for place in (self.point, point))
+        return bound - at
 
     def longer(self, more: float) -> Side:
         """Return a reach that is longer, m."""
@@ -159,7 +165,7 @@ class Side:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sphere:
+class Sphere(_Limited):
     """A robot at a fixed base reaches every point within a radius.
 
     Parameters
@@ -185,12 +191,8 @@ class Sphere:
     def __post_init__(self) -> None:
         check(self, "reach", center=vector, radius=length)
 
-    def covers(self, point: Vector) -> bool:
-        """Return whether a point is within reach."""
-        return math.dist(self.center, point) <= self.radius
-
     def lack(self, point: Vector) -> float:
-        """Return how far a point is out of reach, m."""
+        """Return how far a point is out of reach, m; negative within."""
         return math.dist(self.center, point) - self.radius
 
     def longer(self, more: float) -> Sphere:
@@ -202,8 +204,6 @@ class Sphere:
 
 
 Reach = Anywhere | Side | Sphere
-
-
 THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of its bricks
 
 
@@ -408,8 +408,6 @@ class Ground(Spring):
             settle(self, movement=(*vector(what, numbers[:3]), *turn))
         self._check(where)
         check(self, where, anchor=vector)
-        if self.anchor == self.position:
-            raise SceneError(f"{where}: anchor and position are one point; give the stub a length")
 
     @property
     def label(self) -> str:
@@ -551,23 +549,31 @@ class _GripKinds(FrozenValue):
 
 def _grip_kinds(robots: Sequence[Robot], nodes: Sequence[int]) -> _GripKinds:
     """Return the kinds of robots; one that is rigid where there is none. ``nodes``: all numbers."""
-    soft = [r.name if r.arm is not None and r.arm.joint_stiffness else "" for r in robots]
     ways = [
-        (r.stiffness, r.rotational_stiffness, r.payload, arm)
-        for r, arm in zip(robots, soft, strict=True)
+        (
+            r.stiffness,
+            r.rotational_stiffness,
+            r.payload,
+            r.name if r.arm and r.arm.joint_stiffness else "",
+        )
+        for r in robots
     ]
     kinds = list(dict.fromkeys(ways)) or [(None, None, np.inf, "")]
+    shift, turn, payload, arms = zip(*kinds, strict=True)
     compliance = np.zeros((len(kinds), 6, 6))
-    for own, (shift, turn, *_) in zip(compliance, kinds, strict=True):
-        for at, given in ((0, shift), (3, turn)):
-            if given is not None:
-                own[range(at, at + 3), range(at, at + 3)] = 1 / np.array(given)
-    arms = np.array([bool(arm) for *_, arm in kinds])
-    turns = np.array([turn is not None for _, turn, *_ in kinds])
-    payload = np.array([most for *_, most, _ in kinds])
-    of_robot = np.array([kinds.index(way) for way in ways], dtype=np.int64)
-    first, span = min(nodes), max(nodes) - min(nodes) + 1
-    return _GripKinds(compliance, arms, turns, payload, of_robot, first, span)
+    for k, given in enumerate(zip(shift, turn, strict=True)):
+        for at, stiffness in zip((0, 3), given, strict=True):
+            if stiffness is not None:
+                compliance[k, range(at, at + 3), range(at, at + 3)] = 1 / np.array(stiffness)
+    return _GripKinds(
+        compliance=compliance,
+        arms=np.array(arms) != "",
+        turns=np.array([each is not None for each in turn]),
+        payload=np.array(payload),
+        of_robot=np.array([kinds.index(way) for way in ways], dtype=np.int64),
+        first=min(nodes),
+        span=max(nodes) - min(nodes) + 1,
+    )
 
 
 _NEAR = 1.0  # of a node from where a prop is said to be, over the smallest side of its brick

@@ -65,39 +65,44 @@ def _check_bricks(bricks: Sequence[Brick], gravity: Vector, factor: float) -> No
 
 
 def _check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick]) -> None:
-    """Require joints and ground ends whose edges have a length. ``bricks``: by name."""
+    """Require joints off the nodes of bricks, stubs with a length, and numbers within bounds."""
     farthest = _FAR * max(max(brick.dimensions) for brick in bricks.values())
     for spring in springs:
-        points = {"position": spring.position, "anchor": getattr(spring, "anchor", spring.position)}
-        points["movement"] = getattr(spring, "movement", None) or points["position"]
-        for name, point in points.items():
-            if max(map(abs, point)) > farthest:
+        for name in ("position", "anchor", "movement"):
+            point = getattr(spring, name, None)
+            if point and max(map(abs, point)) > farthest:
                 raise SceneError(f"{spring.label}: {name} is {list(point)}; move it to its bricks")
         stiffness = (*spring.translational_stiffness, *spring.rotational_stiffness)
-        stiffest, softest = max(stiffness), min(filter(None, stiffness), default=1.0)
-        wrong = stiffest if stiffest > _HEAVY else softest
-        if not 1 / _HEAVY <= wrong <= _HEAVY:
-            raise SceneError(
-                f"{spring.label}: a stiffness is {wrong:g}; "
-                f"give 0, or from {1 / _HEAVY:g} to {_HEAVY:g}"
-            )
-        for end in spring.ends:
-            _check_edges(spring, bricks[end])
+        for value in filter(None, stiffness):
+            if not 1 / _HEAVY <= value <= _HEAVY:
+                raise SceneError(
+                    f"{spring.label}: a stiffness is {value:g}; "
+                    f"give 0, or from {1 / _HEAVY:g} to {_HEAVY:g}"
+                )
+        for brick in (bricks[end] for end in spring.ends):
+            near = _AT_NODE * brick.dimensions[0]
+            for node in brick.nodes:
+                if math.dist(brick.node_position(node), spring.position) <= near:
+                    raise SceneError(
+                        f"{spring.label}: position is that of node {node} of brick {brick.name}; "
+                        "give a point between the faces that it joins"
+                    )
+            if isinstance(spring, Ground) and math.dist(spring.anchor, spring.position) <= near:
+                raise SceneError(
+                    f"{spring.label}: anchor and position are one point; give the stub a length"
+                )
 
 
-def _check_edges(spring: Joint | Ground, brick: Brick) -> None:
-    """Require a joint off the nodes of a brick, and a stub with a length."""
-    near = _AT_NODE * brick.dimensions[0]
-    for node in brick.nodes:
-        if math.dist(brick.node_position(node), spring.position) <= near:
+def _check_loads(loads: Sequence[Load], bricks: Mapping[int, Brick]) -> None:
+    """Require loads within bounds, at their bricks."""
+    for load in loads:
+        if math.hypot(*load.force) > _HEAVY:
+            raise SceneError(f"{load.label}: force is {list(load.force)}; give N, to {_HEAVY:g}")
+        far = _FAR * max(bricks[load.brick].dimensions)
+        if load.position and max(map(abs, load.position)) > far:
             raise SceneError(
-                f"{spring.label}: position is that of node {node} of brick {brick.name}; "
-                "give a point between the faces that it joins"
+                f"{load.label}: position is {list(load.position)}; move it to its brick"
             )
-    if isinstance(spring, Ground) and math.dist(spring.anchor, spring.position) <= near:
-        raise SceneError(
-            f"{spring.label}: anchor and position are one point; give the stub a length"
-        )
 
 
 _PARTS = (Brick, Joint, Ground, Robot, Load, Prop)
@@ -174,17 +179,9 @@ class Scene(Shown):
         _check_bricks(self.bricks, self.gravity, self.weight_factor)
         by_name = {brick.name: brick for brick in self.bricks}
         _check_springs((*self.joints, *self.grounds), by_name)
-        for load in self.loads:
-            if math.hypot(*load.force) > _HEAVY:
-                found = list(load.force)
-                raise SceneError(f"{load.label}: force is {found}; give N, to {_HEAVY:g}")
-            far = _FAR * max(by_name[load.brick].dimensions)
-            if load.position and max(map(abs, load.position)) > far:
-                found = list(load.position)
-                raise SceneError(f"{load.label}: position is {found}; move it to its brick")
-        blocked, of_node = {*self.blocked_nodes}, self.brick_of_node
-        free = {node: brick for node, brick in of_node.items() if node not in blocked}
-        settle(self, props=_settled_props(self.props, free))
+        _check_loads(self.loads, by_name)
+        held = {n: b for n, b in self.brick_of_node.items() if n not in self.blocked_nodes}
+        settle(self, props=_settled_props(self.props, held))
         if math.hypot(*self.wind) > _STORM:
             raise SceneError(f"{where}: wind is {list(self.wind)}; give shares of the weight")
 
@@ -288,17 +285,7 @@ class Scene(Shown):
         return ", ".join(text for text, counts in said.items() if counts)
 
     def with_robots(self, *robots: Robot) -> Scene:
-        """Return the same scene with other robots.
-
-        ``*robots``: all robots of the new scene.
-
-        Examples
-        --------
-        >>> import seqopt
-        >>> pair = [seqopt.Robot(name=name, payload=400.0) for name in ("left", "right")]
-        >>> seqopt.load_scene("arch25").with_robots(*pair)
-        <Scene arch25: 25 bricks, 24 joints, 2 ground ends, 2 robots>
-        """
+        """Return the same scene with other robots, ``*robots``: all of the new scene."""
         return replace(self, robots=robots)
 
     def with_grips(
@@ -310,15 +297,6 @@ class Scene(Shown):
 
         ``stiffness``, ``rotational_stiffness``: as of `Robot`; None for rigid grips, and for such
         as let their nodes turn.
-
-        Examples
-        --------
-        >>> import seqopt
-        >>> scene = seqopt.load_scene("arch25").with_grips(1e6)
-        >>> scene.robots[0].stiffness
-        (1000000.0, 1000000.0, 1000000.0)
-        >>> scene.with_grips(None) == seqopt.load_scene("arch25")
-        True
         """
         bare = [(r, r.arm and replace(r.arm, joint_stiffness=())) for r in self.robots]
         turn = rotational_stiffness
@@ -327,14 +305,7 @@ class Scene(Shown):
         )
 
     def with_props(self, *props: Prop) -> Scene:
-        """Return the same scene with other props, ``*props``: all of the new scene.
-
-        Examples
-        --------
-        >>> import seqopt
-        >>> seqopt.load_scene("arch25").with_props(seqopt.Prop(node=13)).props
-        (Prop(node=13),)
-        """
+        """Return the same scene with other props, ``*props``: all of the new scene."""
         return replace(self, props=props)
 
     def with_centering(self, stiffness: float | Vector | None = None) -> Scene:
@@ -342,13 +313,6 @@ class Scene(Shown):
 
         It holds the node at which the brick is not placed; a brick of which this is blocked has
         none. ``stiffness``: as of `Prop`.
-
-        Examples
-        --------
-        >>> import seqopt
-        >>> props = seqopt.load_scene("arch25").with_centering(1e6).props
-        >>> len(props), props[0].node
-        (24, 3)
         """
         taken = {*self.blocked_nodes, *(brick.placing_node for brick in self.bricks)}
         free = ([node for node in brick.nodes if node not in taken] for brick in self.placed)
@@ -366,8 +330,6 @@ class Scene(Shown):
 
     def with_durations(self, *words: str) -> Scene:
         """Return the same scene with robots that take as long as words say.
-
-        ``*words``: as of `seqopt.scene.arm._durations_in_words`.
 
         Examples
         --------
@@ -427,18 +389,6 @@ class Scene(Shown):
 
         ``grips``: the node of every robot of the scene in order, None of one that holds none;
         ``bricks``: how many stand, where grips of the props that hold then are to follow.
-
-        Examples
-        --------
-        >>> import dataclasses
-        >>> import seqopt
-        >>> scene = seqopt.load_scene("arch25")
-        >>> scene.grip_numbers((7, None, 3))
-        (7, 3)
-        >>> left, middle, right = scene.robots
-        >>> soft = dataclasses.replace(right, stiffness=1e6)
-        >>> scene.with_robots(left, middle, soft).grip_numbers((7, None, 3))
-        (7, 53)
         """
         robots = [i for i, node in enumerate(grips) if node is not None]
         nodes = np.array([node for node in grips if node is not None], dtype=np.int64)
@@ -516,11 +466,7 @@ ORDERS: dict[str, Callable[[Scene], Order]] = {
     "ends": _from_all_ends,
     "sides": _from_both_sides,
 }
-"""Orders by name.
-
-The scene's own from its last brick on; from all ground ends at once; course by course, from both
-ends of each to its middle.
-"""
+"""Orders by name."""
 
 
 def _parse_order(scene: Scene, text: str) -> Order:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import typing
 from bisect import bisect_left
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import replace
@@ -231,10 +232,11 @@ def _begins_elsewhere(network: Network) -> frozenset[int]:
     A stretch is a brick that is held while others are placed, and these others. A brick begins
     elsewhere if no joint ties it to the stretch that is being built; so does the first one.
     """
-    placed = network.scene.placed
+    springs, tied = network.springs, defaultdict[int, set[int]](set)
+    for a, b in springs.bodies[springs.stiffness.any(axis=1)].tolist():
+        tied[b].add(a)  # the lower one first
     along, stretch, out = lies_along(network), set[int](), set[int]()
-    tied = network.bodies(len(placed))
-    for k, brick in enumerate(placed):
+    for k, brick in enumerate(network.scene.placed):
         if stretch.isdisjoint(tied[k]):
             out.add(brick.name)
         if brick.name in along | out:
