@@ -114,6 +114,7 @@ COMMANDS = {
         ("optimize", "optimize", "choose where robots hold, and write the plan"),
         ("replan", "replan", "plan the rest of a build after a change"),
         ("pareto", "pareto", "find all plans that no other one beats in every aim"),
+        ("sweep", "sweep", "plan many designs, robots or payloads, and compare them"),
         ("analyze", "analyze", "compute forces and displacements in every step"),
         ("times", "times", "say how long a build takes, and who does what when"),
         ("assess", "assess", "prove which steps stand, and with what margins"),

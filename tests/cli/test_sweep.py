@@ -1,0 +1,122 @@
+"""Many problems side by side: ranges, rows as they come, what is left after an end, the chart."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+
+import pandas as pd
+import pytest
+
+import seqopt
+from seqopt._cli.main import main
+from seqopt.errors import ProblemError
+from seqopt.report._sweep_chart import draw_sweep
+from seqopt.sweep import _spread_values, _spread_words, sweep
+
+ASKED = ["--schedule", "free", "--aim", "F_largest,steps", "--no-stability"]
+free = partial(seqopt.optimize, schedule="free", aim="F_largest,steps")
+
+
+def told(*words):
+    return main(["sweep", *words, *ASKED])
+
+
+def without_time(path):
+    return pd.read_csv(path, dtype=str).drop(columns="seconds")
+
+
+def test_every_row_is_what_one_problem_has(tmp_path, capsys):
+    out = tmp_path / "s"
+    assert told("chain:bricks=7..11/3", "--over", "payload=300..500/2", "--out", str(out)) == 0
+    assert "6 problems: 6 optimal" in capsys.readouterr().out
+    rows = pd.read_csv(out / "sweep.csv")
+    assert list(zip(rows["bricks"], rows["payload"], strict=True)) == [
+        (bricks, payload) for bricks in (7, 9, 11) for payload in (300, 500)
+    ]
+    for _, row in rows.iterrows():
+        plan = free(f"chain:bricks={row['bricks']:.0f}")
+        assert row["F_largest"] == pytest.approx(plan.objective["F_largest"], rel=1e-8)
+        assert row["F_largest_bound"] == pytest.approx(row["F_largest"], rel=1e-8)
+        assert (row["steps"], row["status"]) == (len(plan.steps), "optimal")
+    assert (out / "sweep.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
+def test_a_sweep_that_was_interrupted_goes_on_where_it_ended(tmp_path, workers):
+    """Rows that are there are kept as they are, the others are the same as without an end."""
+    whole, part = tmp_path / "whole", tmp_path / "part"
+    words = ["chain:bricks=7..13/4", "--out"]
+    assert told(*words, str(whole)) == 0
+    assert told(*words, str(part)) == 0
+    lines = (part / "sweep.csv").read_text().splitlines()
+    lines[1] = lines[1].replace("optimal", "kept")
+    (part / "sweep.csv").write_text("\n".join([*lines[:3], ""]))
+    assert told(*words, str(part), "--workers", workers) == 0
+    expected, found = without_time(whole / "sweep.csv"), without_time(part / "sweep.csv")
+    assert found["status"][0] == "kept"
+    pd.testing.assert_frame_equal(found.iloc[1:], expected.iloc[1:])
+
+
+def test_another_sweep_needs_another_folder(tmp_path, capsys):
+    words = ["chain:bricks=7..9/2", "--out", str(tmp_path)]
+    assert told(*words) == 0
+    assert main(["sweep", *words, "--aim", "steps"]) == 2
+    assert "a sweep with another aim, F_largest,steps; name another" in capsys.readouterr().err
+    assert json.loads((tmp_path / "sweep.json").read_text())["problems"] == 2
+
+
+def test_a_problem_without_a_plan_is_a_row_that_says_why(capsys):
+    assert told("chain:bricks=7..9/2", "--over", "payload=1,400") == 0
+    rows = capsys.readouterr().out
+    assert rows.count("infeasible") == 2
+    assert rows.count("optimal") == 2
+    assert told("chain:bricks=7..9/2", "--over", "payload=1") == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("chain:bricks=5", "--over", "paylod=3"), "no option paylod (did you mean payload?)"),
+        (("chain:bricks=5", "--over", "payload"), "give NAME=VALUES"),
+        (("chain:bricks=5..7/0",), "range 5..7/0: give from 1 to 100000 values"),
+        (("chain:bricks=5..7/900", "--over", "payload=1..9/900"), "more than 100000 problems"),
+    ],
+)
+def test_what_is_wrong_gets_one_line(words, said, capsys):
+    assert told(*words) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_ranges_are_even_or_in_proportion():
+    assert _spread_values("0..1/3") == ("0", "0.5", "1")
+    assert _spread_values("1e3..1e9/3log") == ("1000", "1000000", "1000000000")
+    assert _spread_values("1..12,25..13") == ("1..12,25..13",)  # an order of bricks is no range
+    with pytest.raises(ProblemError, match="of a log range above 0"):
+        _spread_values("0..1/3log")
+    assert _spread_words("arch25") == [({"scene": "arch25"}, "arch25")]
+
+
+def test_scenes_of_ones_own_and_any_function(tmp_path):
+    scenes = [seqopt.load_scene(f"chain:bricks={count}") for count in (7, 9)]
+    path = tmp_path / "rows.csv"
+    found = sweep(scenes, free, mortars=["dry"], out=path)
+    again = sweep(scenes, lambda scene: pytest.fail(), mortars=["dry"], out=path)
+    assert list(found["scene"]) == [scene.name for scene in scenes]
+    assert {*found["falls_dry"]} <= {*range(20)}
+    assert list(again["F_largest"]) == pytest.approx(list(found["F_largest"]), rel=1e-8)
+    with pytest.raises(ProblemError, match="it has columns scene, not bricks"):
+        sweep("chain:bricks=7..9/2", free, out=path)
+
+
+@pytest.mark.parametrize("count", [2, 8])
+def test_the_chart_has_lines_for_few_and_a_map_for_many(count):
+    rows = [
+        {"span": f"{s}", "rise": f"{r}", "T_max": None if s == r else 1.0 * s + r, "T_max_bound": 0}
+        for s in range(3)
+        for r in range(count)
+    ]
+    axes = draw_sweep(pd.DataFrame(rows), ["span", "rise"]).axes
+    assert len(axes[0].lines) == (3 if count == 2 else 0)  # two lines, and crosses of no plan
+    assert len(axes[0].images) == (count == 8)
+    assert axes[0].get_xlabel() == "span"
