@@ -562,9 +562,9 @@ def _grip_kinds(robots: Sequence[Robot], nodes: Sequence[int]) -> _GripKinds:
     shift, turn, payload, arms = zip(*kinds, strict=True)
     compliance = np.zeros((len(kinds), 6, 6))
     for k, given in enumerate(zip(shift, turn, strict=True)):
-        for at, stiffness in zip((0, 3), given, strict=True):
-            if stiffness is not None:
-                compliance[k, range(at, at + 3), range(at, at + 3)] = 1 / np.array(stiffness)
+        for at, each in zip((0, 3), given, strict=True):
+            if each is not None:
+                compliance[k, range(at, at + 3), range(at, at + 3)] = 1 / np.array(each)
     return _GripKinds(
         compliance=compliance,
         arms=np.array(arms) != "",

@@ -160,6 +160,7 @@ def _scene_by_words(words: str) -> Scene:
     from seqopt.scene.library import MAKERS  # noqa: PLC0415  # a scene from a file needs none
 
     name, _, rest = words.partition(":")
+    make: Callable[..., Scene]
     make, shape = MAKERS[name]
     takes = inspect.signature(shape or make, eval_str=True).parameters
     numbers = {key: number for key, number in takes.items() if number.annotation in _READ}

@@ -27,15 +27,14 @@ from `seqopt.scene.arch_scene`. The same in words, wherever a scene is named:
 <Scene dome 39: 39 bricks, 82 joints, 12 ground ends, 3 robots>
 """
 
-from collections.abc import Callable
+from typing import Any
 
 from seqopt.scene.library.arch_form import ArchForm, _barrel, arch, barrel_vault, chain
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.wall import WallShape, wall
-from seqopt.scene.scene import Scene
 
-MAKERS: dict[str, tuple[Callable[..., Scene], type | None]] = {
+MAKERS: dict[str, Any] = {
     "arch": (arch, ArchForm),
     "barrel": (barrel_vault, None),
     "chain": (chain, None),
