@@ -9,42 +9,49 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import combinations
-from math import comb
 from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph._orders import order_rules, upward
 from seqopt.graph.formulation import Solution
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import (
     FAILS,
     PASSES,
     _lazy_path,
+    cut,
     lexicographic,
     lexicographic_bounds,
+    potentials,
     reached,
+    tied,
 )
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import is_beyond
-from seqopt.judge._goal_proofs import label_bounds
 from seqopt.judge._rule_moves import RuleTables, Transitions
-from seqopt.judge._states import Filter, Reachable, StateEvaluator, ask
+from seqopt.judge._states import Filter, Reachable, StateEvaluator
 from seqopt.judge._twin import twin_of
-from seqopt.judge.arithmetic import budget_bounds
+from seqopt.judge.arithmetic import (
+    Book,
+    Closed,
+    SumBook,
+    TwinBook,
+    budget_bounds,
+    kept_below,
+    limit_below,
+)
 from seqopt.network.build import build_network
-from seqopt.scene._armed import can_hold
+from seqopt.problem.amounts import NONE
+from seqopt.problem.resources import StepArrays
 from seqopt.scene.scene import Order, in_order
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence._rule_space import node_numbers
-from seqopt.sequence.rules import Ending
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 MOST = 5000  # sets of bricks that are looked at
-MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 BELOW = 1e-9  # by how much a plan must be better, over the size of the value
 
 
@@ -114,13 +121,6 @@ class AllOrders(OneSchedule):
         stands = self._rules.stands
         return frozenset(stands), stands[-1] if stands else 0
 
-    def least(self) -> tuple[float, ...]:
-        """Return lower bounds of goals, also from the whole structure, the end of all orders."""
-        first, *others = self.evaluator.least()
-        goal = self._problem.goals[0]
-        peak = goal.is_peak and not goal.margins
-        return max(first, _bound_of_the_whole(self._problem) if peak else -np.inf), *others
-
     def at(self, part: Key) -> tuple[int, StateEvaluator]:
         if part not in self._known:
             if len(self._known) > MOST:  # the start is looked at too
@@ -171,43 +171,6 @@ class AllOrders(OneSchedule):
         return (*first, *last, *(n for n in own if n not in stand and n != following))
 
 
-def _bound_of_the_whole(problem: States) -> float:
-    """Return the lower bound from the finished structure, in which every order ends.
-
-    Minus infinity where there are too many grip sets to look at.
-    """
-    free, scene = replace(problem, goals=problem.goals[:1]), problem.network.scene
-    rules, kinds = free.free_rules, scene.grip_kinds
-    taken = {*scene.blocked_nodes, *(prop.node for prop in scene.props)}
-    nodes = [node for node in node_numbers(free.network) if node not in taken]
-    grips = [  # numbers, of robots of every kind
-        node + kind * kinds.span
-        for kind in np.unique(kinds.of_robot[: len(scene.robots)]).tolist()
-        for node in nodes
-        if can_hold(scene, kind, node)
-    ]
-    fewest = max(1, rules.fewest_grips(scene) - len(scene.props))
-    held, least = range(fewest, free.space.robots + 1), -np.inf
-    if sum(comb(len(grips), count) for count in held) <= MOST_SETS:
-        least = min((_least(free, grips, count) for count in held), default=np.inf)
-    return least if rules.how_it_ends is Ending.HELD else max(least, _least(free, grips, 0))
-
-
-def _least(free: States, grips: list[int], count: int) -> float:
-    """Return the least value of the whole structure with so many grips; infinite if none fits."""
-    sets = np.array([*combinations(grips, count)], dtype=np.int64)
-    sets = sets.reshape(comb(len(grips), count), count)
-    nodes = np.sort(free.network.scene.grip_kinds.split(sets)[0], axis=1)
-    sets = sets[(np.diff(nodes, axis=1) > 0).all(axis=1)]  # nobody holds what another one holds
-    found = ask(free, len(free.network.inner), sets)
-    return float(found.values[found.fit, 0].min(initial=np.inf))
-
-
-def build_parts(problem: States) -> OneSchedule:
-    """Return the states of a problem in parts, as a judge rebuilds them."""
-    return OneSchedule(problem) if problem.orders is None else AllOrders(problem)
-
-
 Hint = Mapping[int, Ints]  # states that a search visited, by level
 
 
@@ -256,12 +219,11 @@ class Rebuilt:
             for source, move in coming
         ]
         entries = [none, self._hint.get(level, none), *(move.states for _, move in coming)]
-        if np.isfinite(self._asked.steps):
-            spent = [np.full(len(entries[1]), np.inf), *(self._spent[s] + 1 for s, _ in coming)]
-            given = np.concatenate(entries), np.concatenate(spent)
-            found = evaluator.reachable_in(level, *given, self._asked)
-        else:
-            found = evaluator.reachable(level, np.concatenate(entries), self._asked)
+        limited = np.isfinite(self._asked.steps)
+        far = np.full(len(entries[1]), np.inf if limited else 0.0)
+        spent = [far, *(self._spent[source] + limited for source, _ in coming)]
+        given = np.concatenate(entries), np.concatenate(spent)
+        found = evaluator.reachable(level, *given, self._asked)
         self._spent = np.concatenate([self._spent, found.spent])
         within = [(m.source + self._count, m) for m in found.onward if m.level == level]
         order = np.argsort(found.codes, kind="stable")
@@ -303,7 +265,7 @@ class Proof:
     """
 
     def __init__(self, problem: States, hint: Hint | None = None) -> None:
-        self._space = build_parts(problem)
+        self._space = OneSchedule(problem) if problem.orders is None else AllOrders(problem)
         self.evaluator = self._space.evaluator
         given = hint if problem.orders is None else None
         self._hint = {} if given is None else as_rows(problem, self.evaluator, given)
@@ -495,3 +457,172 @@ def as_rows(problem: States, evaluator: StateEvaluator, hint: Hint) -> dict[int,
         own = rows[:, [*order, *range(len(order), width)]].astype(tables.start().dtype)
         out[level] = tables.in_order(own)
     return out
+
+
+def label_bounds(
+    evaluator: StateEvaluator, rebuilt: Any, values: Sequence[float], found: Solution
+) -> Callable[[Graph], tuple[float, ...]]:
+    """Return what bounds the goals after those about margins, by labels, on rebuilt subgraphs.
+
+    ``rebuilt``: states, as of `seqopt.judge._proof.Rebuilt`; ``values``: of all goals; ``found``:
+    what is claimed, with labels. The function raises `SolverError` if labels are given that do not
+    prove what is claimed.
+    """
+    rows = _LabeledRows(evaluator, rebuilt, values, found)
+    return lambda graph: _GoalProofs(rows, graph, values, found).bounds()
+
+
+class _LabeledRows:
+    """The states that a better build could pass, by number, in the columns of the judge.
+
+    ``level`` (n,); ``rows`` (n, c); ``timed``: the same in time, if that counts.
+    """
+
+    def __init__(
+        self, evaluator: StateEvaluator, rebuilt: Any, values: Sequence[float], found: Solution
+    ) -> None:
+        self.evaluator, self._rebuilt = evaluator, rebuilt
+        self._margins = values[: evaluator.margins]
+        tables, problem = evaluator.tables, evaluator.problem
+        self.level = np.array(rebuilt.parts)[rebuilt.part_of()]
+        self.rows = np.concatenate([own[:, : tables.robots] for own in rebuilt.states])
+        columns = [r for kind in problem.space.kinds for r in kind.robots]
+        self._columns = [columns.index(r) for r in tables.team]  # of the search
+        clocks = (goal.twin.clocks for goal in problem.goals if goal.in_time)
+        self.timed = next((make(evaluator, rebuilt, found.motions) for make in clocks), None)
+
+    def clock(self, graph: Graph, proof: LabelProof, most: float, *, strict: bool) -> Any:
+        """Return the book of time, and which moves its arcs are."""
+        assert self.timed is not None
+        wide = proof.prices.ndim == 2 and proof.prices.shape[1] == 1 + len(self._columns)
+        if not wide:
+            raise SolverError("there is no price for every robot")
+        prices = proof.prices[:, [0, *(1 + c for c in self._columns)]]
+        return self.timed.clock(graph, prices, most, strict=strict)
+
+    def twins(self, graph: Graph, move: Ints) -> list[Book]:
+        """Return the books of the problem's own resources on some moves of a graph."""
+        problem, tables = self.evaluator.problem, self.evaluator.tables
+        nodes = np.full((len(self.rows), len(problem.network.scene.robots)), NONE)
+        nodes[:, list(tables.team)] = tables.nodes[self.rows.clip(min=0)]
+        bricks = np.array([tables.bricks_at(k) if k else 0 for k in range(tables.last + 1)])
+        source, target = graph.source[move], graph.target[move]
+        steps = StepArrays(bricks[self.level[target]], nodes[source], nodes[target])
+        return [TwinBook(each.twin, steps) for each in problem.paths if each.twin is not None]
+
+    def labels(self, proof: LabelProof, width: int) -> tuple[Ints, Floats]:
+        """Return labels (N, width) by the numbers of their states, as far as there are such.
+
+        Entries of robots that could change places are sorted, and with them their readiness.
+        """
+        count, tables = len(self._columns), self.evaluator.tables
+        states, values = proof.states, proof.labels
+        if len(states) and (states.ndim != 2 or states.shape[1] < 1 + count):
+            raise SolverError("labels are none of this build: they have other columns")
+        if len(states) != len(values) or values.shape[1:] != (width,):
+            return np.zeros(0, dtype=np.int64), np.zeros((0, width))
+        order = [0, *(1 + c for c in self._columns)]
+        states = states[:, [*order, *range(1 + count, states.shape[1])]]
+        if self.timed is not None:
+            values = values[:, [*order, *range(1 + count, width)]]
+            values = self.timed.in_order(states[:, 1 : 1 + count], values)
+        entries = tables.in_order(states[:, 1:].astype(tables.start().dtype))
+        none = np.zeros(0, dtype=np.int64)
+        numbers, labels = [none], [none]  # where builds begin a state may come twice
+        firsts = np.cumsum([0, *map(len, self._rebuilt.states)])
+        pairs = zip(self._rebuilt.parts, self._rebuilt.states, firsts[:-1], strict=True)
+        for level, rows, first in pairs:
+            own = np.flatnonzero(states[:, 0] == level)
+            if len(own) and len(rows):
+                codes, wanted = tables.codes(rows), tables.codes(entries[own])
+                sort = np.argsort(codes)
+                at = sort[np.searchsorted(codes, wanted, sorter=sort).clip(max=len(rows) - 1)]
+                same = codes[at] == wanted
+                numbers.append(first + at[same])
+                labels.append(own[same])
+        number, label = np.concatenate(numbers), np.concatenate(labels)
+        known = np.isfinite(values[label]).all(axis=1)
+        return number[known], values[label[known]]
+
+    def fallen(self, states: Ints) -> Bools:
+        """Return which states of some numbers are proven to fall; where it begins none is."""
+        out = np.zeros(len(states), dtype=bool)
+        if not self.evaluator.demands(self._margins):
+            return out
+        for level in np.unique(self.level[states]).tolist():
+            own = np.flatnonzero((self.level[states] == level) & (states > 0))
+            out[own] = ~self.evaluator.may_stand(level, self.rows[states[own]], self._margins)
+        return out
+
+
+class _GoalProofs:
+    """Bounds on the goals of a build in time, each where those before it are at their values."""
+
+    def __init__(
+        self, rows: _LabeledRows, graph: Graph, values: Sequence[float], found: Solution
+    ) -> None:
+        self._rows, self._graph, self._values, self._found = rows, graph, values, found
+        problem = rows.evaluator.problem
+        self._aims = len(problem.aims)
+        self._is_time = [goal.in_time for goal in problem.goals]
+        self._time, self._sums = np.inf, list[tuple[int, float]]()
+        for k, cap in zip(range(self._aims, len(values)), problem.budgets, strict=True):
+            self._cap(k, tied(cap))
+        cures = rows.timed is not None and rows.timed.cures
+        self._filtered = not (problem.budgets or cures or problem.paths)
+
+    def _cap(self, k: int, most: float) -> None:
+        """Let builds take no more of a goal from now on."""
+        if self._is_time[k]:
+            self._time = min(self._time, most)
+        elif self._graph.peaks[k]:
+            self._graph = self._graph.only(self._graph.amounts[:, k] <= most)
+        else:
+            self._sums.append((k, most))
+
+    def bounds(self) -> tuple[float, ...]:
+        """Return lower bounds of the aims after those about margins."""
+        proofs, out = iter(self._found.proofs), list[float]()
+        for k in range(self._rows.evaluator.margins, self._aims):
+            value = self._values[k]
+            if self._filtered and not self._is_time[k]:
+                proven = cut if self._graph.peaks[k] else potentials
+                bound, kept = proven(self._graph, k, value)
+                self._graph = self._graph.only(kept)
+                out.append(bound)
+                continue
+            self._filtered = False
+            proof = next(proofs, None)
+            out.append(-np.inf if proof is None else self._by_labels(k, proof))
+            self._cap(k, tied(value))
+        return tuple(out)
+
+    def _by_labels(self, k: int, proof: LabelProof) -> float:
+        """Return the bound of a goal that labels prove, or multipliers alone."""
+        claimed, graph = min(self._found.bound[k], self._values[k]), self._graph
+        if not np.isfinite(claimed):
+            return -np.inf
+        columns = [column for column, _ in self._sums]
+        caps = [self._time, *(most for _, most in self._sums)]
+        strict = [False] * len(caps)
+        if self._is_time[k]:
+            caps[0], strict[0] = limit_below(claimed), True
+        elif graph.peaks[k]:
+            graph = graph.only(kept_below(graph.amounts[:, k], claimed))
+        else:
+            columns, strict = [*columns, k], [*strict, True]
+            caps.append(limit_below(claimed))
+        books, move = list[Book](), np.arange(len(graph.source))
+        if self._rows.timed is not None:
+            clock, move = self._rows.clock(graph, proof, caps[0], strict=strict[0])
+            books.append(clock)
+        if columns:
+            limits = np.array(caps[1:]), np.array(strict[1:])
+            books.append(SumBook(graph, move, graph.amounts[:, columns], limits))
+        closed = Closed(graph, move, [*books, *self._rows.twins(graph, move)])
+        if closed.is_proof(self._rows.labels(proof, closed.width), self._rows.fallen):
+            return claimed
+        if len(proof.labels):
+            goal = self._rows.evaluator.problem.names[k]
+            raise SolverError(f"{goal}: labels do not prove that no build is below {claimed:.9g}")
+        return min(clock.bound, claimed) if self._is_time[k] else -np.inf

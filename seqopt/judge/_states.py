@@ -178,36 +178,13 @@ class StateEvaluator:
         asked = Filter((), margins, exact=True)
         return any(not self.valued(*state, asked)[1].all() for state in self.tables.certain())
 
-    def reachable(self, level: int, entries: Ints, asked: Filter) -> Reachable:
-        """Return the states that pass and are reached from entries (n, c) on the same level."""
-        seen, count, fresh = np.zeros(0, dtype=np.int64), 0, entries
-        none = np.zeros((0, len(self.problem.goals)))
-        parts = [Reachable(seen, entries[:0], none, [], np.zeros(0))]
-        while len(fresh):
-            own, at = np.unique(self.tables.codes(fresh), return_index=True)
-            new = ~np.isin(own, seen, assume_unique=True)
-            seen, rows = np.concatenate([seen, own[new]]), fresh[at[new]]
-            values, ok = self.valued(level, rows, asked)
-            onward = [
-                move._replace(source=move.source + count)
-                for move in self.tables.successors(level, rows[ok])
-            ]
-            parts.append(Reachable(own[new][ok], rows[ok], values[ok], onward, np.zeros(0)))
-            count += int(ok.sum())
-            fresh = np.concatenate([entries[:0], *(m.states for m in onward if m.level == level)])
-        codes, rows, values = map(np.concatenate, zip(*(part[:3] for part in parts), strict=True))
-        onward = [move for part in parts for move in part.onward]
-        return Reachable(codes, rows, values, onward, np.zeros(len(codes)))
+    def reachable(self, level: int, entries: Ints, spent: Floats, asked: Filter) -> Reachable:
+        """Return the states that pass and are reached from entries (n, c) on the same level.
 
-    def reachable_in(self, level: int, entries: Ints, spent: Floats, asked: Filter) -> Reachable:
-        """Return the same of states on paths of few enough steps; ``spent`` (n,): to entries.
-
-        Those to which the fewest steps lead come first, so that no state is looked at twice.
+        ``spent`` (n,): steps to entries. Those to which the fewest steps lead come first, so that
+        no state is looked at twice where steps are limited; where they are not, all are zero.
         """
-        goal = next(goal for goal in self.problem.goals if not goal.is_peak)
-        twin, onward = twin_of(goal), list[Transitions]()
-        assert twin is not None
-        assert twin.to_go is not None  # as is required where steps are limited
+        limited, onward = np.isfinite(asked.steps), list[Transitions]()
         codes, states, values = self.tables.codes(entries[:0]), entries[:0], np.zeros((0, 0))
         steps, ok, left = np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
         fresh = entries
@@ -215,8 +192,9 @@ class StateEvaluator:
             own = self.tables.codes(fresh)
             first = np.lexsort((spent, own))
             first = first[np.unique(own[first], return_index=True)[1]]
-            few = spent[first] + twin.to_go(self.tables, level, fresh[first]) <= asked.steps
-            first = first[few]
+            if limited:
+                to_go = self._steps_to_go(level, fresh[first])
+                first = first[spent[first] + to_go <= asked.steps]
             order = np.argsort(codes, kind="stable")
             at = np.searchsorted(codes, own[first], sorter=order).clip(max=len(codes) - 1)
             known = np.zeros(len(first), dtype=bool)
@@ -241,10 +219,16 @@ class StateEvaluator:
             onward += moves
             within = [move for move in moves if move.level == level]
             fresh = np.concatenate([entries[:0], *(move.states for move in within)])
-            spent = np.concatenate([steps[:0], *(steps[move.source] + 1 for move in within)])
+            spent = np.concatenate([steps[:0], *(steps[m.source] + limited for m in within)])
         number = np.cumsum(ok) - 1
         onward = [move._replace(source=number[move.source]) for move in onward]
         return Reachable(codes[ok], states[ok], values[ok], onward, steps[ok])
+
+    def _steps_to_go(self, level: int, states: Ints) -> Floats:
+        """Return how many steps builds have at least from states on, where steps are limited."""
+        twins = (twin_of(goal) for goal in self.problem.goals if not goal.is_peak)
+        to_go = next(twin.to_go for twin in twins if twin is not None and twin.to_go is not None)
+        return to_go(self.tables, level, states)
 
     def valued(self, level: int, states: Ints, asked: Filter) -> tuple[Floats, Bools]:
         """Return values of goals in states (n, g), and which states pass a filter (n,)."""
