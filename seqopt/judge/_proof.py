@@ -30,7 +30,7 @@ from seqopt.graph.paths import (
     tied,
 )
 from seqopt.graph.states.states import States
-from seqopt.judge._budget_proof import is_beyond
+from seqopt.judge._bounds import is_beyond
 from seqopt.judge._rule_moves import RuleTables, Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator
 from seqopt.judge._twin import twin_of

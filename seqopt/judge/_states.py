@@ -21,7 +21,7 @@ from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._blocks import Block
-from seqopt.responses._grip_sets import KnownRows, solve_sets
+from seqopt.responses._grip_sets import solve_sets
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Payload
 from seqopt.sequence.schedule import Schedule
@@ -153,7 +153,7 @@ class StateEvaluator:
         more = [kind * kinds.span for kind in range(len(kinds.turns))]
         self._numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
         self._beyond = len(nodes) * kinds.of_robot[list(self.tables.team)]
-        self._known, self._standing = KnownRows(), dict[Standing, tuple[StandingSets, ...]]()
+        self._standing = dict[Standing, tuple[StandingSets, ...]]()
         self._exact = not _six_digits_do(problem)
         self.models = 0  # how often the engine was asked of a grip set, in any scenario
 
@@ -305,12 +305,9 @@ class StateEvaluator:
             rows = np.flatnonzero(count == grips)
             places = held[rows, robots - grips :]
             codes = places @ len(self._numbers) ** np.arange(grips)
-
-            def compute(new: Ints, places: Ints = places) -> Floats:
-                return self._computed(bricks, self._numbers[places[new]], asked, below)
-
-            key = (bricks, grips, below, asked.exact, *asked.values)
-            found = self._known.of(key, codes, compute)
+            _, first, again = np.unique(codes, return_index=True, return_inverse=True)
+            numbers = self._numbers[places[first]]
+            found = self._computed(bricks, numbers, asked, below)[again]
             out[rows, :goals] = found[:, :goals]
             out[rows, goals + robots - grips :] = found[:, goals:]
         return out[:, :goals], out[:, goals:-1], out[:, -1] > 0

@@ -31,7 +31,7 @@ from seqopt.graph.states.explored import (
     with_margin,
 )
 from seqopt.graph.states.states import States
-from seqopt.judge._budget_proof import is_kept, least_within
+from seqopt.judge._bounds import is_kept, least_within
 from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, Amount, worst
@@ -53,6 +53,7 @@ from seqopt.sequence._rule_check import RuleBook, unbearable
 from seqopt.sequence._rule_space import loads
 from seqopt.sequence.methods import _enough_reach
 from seqopt.sequence.rules import FREE, FreeRules, Payload
+from seqopt.sequence.schedule import OpenStep
 from seqopt.sequence.steps import Step
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
@@ -502,8 +503,8 @@ def _payload_said(newton: float) -> str:
 
 def _unbearable(problem: States) -> dict[int, str]:
     """Return the steps in which a robot cannot bear its brick, and why; of rules there are none."""
-    rules = problem.rules
-    return {} if rules.method == FREE else unbearable(_scenes(problem), rules.steps, rules.begin)
+    steps: Sequence[OpenStep] = getattr(problem.rules, "steps", ())
+    return unbearable(_scenes(problem), steps, problem.rules.begin)
 
 
 def _scenes(problem: States) -> tuple[Scene, ...]:

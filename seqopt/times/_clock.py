@@ -10,9 +10,9 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import _to_go
+from seqopt.judge._bounds import Book, is_beyond_limits
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
-from seqopt.judge.arithmetic import Book, is_beyond_limits
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.times._acts import Acts, Team, acts_of_rows

@@ -11,7 +11,8 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.graph.graph import Graph, TimedGraph
 from seqopt.graph.instance import Instance
-from seqopt.judge.arithmetic import Book, Claim, Closed, Labels, Stage, SumBook, _sum, limit_below
+from seqopt.judge._bounds import Book, Closed, SumBook, limit_below
+from seqopt.judge.arithmetic import Claim, Labels, Stage, _sum
 from seqopt.times._acts import acts_of_instance
 from seqopt.times._clock import Clock
 

@@ -16,8 +16,8 @@ from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.decisions import steps_over, travel
 from seqopt.graph.formulation import End, FormulationKind, formulations
 from seqopt.graph.graph import Graph
-from seqopt.judge import _budget_proof as budget_proof
-from seqopt.judge._budget_proof import least_within
+from seqopt.judge import _bounds as budget_proof
+from seqopt.judge._bounds import least_within
 from seqopt.judge.arithmetic import budget_bounds
 from seqopt.plan._infeasible import smallest_conflict
 from seqopt.plan.solve import solve

@@ -17,8 +17,8 @@ from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.paths import distances, keep_best, least_peak, lexicographic_bounds, reached
 from seqopt.graph.states.explored import explore, floors_of_goals
 from seqopt.graph.states.states import build_states
-from seqopt.judge import _budget_proof as budget_proof
-from seqopt.judge._budget_proof import least_within
+from seqopt.judge import _bounds as budget_proof
+from seqopt.judge._bounds import least_within
 from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.judge._states import Filter, StateEvaluator
 from seqopt.plan.solve import solve

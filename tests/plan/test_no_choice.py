@@ -179,8 +179,8 @@ def test_that_budgets_conflict_is_proven(bounds, kind, error, said):
 )
 def test_a_heuristic_only_says_that_it_found_none(monkeypatch, kind, error, said):
     """Where the judge gives up, as here with no partial choice kept, an exact one claims it."""
-    monkeypatch.setattr("seqopt.judge._budget_proof.MOST", 0)
-    monkeypatch.setattr("seqopt.judge._budget_proof.MIXTURES", 0)
+    monkeypatch.setattr("seqopt.judge._bounds.MOST", 0)
+    monkeypatch.setattr("seqopt.judge._bounds.MIXTURES", 0)
     costs = LayeredCosts((np.ones(2),) * 2, (np.zeros((1, 2)), np.zeros((2, 2))))
     both = [(np.array([0.5, 2.0])[::turn],) * 2 for turn in (1, -1)]
     budgets = tuple(Budget(f"b{k}", b, costs.shared, 2.5) for k, b in enumerate(both))

@@ -102,8 +102,8 @@ def test_an_optimum_within_budgets_is_proven_or_claimed(engine25, monkeypatch):
     plan = seqopt.solve(tight, "overlap_mip")
     assert plan.certificate.gap <= 1e-6
     assert plan.summary()["status"] == "optimal"
-    monkeypatch.setattr("seqopt.judge._budget_proof.MOST", 1)
-    monkeypatch.setattr("seqopt.judge._budget_proof.MIXTURES", 2)
+    monkeypatch.setattr("seqopt.judge._bounds.MOST", 1)
+    monkeypatch.setattr("seqopt.judge._bounds.MIXTURES", 2)
     plan = seqopt.solve(tight, "overlap_mip")
     assert plan.certificate.gap > 1e-6 >= plan.certificate.claimed_gap
     assert plan.summary()["status"] == "claimed optimal"

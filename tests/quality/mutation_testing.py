@@ -55,7 +55,7 @@ STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
 PROOFS = {
     "seqopt.judge.arithmetic": ("judge/test_certificate", "judge/test_budget_proof"),
     "seqopt.plan._answers": ("judge/test_certificate", "formulations/test_conformance"),
-    "seqopt.judge._budget_proof": ("judge/test_proofs", "judge/test_budget_proof"),
+    "seqopt.judge._bounds": ("judge/test_proofs", "judge/test_budget_proof"),
     "seqopt.judge.certificate": (
         *("judge/test_certificate", "plan/test_values", "judge/test_proofs"),
         "agreement/test_pair_search",
