@@ -120,3 +120,10 @@ def test_the_chart_has_lines_for_few_and_a_map_for_many(count):
     assert len(axes[0].lines) == (3 if count == 2 else 0)  # two lines, and crosses of no plan
     assert len(axes[0].images) == (count == 8)
     assert axes[0].get_xlabel() == "span"
+
+
+def test_without_matplotlib_the_chart_is_left_out_and_it_says_so(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("seqopt._cli.outputs.find_spec", lambda name: None)
+    assert told("chain:bricks=7", "--out", str(tmp_path)) == 0
+    assert "figures are left out" in capsys.readouterr().err
+    assert {path.name for path in tmp_path.iterdir()} == {"sweep.csv", "sweep.json"}

@@ -74,7 +74,7 @@ def run(asked: Sweep) -> Answer:
         text=f"{text}; written to {asked.path}" if written else "",
         data="" if written else csv_text(table),
         written=written,
-        notes=() if written else (text,),
+        notes=outputs.figure_notes(written) if written else (text,),
         status=Status.NO_ANSWER if none else Status.DONE,
         value=table,
     )
@@ -131,8 +131,8 @@ def _begun(asked: Sweep, folder: Path, count: int) -> Path:
 
 def _chart(table: pd.DataFrame, names: list[str]) -> dict[str, bytes]:
     """Return files of the chart over what differs; none where nothing can be drawn."""
-    from seqopt.report._sweep_chart import draw_sweep  # noqa: PLC0415  # matplotlib is an extra
-
     if outputs.figure_notes() or not table.columns.str.endswith("_bound").any():
         return {}
+    from seqopt.report._sweep_chart import draw_sweep  # noqa: PLC0415  # matplotlib is an extra
+
     return outputs.picture(CHART, lambda _: draw_sweep(table, [n for n in names if n in table]))
