@@ -7,11 +7,10 @@ moment, and checked at the corners, where the stress is largest.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
@@ -74,6 +73,7 @@ def first_points(face: Ints, faces: int) -> Ints:
 
 
 _STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
+_CHUNK = 1_000_000  # corners of sets whose stress is held at once
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,26 +105,10 @@ class ElasticLimits(FrozenValue):
 
     def exceeded(self, wrench: Floats) -> Bools:
         """Return which grip sets (S,) leave the elastic limits anywhere, beyond rounding."""
-        margin, size = _STRESS_MARGIN * self.assembly.stress_scale, np.abs(wrench)
-        may = np.zeros(len(wrench), dtype=bool)
-        if self._may_exceed(size.max(axis=0, initial=0.0)[None], margin).any():  # as a rule not
-            may = self._may_exceed(size, margin)
-            may[may] = self.excess(wrench[may]).max(axis=1, initial=-np.inf) > margin
-        return may
-
-    def _may_exceed(self, size: Floats, margin: float) -> Bools:
-        """Return which wrenches with parts up to a size (S, J, 6) may: a tenth of the work."""
-        most = np.einsum("qji,sji->qsj", self._largest, size).max(axis=2, initial=-np.inf)
-        strength = np.array([[self.mortar.tensile_strength], [self.mortar.cohesion]])
-        return np.asarray((most - strength > margin).any(axis=0))
-
-    @cached_property
-    def _largest(self) -> Floats:
-        """Tension, and shear with friction, at any corner for the parts of wrenches, (2, J, 6)."""
-        tension, shear = np.abs(self.stress[:, 0]), np.linalg.norm(self.stress[:, 1:], axis=1)
-        each = np.stack([tension, shear + self.mortar.friction * tension])
-        starts = first_points(self.assembly.contact, len(self.assembly.bodies))
-        return frozen(np.maximum.reduceat(each, starts, axis=1))
+        margin, size = _STRESS_MARGIN * self.assembly.stress_scale, _CHUNK // len(self.stress) + 1
+        chunks = (wrench[start : start + size] for start in range(0, len(wrench), size))
+        most = [self.excess(chunk).max(axis=1, initial=-np.inf) for chunk in chunks]
+        return np.asarray(np.concatenate([np.zeros(0), *most]) > margin)
 
 
 def find_elastic_limits(network: Network, mortar: Mortar) -> ElasticLimits:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -12,7 +14,7 @@ from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen, skew
 from seqopt.errors import SceneError
 from seqopt.network._mechanics import spread
 from seqopt.network.network import GROUND
-from seqopt.scene._checks import frames, units
+from seqopt.scene._checks import frames, settle, units
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -70,15 +72,11 @@ class Assembly(FrozenValue):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        numbers = ("centroid", "weight", "normal", "corner", "grip_position", "payload", "applied")
-        for name in (*numbers, "grip_line", "bond"):
-            values = getattr(self, name)
-            if not isinstance(values, np.ndarray) or not np.isfinite(values).all():
+        for name, values in vars(self).items():
+            if isinstance(values, np.ndarray) and not np.isfinite(values).all():
                 raise SceneError(f"assembly: {name} holds a number that is not finite")
         blocks = len(self.centroid)
-        if not blocks:
-            raise SceneError("assembly: it has no blocks; give at least one")
-        if ((self.bodies < GROUND) | (self.bodies >= blocks)).any():
+        if not blocks or ((self.bodies < GROUND) | (self.bodies >= blocks)).any():
             raise SceneError(f"assembly: bodies name blocks beyond 0 to {blocks - 1}")
         if (self.bodies[:, 1] == GROUND).any():
             raise SceneError("assembly: the ground is a contact's second body; name it first")
@@ -88,8 +86,15 @@ class Assembly(FrozenValue):
 
     def with_bond(self, shares: Floats) -> Assembly:
         """Return a copy with other shares of the mortar's bond, (C,); cached values are kept."""
-        out: Assembly = Assembly.__new__(Assembly)
-        out.__setstate__({**vars(self), "bond": np.array(shares, dtype=float)})
+        out = copy(self)
+        settle(out, bond=frozen(np.array(shares, dtype=float)))
+        return out
+
+    @classmethod
+    def cut(cls, **values: Any) -> Assembly:
+        """Return a part of an assembly that was checked, with cached values that are known."""
+        out = cls.__new__(cls)
+        out.__setstate__(values)
         return out
 
     @cached_property
@@ -137,14 +142,21 @@ class Assembly(FrozenValue):
         return frozen(frames(self.normal, units(first)))
 
     @cached_property
+    def levers(self) -> Floats:
+        """The longer distance of every corner from the centroids of its blocks, (K,) m."""
+        out = np.zeros(len(self.corner))
+        for body in self.bodies[self.contact].T:
+            real = body != GROUND
+            arm = self.corner[real] - self.centroid[body[real]]
+            out[real] = np.maximum(out[real], np.linalg.norm(arm, axis=1))
+        return frozen(out)
+
+    @cached_property
     def scales(self) -> tuple[float, float]:
         """A force (N) and a length (m) to compare in: the heaviest block, the longest lever."""
         force = float(np.linalg.norm(self.weight, axis=1).max())
-        levers = [np.linalg.norm(self.grip_position - self.centroid[self.grip_block], axis=1)]
-        for body in self.bodies[self.contact].T:
-            real = body != GROUND
-            levers.append(np.linalg.norm(self.corner[real] - self.centroid[body[real]], axis=1))
-        return force or 1.0, float(np.concatenate(levers).max(initial=0.0)) or 1.0
+        grips = np.linalg.norm(self.grip_position - self.centroid[self.grip_block], axis=1)
+        return force or 1.0, float(max(self.levers.max(initial=0.0), grips.max(initial=0.0))) or 1.0
 
     @cached_property
     def stress_scale(self) -> float:

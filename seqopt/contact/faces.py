@@ -18,7 +18,7 @@ from seqopt.arrays import Floats, frozen
 from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
-from seqopt.scene.parts import THICKEST, Brick, Prop
+from seqopt.scene.parts import THICKEST, Brick
 from seqopt.scene.shape import clip
 
 _OVERLAP = 0.05  # by which bricks may interpenetrate, over their smallest dimension
@@ -109,9 +109,7 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     SceneError
         If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
     """
-    pairs = zip(grips, network.scene.robots, strict=True)
-    held = [(node, robot.payload) for node, robot in pairs if node is not None]
-    return replace(bare_assembly(network, bricks), **_grip_fields(network, bricks, held))
+    return replace(bare_assembly(network, bricks), **_grip_fields(network, bricks, grips))
 
 
 def bare_assembly(network: Network, bricks: int) -> Assembly:
@@ -205,19 +203,17 @@ def _polygon_area(polygon: Floats) -> float:
 class _PropGrips(NamedTuple):
     """The grips of props on a partial structure.
 
-    ``payload`` (p,): N; ``line`` (p, 3): unit vectors, zero where any direction will do;
-    ``applied`` (B, 6): as of `seqopt.contact.assembly.Assembly`, no rows where none push.
+    What holds both ways is a grip like that of a robot. One that only pushes bears from nothing to
+    its capacity along its line, and nothing across it: half the capacity is applied for good, and a
+    grip along the line adds as much or takes it away. ``payload`` (p,): N; ``line`` (p, 3): unit
+    vectors, zero where any direction will do; ``applied`` (B, 6): as of `Assembly`, no rows where
+    none push.
     """
 
-    props: tuple[Prop, ...]
+    nodes: tuple[int, ...]
     payload: Floats
     line: Floats
     applied: Floats
-
-    @property
-    def nodes(self) -> tuple[int, ...]:
-        """The nodes that they hold."""
-        return tuple(prop.node for prop in self.props)
 
 
 def _prop_grips(network: Network, bricks: int, *, held: bool) -> _PropGrips:
@@ -239,7 +235,7 @@ def _prop_grips(network: Network, bricks: int, *, held: bool) -> _PropGrips:
         arm = np.subtract(scene.node_position(props[i].node), brick.position)
         force = payload[i] * line[i]
         applied[scene.since[brick.name] - 1] += np.concatenate([force, np.cross(arm, force)])
-    return _PropGrips(props, payload, line, applied)
+    return _PropGrips(tuple(prop.node for prop in props), payload, line, applied)
 
 
 def _applied_rows(network: Network, bricks: int, props: _PropGrips | None = None) -> Floats:
@@ -250,20 +246,22 @@ def _applied_rows(network: Network, bricks: int, props: _PropGrips | None = None
     return applied + props.applied
 
 
-def _grip_fields(
-    network: Network, bricks: int, held: Sequence[tuple[int, float]]
-) -> dict[str, Any]:
-    """Return the fields of an assembly that depend on its grips, by name.
+def _grip_fields(network: Network, bricks: int, grips: Sequence[int | None]) -> dict[str, Any]:
+    """Return the fields of an assembly that depend on its grips, by name; props follow robots.
 
-    ``held``: node and payload (N) of every robot that holds one; props follow.
+    Grips beyond those of the scene's robots bear what the strongest of these does.
     """
-    scene, props = network.scene, _prop_grips(network, bricks, held=bool(held))
+    scene = network.scene
+    payload = [robot.payload for robot in scene.robots]
+    payload += [max(payload, default=0.0)] * (len(grips) - len(payload))
+    held = [(n, most) for n, most in zip(grips, payload, strict=True) if n is not None]
+    props = _prop_grips(network, bricks, held=bool(held))
     nodes = [*(node for node, _ in held), *props.nodes]
     blocks = [scene.since[scene.brick_of_node[node].name] - 1 for node in nodes]
     return {
         "grip_block": np.array(blocks, dtype=np.int64),
         "grip_position": np.array([scene.node_position(n) for n in nodes]).reshape(-1, 3),
-        "payload": np.array([*(payload for _, payload in held), *props.payload]),
+        "payload": np.array([*(most for _, most in held), *props.payload]),
         "applied": _applied_rows(network, bricks, props),
         "grip_line": np.concatenate([np.zeros((len(held), 3)), props.line]),
     }
@@ -275,30 +273,24 @@ _KEPT = 3000  # bricks in all partial structures that are kept, some 5 kB each
 class PartialAssemblies:
     """Cuts the assemblies of steps, as of `step_assembly`, from one whole.
 
-    Its maps differ by rounding, and all else in no bit. Raises a `SceneError` if bricks that share
-    a joint do not touch, even in a step that is not asked for.
+    The parts of a partial structure come first in a network, and so do its contacts and corners in
+    the assembly of the whole. Only what is largest or heaviest in it, and all lengths over a lever,
+    differ: maps by rounding, and all else in no bit. Raises a `SceneError` if bricks that share a
+    joint do not touch, even in a step that is not asked for.
     """
 
     def __init__(self, network: Network, bricks: int) -> None:
         self.network, self.bricks = network, bricks
         self._whole = whole = bare_assembly(network, bricks)
         self._heaviest = np.maximum.accumulate(np.linalg.norm(whole.weight, axis=1))
-        lever = np.zeros(len(whole.corner))
-        for body in whole.bodies[whole.contact].T:
-            real = body != GROUND
-            arm = whole.corner[real] - whole.centroid[body[real]]
-            lever[real] = np.maximum(lever[real], np.linalg.norm(arm, axis=1))
-        self._lever = np.maximum.accumulate(lever)
+        self._lever = np.maximum.accumulate(whole.levers)
         self._map = whole.contact_map.tocsc()
         self._turning = self._map.indices % 6 >= 3  # which entries are moments
         self._last: dict[tuple[int, float], sparse.csr_array] = {}  # asked again by its next step
         self._made: dict[tuple[int, tuple[int | None, ...]], Assembly] = {}
 
     def __call__(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
-        """Return a partial structure with the grips that hold it; those made last are kept.
-
-        Grips beyond those of the scene's robots bear what the strongest of these does.
-        """
+        """Return a partial structure with the grips that hold it; those made last are kept."""
         key = bricks, (*grips,)
         if key not in self._made:
             if len(self._made) >= max(_KEPT // bricks, 1):
@@ -310,38 +302,32 @@ class PartialAssemblies:
         whole = self._whole
         contacts = len(self.network.springs.acting(bricks))
         corners = int(np.searchsorted(whole.contact, contacts))
-        payload = [robot.payload for robot in self.network.scene.robots]
-        payload += [max(payload, default=0.0)] * (len(grips) - len(payload))
-        pairs = zip(grips, payload, strict=True)
-        held = [(node, most) for node, most in pairs if node is not None]
-        part: Assembly = Assembly.__new__(Assembly)
-        part.__setstate__(  # as one that was checked before
-            {
-                "block_name": whole.block_name[:bricks],
-                "centroid": whole.centroid[:bricks],
-                "weight": whole.weight[:bricks],
-                "contact_name": whole.contact_name[:contacts],
-                "bodies": whole.bodies[:contacts],
-                "normal": whole.normal[:contacts],
-                "corner": whole.corner[:corners],
-                "contact": whole.contact[:corners],
-                **_grip_fields(self.network, bricks, held),
-                "bond": np.zeros(0),
-                "corner_area": whole.corner_area[:corners],
-                "area": whole.area[:contacts],
-                "axes": whole.axes[:contacts],
-            }
+        ends = (
+            (bricks, ("block_name", "centroid", "weight")),
+            (contacts, ("contact_name", "bodies", "normal", "area", "axes")),
+            (corners, ("corner", "contact", "corner_area")),
         )
-        levers = np.linalg.norm(part.grip_position - part.centroid[part.grip_block], axis=1)
+        fields = _grip_fields(self.network, bricks, grips)
+        own = whole.centroid[fields["grip_block"]]
+        levers = np.linalg.norm(fields["grip_position"] - own, axis=1)
         longest = max(self._lever[:corners].max(initial=0.0), levers.max(initial=0.0))
         scales = float(self._heaviest[bricks - 1]) or 1.0, float(longest) or 1.0
-        key = bricks, scales[1]
+        return Assembly.cut(
+            **{name: getattr(whole, name)[:end] for end, names in ends for name in names},
+            **fields,
+            bond=np.zeros(0),
+            scales=scales,
+            contact_map=self._contact_map(bricks, corners, scales[1]),
+        )
+
+    def _contact_map(self, bricks: int, corners: int, lever: float) -> sparse.csr_array:
+        """Return the first columns of the whole's map, its moments over another lever."""
+        key = bricks, lever
         if key not in self._last:
             ends = self._map.indptr[: 3 * corners + 1]
             kept = slice(0, int(ends[-1]))
-            ratio = np.where(self._turning[kept], whole.scales[1] / scales[1], 1.0)  # of levers
+            ratio = np.where(self._turning[kept], self._whole.scales[1] / lever, 1.0)
             entries = self._map.data[kept] * ratio, self._map.indices[kept], ends
             shape = 6 * bricks, 3 * corners
             self._last = {key: sparse.csc_array(entries, shape=shape).tocsr()}
-        part.__setstate__({"scales": scales, "contact_map": self._last[key]})
-        return part
+        return self._last[key]

@@ -69,9 +69,6 @@ def _is_as_strong(mortar: Mortar, other: Mortar) -> bool:
     """Return whether a mortar carries whatever another one does: what stands with that, stands.
 
     Friction takes from what is carried in shear where a contact is pulled: there it must be equal.
-
-    >>> _is_as_strong(EPOXY, DRY), _is_as_strong(DRY, EPOXY)
-    (True, False)
     """
     slides = mortar.friction - other.friction
     return (
@@ -82,11 +79,7 @@ def _is_as_strong(mortar: Mortar, other: Mortar) -> bool:
 
 
 def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:
-    """Return the mortar of a bond with the same strength in tension and in shear, Pa.
-
-    >>> bond_mortar(3e3, friction=0.5)
-    Mortar(friction=0.5, tensile_strength=3000.0, cohesion=4500.0)
-    """
+    """Return the mortar of a bond with the same strength in tension and in shear, Pa."""
     strength = not_negative("mortar: tensile_strength", strength)
     friction = not_negative("mortar: friction", friction)
     return Mortar(friction=friction, tensile_strength=strength, cohesion=strength * (1 + friction))
@@ -111,11 +104,7 @@ def find_mortar(mortar: Mortar | str) -> Mortar:
 
 
 def _mortar_name(mortar: Mortar) -> str:
-    """Return what a mortar is called: as `find_mortar` takes it, or its strengths.
-
-    >>> _mortar_name(DRY), _mortar_name(bond_mortar(3e3)), _mortar_name(Mortar(friction=0.6))
-    ('dry', 'bond=3000', 'dry, friction 0.6')
-    """
+    """Return what a mortar is called: as `find_mortar` takes it, or its strengths."""
     tension, cohesion = mortar.tensile_strength, mortar.cohesion
     named = (
         n for n, m in MORTARS.items() if (m.tensile_strength, m.cohesion) == (tension, cohesion)
@@ -129,11 +118,7 @@ def _mortar_name(mortar: Mortar) -> str:
 
 
 def _with_mortar(name: str) -> str:
-    """Return a mortar's name as what a structure stands with.
-
-    >>> _with_mortar("dry"), _with_mortar("epoxy")
-    ('dry', 'with epoxy')
-    """
+    """Return a mortar's name as what a structure stands with: dry, or with epoxy."""
     return name if name.partition(",")[0] == "dry" else f"with {name}"
 
 
@@ -151,21 +136,11 @@ class Curing(Terse):
     A joint's age counts from when the brick that closes it is in its place. Tensile strength and
     cohesion grow with the share; friction is there from the first.
 
-    Parameters
-    ----------
-    points : tuple of (float, float)
-        Ages, s, and the share that is reached then, both rising; the last share is 1. Before the
-        first point there is no bond. No points at all: it never cures.
-    joints : tuple of (str, tuple of (float, float))
-        Names of joints, as ``5-6``, that have points of their own.
+    ``points``: ages, s, and the share that is reached then, both rising; the last share is 1.
+    Before the first point there is no bond. No points at all: it never cures. ``joints``: names of
+    joints, as ``5-6``, and points of their own. Raises `SceneError` if ages or shares do not rise,
+    or the last share is not 1.
 
-    Raises
-    ------
-    SceneError
-        If ages or shares do not rise, or the last share is not 1.
-
-    Examples
-    --------
     >>> Curing(((300.0, 0.4), (900.0, 1.0))).share(600.0)
     0.4
     >>> _find_curing("15min").share(90.0)

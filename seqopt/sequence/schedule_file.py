@@ -70,14 +70,14 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     Other columns are ignored. A take-down may begin with any bricks.
     """
     steps: list[Step] = []
-    for line, _, step in _read_steps(scene, text, f"plan {source}"):
-        if step.moves:
+    for line, _, read in _read_steps(scene, text, f"plan {source}"):
+        if read.moves:
             raise StepError(
                 f"plan {source}, line {line}: a grip is ?, open; give its node, or optimize the "
                 "file as a schedule"
             )
-        nodes = (grip if isinstance(grip, int) else None for grip in step.grips)
-        steps.append(Step(step.number, step.kind, step.bricks, tuple(nodes)))
+        nodes = (grip if isinstance(grip, int) else None for grip in read.grips)
+        steps.append(Step(read.number, read.kind, read.bricks, tuple(nodes)))
     first = 1
     if steps and (steps[0].kind, steps[0].bricks) != (StepKind.PLACE, 1):  # a part of a plan
         first = max(1, steps[0].number)
