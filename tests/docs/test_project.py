@@ -81,3 +81,21 @@ def test_one_version_is_said_everywhere():
     project = re.search(r'^version = "(.*)"', (ROOT / "pyproject.toml").read_text(), re.M)[1]
     assert str(loaded(ROOT / "CITATION.cff")["version"]) == project
     assert f"\n## [{project}] - " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_no_page_is_wider_than_the_window():
+    """The width of the text and of both side bars, by the numbers of the style sheet and of furo.
+
+    Furo: side bars of 15em, the right one from 82em on, the left one from 63em on; letters are a
+    tenth larger from 97em on. A scroll bar takes 17 pixels.
+    """
+    css = (ROOT / "docs" / "_static" / "site.css").read_text(encoding="utf-8")
+    (width,) = map(float, re.findall(r"\.content \{ width: (\d+)em", css))
+    beside = [float(each) for each in re.findall(r"calc\(100vw - ([\d.]+)em\)", css)]
+    (half,) = map(float, re.findall(r"\.sidebar-drawer \{ width: calc\(50% - (\d+)em\)", css))
+    for pixels in range(1010, 2600):
+        em = pixels / (16 if pixels < 97 * 16 else 17.6)
+        two = pixels > 82 * 16
+        left = max(15.0, (pixels - 17) / pixels * em / 2 - half)
+        text = min(width, em - beside[0 if two else 1])
+        assert left + text + 15.0 * two <= em * (pixels - 17) / pixels, pixels
