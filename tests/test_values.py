@@ -15,12 +15,11 @@ from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.engines._grip_compliance import RIGID, read_compliance
-from seqopt.engines._planar import _Plane
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete._equilibrium_path import settle
 from seqopt.engines.discrete._system import build_system
 from seqopt.engines.discrete.engine import _held_nodes
-from seqopt.engines.interface import SPACE, Fields, Want
+from seqopt.engines.interface import Fields, Want
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import share, ungripped_system
 from seqopt.engines.rigid._mixed import Solution, mixed_system
@@ -55,7 +54,6 @@ def values(arch25):
     held = _held_nodes(network, system, grips, RIGID, [])
     parts = ungripped_system(network, 2)
     proven = Prover(assembly, _compiled())(bonded(assembly, EPOXY))
-    plane = _Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
     maps, operator = scene_maps(network), OperatorBuilder(network, tree).operator(2)
     shapes = boxes(arch25.bricks)
     cube = box((1, 1, 1))
@@ -67,7 +65,7 @@ def values(arch25):
         *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, network.compliances, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
-        *(SPACE, plane, tree, operator, operator.doubts, parts, share(network)),
+        *(tree, operator, operator.doubts, parts, share(network)),
         mixed_system(parts, grips),
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),

@@ -9,7 +9,6 @@ import pytest
 import seqopt
 from seqopt._cli.grammar import parse_options
 from seqopt.engines._auto import AutoEngine
-from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -28,9 +27,7 @@ EQUATIONS = seqopt.CRITERIA["equations-2-3"]
 PROBLEM = pose_decisions(ENGINE, LOOP, EQUATIONS)
 
 
-@pytest.mark.parametrize(
-    "engine", [ComplianceEngine, FrameEngine, PlanarEngine, DiscreteEngine, AutoEngine]
-)
+@pytest.mark.parametrize("engine", [ComplianceEngine, FrameEngine, DiscreteEngine, AutoEngine])
 def test_engines_take_a_scene(engine):
     made = engine(FLAT)
     held = np.array([[2]])

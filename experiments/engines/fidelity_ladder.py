@@ -1,28 +1,25 @@
 """Claim: where its condition is met, a simpler model gives the answer of the next one in less time.
 
-That is, to 1e-8 between planar, rigid and discrete bricks and to 1e-5 from rigid bricks to the
-stiff-bar frame; and where its condition is not met a level is wrong by more than a tenth. For less:
-in the median of rounds it takes less time, if only by a little where a plane is all it saves; for
-`auto`, which where joints give way takes the discrete elements themselves, no more than a tenth
-above theirs. The lowest ratio of a round is stored beside the median.
+That is, to 1e-8 between rigid and discrete bricks and to 1e-5 from rigid bricks to the stiff-bar
+frame; and where its condition is not met a level is wrong by more than a tenth. For less: in the
+median of rounds it takes less time; for `auto`, which where joints give way takes the discrete
+elements themselves, no more than a tenth above theirs. The lowest ratio of a round is stored beside
+the median.
 
-Method: a level and the next answer the same grip sets. Planar bricks: arches of 10 to 200 bricks in
-one plane, three random grips (condition met), and `arch25` pressed flat into its middle plane,
-every step of the sequential method (not met). Rigid bricks: every such step against the frame, and
-against discrete elements with the paper's epoxy (met: all joints stay within their limits) and
-without bonds (not met; some steps in which the bricks come to rest). The error is the largest
-difference of the inner nodes' displacements over the largest displacement, in the worst set. Times
-are medians of rounds in one process on one core, ratios those within rounds.
+Method: a level and the next answer the same grip sets. Rigid bricks: every step of the sequential
+method against the frame, and against discrete elements with the paper's epoxy (met: all joints stay
+within their limits) and without bonds (not met; some steps in which the bricks come to rest). The
+error is the largest difference of the inner nodes' displacements over the largest displacement, in
+the worst set. Times are medians of rounds in one process on one core, ratios those within rounds.
 
 Inputs: the shipped scene; seed 0. Command: ``OPENBLAS_NUM_THREADS=1 python -m
 experiments fidelity_ladder [--quick]``.
 """
 
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator
 from statistics import median
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -31,70 +28,20 @@ from matplotlib.figure import Figure
 from experiments.harness.charts import note, subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import best, drawn, two
-from experiments.harness.scenes import arch25, grip_sets
-from seqopt import DRY, ArchShape, Scene, arch_scene, build_network, sequential
-from seqopt.arrays import Floats, Ints, Vector
+from experiments.harness.scenes import arch25
+from seqopt import DRY, Scene, build_network, sequential
+from seqopt.arrays import Floats, Ints
 from seqopt.engines._auto import AutoEngine
-from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine, Want
-from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.report._style import BLUE, GRAY, GREEN, VERMILION, dress, plain, styled
-from seqopt.scene.parts import Brick, Ground, Joint
-
-S = TypeVar("S", Joint, Ground)
-SPAN = 6.0  # m along the line of a flat arch
-
-
-def flat_arch(count: int) -> Scene:
-    """Return a closed arch of bricks that all lie along it, in one plane."""
-    pitch = np.linspace(1.3, -1.3, count)
-    size = (SPAN / count, 0.116, 0.053)
-    return arch_scene(ArchShape(pitch=pitch, pattern="V", dimensions=size, gap=0.0))
-
-
-def flattened(scene: Scene) -> Scene:
-    """Return a scene pressed into the plane y = 0; bricks laid across it keep their size along it.
-
-    Nodes keep their numbers and all lie in the plane.
-    """
-    ends = tuple(replace(_spring(end), anchor=_pressed(end.anchor)) for end in scene.grounds)
-    bricks, joints = tuple(map(_brick, scene.bricks)), tuple(map(_spring, scene.joints))
-    name = f"{scene.name} flattened"
-    return replace(scene, name=name, bricks=bricks, joints=joints, grounds=ends)
-
-
-def _pressed(point: Sequence[float]) -> Vector:
-    return point[0], 0.0, point[2]
-
-
-def _unit(axis: Sequence[float]) -> Vector:
-    size = float(np.hypot(axis[0], axis[2]))
-    return axis[0] / size, 0.0, axis[2] / size
-
-
-def _brick(brick: Brick) -> Brick:
-    (length, width, height), axis = brick.dimensions, brick.length_axis
-    if abs(axis[1]) > abs(brick.width_axis[1]):  # it lies across
-        length, width, axis = width, length, brick.width_axis
-    axes = {"length_axis": _unit(axis), "width_axis": (0.0, 1.0, 0.0)}
-    place = _pressed(brick.position)
-    return replace(brick, position=place, dimensions=(length, width, height), **axes)
-
-
-def _spring(spring: S) -> S:
-    position, along = _pressed(spring.position), _unit(spring.along)
-    return replace(spring, position=position, along=along, across=(0.0, 1.0, 0.0))
-
+from seqopt.report._style import BLUE, GRAY, VERMILION, dress, plain, styled
 
 EXACT, FRAME, WRONG = 1e-8, 1e-5, 0.1
 SAME = 0.9  # ratio of times that are alike
-SIZES = (10, 25, 50, 100, 200)
-SETS = 200
 MET, NOT_MET = "met", "not met"
 RESTING = (3, 7, 13, 24, 40)  # steps of the sequential method that rest unbonded
-LOOKS = {"planar": (GREEN, "s"), "rigid": (BLUE, "o"), "auto": (VERMILION, "D")}
+LOOKS = {"rigid": (BLUE, "o"), "auto": (VERMILION, "D")}
 
 
 Question = tuple[int, Ints]
@@ -121,15 +68,9 @@ def steps_of(scene: Scene, numbers: tuple[int, ...] | None = None) -> list[Quest
 
 
 def pairs(*, quick: bool) -> Iterator[Pair]:
-    for count in SIZES[: 1 if quick else None]:
-        net = build_network(flat_arch(count))
-        asked, case = [(count, grip_sets(net, count, SETS))], f"flat arch, {count} bricks"
-        yield Pair("planar", "rigid", case, MET, PlanarEngine(net), ComplianceEngine(net), asked)
     rigid = arch25()
     net, scene = rigid.network, rigid.network.scene
     all_steps = steps_of(scene)[: 12 if quick else None]
-    flat = PlanarEngine(build_network(flattened(scene)))
-    yield Pair("planar", "rigid", "arch25 pressed flat", NOT_MET, flat, rigid, all_steps)
     yield Pair("rigid", "frame", "arch25", MET, rigid, FrameEngine(net), all_steps)
     bonded, dry = DiscreteEngine(net), DiscreteEngine(net, DRY)
     yield Pair("rigid", "discrete", "arch25, epoxy", MET, rigid, bonded, all_steps)

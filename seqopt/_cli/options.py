@@ -248,10 +248,9 @@ class Computed(Asked):
     """How are responses computed?
 
     engine : CHOICE
-        what computes responses (default: {engine}): compliance: exactly rigid bricks, fast; planar:
-        the same with three unknowns per brick, where all lies in a plane; frame: stiff bars, a slow
-        independent check; discrete: joints that open and slip; auto: the cheapest of planar,
-        compliance and discrete that is enough
+        what computes responses (default: {engine}): compliance: exactly rigid bricks, fast; frame:
+        stiff bars, a slow independent check; discrete: joints that open and slip; auto: compliance,
+        and discrete where that is not enough
     mortar : MORTAR
         what holds the joints, in verdicts and in the engines auto and discrete: epoxy, that of
         Bruun et al. (default), dry, nothing, or bond=STRENGTH (Pa)

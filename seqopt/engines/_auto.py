@@ -1,12 +1,8 @@
 """The engine that chooses the simplest sufficient model for each grip set, and says why.
 
-There are three levels, and the cheapest whose condition holds is used: planar, if the whole scene
-lies in one plane; exactly rigid bricks, if joints stay within their elastic limits; and discrete
-elements for the grip sets with which one would not. Where their condition holds, the first two give
-the same answer as the next level, to rounding.
-
-Who chooses among many grip sets takes one of the first two for all of them (`find_level`), and asks
-of what was chosen alone whether joints stay within their elastic limits.
+Exactly rigid bricks, as long as joints stay within their elastic limits, else discrete elements:
+within the limits both give the same answer, to rounding. Who chooses among many grip sets takes
+rigid bricks for all of them, and asks of what was chosen alone whether joints stay within limits.
 """
 
 from __future__ import annotations
@@ -19,8 +15,6 @@ from numpy.typing import ArrayLike
 
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._grip_compliance import compliance_by_kind
-from seqopt.engines._planar import PlanarEngine, _mixes, find_plane, off_plane
 from seqopt.engines.interface import (
     Fields,
     Level,
@@ -37,22 +31,8 @@ from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 
-_IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity, loads and grips lie in one plane")
-_OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
-_GIVING = LevelChoice(Level.RIGID, "grips give way out of the plane of the bricks")
-_MOVED = LevelChoice(Level.RIGID, "grips are moved, which may be out of the plane of the bricks")
+_SIMPLEST = LevelChoice(Level.RIGID, "the simplest, until a joint leaves its elastic limits")
 _BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
-
-
-def find_level(network: Network) -> LevelChoice:
-    """Return the cheapest level of joints that never fail which answers every grip set."""
-    plane = find_plane(network)
-    if isinstance(plane, str):
-        return LevelChoice(Level.RIGID, plane)
-    if off_plane(network, plane).any():
-        return _OFF_PLANE
-    matrix = compliance_by_kind(network)
-    return _GIVING if _mixes(plane, matrix).any() else _IN_PLANE
 
 
 class AutoEngine(NamedEngine):
@@ -66,16 +46,12 @@ class AutoEngine(NamedEngine):
         super().__init__(network)
         self.mortar, self.tally = mortar, Counter[LevelChoice]()
 
-    @cached_property
-    def choice(self) -> LevelChoice:
-        """The level that alone answers all grip sets of a problem, and why."""
-        return find_level(self.network)
+    choice = _SIMPLEST  # of the level that alone answers all grip sets of a problem
 
     @cached_property
     def rigid(self) -> ComplianceEngine:
         """Bricks on springs that never break."""
-        planar = self.choice.level is Level.PLANAR
-        return PlanarEngine(self.network) if planar else ComplianceEngine(self.network)
+        return ComplianceEngine(self.network)
 
     @cached_property
     def _discrete(self) -> OpeningEngine:
@@ -109,10 +85,7 @@ class AutoEngine(NamedEngine):
     ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         asked = want if self.limits is None else want | Want.JOINTS
-        rigid, choice = self.rigid, self.choice
-        if moved is not None and isinstance(rigid, PlanarEngine):
-            rigid, choice = rigid.in_space, _MOVED
-        fields = rigid.solve(bricks, grips, asked, moved)
+        fields = self.rigid.solve(bricks, grips, asked, moved)
         beyond = np.zeros(len(fields.grip_force), dtype=bool)
         if self.limits is not None:
             beyond = self.limits.exceeded(fields.joint_wrench)
@@ -121,6 +94,6 @@ class AutoEngine(NamedEngine):
             far = None if moved is None else np.asarray(moved, dtype=float)[beyond]
             found = self._discrete.solve(bricks, sets, asked, far)
             fields = merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
-        levels = (choice, ~beyond), (_BEYOND, beyond)
+        levels = (_SIMPLEST, ~beyond), (_BEYOND, beyond)
         self.tally.update({level: int(mine.sum()) for level, mine in levels if mine.any()})
         return keep_wanted(fields, want)

@@ -25,12 +25,12 @@ _Number = TypeVar("_Number", np.float64, np.bool_)
 class GripCompliance(FrozenValue):
     """The compliance of the grips of S grip sets, and their offsets.
 
-    ``moved`` (S, r, d): how far each is from where it should be, m; None if none is. ``matrix``
-    (K, w, w): compliance of each kind of grip, m/N, first of forces in d directions, then of
+    ``moved`` (S, r, 3): how far each is from where it should be, m; None if none is. ``matrix``
+    (K, w, w): compliance of each kind of grip, m/N, first of forces, then of
     moments over the lever if any grip of the scene transmits any; None if all are rigid and
     transmit none. ``transmits_moment`` (K,): which kinds do; None if none of the scene does.
     ``kind`` (S, r): of every grip; (1, 1) if all are of one: that of its robot, or of its robot at
-    its node where it has an arm with compliant joints. ``lever``: m. ``directions``: of forces, d.
+    its node where it has an arm with compliant joints. ``lever``: m.
     """
 
     moved: Floats | None = None
@@ -38,7 +38,6 @@ class GripCompliance(FrozenValue):
     transmits_moment: Bools | None = None
     kind: Ints = field(default_factory=lambda: np.zeros((1, 1), dtype=np.int64))
     lever: float = 1.0
-    directions: int = 3
 
     @property
     def rigid(self) -> bool:
@@ -58,17 +57,6 @@ class GripCompliance(FrozenValue):
         """Whether all grips are of one kind."""
         return self.matrix is None or len(self.matrix) == 1
 
-    def within(self, force: Floats, wrench: Floats) -> GripCompliance:
-        """Return it in the directions of a `Basis`: a plane's, or all."""
-        matrix, count = self.matrix, len(force)
-        if count == self.directions or self.rigid:
-            return self
-        if matrix is not None:
-            ways = force if self.transmits_moment is None else wrench
-            matrix = ways @ matrix @ ways.T
-        moved = None if self.moved is None else self.moved @ force.T
-        return replace(self, moved=moved, matrix=matrix, directions=count)
-
     def offsets(self, sets: int, grips: int) -> Floats:
         """Return how far the grips are moved (S, r, 3), in space."""
         return np.zeros((sets, grips, 3)) if self.moved is None else self.moved
@@ -77,8 +65,7 @@ class GripCompliance(FrozenValue):
         """Return which grips (S, r) are compliant to forces."""
         if self.matrix is None:
             return np.zeros((sets, grips), dtype=bool)
-        d = self.directions
-        return self._each(np.asarray(self.matrix[:, :d, :d].any(axis=(1, 2))), sets, grips)
+        return self._each(np.asarray(self.matrix[:, :3, :3].any(axis=(1, 2))), sets, grips)
 
     def matrices(self, sets: int, grips: int) -> Floats:
         """Return the compliance of every grip, (S, r, w, w); they must not all be rigid."""

@@ -6,14 +6,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum, Flag, auto
-from functools import cache, cached_property, wraps
+from functools import cache, wraps
 from itertools import combinations
 from math import isfinite
-from typing import ParamSpec, Protocol, SupportsIndex, TypeVar
+from typing import ParamSpec, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import linalg
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.engines._grip_compliance import GripCompliance, read_compliance
@@ -25,41 +24,6 @@ from seqopt.scene.scene import Scene
 
 _Asked = ParamSpec("_Asked")
 _Answer = TypeVar("_Answer")
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Basis(FrozenValue):
-    """The directions in which a structure is loaded and moves.
-
-    ``force``, ``moment`` (d, 3), (m, 3): unit vectors of forces and translations, of moments and
-    rotations.
-    """
-
-    force: Floats
-    moment: Floats
-
-    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[object, ...]:
-        # where a copy arrives, all of space must be the one that others are compared with
-        return "SPACE" if self is SPACE else super().__reduce_ex__(protocol)
-
-    @cached_property
-    def wrench(self) -> Floats:
-        """Both as rows, (k, 6) with k = d + m."""
-        return frozen(linalg.block_diag(self.force, self.moment))
-
-    def levers(self, arms: Floats) -> Floats:
-        """Return the moments (..., m, d) of unit forces at the ends of arms (..., 3)."""
-        sizes = len(self.moment), len(self.force)
-        return np.asarray((arms @ self._turns.T).reshape(*arms.shape[:-1], *sizes))
-
-    @cached_property
-    def _turns(self) -> Floats:
-        """What arms are multiplied by, (md, 3): (r × f) · n = r · (f × n)."""
-        return frozen(np.cross(self.force[None], self.moment[:, None]).reshape(-1, 3))
-
-
-SPACE = Basis(np.eye(3), np.eye(3))
-"""All of space: d = m = 3."""
 
 
 class Want(Flag):
@@ -117,7 +81,6 @@ class Fields(FrozenValue):
 class Level(Enum):
     """Levels of detail of a model, cheapest first; values are the engines' names."""
 
-    PLANAR = "planar"
     RIGID = "compliance"
     DISCRETE = "discrete"
 

@@ -14,8 +14,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from typing import Any
 
 from seqopt.contact.mortar import Mortar, find_mortar
-from seqopt.engines._auto import AutoEngine, find_level
-from seqopt.engines._planar import PlanarEngine
+from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SceneError
@@ -48,9 +47,7 @@ class Recipe:
     @cached_property
     def name(self) -> str:
         """The name of what answers grip sets."""
-        if not self.simplest:
-            return self.engine
-        return find_level(self.network).level.value
+        return USUAL if self.simplest else self.engine
 
     @cached_property
     def network(self) -> Network:
@@ -105,7 +102,6 @@ def _discrete(network: Network | Scene, **options: Any) -> Engine:
 
 ENGINES: dict[str, Callable[..., Engine]] = {
     "auto": AutoEngine,
-    "planar": PlanarEngine,
     "compliance": ComplianceEngine,
     "frame": _frame,
     "discrete": _discrete,
@@ -164,8 +160,8 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
 def simplest(engine: Engine) -> Engine:
     """Return what alone answers all grip sets of a problem: of `auto` the level of its scene.
 
-    Planar where nothing leaves one plane, else exactly rigid bricks; whether that was enough is to
-    be asked of the steps that are chosen. Any other engine is returned as it is.
+    Exactly rigid bricks; whether that was enough is to be asked of the steps that are chosen. Any
+    other engine is returned as it is.
     """
     if not isinstance(engine, AutoEngine):
         return engine

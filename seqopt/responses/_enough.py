@@ -11,7 +11,6 @@ import numpy as np
 from seqopt.arrays import Terse
 from seqopt.contact.mortar import _mortar_name, _with_mortar
 from seqopt.engines._auto import AutoEngine
-from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.interface import OpeningEngine
 from seqopt.engines.registry import recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -20,7 +19,7 @@ from seqopt.responses.quantities import RESPONSES, _plain, length_text
 from seqopt.responses.table import LinearRange, _Columns, _node, force_column, held_in_table
 
 _FEW = 100  # bricks up to which tolerances take less than a second
-_KNOWN = AutoEngine, PlanarEngine, ComplianceEngine, OpeningEngine
+_KNOWN = AutoEngine, ComplianceEngine, OpeningEngine
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,21 +80,19 @@ def _others(within: LinearRange, below: float, where: str) -> str:
         return "none is more detailed"
     if not isinstance(engine, _KNOWN):
         return "what another one would change is not known"
-    flat = "compliance would change nothing, as nothing leaves the plane; "
-    said = flat if isinstance(engine, PlanarEngine) else ""
     if np.isnan(below):
         unchecked = "; ".join(within.unchecked) or str(getattr(engine, "unchecked", ""))
         why = unchecked or "steps build on earlier ones"
-        return f"{said}what discrete elements would change is not known: {why}"
+        return f"what discrete elements would change is not known: {why}"
     if below >= 0:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
         own = f" {_with_mortar(_mortar_name(within.mortar))}"  # whose limits they are
         own = "" if isinstance(engine, AutoEngine) else own
-        return f"{said}discrete elements{own} would change nothing in these steps: {close}"
+        return f"discrete elements{own} would change nothing in these steps: {close}"
     if isinstance(engine, AutoEngine):
         return "discrete elements were taken where joints open, elsewhere they change nothing"
     asks = f"{where} leaves its limits; the engine discrete says it"
-    return f"{said}what discrete elements would change is not known: {asks}"
+    return f"what discrete elements would change is not known: {asks}"
 
 
 def _left_out(

@@ -16,7 +16,6 @@ import pandas as pd
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._auto import AutoEngine
-from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.interface import Engine, OpeningEngine, Want, grip_columns, select_sets
 from seqopt.engines.registry import USUAL, Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -146,9 +145,7 @@ def _linear(engine: Engine) -> Engine:
             f"tolerance: a {type(engine).__name__} is not linear in where grips are; take the "
             "engine compliance or auto"
         )
-    engine = engine.rigid if isinstance(engine, AutoEngine) else engine
-    # grips may be off in any direction
-    return engine.in_space if isinstance(engine, PlanarEngine) else engine
+    return engine.rigid if isinstance(engine, AutoEngine) else engine
 
 
 def _groups(
@@ -249,9 +246,8 @@ def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
 
 
 def is_linear(engine: Engine) -> bool:
-    """Return whether an engine is linear in misplacements of grips in all directions."""
-    known = isinstance(engine, AutoEngine | PlanarEngine)
-    return known or type(engine) is ComplianceEngine
+    """Return whether an engine is known to be linear in misplacements of grips."""
+    return isinstance(engine, AutoEngine | ComplianceEngine)
 
 
 def is_tied(engine: Engine, steps: Sequence[_Held]) -> bool:

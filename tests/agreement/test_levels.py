@@ -8,7 +8,6 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from seqopt.contact.mortar import DRY, Mortar
-from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -19,17 +18,7 @@ from seqopt.sequence.methods import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
 from tests.builders import largest_difference
-from tests.strategies import arches, both_sided, flat_arches, states, walls
-
-
-@settings(max_examples=25)
-@given(states(scenes=st.one_of(flat_arches(), walls(), both_sided("V"))))
-def test_in_a_plane_three_unknowns_say_what_six_do(state):
-    scene, bricks, grips = state
-    net = build_network(scene)
-    flat = PlanarEngine(net).solve(bricks, grips, Want.ALL)
-    whole = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
-    assert largest_difference(flat, whole, net) <= 1e-9
+from tests.strategies import arches, both_sided, states, walls
 
 
 @settings(max_examples=15)

@@ -9,7 +9,6 @@ import pytest
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines._auto import AutoEngine
-from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
@@ -26,7 +25,6 @@ ROUTES = {
     "frame": lambda net, *asked: FrameEngine(net).solve(*asked),
     "discrete": lambda net, *asked: DiscreteEngine(net, STRONG).solve(*asked),
     "auto": lambda net, *asked: AutoEngine(net, STRONG).solve(*asked),
-    "planar": lambda net, *asked: PlanarEngine(net).solve(*asked),
 }
 TOLERANCE = {"frame": 5e-6, "discrete": 1e-7}  # of the largest force or moment; else 1e-9
 STATES = [(1, [[1]]), (2, [[]]), (4, [[2, 12]]), (5, [[5], [11]]), (7, [[2, 7], [6, 11]])]
@@ -45,7 +43,7 @@ def gap(route, scene, bricks, grips):
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize(("bricks", "grips"), STATES)
 def test_every_end_is_the_same_by_every_route(route, bricks, grips):
-    scene = from_both_sides(7, "V" if route == "planar" else "VLR")
+    scene = from_both_sides(7, "VLR")
     assert gap(route, scene, bricks, grips).max() <= TOLERANCE.get(route, 1e-9)
 
 

@@ -563,14 +563,12 @@ def test_a_closed_pipe_is_no_error():
 def test_the_command_line_says_why(capsys):
     assert main(["analyze", "--method", "sequential", "--engine", "auto"]) == 0
     said = capsys.readouterr().err
-    assert "engine: compliance for 49 grip sets: brick 11: its centroid lies 65.2 mm" in said
+    assert "engine: compliance for 49 grip sets: the simplest, until a joint leaves" in said
     dry = ["analyze", "--method", "sequential", "--engine", "auto", "--mortar", "dry"]
     assert main(dry) == 4  # some steps are mechanisms, of others it is not known
     said = capsys.readouterr().err
     assert "step 9: 5 bricks: joints open or slip and brick" in said
     assert "neither came to rest nor became unstable" in said
-    assert main(["analyze", "--method", "sequential", "--engine", "planar"]) == 2
-    assert "use the compliance engine" in capsys.readouterr().err
     rigid = ["analyze", "--method", "sequential", "--engine", "compliance", "--mortar", "dry"]
     assert main(rigid) == 2
     assert "engine compliance: its joints never fail" in capsys.readouterr().err

@@ -23,7 +23,7 @@ def test_what_is_no_time_is_refused_in_a_line(words, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--reference", "planar"], "--reference: it values the plans of --speed; give --speed 60"),
+        (["--reference", "frame"], "--reference: it values the plans of --speed; give --speed 60"),
         (["--speed", "9", "--reference", "rigid"], "reference 'rigid' does not exist; give one of"),
     ],
 )
@@ -42,7 +42,7 @@ def test_a_comparison_with_speed(tmp_path, capsys):
     block = said.split("Speed against regret\n")[1].split("written to")[0]
     assert all(len(line) <= 80 for line in block.splitlines())
     rows = pd.read_csv(out / "speed.csv")
-    assert {"compliance", "planar", "frame"} <= {*rows["engine"]}
+    assert {"compliance", "frame"} <= {*rows["engine"]}
     assert {"loop", "free"} == {*rows["schedule"]}
     sentence = " ".join(block.partition("\n\n")[0].split())
     assert sentence.startswith("Take ")

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.rigid import _refinement as refinement
 from seqopt.engines.rigid import compliance
@@ -224,17 +223,6 @@ def test_what_is_only_to_be_compared_is_corrected_less(monkeypatch):
     engine.solve(100, sets, Want.RESPONSES | Want.SCREEN)
     with pytest.raises(TypeError):
         engine.solve(100, sets)
-
-
-@pytest.mark.parametrize("factor", [1e-4, 1e-5, 1e-6, 1e-9])
-def test_bricks_in_a_plane_are_corrected_too(factor):
-    """Whether the joint counts as loose or not."""
-    net = build_network(loosened(chain(16, pattern="V"), factor, only_turning=True))
-    sets = [(26, 29, 31), (27, 31, 30), (4, 14, 30), *BOTH_SIDES]
-    plane, space = (e(net).solve(16, sets, Want.ALL) for e in (PlanarEngine, ComplianceEngine))
-    for name in ("displacement", "grip_force", "support"):
-        size = np.abs(getattr(space, name)).max()
-        assert np.abs(getattr(plane, name) - getattr(space, name)).max() <= 1e-8 * size
 
 
 def test_sets_keep_their_places_where_some_are_corrected():

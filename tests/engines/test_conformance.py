@@ -15,14 +15,9 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from tests.builders import from_both_sides, six_bricks
 
 
-def pattern(name):
-    """Bricks that the engine accepts: along the arch where all must lie in one plane."""
-    return "V" if name == "planar" else "VLR"
-
-
 @pytest.fixture(params=ENGINES)
 def engine(request):
-    return ENGINES[request.param](build_network(six_bricks(pattern(request.param))))
+    return ENGINES[request.param](build_network(six_bricks("VLR")))
 
 
 def test_shapes(engine):
@@ -78,7 +73,7 @@ def test_bad_grips_are_refused(engine, bricks, grips, named):
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_brick_held_by_robots_alone(name):
     """One grip leaves it turning, two leave it turning about their line, whatever the engine."""
-    scene = arch_scene(ArchShape(pitch=[1.2, 0.7], pattern=pattern(name), closed=False))
+    scene = arch_scene(ArchShape(pitch=[1.2, 0.7], pattern="VLR", closed=False))
     alone = replace(scene, joints=())
     engine = ENGINES[name](build_network(alone))
     engine.solve(1, [[1]])
@@ -90,7 +85,7 @@ def test_a_brick_held_by_robots_alone(name):
 @pytest.mark.parametrize("name", ENGINES)
 def test_an_end_that_closes_late(name):
     """A ground end with ``closes_with`` carries nothing before that brick is placed."""
-    scene = arch_scene(ArchShape(pitch=[1.0, 0.3, -0.3, -1.0], pattern=pattern(name)))
+    scene = arch_scene(ArchShape(pitch=[1.0, 0.3, -0.3, -1.0], pattern="VLR"))
     near, far = scene.grounds
     early = replace(far, brick=3, position=scene.joints[2].position, anchor=far.anchor)
     late = replace(scene, grounds=(near, replace(early, closes_with=4)))
@@ -110,7 +105,7 @@ def test_an_end_that_closes_late(name):
 @pytest.mark.parametrize("name", ENGINES)
 def test_ends_come_in_the_scenes_order(name):
     """Not in that in which they begin to act, nor in that of their bricks."""
-    scene = from_both_sides(7, pattern(name))
+    scene = from_both_sides(7, "VLR")
     turned = replace(scene, grounds=scene.grounds[::-1])
     one, other = (
         ENGINES[name](build_network(s)).solve(5, [[5]], Want.ALL) for s in (scene, turned)

@@ -223,17 +223,3 @@ def test_two_that_give_way_may_hold_one_brick_and_be_off(arch25):
     assert 0 < misfits(make_engine("compliance", scene), 18, pair)[0] < 1e6
     rigid = make_engine("compliance", arch25)
     assert misfits(rigid, 18, np.array([[22, 23]]))[0] > 1e12
-
-
-def test_grips_that_leave_the_plane_of_planar_bricks_are_refused():
-    """Where joints move nodes in the plane alone, the planar engine is enough."""
-    rng, scene = np.random.default_rng(3), six_bricks("V")
-    jacobians, held = drawn_jacobians(rng, scene, 3), (3, 8, 11)
-    arms = with_joints(scene, 10 ** rng.uniform(5, 7, (3, 6)), jacobians)
-    with pytest.raises(GripError, match="plane"):
-        make_engine("planar", arms).solve(6, [arms.grip_numbers(held)])
-    jacobians[:, :, 1] = jacobians[:, :, 3] = jacobians[:, :, 5] = 0.0
-    flat = with_joints(scene, 10 ** rng.uniform(5, 7, (3, 6)), jacobians)
-    grips = [flat.grip_numbers(held)]
-    one, two = (make_engine(n, flat).solve(6, grips) for n in ("planar", "compliance"))
-    assert far(one.grip_force, two.grip_force) <= 1e-9

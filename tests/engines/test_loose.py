@@ -10,7 +10,6 @@ import pytest
 
 from experiments.harness.scenes import grip_sets, running_bond
 from seqopt.engines._grip_compliance import RIGID
-from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
@@ -155,13 +154,6 @@ def test_a_scene_that_is_loose_from_its_first_brick():
     sets = [(3, 5), (2, 9), (11, 6)]
     alone = solve_mixed(net, 6, grip_columns(net, 6, sets))
     assert apart(engine.solve(6, sets, Want.ALL), alone) <= 1e-9
-
-
-def test_a_loose_joint_in_a_plane():
-    """Motions out of the plane are asked about where something is loose."""
-    net = build_network(hinged(six_bricks("V"), 2))
-    a, b = (engine(net).solve(5, [[7, 9], [8, 6]]) for engine in (PlanarEngine, ComplianceEngine))
-    assert apart(a, b) <= 1e-12
 
 
 def test_a_wall_with_loose_joints():

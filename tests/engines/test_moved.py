@@ -34,23 +34,15 @@ def drawn(sets, size, seed=0):
     return size * np.random.default_rng(seed).normal(size=(*np.shape(sets), 3))
 
 
-def in_plane(net, moved):
-    """Without what leaves the plane of an arch whose bricks all stand in it."""
-    normal = np.cross(np.diff(net.centroid[:2], axis=0)[0], (0.0, 0.0, 1.0))
-    normal /= np.linalg.norm(normal)
-    return moved - (moved @ normal)[..., None] * normal
-
-
 @pytest.fixture(params=ENGINES)
 def engine(request):
-    pattern = "V" if request.param == "planar" else "VLR"
-    return ENGINES[request.param](build_network(six_bricks(pattern)))
+    return ENGINES[request.param](build_network(six_bricks("VLR")))
 
 
 def test_held_nodes_go_along_and_answers_add_up(engine):
     """Small enough that no joint leaves its elastic limits, for engines that have any."""
     net = engine.network
-    ways = [in_plane(net, drawn(SETS, 1e-8, seed)) for seed in range(2)]
+    ways = [drawn(SETS, 1e-8, seed) for seed in range(2)]
     still, one, two, both = (
         engine.solve(6, SETS, Want.ALL, m) for m in (None, *ways, ways[0] + ways[1])
     )
@@ -65,7 +57,7 @@ def test_held_nodes_go_along_and_answers_add_up(engine):
 
 def test_engines_agree(engine):
     net = engine.network
-    moved = in_plane(net, drawn(SETS, 1e-8))
+    moved = drawn(SETS, 1e-8)
     columns = grip_columns(net, 6, SETS)
     direct = solve_dense(net, 6, columns, read_compliance(net, columns, SETS, moved))
     assert apart(engine.solve(6, SETS, Want.ALL, moved), direct) <= 1e-5
@@ -83,16 +75,6 @@ def test_engines_agree(engine):
 def test_wrong_ways_are_refused(engine, moved, named):
     with pytest.raises(GripError, match=named):
         engine.solve(6, SETS, Want.RESPONSES, moved)
-
-
-def test_a_plane_is_not_left():
-    net = build_network(six_bricks("V"))
-    out = drawn(SETS, 1e-4)
-    with pytest.raises(GripError, match="out of the scene's plane; use the compliance engine"):
-        ENGINES["planar"](net).solve(6, SETS, Want.RESPONSES, out)
-    within = in_plane(net, out)
-    mine = ENGINES["planar"](net).solve(6, SETS, Want.ALL, within)
-    assert apart(mine, ComplianceEngine(net).solve(6, SETS, Want.ALL, within)) <= 1e-9
 
 
 def test_a_brick_is_not_stretched(engine25):

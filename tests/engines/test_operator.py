@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.harness.scenes import running_bond
-from seqopt.engines._planar import PlanarEngine
-from seqopt.engines.interface import _NAMES, FLAGS, SPACE, Want, grip_columns
+from seqopt.engines.interface import _NAMES, FLAGS, Want, grip_columns
 from seqopt.engines.rigid._grip_equations import (
     _doubts,
     grip_forces,
@@ -24,7 +23,6 @@ from seqopt.engines.rigid._refinement import _held_operator, _hold_loose
 from seqopt.engines.rigid._response_maps import _GATHERED, loads_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.scene.arch import ArchShape, arch_scene
 from tests.builders import (
     branch,
     from_both_sides,
@@ -105,19 +103,6 @@ def test_flexibility_is_symmetric_and_costs_work(name):
     assert operator.dead_displacement == pytest.approx(flexibility @ weight, rel=1e-12)
 
 
-@pytest.mark.parametrize("grips", [1, 2, 3])
-def test_in_a_plane_the_same_with_fewer_directions(grips):
-    shape = ArchShape(pitch=np.linspace(1.3, -1.3, 6).tolist(), pattern="V")
-    net = build_network(unequal(arch_scene(shape)))
-    plane, space = PlanarEngine(net), ComplianceEngine(net)
-    for bricks in (2, 5, 6):
-        sets = sets_of(net.scene, bricks, grips)
-        a, b = (engine.solve(bricks, sets, Want.ALL) for engine in (plane, space))
-        for field in _NAMES:
-            size = np.abs(getattr(b, field)).max()
-            assert np.abs(getattr(a, field) - getattr(b, field)).max() <= 1e-8 * size, field
-
-
 def test_only_what_is_wanted_is_computed():
     net = build_network(small_arch(5))
     engine = ComplianceEngine(net)
@@ -164,7 +149,7 @@ def test_loads_sum_rows_as_their_matrix_does(sets):
 
 def test_which_loads_act_at_a_grip():
     net = build_network(small_arch(5))
-    operator = OperatorBuilder(net, grow_tree(net), SPACE).operator(5)
+    operator = OperatorBuilder(net, grow_tree(net)).operator(5)
     columns = np.array([[0, 4], [9, 2]])
     index = [[0, 1, 2, 12, 13, 14], [27, 28, 29, 6, 7, 8]]
     assert operator.load_index(columns).tolist() == index

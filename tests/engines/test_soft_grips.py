@@ -16,7 +16,6 @@ from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, MechanismError, SceneError
 from seqopt.network.build import build_network
-from tests.builders import moved as turned_scene
 from tests.builders import six_bricks
 from tests.limit_scenes import softened
 from tests.soft_bodies import SoftBodies
@@ -133,7 +132,7 @@ def test_engines_agree(ways, grips, moved):
     shift[..., 1] = 0.0
     net, numbers = build_network(scene), [scene.grip_numbers(grips)]
     borne, shifts = SoftBodies(scene, 6).solve(grips, hands_of(WAYS[ways]), shift[0])
-    for name, most in {"compliance": 1e-12, "planar": 1e-12, "discrete": 1e-8}.items():
+    for name, most in {"compliance": 1e-12, "discrete": 1e-8}.items():
         found = make_engine(name, net).solve(6, numbers, Want.ALL, shift)
         assert far(found.grip_force[0], borne[:, :3]) <= most
         assert far(found.grip_moment[0], borne[:, 3:]) <= most
@@ -236,18 +235,6 @@ def test_turning_is_a_hold_of_its_own():
         weight = np.linalg.norm(free.weight[1])
         assert np.linalg.norm(found.grip_force) == pytest.approx(weight, rel=1e-4)
         assert np.abs(found.grip_moment).max() > 0
-
-
-def test_planes_and_grips_that_leave_them():
-    flat = six_bricks("V").with_grips((1e6, 1e5, 1e6))
-    assert make_engine("planar", flat).solve(6, [[3]]).grip_force.shape == (1, 1, 3)
-    turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
-    scene = turned_scene(flat, lambda point: turn @ point)
-    with pytest.raises(GripError, match="gives way, out of the scene's plane"):
-        make_engine("planar", scene).solve(3, [[3]])
-    auto = make_engine("auto", scene)
-    whole = make_engine("compliance", scene).solve(3, [[3]], Want.ALL)
-    assert apart(auto.solve(3, [[3]], Want.ALL), whole) <= 1e-12
 
 
 def test_numbers_of_grips_that_there_are_not(arch25):

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import replace
 
 import pytest
 
 import seqopt
 from seqopt._cli.main import main
 from seqopt.contact.mortar import bond_mortar
-from seqopt.engines._auto import AutoEngine, find_level
-from seqopt.engines._planar import PlanarEngine
-from seqopt.engines.interface import Level, Want
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines.interface import Want
 from seqopt.engines.registry import (
     _chooser_of,
     engine_for,
@@ -26,15 +24,15 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses._blocks import packed, unpacked
 from seqopt.responses.table import OUTSIDE, LinearRange
 from seqopt.scene.scene_file import load_scene, save_scene
-from tests.builders import about_vertical, moved, small_arch
+from tests.builders import small_arch
 
 WALL, ARCH = load_scene("wall:columns=3,courses=2"), small_arch(5)
 WEAK = bond_mortar(3e4)  # some joints of the small arch would leave its limits
 
 
 @pytest.mark.parametrize("schedule", [None, "free"])
-@pytest.mark.parametrize(("scene", "level"), [(WALL, Level.PLANAR), (ARCH, Level.RIGID)])
-def test_it_chooses_as_rigid_bricks_do_and_asks_no_joint(scene, level, schedule, monkeypatch):
+@pytest.mark.parametrize("scene", [WALL, ARCH])
+def test_it_chooses_as_rigid_bricks_do_and_asks_no_joint(scene, schedule, monkeypatch):
     wanted, real = set(), ComplianceEngine._found
 
     def noted(self, bricks, columns, hands, want):
@@ -45,24 +43,23 @@ def test_it_chooses_as_rigid_bricks_do_and_asks_no_joint(scene, level, schedule,
     monkeypatch.setattr(AutoEngine, "solve", lambda *_: pytest.fail("set by set"))
     plan = seqopt.optimize(scene, schedule)
     assert not any(want & (Want.JOINTS | Want.BRICKS) for want in wanted)
-    assert isinstance(plan.engine, PlanarEngine) == (level is Level.PLANAR)
     other = seqopt.optimize(scene, schedule, engine="compliance")
     assert plan.objective == pytest.approx(other.objective, rel=1e-9)
     assert [step.grips for step in plan.steps] == [step.grips for step in other.steps]
     said = plan.summary()["engine"]
     assert (said["name"], said["reason"]) == ("auto", "the default")
-    assert said["level"]["engine"] == level.value
-    assert plan.enough.engine == level.value
+    assert said["level"]["engine"] == "compliance"
+    assert plan.enough.engine == "compliance"
 
 
 def test_without_a_name_python_and_the_command_line_take_it(capsys, tmp_path):
     save_scene(WALL, path := tmp_path / "wall.json")
     assert main(["optimize", str(path)]) == 0
     said = capsys.readouterr()
-    assert "enough: planar; compliance would change nothing" in said.err
+    assert "enough: compliance; discrete elements with epoxy would change nothing" in said.err
     assert "engine: " not in said.err
     assert main(["optimize", str(path), "--engine", "auto"]) == 0
-    assert "engine: planar: bricks, springs, gravity" in capsys.readouterr().err
+    assert "engine: compliance: the simplest, until a joint" in capsys.readouterr().err
 
 
 def test_each_grip_set_by_itself_is_answered_as_before():
@@ -75,33 +72,12 @@ def test_each_grip_set_by_itself_is_answered_as_before():
     assert provenance(level)["engine"]["mortar"]["tensile_strength"] == 3e4
 
 
-def test_it_chooses_anew_where_it_is_made_anew():
+def test_what_it_chose_can_be_sent():
     level = simplest(make_engine("auto", WALL))
-    x, y, z = WALL.bricks[-1].position
-    bent = replace(
-        WALL, bricks=(*WALL.bricks[:-1], replace(WALL.bricks[-1], position=(x, y + 0.001, z)))
-    )
-    assert find_level(seqopt.build_network(bent)).level is Level.RIGID
-    assert type(engine_for(level, bent)) is ComplianceEngine
-    assert isinstance(unpacked(packed(level)), PlanarEngine)
-    assert recipe_of(level).name == "planar"
-
-
-@pytest.mark.parametrize(
-    ("stiffness", "angle", "level"),
-    [
-        ((1e6, 1e6, 1e6), 0.5, Level.PLANAR),
-        ((1e6, 1e5, 1e6), 0.0, Level.PLANAR),
-        ((1e6, 1e5, 1e6), 0.5, Level.RIGID),  # axes of robots are those of the site
-    ],
-)
-def test_grips_that_give_way_out_of_the_plane_are_answered_in_space(stiffness, angle, level):
-    turn = about_vertical(angle)
-    scene = moved(WALL, lambda point: turn @ point)
-    scene = scene.with_robots(*(replace(r, stiffness=stiffness) for r in scene.robots))
-    assert find_level(seqopt.build_network(scene)).level is level
-    found = seqopt.optimize(scene).objective
-    assert found == pytest.approx(seqopt.optimize(scene, engine="compliance").objective, rel=1e-9)
+    for sent in (unpacked(packed(level)), engine_for(level, WALL)):
+        assert type(sent) is ComplianceEngine
+        assert recipe_of(sent) == recipe_of(level)
+    assert recipe_of(level).name == "compliance"
 
 
 def test_a_plan_that_leaves_elastic_limits_says_so_first_and_what_to_do():

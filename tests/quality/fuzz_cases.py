@@ -21,7 +21,7 @@ from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step
 
 COMMANDS = ("scene", "analyze", "optimize", "assess", "compare")
-QUICK = ("compliance", "frame", "planar", "auto")  # hundreds of grip sets in a moment
+QUICK = ("compliance", "frame", "auto")  # hundreds of grip sets in a moment
 SHARES = (0.3, 0.3, 0.25, 0.1, 0.05)  # of the commands
 
 

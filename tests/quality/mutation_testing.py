@@ -48,7 +48,6 @@ RIGID = (
     "engines/test_rigid_bricks",
     "validation/test_closed_forms",
     "engines/test_conformance",
-    "engines/test_planar",
 )
 CHOSEN = ("formulations/test_programs", "formulations/test_degenerate")
 STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
@@ -72,7 +71,7 @@ PROOFS = {
 MODULES = {
     "seqopt.engines.rigid.compliance": (
         *("engines/test_compliance", "engines/test_operator", "engines/test_rigid_bricks"),
-        *("engines/test_loose", "engines/test_planar", "responses/test_finite"),
+        *("engines/test_loose", "responses/test_finite"),
         *("engines/test_trial", "engines/test_growth"),
     ),
     "seqopt.engines.rigid._operator": RIGID,

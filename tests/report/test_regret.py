@@ -204,8 +204,8 @@ def test_what_is_stopped_is_said():
 
 def test_other_references_are_refused():
     engine = seqopt.make_engine("compliance", small_arch(4))
-    with pytest.raises(ProblemError, match="reference 'planer' does not exist; give one of planar"):
-        measure_regret(engine, WORST, reference="planer")
+    with pytest.raises(ProblemError, match="reference 'rigid' does not exist; give one of"):
+        measure_regret(engine, WORST, reference="rigid")
 
 
 def test_without_weight_nothing_is_regretted():

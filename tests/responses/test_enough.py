@@ -25,13 +25,12 @@ def enough(scene, name):
     return what_was_enough(LinearRange(engine), {"": table}), steps, table
 
 
-@pytest.mark.parametrize("name", ["compliance", "planar", "auto"])
+@pytest.mark.parametrize("name", ["compliance", "auto"])
 def test_within_elastic_limits_discrete_elements_change_nothing(name):
     found, steps, table = enough(arch(), name)
     of_epoxy = "" if name == "auto" else " with epoxy"
     said = f"discrete elements{of_epoxy} would change nothing in these steps"
     assert said in found.others
-    assert ("compliance would change nothing" in found.others) == (name == "planar")
     assert found.below_limit > 0
     assert f"{found.joint} in {found.step}" in found.lines[0]
     detailed = seqopt.analyze(DiscreteEngine(seqopt.build_network(arch())), steps)

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.engines._auto import AutoEngine, Level
 from seqopt.engines.diagnosis import residual
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import ComplianceEngine, solve_mixed
 from seqopt.engines.rigid._refinement import Refinement
-from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.responses._staged import staged_fields
 from seqopt.scene import Load
@@ -60,9 +58,7 @@ def along_joints(scene):
     return np.linalg.norm(springs.position - springs.position[0], axis=1)
 
 
-ENGINES = pytest.mark.parametrize(
-    ("engine", "digits"), [("compliance", 1e-11), ("planar", 1e-11), ("frame", 1e-5)]
-)
+ENGINES = pytest.mark.parametrize(("engine", "digits"), [("compliance", 1e-11), ("frame", 1e-5)])
 
 
 @ENGINES
@@ -266,32 +262,6 @@ def test_a_long_chain_that_meets_the_far_ground():
         columns = grip_columns(network, bricks, np.array([grips], dtype=int))
         found = engine.solve(bricks, [grips], Want.ALL)
         assert far(found, solve_mixed(network, bricks, columns)) < 1e-10
-
-
-def test_the_plane_is_left():
-    """A load or a movement out of it is refused by name, and the automatic engine goes up."""
-    scene = bar(4, 0.0, closed=True)
-    x, y, z = scene.bricks[1].position
-    place = (x, y + 0.02, z)
-    down, aside = (0.0, 0.0, -9.0), (0.0, 1.0, -9.0)
-    ends = (scene.grounds[0], replace(scene.grounds[1], movement=(0, 0, 0, 1e-3, 0, 0)))
-    for change, word in (
-        ({"loads": (Load(brick=2, force=aside),)}, "brick 2: a load on it"),
-        ({"loads": (Load(brick=2, force=down, position=place),)}, "brick 2: a load on it"),
-        ({"gravity": (0.0, 0.0, -9.81), "wind": (0.0, 0.1, 0.0)}, "the wind is not in"),
-        ({"grounds": ends}, "ground end of brick 4: it moves out"),
-    ):
-        out = replace(scene, **change)
-        with pytest.raises(SceneError, match=word):
-            seqopt.make_engine("planar", out)
-        engine = AutoEngine(build_network(out))
-        found = engine.solve(4, HERE, Want.ALL)
-        assert {choice.level for choice in engine.tally} == {Level.RIGID}
-        assert far(found, whole(out)) < 1e-12
-    within = replace(scene, loads=(Load(brick=2, force=down),))
-    engine = AutoEngine(build_network(within))
-    engine.solve(4, HERE)
-    assert {choice.level for choice in engine.tally} == {Level.PLANAR}
 
 
 def test_loads_come_with_their_brick_in_a_staged_build():

@@ -23,7 +23,7 @@ import numpy as np
 from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.engines.interface import SPACE, Basis
+from seqopt.network._mechanics import point_motion
 from seqopt.network.network import GROUND, Network
 from seqopt.work._threads import cores, in_threads
 
@@ -58,16 +58,15 @@ def grow_tree(network: Network) -> SpanningTree:
     return SpanningTree(spring, parent)
 
 
-def compliances(network: Network, first: int, basis: Basis) -> Floats:
-    """Return the compliances (s, k, k) of the first springs in k directions, m/N, rad/(N m)."""
-    springs, count = network.springs, len(basis.force)
-    out = np.zeros((first, *2 * basis.wrench.shape[:1]))
-    for block, directions, stiffness in (
-        (slice(0, count), basis.force, springs.translational_stiffness[:first]),
-        (slice(count, None), basis.moment, springs.rotational_stiffness[:first]),
-    ):
-        own = springs.axes[:first] @ directions.T
-        out[:, block, block] = own.transpose(0, 2, 1) / stiffness[:, None, :] @ own
+def _compliances(network: Network, first: int) -> Floats:
+    """Return the compliances (s, 6, 6) of the first springs, m/N and rad/(N m)."""
+    springs, out = network.springs, np.zeros((first, 6, 6))
+    axes, parts = (
+        springs.axes[:first],
+        (springs.translational_stiffness, springs.rotational_stiffness),
+    )
+    for own, stiffness in zip((slice(3), slice(3, 6)), parts, strict=True):
+        out[:, own, own] = axes.transpose(0, 2, 1) / stiffness[:first, None] @ axes
     return out
 
 
@@ -78,7 +77,7 @@ _SUMMED = 2**22  # the same, where much is done with each, brick after brick
 _TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
 _WORSE = 10.0  # times the rounding that was left when they were summed anew
 _SAMPLE = 600  # motions that are compared with each other, about
-_MOST = 0.95  # share of all pairs of motions in space whose asymmetry counts as rounding
+_MOST = 0.95  # share of all pairs of motions whose asymmetry counts as rounding
 
 
 class _Before(NamedTuple):
@@ -97,34 +96,33 @@ class Growth:
     """The answers of a growing structure to its weight and to unit wrenches on its bricks.
 
     Row 0 is the weight of the bricks that stand with all else that loads and moves them, row
-    ``1 + kb + i`` a unit of component ``i`` of k on brick b at its centroid. Of the arrays, which
+    ``1 + 6b + i`` a unit of component ``i`` on brick b at its centroid. Of the arrays, which
     have room for all bricks of the tree, the rows and columns of bricks and springs that are there
     count.
 
-    ``tree``: on which the bricks hang. ``basis``: k directions in which bricks are loaded and move;
-    all by default. ``twist`` (1 + kB, kB): of the bricks, m and rad; ``wrench`` (1 + kB, kS): of
-    every spring on its second body, N and N m; ``loss`` (B,): how much more than the last digit of
-    a brick's motions is rounding, as what moved it further before is gone; ``remembers``: whether
-    `answers` takes the last brick count but one from the last, which differs in rounding.
+    ``tree``: on which the bricks hang. ``twist`` (1 + 6B, 6B): of the bricks, m and rad; ``wrench``
+    (1 + 6B, 6S): of every spring on its second body, N and N m; ``loss`` (B,): how much more than
+    the last digit of a brick's motions is rounding, as what moved it further before is gone;
+    ``remembers``: whether `answers` takes the last brick count but one from the last, which differs
+    in rounding.
     """
 
     remembers = False
 
-    def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
-        self._network, self._tree, self._basis = network, tree, basis
-        self._size = len(basis.wrench)
-        most = self._size * len(tree.spring)
+    def __init__(self, network: Network, tree: SpanningTree) -> None:
+        self._network, self._tree = network, tree
+        most = 6 * len(tree.spring)
         counts = np.arange(len(tree.spring) + 1)
         # how many springs act on as many bricks
         self._acting = np.searchsorted(network.springs.since, counts, side="right").tolist()
-        self._compliance = compliances(network, self._acting[-1], basis)
-        self._shift = network.springs.movement[: self._acting[-1]] @ basis.wrench.T
+        self._compliance = _compliances(network, self._acting[-1])
+        self._shift = network.springs.movement[: self._acting[-1]]
         center = network.centroid[: len(tree.spring)]
-        self._own_arm = self._carried(center - network.springs.position[tree.spring])
-        self._along = self._carried(center - center[tree.parent])
+        self._own_arm = _carried(center - network.springs.position[tree.spring])
+        self._along = _carried(center - center[tree.parent])
         self.loss = np.ones(len(tree.spring))
         self.twist = np.empty((1 + most, most))
-        self.wrench = np.zeros((1 + most, self._size * self._acting[-1]))
+        self.wrench = np.zeros((1 + most, 6 * self._acting[-1]))
         self.bricks = self._closed = 0
         self._weighed: list[list[Floats]] = []
         self._before: _Before | None = None
@@ -169,9 +167,9 @@ class Growth:
         """
         if not self.recalls(bricks):
             self.reach(bricks)
-        rows: slice | Ints = slice(1 + self._size * bricks)
+        rows: slice | Ints = slice(1 + 6 * bricks)
         if len(held) < bricks:
-            every = 1 + self._size * held[:, None] + np.arange(self._size)
+            every = 1 + 6 * held[:, None] + np.arange(6)
             rows = np.concatenate([[0], every.ravel()])
         twist, wrench = self._answers(rows)
         if bricks == self.bricks or self._before is None:
@@ -190,11 +188,11 @@ class Growth:
 
     @property
     def _moves(self) -> int:
-        return self._size * self.bricks
+        return 6 * self.bricks
 
     def _answers(self, rows: slice | Ints | int) -> tuple[Floats, Floats]:
         """Return the twists of bricks that stand, and what springs that act transmit."""
-        acting = self._size * self._acting[self.bricks]
+        acting = 6 * self._acting[self.bricks]
         return self.twist[:, : self._moves][rows], self.wrench[:, :acting][rows]
 
     def _start(self) -> None:
@@ -209,7 +207,7 @@ class Growth:
 
     def _add(self) -> None:
         """Hang the next brick on its spring."""
-        tree, k, brick = self._tree, self._size, self.bricks
+        tree, k, brick = self._tree, 6, self.bricks
         spring, parent = int(tree.spring[brick]), int(tree.parent[brick])
         old, after = slice(0, 1 + k * brick), 1 + k * brick
         mine, rows = slice(k * brick, k * brick + k), slice(after, after + k)
@@ -239,11 +237,10 @@ class Growth:
 
     def _load(self, brick: int) -> None:
         """Add to what the weight does that of a brick, and of loads that begin with it."""
-        k, weight = self._size, self._basis.force @ self._network.weight[brick]
-        pulls = [(brick, weight)]
+        k, pulls = 6, [(brick, self._network.weight[brick])]
         begun = self._network.applied(brick + 1, before=brick)
         for other in np.flatnonzero(begun.any(axis=1)).tolist():
-            pulls.append((other, self._basis.wrench @ begun[other]))
+            pulls.append((other, begun[other]))
         for body, pull in pulls:
             rows = slice(1 + k * body, 1 + k * body + len(pull))
             for weighed, answer in zip(self._answers(0), self._answers(rows), strict=True):
@@ -251,11 +248,11 @@ class Growth:
 
     def _of(self, spring: int) -> slice:
         """Return the columns of what a spring transmits."""
-        return slice(self._size * spring, self._size * spring + self._size)
+        return slice(6 * spring, 6 * spring + 6)
 
     def _close(self, springs: Ints) -> tuple[Floats, list[Floats]]:
         """Let springs act that close loops; return what is added, as of `_Before`."""
-        k, rows = self._size, slice(0, 1 + self._moves)
+        k, rows = 6, slice(0, 1 + self._moves)
         gaps = np.concatenate([self._gap(s) for s in springs], axis=1)
         answers = self._answers(rows)
         pulled = np.concatenate([self._pulled(answers[1], s) for s in springs])
@@ -281,13 +278,13 @@ class Growth:
 
     def _sum_again(self) -> None:
         """Sum all twists anew, from what springs give on the shortest way from the ground."""
-        k, springs, center = self._size, self._network.springs, self._network.centroid
+        k, springs, center = 6, self._network.springs, self._network.centroid
         ways, shift = [], np.zeros((self.bricks, k))  # the ground's, where bricks hang on it
         for parent, brick, spring, sign in self._ways(GROUND):
-            at_spring = self._carried(center[brick] - springs.position[spring])
+            at_spring = _carried(center[brick] - springs.position[spring])
             given = self._compliance[spring] @ at_spring.T
             arm = center[brick] - center[parent] if parent != GROUND else np.zeros(3)
-            ways.append((brick, parent, spring, -sign * given, self._carried(arm).T))
+            ways.append((brick, parent, spring, -sign * given, _carried(arm).T))
             shift[brick] = at_spring @ self._shift[spring]
         step = max(1, _SUMMED // self._moves)
         for start in range(0, 1 + self._moves, step):
@@ -303,14 +300,13 @@ class Growth:
         some = np.linspace(0, self._moves - 1, min(self._moves, _SAMPLE)).astype(int)
         matrix, root = self.twist[np.ix_(1 + some, some)], np.sqrt(np.abs(self._own()[some]))
         apart = np.abs(matrix - matrix.T) / np.maximum(root * root[:, None], TINY)
-        more = (len(SPACE.wrench) / self._size) ** 2  # in space there are as many times the pairs
-        self._left = max(1.0, float(np.quantile(apart, 1 - more * (1 - _MOST))) / ROUNDING)
+        self._left = max(1.0, float(np.quantile(apart, _MOST)) / ROUNDING)
         self.loss[: self.bricks] = self._left
 
     def _gap(self, spring: int) -> Floats:
         """Return how far the bodies of a spring part at it under every load, (1 + kb, k)."""
         springs = self._network.springs
-        at, out = springs.position[spring], np.zeros((1 + self._moves, self._size))
+        at, out = springs.position[spring], np.zeros((1 + self._moves, 6))
         first, body = springs.bodies[spring].tolist()
         trail = {}
         for before, after, s, sign in self._ways(first):
@@ -319,7 +315,7 @@ class Growth:
                 break
         while body != first:
             body, s, sign = trail[body]
-            carried = self._carried(at - springs.position[s])
+            carried = _carried(at - springs.position[s])
             turn = self._compliance[s] @ carried.T
             out -= self.wrench[: len(out), self._of(s)] @ (sign * turn)
             out[0] += sign * carried @ self._shift[s]
@@ -351,20 +347,19 @@ class Growth:
 
     def _pulled(self, answers: Floats, spring: int) -> Floats:
         """Return what a spring's unit wrenches on both its bodies do, of the answers' rows."""
-        k, springs = self._size, self._network.springs
+        k, springs = 6, self._network.springs
         out = np.zeros((k, answers.shape[1]))
         for body, sign in zip(springs.bodies[spring].tolist(), (-1.0, 1.0), strict=True):
             if body != GROUND:
                 arm = springs.position[spring] - self._network.centroid[body]
-                out += sign * self._carried(arm) @ answers[1 + k * body : 1 + k * body + k]
+                out += sign * _carried(arm) @ answers[1 + k * body : 1 + k * body + k]
         return out
 
-    def _carried(self, arm: Floats) -> Floats:
-        """Return the twists (.., k, k) at the ends of arms (.., 3) for unit twists at its start."""
-        out, forces = np.zeros((*arm.shape[:-1], self._size, self._size)), len(self._basis.force)
-        out[...] = np.eye(self._size)
-        out[..., :forces, forces:] = self._basis.levers(arm).swapaxes(-1, -2)
-        return out
+
+def _carried(arm: Floats) -> Floats:
+    """Return the twists (.., 6, 6) at the ends of arms (.., 3) for unit twists at its start."""
+    turned = np.broadcast_to(np.eye(6)[3:], (*arm.shape[:-1], 3, 6))
+    return np.concatenate([point_motion(arm), turned], axis=-2)
 
 
 def _add_products(targets: Sequence[Floats], left: Floats, changes: Sequence[Floats]) -> None:

@@ -13,17 +13,16 @@ from math import prod
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines.interface import SPACE, Basis
 from seqopt.engines.rigid._growth import Growth, SpanningTree
 from seqopt.engines.rigid._response_maps import (
     AT_ONCE,
     Loads,
     ResponseMaps,
     inner_edges,
-    inner_motions,
     loads_of,
     scene_maps,
 )
+from seqopt.network._mechanics import point_motion
 from seqopt.network.network import Network
 
 _OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
@@ -265,16 +264,16 @@ def load_rows(nodes: Ints, directions: int, moments: int) -> Ints:
 class OperatorBuilder:
     """Makes the operator of any brick count of a tree from what grows with it."""
 
-    def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
-        self.network, self.basis = network, basis
-        self.growth = Growth(network, tree, basis)
-        self.maps = scene_maps(network, basis)
-        self.nodes = inner_motions(network, basis)
-        self.moments = len(basis.moment) if network.scene.grip_kinds.turns.any() else 0
+    def __init__(self, network: Network, tree: SpanningTree) -> None:
+        self.network, self.growth = network, Growth(network, tree)
+        self.maps = scene_maps(network)
+        count, self.moments = len(network.inner), 3 if network.scene.grip_kinds.turns.any() else 0
+        arms = network.node_position[network.inner] - network.centroid[:count, None]
+        self.nodes = point_motion(arms).reshape(count, 6, 6)
         if self.moments:
-            turned = np.zeros((len(self.nodes), self.moments, len(basis.wrench)))
-            turned[..., -self.moments :] = network.lever * np.eye(self.moments)
-            self.nodes = np.concatenate([self.nodes, turned], axis=1)
+            turned = network.lever * np.eye(6)[3:]
+            every = np.broadcast_to(turned, (count, 3, 6))
+            self.nodes = np.concatenate([self.nodes, every], axis=1)
 
     def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
         """Return the operator of at most as many bricks as the tree has.
@@ -300,7 +299,7 @@ class OperatorBuilder:
             wrench=wrench,
             maps=ResponseMaps(self.maps, bricks),
             at_second=at_second,
-            axis=axis @ self.basis.force.T,
+            axis=axis,
             inner_edge=inner_edge,
             loss=np.repeat(loss, nodes.shape[1]),
             moments=self.moments,

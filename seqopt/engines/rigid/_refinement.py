@@ -31,7 +31,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
-from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
+from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import (
     _by_grip,
     grip_forces,
@@ -270,20 +270,18 @@ class Refinement:
         columns: Ints,
         operator: ComplianceOperator | None = None,
         largest: float = LAST_CORRECTION,
-        basis: Basis = SPACE,
         compliance: GripCompliance = RIGID,
     ) -> Fields:
         """Return all fields of grip sets.
 
         ``operator``: with wrenches and twists, if there is one for these grips; it serves if
         nothing is loose. ``largest``: correction of a set after which it needs no other, over the
-        largest of each kind. ``basis``: the directions that the operator knows; in the others
-        nothing may move. ``compliance``: of the sets, in all of space.
+        largest of each kind. ``compliance``: of the sets.
         """
         every = [slice(i, i + _TOGETHER) for i in range(0, len(columns), _TOGETHER)]
         if operator is None or self.held.loose:
-            operator, basis = self.own, SPACE
-        corrector = _Corrector(self, operator, largest, basis)
+            operator = self.own
+        corrector = _Corrector(self, operator, largest)
         own = [compliance.select(part) for part in every]
         parts = (corrector.together(columns[p], h) for p, h in zip(every, own, strict=True))
         return join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
@@ -324,7 +322,7 @@ class _Asked(NamedTuple):
 
     columns: Ints  # (S, r)
     loads: Ints  # (S, k); rows of the operator's loads at the grips
-    compliance: GripCompliance  # in the operator's directions
+    compliance: GripCompliance
 
     @property
     def grips(self) -> int:
@@ -344,28 +342,25 @@ class _Corrector:
     system: Refinement
     operator: ComplianceOperator
     largest: float = LAST_CORRECTION
-    basis: Basis = SPACE
 
     def together(self, columns: Ints, compliance: GripCompliance = RIGID) -> Fields:
         """Return the fields of a few sets."""
         operator, parts, network = self.operator, self.system.parts, self.system.network
         index = operator.load_index(columns)
-        own = compliance.within(self.basis.force, self.basis.wrench)
         pairs = pairs_of(operator, columns)
-        found = grip_forces(operator, columns, index, pairs, own)
+        found = grip_forces(operator, columns, index, pairs, compliance)
         if operator.loose:
             for at in np.flatnonzero(~(found.lowest >= _HARDLY_HELD)):
                 mine = compliance.select(slice(at, at + 1))
                 require_resistance(network, parts.bricks, columns[at], mine)
         states = self._states(index, found.force)
-        force = self._in_space(found.force, columns.shape[1])
-        done = self._correct(_Asked(columns, index, own), states, force)
-        done &= ~nearly_rigid(operator, index, pairs, own)
+        force = found.force[:, : len(index.T) - operator.loose].copy()
+        done = self._correct(_Asked(columns, index, compliance), states, force)
+        done &= ~nearly_rigid(operator, index, pairs, compliance)
         wrench, twist = unscaled(parts, states[done])
         mine = compliance.select(done)
         solution = Solution(twist, wrench, *borne(force[done], columns.shape[1], mine))
-        motion = operator.maps.motion if self.basis is SPACE else parts.motion
-        fields = respond(network, parts.statics, motion, columns[done], solution)
+        fields = respond(network, parts.statics, operator.maps.motion, columns[done], solution)
         if done.all():
             return fields
         rest = compliance.select(~done)
@@ -374,23 +369,8 @@ class _Corrector:
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
         """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
         loads = self.operator.loads(index, force, weight)
-        every = self.basis.wrench
-        rows = self.operator.wrench, self.operator.twist
-        wrench, twist = (loads.sum(r).reshape(len(index), -1, len(every)) @ every for r in rows)
-        return rescaled(self.system.parts, wrench, twist.reshape(len(index), -1))
-
-    def _in_space(self, force: Floats, grips: int) -> Floats:
-        """Return forces of grips, then moments if any, given in the operator's directions (S, k).
-
-        Result (S, 3r) or (S, 6r).
-        """
-        sets, width = len(force), len(self.basis.force)
-        nodes = force[:, : grips * width].reshape(sets, grips, width)
-        out = np.asarray(nodes @ self.basis.force).reshape(sets, 3 * grips)
-        if not self.operator.moments:
-            return out
-        borne = _by_grip(self.operator, force, grips)[..., width:] @ self.basis.moment
-        return np.hstack([out, borne.reshape(sets, 3 * grips)])
+        wrench, twist = (loads.sum(rows) for rows in (self.operator.wrench, self.operator.twist))
+        return rescaled(self.system.parts, wrench.reshape(len(index), -1, 6), twist)
 
     def _correct(self, asked: _Asked, states: Floats, force: Floats) -> Bools:
         """Correct answers in place until they no longer change; return which have come so far.
@@ -414,7 +394,7 @@ class _Corrector:
         """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
         operator, system, columns = self.operator, self.system, asked.columns
         parts, inner = system.parts, system.inner
-        joints, grips = len(parts.wrench_unit), columns.shape[1]
+        joints = len(parts.wrench_unit)
         at = load_rows(columns, 3, 3 if operator.moments else 0)
         load = np.zeros((len(at), inner.shape[0]))
         np.add.at(load, (np.arange(len(at))[:, None], at), force)  # a brick may be turned twice
@@ -427,21 +407,12 @@ class _Corrector:
         loose = -operator.softness * pull  # how far what is missing moves loose parts
         if operator.loose:
             moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
-        at_grips = self._at_grips(np.take_along_axis(moved, at, axis=1), grips)
-        moved, off = np.hstack([at_grips, -pull]), self._off(asked, force)
+        moved = np.hstack([np.take_along_axis(moved, at, axis=1), -pull])
+        off = self._off(asked, force)
         change = still_forces(operator, columns, asked.loads, moved, asked.compliance, off)
-        more = self._in_space(change, grips)
+        more = change[:, : at.shape[1]].copy()
         change[:, change.shape[1] - operator.loose :] += loose
         return answer + self._states(asked.loads, change, 0.0), more
-
-    def _at_grips(self, moved: Floats, grips: int) -> Floats:
-        """Return motions at grips, (S, 3r) or (S, 6r) in space, in the operator's directions."""
-        sets = len(moved)
-        shift = moved[:, : 3 * grips].reshape(-1, 3) @ self.basis.force.T
-        if not self.operator.moments:
-            return shift.reshape(sets, -1)
-        turn = moved[:, 3 * grips :].reshape(-1, 3) @ self.basis.moment.T
-        return np.hstack([shift.reshape(sets, -1), turn.reshape(sets, -1)])
 
     def _off(self, asked: _Asked, force: Floats) -> Floats | None:
         """Return how far grips let their nodes be, (S, r, w); None if rigid and in place."""
@@ -451,7 +422,7 @@ class _Corrector:
         width, moments = self.operator.directions, self.operator.moments
         out = np.zeros((len(force), grips, width + moments))
         if compliance.matrix is not None:
-            bears = _by_grip(self.operator, self._at_grips(force, grips), grips)
+            bears = _by_grip(self.operator, force, grips)
             out += np.einsum("srij,srj->sri", compliance.matrices(len(force), grips), bears)
         if compliance.moved is not None:
             out[..., :width] -= compliance.moved

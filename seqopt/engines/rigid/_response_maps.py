@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines.interface import SHAPES, SPACE, Basis, _counts_of_fields
+from seqopt.engines.interface import SHAPES, _counts_of_fields
 from seqopt.network._mechanics import build_statics, node_motion
 from seqopt.network.network import Network
 
@@ -22,41 +22,33 @@ AT_ONCE = 2**18  # numbers mapped at a time: they stay in the processor's cache
 class SceneMaps(FrozenValue):
     """What twists and wrenches of all bricks and springs of a scene mean, once all springs act.
 
-    ``basis``: k directions of twists and wrenches. ``edge`` (E, kS): what edges carry of wrenches.
-    ``motion`` (3N, kB): how twists move nodes. ``since`` (m,): of the entries of ``motion``, from
-    which brick count on they hold; before, where its spring does not act yet, a joint node follows
-    the brick that is there alone. ``support`` (G, k, 6): force and moment at every ground end for
-    the wrench of its spring.
+    ``edge`` (E, 6S): what edges carry of wrenches. ``motion`` (3N, 6B): how twists move nodes.
+    ``since`` (m,): of the entries of ``motion``, from which brick count on they hold; before, where
+    its spring does not act yet, a joint node follows the brick that is there alone. ``support`` (G,
+    6, 6): force and moment at every ground end for the wrench of its spring.
     """
 
     network: Network
-    basis: Basis
     edge: sparse.csr_array
     motion: sparse.csr_array
     since: Ints
     support: Floats
 
 
-def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
+def scene_maps(network: Network) -> SceneMaps:
     """Return the maps of a scene."""
     statics, springs = build_statics(network), network.springs
-    pick = np.zeros((3, len(basis.wrench)))
-    pick[:, : len(basis.force)] = basis.force.T
     every = sparse.eye_array(len(springs.since))
     motion = node_motion(network, len(network.inner))
-    if basis is not SPACE:
-        each = sparse.eye_array(len(network.inner))
-        motion = sparse.csr_array(motion @ sparse.kron(each, basis.wrench.T))
-    edge = sparse.csr_array(statics.edge_of_spring @ sparse.kron(every, pick))
+    edge = sparse.csr_array(statics.edge_of_spring @ sparse.kron(every, np.eye(3, 6)))
     of_node = np.where(network.node_spring >= 0, springs.since[network.node_spring], 0)
     since = np.repeat(np.repeat(of_node, 3), np.diff(motion.indptr))
-    support = basis.wrench @ statics.support_of_spring.transpose(0, 2, 1)
-    return SceneMaps(network, basis, edge, motion, since, support)
+    return SceneMaps(network, edge, motion, since, statics.support_of_spring.transpose(0, 2, 1))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ResponseMaps(FrozenValue):
-    """What twists (.., kb) and wrenches (.., ks) of the first b bricks and s springs mean."""
+    """What twists (.., 6b) and wrenches (.., 6s) of the first b bricks and s springs mean."""
 
     scene: SceneMaps
     bricks: int  # how many stand
@@ -68,17 +60,17 @@ class ResponseMaps(FrozenValue):
 
     @cached_property
     def edge(self) -> sparse.csr_array:
-        """What edges carry of wrenches, (E, ks)."""
+        """What edges carry of wrenches, (E, 6s)."""
         network = self.scene.network
         acting = int(np.searchsorted(network.springs.since, self.bricks, side="right"))
-        width = acting * len(self.scene.basis.wrench)
+        width = 6 * acting
         return frozen(_leading(self.scene.edge, network.count_edges(self.bricks), width))
 
     @cached_property
     def motion(self) -> sparse.csr_array:
-        """How twists move nodes, (3n, kb)."""
+        """How twists move nodes, (3n, 6b)."""
         rows = 3 * self.scene.network.count_nodes(self.bricks)
-        width = self.bricks * len(self.scene.basis.wrench)
+        width = 6 * self.bricks
         entries = int(self.scene.motion.indptr[rows])
         alone = np.where(self.scene.since[:entries] > self.bricks, 2.0, 1.0)
         return frozen(_leading(self.scene.motion, rows, width, alone))
@@ -107,17 +99,13 @@ class ResponseMaps(FrozenValue):
         """
         out = np.empty((len(states), self.count(name))) if out is None else out
         if name == "support":
-            k = len(self.scene.basis.wrench)
             for g, spring in enumerate(self.scene.network.springs.support.tolist()):
-                mine = states[:, k * spring : k * spring + k]
+                mine = states[:, 6 * spring : 6 * spring + 6]
                 there = mine.shape[1] > 0  # else it does not act
                 out[:, 6 * g : 6 * g + 6] = mine @ self.scene.support[g] if there else 0.0
         elif name in ("joint_wrench", "brick_twist"):
-            basis = self.scene.basis
-            own = states.reshape(len(states), -1, len(basis.wrench))
-            whole = own if basis is SPACE else own @ basis.wrench
-            out[:, 6 * own.shape[1] :] = 0.0
-            out[:, : 6 * own.shape[1]] = whole.reshape(len(states), 6 * own.shape[1])
+            out[:, states.shape[1] :] = 0.0
+            out[:, : states.shape[1]] = states
         else:
             maps = self.edge if name == "edge_force" else self.motion
             step = max(16, AT_ONCE // max(1, *maps.shape))
@@ -182,13 +170,3 @@ def inner_edges(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
     edge = np.flatnonzero(network.edge_spring[: network.count_edges(bricks)] < 0)
     axis = network.edge_axis[edge]
     return edge, axis, np.einsum("bi,bi->b", axis, network.inner_load(bricks)[1::2])
-
-
-def inner_motions(network: Network, basis: Basis) -> Floats:
-    """Return the displacements (n, 2d, k) of the inner nodes of bricks for their unit twists."""
-    count, forces = len(network.inner), len(basis.force)
-    arms = network.node_position[network.inner] - network.centroid[:count, None]
-    out = np.zeros((count, 2, forces, len(basis.wrench)))
-    out[..., :forces] = np.eye(forces)
-    out[..., forces:] = basis.levers(arms).swapaxes(-1, -2)
-    return out.reshape(count, 2 * forces, len(basis.wrench))

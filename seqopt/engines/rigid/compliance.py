@@ -24,8 +24,6 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance, read_compliance
 from seqopt.engines.interface import (
     SHAPES,
-    SPACE,
-    Basis,
     Fields,
     NamedEngine,
     Want,
@@ -173,16 +171,13 @@ _EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole 
 class ComplianceEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a scene.
 
-    ``basis``: the directions in which bricks are loaded and move; all by default, fewer in a plane.
     ``accuracy``: largest error of fields, over the largest entry of each, that is accepted; with
     `Want.SCREEN`, `_SCREEN` if that is larger. Sets that may err more are corrected.
     """
 
-    def __init__(
-        self, network: Network | Scene, basis: Basis = SPACE, accuracy: float = ACCURACY
-    ) -> None:
+    def __init__(self, network: Network | Scene, accuracy: float = ACCURACY) -> None:
         super().__init__(network)
-        self._basis, self._accuracy = basis, accuracy
+        self._accuracy = accuracy
         self._tree, self._uniform = grow_tree(self.network), _count_uniform(self.network)
         self._kept: dict[int, ComplianceOperator] = {}  # the one that was asked last comes last
         self._grown: GrownExtremes | None = None  # what answers few grip sets of large structures
@@ -198,12 +193,8 @@ class ComplianceEngine(NamedEngine):
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self._network, bricks, grips)
         compliance = read_compliance(self._network, columns, grips, moved)
-        self._require_known(columns, compliance)
         found = self._found(bricks, columns, compliance, want)
         return require_finite(found, bricks, grips)
-
-    def _require_known(self, columns: Ints, compliance: GripCompliance) -> None:
-        """Raise `GripError` where a grip set is none that the directions of bricks can answer."""
 
     def _found(self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want) -> Fields:
         """Return what is wanted of grip sets, corrected where the operator is not enough."""
@@ -211,16 +202,11 @@ class ComplianceEngine(NamedEngine):
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._uniform
             accuracy = self._accepted(want)
-            own = compliance.within(self._basis.force, self._basis.wrench)
-            fast = _solve_fast(operator, columns, own, even=even, accuracy=accuracy)
+            fast = _solve_fast(operator, columns, compliance, even=even, accuracy=accuracy)
         sure = 0 if fast is None else np.count_nonzero(fast.well_conditioned)
         if fast is None or (len(columns) and not sure):
             return self._refined(bricks, columns, compliance, want)
         found = fast.fields(want)
-        if self._basis is not SPACE:
-            found["grip_force"] = found["grip_force"] @ self._basis.force
-            if fast.operator.moments:
-                found["grip_moment"] = found["grip_moment"] @ self._basis.moment
         if sure < len(columns):
             wrong = ~fast.well_conditioned
             rest = compliance.select(wrong)
@@ -240,14 +226,13 @@ class ComplianceEngine(NamedEngine):
         """
         columns, numbers = grip_columns(self._network, bricks, grips), np.asarray(grips)
         compliance = read_compliance(self._network, columns, numbers, None)
-        self._require_known(columns, compliance)
         if not compiled or not compliance.rigid or not can_compile():
             fields = self._found(bricks, columns, compliance, want)
             return extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
         if bricks <= min(self._uniform, len(self._tree.spring)):
-            many = are_few(bricks * len(self._basis.force), len(columns))  # fields take less
+            many = are_few(3 * bricks, len(columns))  # fields take less
             if not many and self._can_grow and self._builder.growth.bricks <= bricks:
                 if self._grown is None:
                     self._grown = GrownExtremes(self._builder)
@@ -293,13 +278,13 @@ class ComplianceEngine(NamedEngine):
     @cached_property
     def _builder(self) -> OperatorBuilder:
         """Made when the first operator is: a scene that is loose from the start has none."""
-        return OperatorBuilder(self._network, self._tree, self._basis)
+        return OperatorBuilder(self._network, self._tree)
 
     @property
     def _can_grow(self) -> bool:
         """Whether the compiled loops are made for the scene."""
         rests = not self._network.springs.movement.any()
-        return self._basis is SPACE and rests and not self._builder.moments
+        return bool(rests and not self._builder.moments)
 
     def _refined(
         self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want
@@ -310,7 +295,7 @@ class ComplianceEngine(NamedEngine):
             tied = operator is not None  # the tree that it grew on reaches them all
             refinement = self._refinements.of(bricks, tied=tied)
             largest = _SCREEN if _is_screen(want) else self._refinements.largest
-            answer = refinement.solve(columns, operator, largest, self._basis, compliance)
+            answer = refinement.solve(columns, operator, largest, compliance)
         return keep_wanted(answer, want)
 
 

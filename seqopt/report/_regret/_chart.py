@@ -110,13 +110,7 @@ def _shared(boxes: Floats, others: Floats) -> Floats:
     return np.asarray((high - low).clip(min=0.0).prod(axis=2).sum(axis=1))
 
 
-ENGINES = (
-    "compliance",
-    "planar",
-    "rigid grips",
-    "frame",
-    "discrete",
-)  # in the order of their looks
+ENGINES = ("compliance", "rigid grips", "frame", "discrete")  # in the order of their looks
 MARKS = {"loop": "o", FREE: "s"}
 PALE = 0.28
 LEAST = 1e-6  # regret from which on the axis is logarithmic; less is drawn in the band of none

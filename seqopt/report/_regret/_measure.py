@@ -326,7 +326,7 @@ def _ways(course: _Course, reference: str) -> tuple[list[Way], dict[str, str]]:
     """Return all ways, the usual ones first, and engines that cannot model the scene, and why."""
     refused, engines = dict[str, str](), list[str]()
     soft = bool(np.any(course.reference.engine.network.compliances.compliance))
-    for name in ("planar", "compliance", *([RIGID_GRIPS] if soft else []), "frame", "discrete"):
+    for name in ("compliance", *([RIGID_GRIPS] if soft else []), "frame", "discrete"):
         if name == "discrete" != reference and course.mortar is None:
             continue  # where joints do not open it says what rigid bricks say
         try:
