@@ -7,7 +7,7 @@
 >>> seqopt.judge_instance(instance, plan.nodes).gap
 0.0
 
-Files hold the graph, goals and caps of its paths (`save_instance`, `read_instance`); MPS and LP
+Files hold the graph, goals and caps of its paths (`save_instance`, `read_instance`); MPS
 files hold it as an integer program.
 """
 

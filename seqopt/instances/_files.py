@@ -17,7 +17,7 @@ from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
 from seqopt.errors import FileError, ProblemError
 from seqopt.graph.graph import NOW, Graph, TimedGraph
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _by_goal, _Cap, _Target
-from seqopt.instances._texts import as_cp_sat, as_lp, as_mps
+from seqopt.instances._program import as_mps
 from seqopt.scene._checks import short
 
 FORMAT, VERSION = "seqopt-instance", 1
@@ -235,12 +235,7 @@ def _require_columns(goals: Sequence[_Target], caps: Sequence[_Cap], count: int)
             raise ValueError(f"cap {cap.name}: {cap.most:g} is no amount; give a number from 0")
 
 
-WRITERS: dict[str, Callable[[Instance], bytes | str]] = {
-    ".npz": stored,
-    ".mps": as_mps,
-    ".lp": as_lp,
-    ".pbtxt": as_cp_sat,
-}
+WRITERS: dict[str, Callable[[Instance], bytes | str]] = {".npz": stored, ".mps": as_mps}
 
 
 def read_instance(path: Path | str) -> Instance:
@@ -291,8 +286,8 @@ def save_instance(instance: Instance, path: Path | str) -> None:
     ----------
     instance : Instance
     path : path
-        ``.npz`` for the archive that `read_instance` reads; ``.mps``, ``.lp`` or ``.pbtxt``
-        (CP-SAT) for a program; a name without an end for a folder with all of them.
+        ``.npz`` for the archive that `read_instance` reads; ``.mps`` for a program; a name
+        without an end for a folder with both.
 
     Raises
     ------
@@ -308,7 +303,10 @@ def save_instance(instance: Instance, path: Path | str) -> None:
     """
     path = Path(path)
     if path.suffix == "":
-        write_folder(path, _all(instance))
+        archive = stored(instance)
+        text = Archive(archive, str(path)).text(TEXT)
+        names = {"instance.npz": archive, "instance.mps": as_mps(instance), TEXT: text}
+        write_folder(path, names)
         return
     if path.suffix not in WRITERS:
         known = ", ".join(WRITERS)
@@ -316,15 +314,3 @@ def save_instance(instance: Instance, path: Path | str) -> None:
             f"{path}: {path.suffix} is no format of instances; give {known}, or a folder"
         )
     write_bytes(path, WRITERS[path.suffix](instance))
-
-
-def _all(instance: Instance) -> dict[str, bytes | str]:
-    """Return an instance in all formats by file name; that of CP-SAT only with times."""
-    names = {f"instance{end}": write for end, write in WRITERS.items()}
-    if not instance.asks_time:
-        del names["instance.pbtxt"]
-    out: dict[str, bytes | str] = {name: write(instance) for name, write in names.items()}
-    archive = out["instance.npz"]
-    assert isinstance(archive, bytes)  # it is the one that is no text
-    with zipfile.ZipFile(io.BytesIO(archive)) as parts:
-        return {**out, TEXT: parts.read(TEXT).decode()}

@@ -6,11 +6,12 @@ arcs of every level where all paths have one arc on each, else over the arcs to 
 is :math:`\eta + m \sum_s u_s` with :math:`u_s \ge \sum_a c_{s a} x_a - \eta`, where :math:`m` is
 the largest weight. Of times, :math:`T_v` is the end of the act that leads to a node, and
 :math:`\rho_{v r}` the time from which robot :math:`r` is free there; the constraints of an act on
-these are active if it is taken.
+these are relaxed by the horizon (big-M) unless it is taken.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -22,16 +23,12 @@ from seqopt.graph.graph import HELD, NOW, TimedGraph
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target
 from seqopt.graph.paths import distances
 
-NEVER = -1  # of a row: it holds whatever is taken
-
 
 class Program(NamedTuple):
-    """Minimize ``cost @ x`` with rows between limits, some active only if a 0-1 variable is 1.
+    """Minimize ``cost @ x`` with rows between limits; further goals are rows without limits.
 
     ``names`` (v), ``cost`` (v,), ``upper`` (v,), from 0; ``whole`` (v,) bool; ``matrix`` (r, v),
-    ``low``, ``high`` (r,); ``where`` (r,): the indicator variable of a row, or `NEVER`;
-    ``slack`` (r,): its big-M, if inactive; ``later`` (k, v): further goals;
-    ``rows`` (r): names.
+    ``low``, ``high`` (r,); ``rows`` (r): names.
     """
 
     names: list[str]
@@ -41,10 +38,46 @@ class Program(NamedTuple):
     matrix: sparse.csr_array
     low: Floats
     high: Floats
-    where: Ints
-    slack: Floats
-    later: sparse.csr_array
     rows: list[str]
+
+
+def as_mps(instance: Instance) -> str:
+    """Return the program in free MPS; further goals are rows of type N after the first."""
+    found = program(instance)
+    made_by, goals = instance.facts.get("made_by", ""), [goal.name for goal in instance.goals]
+    said = [
+        f"* seqopt instance {instance.name}: {', '.join(goals)}",
+        *([f"* {made_by}"] * bool(made_by)),
+    ]
+    bounded = np.isfinite(found.low)
+    kinds = np.where(bounded, "G", np.where(np.isfinite(found.high), "L", "N"))
+    kinds[found.low == found.high] = "E"
+    right = np.where(kinds == "N", 0.0, np.where(bounded, found.low, found.high))
+    lines = [*said, "NAME " + "".join(c if c.isalnum() else "_" for c in instance.name)]
+    lines += ["ROWS", " N goal_0"]
+    lines += [f" {kind} {name}" for kind, name in zip(kinds, found.rows, strict=True)]
+    lines += ["COLUMNS", *_columns(found), "RHS"]
+    lines += [f" RHS {found.rows[k]} {float(right[k])!r}" for k in np.flatnonzero(right)]
+    lines.append("BOUNDS")
+    for name, upper, whole in zip(found.names, found.upper.tolist(), found.whole, strict=True):
+        lines += [f" BV BND {name}"] if whole else []
+        lines += [f" UP BND {name} {upper!r}"] if np.isfinite(upper) and not whole else []
+    return "\n".join([*lines, "ENDATA", ""])
+
+
+def _columns(found: Program) -> Iterator[str]:
+    """Yield the entries of variables, those that are whole numbers, which come first, marked."""
+    whole, rows = int(found.whole.sum()), ["goal_0", *found.rows]
+    entries = sparse.vstack([sparse.csr_array(found.cost[None]), found.matrix]).tocsc()
+    yield " MARKER 'MARKER' 'INTORG'"
+    for j, name in enumerate(found.names):
+        if j == whole:
+            yield " MARKER 'MARKER' 'INTEND'"
+        part = slice(entries.indptr[j], entries.indptr[j + 1])
+        for row, value in zip(entries.indices[part], entries.data[part].tolist(), strict=True):
+            yield f" {name} {rows[row]} {value!r}"
+    if whole == len(found.names):
+        yield " MARKER 'MARKER' 'INTEND'"
 
 
 @dataclass
@@ -55,27 +88,18 @@ class _Draft:
     at: list[tuple[Ints, Ints, Floats]] = field(default_factory=list)
     low: list[Floats] = field(default_factory=list)
     high: list[Floats] = field(default_factory=list)
-    where: list[Ints] = field(default_factory=list)
-    slack: list[Floats] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
     total: int = 0
 
     def add(
-        self,
-        name: str,
-        parts: tuple[Ints, Ints, Floats],
-        limits: tuple[Floats, Floats],
-        switch: tuple[Ints, float] | None = None,
+        self, name: str, parts: tuple[Ints, Ints, Floats], limits: tuple[Floats, Floats]
     ) -> None:
-        """Add rows: entries, limits, and indicator variables."""
+        """Add rows: entries (row, column, value) and limits."""
         count = len(limits[0])
         rows, columns, values = parts
         self.at.append((rows + self.total, columns, values))
         self.low.append(limits[0])
         self.high.append(limits[1])
-        where, slack = (np.full(count, NEVER), 0.0) if switch is None else switch
-        self.where.append(where)
-        self.slack.append(np.full(count, slack))
         self.names += [name] if count == 1 else [f"{name}_{k}" for k in range(count)]
         self.total += count
 
@@ -95,17 +119,19 @@ def program(instance: Instance) -> Program:
     if timed is not None:
         _times(draft, instance, timed, more)
     total = len(names)
-    every = (np.concatenate(each) for each in zip(*draft.at, strict=True))
-    rows, columns, values = every
+    for k, own in enumerate(goals[1:], start=1):
+        at = np.flatnonzero(own)
+        parts = np.zeros(len(at), dtype=int), at, own[at]
+        draft.add(f"goal_{k}", parts, (np.full(1, -np.inf), np.full(1, np.inf)))
+    rows, columns, values = (np.concatenate(each) for each in zip(*draft.at, strict=True))
     matrix = sparse.csr_array((values, (rows, columns)), shape=(draft.total, total))
     matrix.sum_duplicates()
-    costs = sparse.csr_array(np.array([np.pad(g, (0, total - len(g))) for g in goals]))
+    matrix.eliminate_zeros()
+    cost = np.pad(goals[0], (0, total - len(goals[0])))
     whole = np.arange(total) < count
     upper = np.where(whole, 1.0, more.most)
     limits = np.concatenate(draft.low), np.concatenate(draft.high)
-    switches = np.concatenate(draft.where), np.concatenate(draft.slack)
-    cost = costs[[0]].toarray()[0]
-    return Program(names, cost, upper, whole, matrix, *limits, *switches, costs[1:], draft.names)
+    return Program(names, cost, upper, whole, matrix, *limits, draft.names)
 
 
 class _More(NamedTuple):
@@ -129,7 +155,7 @@ def _more(instance: Instance, timed: TimedGraph | None) -> _More:
     if timed is None:
         return _More(names, at, np.inf)
     at["end"] = first + len(names)
-    names.append("makespan")  # what LP files call end is their own
+    names.append("makespan")
     at["node"] = first + len(names)
     names += [f"T{v}" for v in range(instance.nodes)]
     at["since"] = first + len(names)
@@ -216,23 +242,20 @@ def _times(draft: _Draft, instance: Instance, timed: TimedGraph, more: _More) ->
     before, after = instance.source[move].astype(int), instance.target[move].astype(int)
     every = np.arange(len(move))
     acts, prepares = timed.acts[move], timed.prepares[move]
-    _after(draft, "act", (node + after, node + before), acts, (every, big))
+    _after(draft, "act", (node + after, node + before), acts, every, big)
     own = column >= 0
     free = since + robots * before + column
-    _after(
-        draft, "own", ((node + after)[own], free[own]), (acts + prepares)[own], (every[own], big)
-    )
+    _after(draft, "own", ((node + after)[own], free[own]), (acts + prepares)[own], every[own], big)
     for c in range(robots):
         origin = timed.origin[:, c]
         rows = np.flatnonzero(origin != HELD)
         from_node = origin[rows] == NOW
         was = np.where(from_node, node + after[rows], since + robots * before[rows] + origin[rows])
         is_ = since + robots * after[rows] + c
-        _after(draft, f"ready{c}", (is_, was), np.zeros(len(rows)), (rows, big))
+        _after(draft, f"ready{c}", (is_, was), np.zeros(len(rows)), rows, big)
     ends = np.flatnonzero(instance.ends)
-    none = np.full(len(ends), NEVER)
     last = np.full(len(ends), more.at["end"])
-    _after(draft, "last", (last, node + ends), np.zeros(len(ends)), (none, 0.0))
+    _after(draft, "last", (last, node + ends), np.zeros(len(ends)))
     for k, size in enumerate(timed.sizes.tolist()):
         parts = np.append(every, more.at["end"])
         values = np.append(-timed.work[move, k], float(size))
@@ -245,12 +268,19 @@ def _after(
     name: str,
     variables: tuple[Ints, Ints],
     least: Floats,
-    switch: tuple[Ints, float],
+    taken: Ints | None = None,
+    big: float = 0.0,
 ) -> None:
-    """Add precedence rows: one variable is at least another plus a duration."""
+    r"""Add precedence rows: one variable is at least another plus a duration.
+
+    Of acts, :math:`t - t' - (M + d) y \ge -M`: only of those that are ``taken``.
+    """
     first, second = variables
     count = len(first)
-    rows = np.tile(np.arange(count), 2)
-    values = np.concatenate([np.ones(count), -np.ones(count)])
-    parts = rows, np.concatenate([first, second]), values
-    draft.add(name, parts, (least, np.full(count, np.inf)), switch)
+    ones, low = np.ones(count), least if taken is None else np.full(count, -big)
+    columns, values = [first, second], [ones, -ones]
+    if taken is not None:
+        columns, values = [*columns, taken], [*values, -(big + least)]
+    rows = np.tile(np.arange(count), len(columns))
+    parts = rows, np.concatenate(columns), np.concatenate(values)
+    draft.add(name, parts, (low, np.full(count, np.inf)))

@@ -6,6 +6,7 @@ import pytest
 
 import seqopt
 from experiments.harness.results import stored
+from experiments.instances.parts.cp_sat import as_cp_sat
 from experiments.instances.parts.library import HOME, LARGE, MADE, instance, known, made
 from seqopt.errors import SolverError
 from tests.builders import ROOT
@@ -68,3 +69,14 @@ def test_built_in_ones_are_of_the_library():
     for path in built_in:
         assert path.read_bytes() == (HOME / path.name).read_bytes()
         assert seqopt.read_instance(path.stem) == instance(path.stem)
+
+
+@pytest.mark.parametrize("name", ["chain-8", "pair-25-peak", "chain-12-way"])
+def test_cp_sat_finds_the_same_value(name):
+    cp_model = pytest.importorskip("ortools.sat.python.cp_model")
+    text_format = pytest.importorskip("google.protobuf.text_format")
+    model, solver = cp_model.CpModel(), cp_model.CpSolver()
+    text_format.Parse(as_cp_sat(instance(name)), model.Proto())
+    assert not model.validate()
+    assert solver.solve(model) == cp_model.OPTIMAL
+    assert solver.objective_value == pytest.approx(KNOWN[name]["values"][0], rel=1e-5)

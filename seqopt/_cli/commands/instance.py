@@ -26,8 +26,8 @@ class Instance(Optimize):
     """What is written and printed?
 
     out : FILE
-        file to write: .npz (the instance), .mps, .lp or .pbtxt (a program, the last for CP-SAT);
-        without an end a folder with all of them
+        file to write: .npz (the instance) or .mps (a program);
+        without an end a folder with both
     name : NAME
         what it is called (default: as the file)
     below : VALUE
