@@ -190,14 +190,12 @@ def _stored() -> tuple[str, ...]:
 
 def _refuse_mesh(path: Path) -> None:
     """Raise an error that says how a mesh becomes a scene."""
-    within = [path] if path.is_file() else path.glob("*.*") if path.is_dir() else ()
-    if suffixes := {file.suffix.lower() for file in within} & _MESHES.keys():
-        unit = any(_MESHES[suffix] for suffix in suffixes)
-        what = "a folder of meshes" if path.is_dir() else "a mesh"
+    if path.is_file() and path.suffix.lower() in _MESHES:
+        unit = _MESHES[path.suffix.lower()]
         out = shlex.quote(f"{path.resolve().stem}.json")
         words = f"{shlex.quote(str(path))} {'--unit m ' * unit}--density 2400 --out {out}"
         raise SceneError(
-            f"scene {path}: {what}; seqopt import {words} makes a scene of it, with its own "
+            f"scene {path}: a mesh; seqopt import {words} makes a scene of it, with its own "
             f"{'unit and ' * unit}density"
         )
 

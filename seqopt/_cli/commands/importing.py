@@ -23,7 +23,7 @@ class Import(options.Asked):
     """What is read and written?
 
     file : FILE
-        what to read, or a folder of meshes with a block in each
+        what to read
     out : FILE
         scene to write, JSON
     format : NAME
@@ -73,17 +73,15 @@ class Import(options.Asked):
 def run(asked: Import) -> Answer:
     """Read an assembly of others, say what was assumed, and write it as a scene.
 
-    It is a file of Rhino, an assembly of COMPAS, meshes in a file or a folder, a table of boxes or
-    a frame.
+    It is a file of Rhino, an assembly of COMPAS, meshes, or a table of boxes.
 
     Usage
-    FILE|FOLDER --out SCENE.json [--unit UNIT] [other options]
+    FILE --out SCENE.json [--unit UNIT] [other options]
 
     Examples
     --------
     seqopt import wall.obj --unit m --density 2400 --out wall.json
     seqopt import boxes.csv --unit mm --supports 0,1 --out house.json
-    seqopt import blocks --unit m --density 2400 --supports 0 --out dome.json
     """
     require_apart([asked.out], [asked.file])
     asked.tell("reading the file")
