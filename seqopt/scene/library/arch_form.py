@@ -56,21 +56,17 @@ def _circular(span: float, rise: float) -> _Line:
 
     def line(at: float) -> Floats:
         turn = half * (2 * at - 1)
-        return np.array(
-            [0.5 * span + radius * math.sin(turn), rise - radius * (1 - math.cos(turn))]
-        )
+        x, drop = radius * math.sin(turn), radius * (1 - math.cos(turn))
+        return np.array([0.5 * span + x, rise - drop])
 
     return line
 
 
 def _catenary(span: float, rise: float) -> _Line:
     """Return a hanging chain turned upside down: the line of thrust of an even arch."""
-    from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
-
     # with u = span / 2a: rise / span = (cosh u - 1) / 2u
-    slope = float(brentq(lambda u: (math.cosh(u) - 1) / (2 * u) - rise / span, 1e-9, 100.0))
-    scale = 0.5 * span / slope
-    end = math.sinh(slope)
+    slope = _root(lambda u: (math.cosh(u) - 1) / (2 * u) - rise / span, 1e-9, 100.0, 2e-12)
+    scale, end = 0.5 * span / slope, math.sinh(slope)
 
     def line(at: float) -> Floats:
         x = scale * math.asinh(end * (2 * at - 1))  # evenly along the line
@@ -101,16 +97,20 @@ _CURVES = {"circular": _circular, "catenary": _catenary, "pointed": _pointed}
 """By name; each takes span and rise, m."""
 
 
-def _chords(line: _Line, lengths: Floats) -> Floats | None:
-    """Return the points (n + 1, 2) of a chain of links laid along a line; none if it is short."""
+def _root(of: Callable[[float], float], low: float, high: float, tolerance: float = 1e-15) -> float:
     from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
 
+    return float(brentq(of, low, high, xtol=tolerance))
+
+
+def _chords(line: _Line, lengths: Floats) -> Floats | None:
+    """Return the points (n + 1, 2) of a chain of links laid along a line; none if it is short."""
     at, points = 0.0, [line(0.0)]
     for link in lengths.tolist():
         here = points[-1]
         if math.dist(line(1.0), here) < link:
             return None
-        at = float(brentq(lambda s: math.dist(line(s), here) - link, at, 1.0, xtol=1e-15))  # noqa: B023
+        at = _root(lambda s, here=here, link=link: math.dist(line(s), here) - link, at, 1.0)  # type: ignore[misc]
         points.append(line(at))
     return np.array(points)
 
@@ -182,9 +182,21 @@ def arch(form: ArchForm) -> Scene:
 
 
 def _first_that_fits(form: ArchForm, make: Callable[[int], Scene]) -> Scene:
-    """Return the scene of the first number of bricks that can be built, the best ones first."""
+    """Return the scene of the first number of bricks that can be built.
+
+    If none is given, those first whose joints are most nearly as wide as asked for.
+    """
+    counts = [form.bricks] if form.bricks else []
+    if not counts:
+        points = np.array([form.line(at) for at in np.linspace(0, 1, 2001)])
+        way = float(np.hypot(*np.diff(points, axis=0).T).sum())
+        most = math.ceil(2 * way / (form.lengths(len(form.pattern)) + form.gap).min()) + 2
+        _few_enough("arch", most // 2)
+        over = np.cumsum(form.lengths(most) + form.gap) - way
+        off = np.abs(over) / np.arange(1, most + 1)  # what each joint is wider, or narrower
+        counts = [int(count) + 2 for count in np.argsort(off[1:], kind="stable")[:_TRIED]]
     refused: SceneError | None = None
-    for count in [form.bricks] if form.bricks else _counts(form):
+    for count in counts:
         try:
             return make(count)
         except SceneError as error:
@@ -221,24 +233,11 @@ def _arch(form: ArchForm, count: int) -> Scene:
     return scene
 
 
-def _counts(form: ArchForm) -> list[int]:
-    """Return numbers of bricks, first those whose joints are most nearly as wide as asked for."""
-    points = np.array([form.line(at) for at in np.linspace(0, 1, 2001)])
-    way = float(np.hypot(*np.diff(points, axis=0).T).sum())
-    most = math.ceil(2 * way / (form.lengths(len(form.pattern)) + form.gap).min()) + 2
-    _few_enough("arch", most // 2)
-    over = np.cumsum(form.lengths(most) + form.gap) - way
-    off = np.abs(over) / np.arange(1, most + 1)  # what each joint is wider, or narrower
-    return [int(count) + 2 for count in np.argsort(off[1:], kind="stable")[:_TRIED]]
-
-
 def _laid(form: ArchForm, count: int) -> tuple[float, Floats]:
     """Return the width of the joints, and the points (n + 1, 2) between bricks that fill a curve.
 
     The first and the last brick end at a springing, half a joint behind and before.
     """
-    from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
-
     lengths, line = form.lengths(count), form.line
 
     def left(gap: float) -> float:
@@ -258,7 +257,7 @@ def _laid(form: ArchForm, count: int) -> tuple[float, Floats]:
             f"arch: joints between {count} bricks would be wider than {1e3 * widest:.3g} mm; give "
             f"more than {count}, or longer ones"
         )
-    gap = float(brentq(left, 0.0, widest, xtol=1e-15))
+    gap = _root(left, 0.0, widest)
     points = _chords(line, lengths[:-1] + gap)
     if points is None:  # by rounding alone
         raise SceneError(f"arch: {count} bricks do not fill its curve; give another number")
