@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.harness.scenes import running_bond
-from seqopt.contact.faces import _distance_beside, bare_assembly
+from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import DRY
 from seqopt.engines._auto import AutoEngine
 from seqopt.errors import SceneError
@@ -106,10 +106,3 @@ def test_the_joints_of_the_reference_arch_are_well_within(arch25):
     apart = replace(arch25, bricks=narrow)  # those across, by 26 mm
     with pytest.raises(SceneError, match="mm between its faces"):
         touches(apart)
-
-
-def test_the_distance_beside_a_polygon():
-    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    assert _distance_beside(square) == -1.0
-    assert _distance_beside(square + np.array([3.0, 0.0])) == pytest.approx(2.0)
-    assert _distance_beside(square - np.array([0.0, 2.5])) == pytest.approx(1.5)

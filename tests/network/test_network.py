@@ -34,14 +34,6 @@ def test_graph_carries_the_numbers(engine25, arch25):
             assert graph.nodes[node]["position"] == pytest.approx(arch25.node_position(node))
 
 
-def test_partial_structures_are_prefixes(engine25):
-    """An edge keeps its number from the brick that brings it on."""
-    small, large = engine25.network.graph(10), engine25.network.graph(11)
-    assert set(small.edges) < set(large.edges)
-    for a, b, number in small.edges(data="number"):
-        assert large.edges[a, b]["number"] == number
-
-
 @given(scene=arches())
 def test_chains(scene):
     net = build_network(scene)

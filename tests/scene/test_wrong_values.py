@@ -56,13 +56,6 @@ def test_one_line_says_what_is_wrong(what, name):
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: ArchShape(pitch=[1.0], pattern=3), "arch: pattern is 3; give letters of V, L, R"),
-        (lambda: ArchShape(pitch=None), "arch: pitch is None; give a number per brick"),
-        (lambda: ArchShape(pitch=[1.0], gap="x"), "arch: gap is 'x'; give a finite number"),
-        (lambda: ArchForm(span=2.0, rise=0.7, curve=[]), r"arch: curve is \[\]; give one of circ"),
-        (lambda: ArchForm(span=2.0, rise=0.7, law=3), "arch: law is 3; give a JointLaw"),
-        (lambda: WallShape(columns=2, courses=2, density="x"), "wall: density is 'x'; give a pos"),
-        (lambda: Mortar(friction="x"), "mortar: friction is 'x'; give a number that is not neg"),
         (lambda: bond_mortar("x"), "mortar: tensile_strength is 'x'; give a number"),
         (lambda: find_mortar(3), "mortar 3: give a Mortar, or one of epoxy, dry, or bond="),
         (lambda: find_mortar([]), r"mortar \[\]: give a Mortar"),

@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 
 import seqopt
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import StepError
 from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
@@ -113,11 +112,3 @@ def test_too_few_robots_or_bricks_are_counted():
             SCHEDULES["loop"](build_network(scene))
     with pytest.raises(StepError, match="3 robots and 7 bricks; this method needs four robots"):
         robot_loop(build_network(replace(small_arch(7), robots=anywhere(3))), 4)
-
-
-def test_the_engine_answers_a_loop_of_five():
-    engine = ComplianceEngine(build_network(replace(small_arch(8), robots=anywhere(5))))
-    plan = solve(
-        pose_decisions(engine, robot_loop(engine.network), EQUATIONS), "cascade", proof=False
-    )
-    assert max(len(step.held) for step in plan.steps) == 5

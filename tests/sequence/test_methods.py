@@ -77,8 +77,3 @@ def test_impossible_steps(arch25, number, changes, named):
     with pytest.raises(StepError, match=named) as caught:
         check_sequence(arch25, edited(published_plan(arch25), number, **changes))
     assert "\n" not in str(caught.value)
-
-
-def test_an_empty_sequence_is_refused(arch25):
-    with pytest.raises(StepError, match="no steps"):
-        check_sequence(arch25, [])

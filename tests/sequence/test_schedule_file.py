@@ -150,11 +150,12 @@ def test_what_cannot_be_found_gets_one_line(engine25, loop25, tmp_path):
         find_schedule(network, loop25, ("rob1", "rob2"))
 
 
-def test_a_schedule_of_ones_own_is_optimized(arch25, loop25, tmp_path):
+def test_a_schedule_of_ones_own_is_optimized(tmp_path):
     """From a file, given whole and by name it is the same problem."""
-    path = tmp_path / "own.csv"
-    path.write_text(schedule_text(loop25), encoding="utf-8")
-    plans = [seqopt.optimize(arch25, schedule) for schedule in ("three-robot", loop25, path)]
+    scene, path = small_arch(7), tmp_path / "own.csv"
+    loop = SCHEDULES["three-robot"](scene)
+    path.write_text(schedule_text(loop), encoding="utf-8")
+    plans = [seqopt.optimize(scene, schedule) for schedule in ("three-robot", loop, path)]
     assert len({plan.nodes for plan in plans}) == 1
     assert plans[2].summary()["schedule"] == "own"
 

@@ -197,6 +197,7 @@ def test_margins_are_aims_of_a_take_down():
     assert plan.selection.objective[0] == pytest.approx(lost, rel=0.02)
 
 
+@pytest.mark.slow
 def test_best_order_is_that_of_all():
     engine = small_wall()
     scene, criterion = engine.network.scene, seqopt.CRITERIA["worst-ratio"]

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, reject
 from hypothesis import strategies as st
 
-from seqopt._cli.main import main
 from seqopt.errors import SceneError
 from seqopt.scene.library import (
     ArchForm,
@@ -22,7 +21,7 @@ from seqopt.scene.library import (
     dome,
     wall,
 )
-from seqopt.scene.scene_file import KINDS, _parse_scene, dump_scene, load_scene
+from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene
 
 
 def off_circle(x, z, span, rise):
@@ -164,14 +163,3 @@ def test_words_that_make_no_scene(words, said):
         load_scene(words)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_words_on_the_command_line(capsys, tmp_path):
-    words = "wall:columns=3,courses=2"
-    assert main(["scene", words, "--export", str(tmp_path / "wall.json")]) == 0
-    assert load_scene(tmp_path / "wall.json") == load_scene(words)
-    assert main(["scene", "arch:span=2"]) == 2
-    assert "rise is missing" in capsys.readouterr().err
-    assert main(["scene", "--list"]) == 0
-    out = capsys.readouterr().out
-    assert all(about in out for about in KINDS.values())

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import seqopt
 from seqopt.contact.faces import _face_distance, bare_assembly
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -136,16 +135,6 @@ def test_every_partial_vault_stands_on_the_ground(network):
     assert all(islands(network, count) == () for count in range(1, 339))
 
 
-def test_layers_grow_to_either_side_in_turn(vault):
-    """How far out the newest brick lies never falls back by more than a layer."""
-    beside = np.array([b.position[1] for b in vault.placed[25:]])
-    reached = np.maximum.accumulate(np.abs(beside))
-    assert (np.abs(beside) > reached - 0.5).all()
-    sides = np.sign(beside[np.abs(beside) > 0.2])
-    turns = np.count_nonzero(np.diff(sides))
-    assert turns >= 15
-
-
 def pushed(brick, way):
     place = np.array(brick.position) + 0.03 * np.array(way)
     return replace(brick, position=tuple(place.tolist()))
@@ -175,19 +164,6 @@ def test_a_brick_that_is_pulled_out_is_found(vault):
         bare_assembly(build_network(replace(vault, bricks=tuple(bricks))), 338)
 
 
-@pytest.mark.parametrize(
-    ("method", "steps"),
-    [
-        (seqopt.sequential, 675),
-        (seqopt.cantilever, 675),
-        (lambda network: seqopt.three_robot_loop(network).steps, 1342),
-        (lambda network: seqopt.modified_sequential(network).steps, 1347),
-    ],
-)
-def test_methods_build_the_vault(network, method, steps):
-    assert len(method(network)) == steps
-
-
 def test_the_vault_answers_as_independent_solvers_do(vault):
     network = build_network(first(vault, 60))
     engine = ComplianceEngine(network)
@@ -197,16 +173,6 @@ def test_the_vault_answers_as_independent_solvers_do(vault):
         fields = engine.solve(bricks, grips, Want.ALL)
         wanted = solve_dense(network, bricks, grip_columns(network, bricks, grips))
         assert largest_difference(fields, wanted, network) < 1e-9
-
-
-def test_the_first_bricks_of_the_vault_are_analyzed(vault):
-    table = seqopt.analyze(ComplianceEngine(first(vault, 45)), seqopt.sequential(first(vault, 45)))
-    assert len(table) == 89
-    numbers = table[["F_max_N", "M_sup_Nm", "D_max_1e-3mm"]].to_numpy()
-    assert np.isfinite(numbers).all()
-    twisting = table["bricks"] < 25
-    closed = table.loc[~twisting, "D_max_1e-3mm"].max()
-    assert closed < table.loc[twisting, "D_max_1e-3mm"].max()  # the closed arch carries the layers
 
 
 def test_the_dome_is_round_and_of_the_size_of_benchmarks():

@@ -42,16 +42,6 @@ def test_a_face_on_itself(wide, high, x, y):
     assert moments == pytest.approx([wide * high**3 / 12, wide**3 * high / 12])
 
 
-@given(x=st.floats(-0.99, 0.99), y=st.floats(-0.99, 0.99))
-def test_faces_side_by_side_in_line(x, y):
-    """Edges in one line are counted once."""
-    for dx, dy in ((x, y), (x, 0.0), (0.0, y)):
-        area, center, _ = overlap(rectangle(1, 1), rectangle(1, 1, dx, dy))
-        wide, high = 1 - abs(dx), 1 - abs(dy)
-        assert area == pytest.approx(wide * high, rel=1e-9, abs=1e-15)
-        assert center == pytest.approx([dx / 2, dy / 2], abs=1e-6)
-
-
 @given(x=numbers, y=numbers, first=numbers, turn=st.floats(-3, 3), cut=st.floats(-0.4, 0.4))
 def test_parts_of_a_cut_add_up(x, y, first, turn, cut):
     """A long rectangle, cut in two across its length, overlaps another as its parts do."""
@@ -65,13 +55,6 @@ def test_parts_of_a_cut_add_up(x, y, first, turn, cut):
         total += about_origin(part)
     assert about_origin(whole) == pytest.approx(total, abs=1e-9)
     assert 0 <= whole[0] <= 0.4 + 1e-9
-
-
-@given(x=numbers, y=numbers, turn=st.floats(-3, 3))
-def test_order_does_not_count(x, y, turn):
-    one, other = rectangle(0.8, 0.5), rectangle(1.2, 0.6, x, y, turn)
-    there, back = overlap(one, other), overlap(other, one)
-    assert about_origin(there) == pytest.approx(about_origin(back), abs=1e-9)
 
 
 def test_faces_apart_share_nothing():

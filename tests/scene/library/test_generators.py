@@ -144,33 +144,21 @@ def test_compliance_agrees_with_independent_routes(scene, share):
     ("make", "named"),
     [
         (lambda: chain(1), "chain: bricks is 1; give a whole number from 2"),
-        (lambda: chain(2.5), "chain: bricks is 2.5; give a whole number"),
         (
             lambda: chain(3),
             "chain of 3: bricks 2 and 3 interpenetrate by 17.6 mm; give more bricks",
         ),
         (lambda: chain(9, lean=2.0), "chain: lean is 2 rad; give at most a right angle"),
         (lambda: WallShape(columns=0, courses=1), "wall: columns is 0 or missing; give a whole"),
-        (lambda: WallShape(columns=True, courses=1), "wall: columns is True; give a whole number"),
-        (lambda: WallShape(columns=1, courses=1, gap=-1.0), "wall: gap is -1.0; give a positive"),
         (lambda: WallShape(columns=1, courses=1, gap=0.1), "wall: gap is 0.1 m, half a brick"),
-        (
-            lambda: WallShape(columns=1, courses=1, dimensions=(1.0, 0.0, 1.0)),
-            "wall: dimensions is 0.0; give a positive number of m",
-        ),
         (lambda: DomeShape(courses=1, around=2), "dome: around is 2; give a whole number from 3"),
         (lambda: DomeShape(courses=1, around=12, rise=1.1), "dome: rise is 1.1 m; give at most"),
         (lambda: DomeShape(courses=1, around=12, opening=2.0), "dome: opening is 2 m; give less"),
-        (lambda: DomeShape(courses=1, around=12, span=-1.0), "dome: span is -1.0; give a positive"),
         (
             lambda: dome(DomeShape(courses=40, around=24, opening=0.1)),
             "dome: a brick in course 34 would be .* mm long and .* mm high; give fewer around",
         ),
         (lambda: WallShape(columns=1, courses=1, corbel=0.1), "wall: corbel is 0.1 m, a brick's"),
-        (lambda: ArchForm(span=0.0, rise=1.0), "arch: span is 0.0; give a positive number of m"),
-        (lambda: ArchForm(span=2.0, rise=1.0, curve="x"), "arch: curve is 'x'; give one of circ"),
-        (lambda: ArchForm(span=2.0, rise=1.0, pattern="VX"), "arch: pattern is 'VX'; give letters"),
-        (lambda: ArchForm(span=2.0, rise=1.0, bricks=1), "arch: bricks is 1; give a whole number"),
         (
             lambda: arch(ArchForm(span=2.0, rise=1.2)),
             "arch: rise is 1.2 m; a circular arch rises at most half of its span, 1: give less",
@@ -192,18 +180,10 @@ def test_compliance_agrees_with_independent_routes(scene, share):
             "arch of 7: bricks . and . interpenetrate by .* mm; give another number of bricks",
         ),
         (lambda: chain(10**9), "chain: bricks is 1000000000; give a whole number from 2 to 20000"),
-        (
-            lambda: WallShape(columns=10**5, courses=1),
-            "wall: columns is 100000; give a whole number",
-        ),
         (lambda: WallShape(columns=300, courses=100), "wall: 30000 bricks; give numbers that make"),
         (lambda: DomeShape(courses=300, around=100), "dome: 30000 bricks; give numbers that make"),
         (lambda: arch(ArchForm(span=1e9, rise=7.0)), "arch: .* bricks; give numbers that make at"),
         (lambda: _scene_by_words("arch:span=1e300,rise=7"), "numbers are too large; give smaller"),
-        (
-            lambda: JointLaw(translational=(1.0, -1.0, 1.0)),
-            "joint law: translational is .*at least",
-        ),
     ],
 )
 def test_one_line_says_what_is_wrong(make, named):
