@@ -1,7 +1,7 @@
 """Extension points of the core: offers of outer rooms, found by name and loaded on demand.
 
-A room with another amount, filter, picture or command adds a line here. The core works without any
-of them. Plug-ins add amounts, filters, formats, pictures and commands by entry points of the group
+A room with another amount, filter or command adds a line here. The core works without any
+of them. Plug-ins add amounts, filters, formats and commands by entry points of the group
 ``seqopt.parts``, users by `seqopt.register`.
 """
 
@@ -53,7 +53,7 @@ ADDED: dict[tuple[type, str], Any] = {}
 
 
 class Part:
-    """Base of what is taken from packages and users by name: formats, pictures, commands."""
+    """Base of what is taken from packages and users by name: formats, commands."""
 
     name: str
 

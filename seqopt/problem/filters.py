@@ -263,13 +263,13 @@ def _limit_of(text: str, where: str) -> Limit:
 
 
 def register(*parts: Amount | Filter | Resource | Part) -> None:
-    """Add amounts, filters, resources, formats, pictures and commands, asked for by name.
+    """Add amounts, filters, resources, formats and commands, asked for by name.
 
     Packages register theirs by entry points of the group ``seqopt.parts``.
 
     Parameters
     ----------
-    *parts : Amount, Filter, Resource, Format, Picture or Command
+    *parts : Amount, Filter, Resource, Format or Command
         Each takes the place of one of its kind that was registered by its name before.
 
     Raises
@@ -289,7 +289,7 @@ def register(*parts: Amount | Filter | Resource | Part) -> None:
         if not isinstance(part, Amount | Filter | Resource | Part):
             raise ProblemError(
                 f"{short(part)}: give an Amount, a Filter or a Resource of seqopt.problem, a "
-                "Format of seqopt.exchange, a Picture of seqopt.report or a Command of seqopt.doors"
+                "Format of seqopt.exchange or a Command of seqopt.doors"
             )
         taken = part.reserved() if isinstance(part, Part) else (*BUILT_IN, *TAKEN)
         if part.name in taken:

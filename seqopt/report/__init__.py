@@ -16,15 +16,6 @@ this page does not import.
 chain 9: 9 bricks, 3 robots
 """
 
-from seqopt.report._picture import Picture, picture
 from seqopt.report.comparison import Comparison, compare, format_comparison, largest, method_tables
 
-__all__ = [
-    "Comparison",
-    "Picture",
-    "compare",
-    "format_comparison",
-    "largest",
-    "method_tables",
-    "picture",
-]
+__all__ = ["Comparison", "compare", "format_comparison", "largest", "method_tables"]

@@ -16,7 +16,8 @@ from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 from seqopt.engines.interface import Engine
 from seqopt.plan.front import Front
 from seqopt.report._failures import AXIS_WORDS
-from seqopt.report._picture import pictures
+from seqopt.report._gantt import gantt_picture
+from seqopt.report._pictures import steps_picture
 from seqopt.report._style import (
     BLUE,
     GRAY,
@@ -184,12 +185,12 @@ def _scale(axes: Axes, far: float) -> None:
 
 
 def plan_figures(engine: Engine, builds: Sequence[Build]) -> dict[str, bytes]:
-    """Return figures of plans as PNG and SVG, by file name: every picture, and all responses."""
+    """Return figures of plans as PNG and SVG, by file name: steps, grips, and all responses."""
     files: dict[str, bytes] = {}
     for build in builds:
-        for name, each in pictures().items():
-            shown = each.draw(engine, build.steps, build.table)
-            files |= picture_files(f"{build.name}_{name}", shown)
+        files |= picture_files(f"{build.name}_steps", steps_picture(engine, build.steps))
+        grips = gantt_picture(engine.network.scene, build.steps, build.table)
+        files |= picture_files(f"{build.name}_grips", grips)
     tables = {build.name: build.table for build in builds}
     return files | picture_files("responses", responses_figure(tables))
 
