@@ -175,14 +175,11 @@ def test_budgets_that_conflict_are_named(problem25):
         assert solve(replace(problem25, budgets=(budget,)), "labels").certificate.gap <= 1e-6
     idle = travel(problem25, 1e3)
     capped = replace(problem25, budgets=(idle, way, force))
-    for name in ("labels", "overlap_mip", "lagrangian"):
-        with pytest.raises(InfeasibleError) as caught:
-            solve(capped, name)
-        said = (
-            "11.5 of 'robot travel [m]' and 8 of 'steps with F_largest over 238.7' cannot be kept"
-        )
-        assert said in str(caught.value)
-        assert "1000" not in str(caught.value)
+    said = "11.5 of 'robot travel [m]' and 8 of 'steps with F_largest over 238.7' cannot be kept"
+    with pytest.raises(InfeasibleError) as caught:
+        solve(capped, "labels")
+    assert said in str(caught.value)
+    assert "1000" not in str(caught.value)
 
 
 def test_few_labels_stop_with_a_bound(problem25):
@@ -239,26 +236,3 @@ def test_what_is_spent_may_be_below_zero(problem25):
     (spent,), (lower,) = (plan.certificate.spent.values() for plan in plans)
     assert lower == pytest.approx(spent - 22)
     assert plans[0].selection.prices[0] == pytest.approx(plans[1].selection.prices[0])
-
-
-def test_the_bound_holds_where_costs_have_both_signs():
-    rng = np.random.default_rng(3)
-    costs = Costs(_random(rng, 4, 6).sums)
-    assert costs.sums.sizes == (6,) * 4
-    capped = _random(rng, 4, 6)
-    found = capped.within()
-    plan = answer(capped, "labels")
-    assert plan.certificate.objective == pytest.approx(min(found.values()))
-    assert plan.certificate.gap <= 1e-6
-
-
-def _random(rng, moves, size):
-    def parts():
-        single = tuple(rng.normal(size=size) for _ in range(moves))
-        shared = (
-            rng.normal(size=(1, size)),
-            *(rng.normal(size=(size, size)) for _ in range(1, moves)),
-        )
-        return single, shared
-
-    return Costs(LayeredCosts(*parts()), (Budget("use", *parts(), -2.0),))

@@ -121,6 +121,7 @@ PATHS = {
     "path cut short": steps(lambda own: own[:-1]),
     "path without a step": steps(lambda own: own[:1] + own[2:]),
     "path turned round": steps(lambda own: own[::-1]),
+    "path too long": steps(lambda own: (*own, own[-1])),
     "no path": steps(lambda own: ()),
     "unknown state": steps(lambda own: (*own[:-1], tuple(10**6 for _ in own[-1]))),
 }
@@ -249,6 +250,8 @@ def test_a_front_with_a_point_missing_or_moved_is_refused():
     found = front()[1]
     assert told_front(lambda plans: plans).complete
     assert len(found) > 1
+    early = told_front(lambda plans: (replace(plans[0], stopped="time"),))
+    assert (early.complete, len(early.table)) == (False, 1)
     for lost in found:
         fewer = tuple(plan for plan in found if plan is not lost)
         with pytest.raises(SolverError, match="the set lacks a point below"):

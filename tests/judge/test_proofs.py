@@ -12,7 +12,7 @@ import pytest
 import seqopt
 from seqopt.engines.interface import Want
 from seqopt.graph import Explorer
-from seqopt.graph._orders import OrderSpace, among_orders, whole_bound
+from seqopt.graph._orders import OrderSpace, among_orders
 from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.paths import distances, keep_best, least_peak, lexicographic_bounds, reached
 from seqopt.graph.states.explored import explore, floors_of_goals
@@ -164,15 +164,14 @@ def signed_problem(rng, moves=3, size=5):
     return problem, sorted(problem.within().values())
 
 
-@pytest.mark.parametrize("most", [1, 3])
-@pytest.mark.parametrize("climbs", [1, 80])
+@pytest.mark.parametrize(("most", "climbs"), [(1, 80), (3, 1)])
 def test_what_is_set_aside_counts_and_prices_are_not_negative(monkeypatch, most, climbs):
     """Few partial choices are kept, prices of any sign are claimed: no choice is below a bound."""
     monkeypatch.setattr(budget_proof, "MOST", most)
     monkeypatch.setattr(budget_proof, "MIXTURES", climbs)
     rng = np.random.default_rng(4)
     proven = 0
-    for _ in range(10):
+    for _ in range(6):
         problem, found = signed_problem(rng)
         compiled = problem.compiled()
         graph, costs = compiled.instance.graph, compiled.instance.amounts[:, 0]
@@ -213,20 +212,6 @@ def test_goals_that_take_no_more_than_all_must_leave_the_cut_of_the_first():
     assert proof.states == alone.states
     assert Proof(problem).bounds((1.01 * best[0], best[1]))[0] < 1.01 * best[0]
     assert Proof(problem).bounds((best[0], best[1] + 1))[1] <= best[1]
-
-
-def test_a_soft_first_robot_does_not_raise_the_bound_of_the_whole():
-    """The judge took all grips for those of the first robot; stiffer ones hold better."""
-    scene, held = small_arch(3), FreeRules(ending=Ending.HELD)
-    soft = replace(scene.robots[0], stiffness=(1e5,) * 3)
-    softer = replace(scene, robots=(soft, *scene.robots[1:]))
-    problem, alike = (
-        among_orders(posed("D_max", each, rules=held), "tied") for each in (softer, scene)
-    )
-    best = seqopt.solve(problem).certificate.objective
-    assert Proof(problem).bounds_first(best)
-    assert not Proof(problem).bounds_first(best * 1.01)
-    assert whole_bound(problem) == pytest.approx(whole_bound(alike))  # two can hold it alone
 
 
 def test_a_plan_with_more_regrips_is_found_within_the_same_peak():

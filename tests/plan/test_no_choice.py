@@ -229,12 +229,6 @@ def test_what_does_not_fit_into_memory_is_refused_before(problem, monkeypatch):
     assert fresh.sums == problem.sums
 
 
-def test_the_estimate_of_memory_is_about_right(problem):
-    kept = sum(a.nbytes for s in problem.evaluation.steps for a in s.responses.values())
-    assert 1 < batches._bytes_of_choices(problem.schedule, problem.evaluation.wanted) / kept < 5
-    assert batches.free_memory() > 1e6
-
-
 def test_one_that_cannot_be_used_is_left_out_of_all_others(monkeypatch, tmp_path, capsys):
     """A package of others that is wrong spoils no command that does not ask for it."""
     whole = formulations()

@@ -11,7 +11,7 @@ import seqopt
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.decision_costs import LayeredCosts
 from seqopt.graph.decisions import pose_decisions, travel
-from seqopt.problem.requirements import Excess, Limit, overloads, payload_limits
+from seqopt.problem.requirements import overloads, payload_limits
 from tests.layered import Costs
 
 
@@ -107,9 +107,3 @@ def test_an_optimum_within_budgets_is_proven_or_claimed(engine25, monkeypatch):
     plan = seqopt.solve(tight, "overlap_mip")
     assert plan.certificate.gap > 1e-6 >= plan.certificate.claimed_gap
     assert plan.summary()["status"] == "claimed optimal"
-
-
-def test_a_long_list_of_steps_is_cut():
-    excess = Excess(Limit("D_max", 1e-5), tuple(range(1, 31)), 2e-5)
-    assert str(excess).endswith("(steps 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 and 18 more)")
-    assert str(Excess(Limit("D_max", 1e-5), (7,), 2e-5)).endswith("(step 7)")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from seqopt import Search
 from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError, StepError
 from seqopt.graph.decision_costs import LayeredCosts
-from seqopt.graph.decisions import Decisions, pose_decisions, travel
+from seqopt.graph.decisions import pose_decisions, travel
 from seqopt.graph.formulation import FormulationKind
 from seqopt.study.published import find_criterion
 from seqopt.workflow import Robust
@@ -175,15 +174,6 @@ def test_the_short_cut_does_what_the_long_way_does(arch25, engine25):
 def test_a_wrong_word_gets_the_words_there_are(arch25, wrong, error, message):
     with pytest.raises(error, match=message):
         seqopt.optimize(**({"scene": arch25} | wrong))
-
-
-def test_a_problem_is_the_same_after_pickling(engine25):
-    problem = pose_decisions(engine25, seqopt.three_robot_loop(engine25.network), WORST)
-    costs = pickle.loads(pickle.dumps(problem.sums))
-    assert costs == problem.sums
-    assert hash(costs) == hash(problem.sums)
-    assert not costs.single[0].flags.writeable
-    assert isinstance(problem, Decisions)
 
 
 def test_every_plan_has_one_summary():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -155,15 +155,6 @@ def test_a_plan_that_has_no_time_is_feasible_and_its_bound_valid(aim, layers):
         assert plan.selection.bound[0] <= min(found.values()) + 1e-9
 
 
-@given(layers=many())
-@settings(max_examples=8)
-def test_aims_are_ordered(layers):
-    """The mean is at most any mean of the worst, and these at most the worst."""
-    if values(layers, WORST_TOTAL):
-        worth = [solved(layers, aim).certificate.objective for aim in (*AIMS[2:], WORST_TOTAL)]
-        assert all(a <= b + 1e-7 for a, b in pairwise(worth))
-
-
 @given(each=st.lists(st.floats(-100, 100), min_size=1, max_size=8), level=st.floats(0, 0.99))
 def test_a_tail_is_the_least_over_thresholds(each, level):
     aim = cvar(level)
@@ -275,16 +266,6 @@ def test_costs_of_a_scenario_are_those_of_its_own_problem():
                 assert all(np.allclose(a, b, rtol=1e-9, atol=0) for a, b in pairs)
     first, second = found.costs_in_scenarios
     assert first != second
-
-
-@pytest.mark.slow
-def test_workers_change_nothing():
-    scene = six_bricks()
-    drawn = scenarios(scene, count=3, seed=1)
-    one, two = (seqopt.solve(robust(posed(workers=n), drawn, WORST_TOTAL)) for n in (1, 2))
-    assert one.choice == two.choice
-    first, second = (plan.graph.costs_in_scenarios[0] for plan in (one, two))
-    assert first.sums == second.sums
 
 
 def test_limits_hold_in_every_scenario():

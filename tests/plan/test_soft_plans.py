@@ -14,7 +14,6 @@ from seqopt.network.build import build_network
 from seqopt.responses._staged import analyze_staged
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scenarios import require_alike
-from seqopt.sequence.rules import with_robots
 from seqopt.workflow import Robust
 from tests.builders import small_arch
 from tests.soft_bodies import SoftBodies
@@ -67,12 +66,6 @@ def test_who_is_how_stiff_counts_and_not_who_comes_first(unlike):
     assert least(unlike.with_robots(*unlike.robots[::-1])) == pytest.approx(own, rel=1e-9)
     softer, stiffer = (least(unlike.with_grips(k)) for k in (min(STIFF), max(STIFF)))
     assert 1.01 * stiffer < own < 0.99 * softer
-
-
-def test_further_robots_are_as_stiff_as_the_first(unlike):
-    more = with_robots(unlike, 5)
-    assert [robot.stiffness for robot in more.robots[3:]] == [unlike.robots[0].stiffness] * 2
-    assert more.robots[:3] == unlike.robots
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import pytest
 
 from seqopt.errors import ProblemError
 from seqopt.graph.decision_costs import LayeredCosts
-from seqopt.graph.formulation import Finding, Watch, find_formulation
+from seqopt.graph.formulation import Watch, find_formulation
 from seqopt.plan.solve import solve
 from tests.layered import Costs
 
@@ -21,13 +21,6 @@ def test_only_what_is_better_is_told():
         watch.tell(objective, bound)
     assert [(f.objective, f.bound) for f in told] == [(np.inf, -np.inf), (9, 1), (8, 1), (8, 2)]
     assert tuple(told) == watch.trace
-
-
-def test_a_finding_in_words():
-    assert str(Finding(1.0, 10.0, 9.0)) == "1.00 s, objective 10, bound 9, gap 10 %"
-    assert str(Finding(1.0, np.inf, 9.0)) == "1.00 s, bound 9"
-    assert Finding(1.0, 0.0, 0.0).gap == 0
-    assert Finding(1.0, np.inf, 9.0).gap == np.inf or np.isnan(Finding(1.0, np.inf, 9.0).gap)
 
 
 def problem():

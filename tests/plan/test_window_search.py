@@ -70,14 +70,6 @@ def test_the_search_answers_steps_on_its_way(monkeypatch):
         )
 
 
-def test_a_dead_end_is_named(engine25):
-    schedule = three_robot_loop(engine25.network)
-    with pytest.raises(SolverError, match="move 1, step 3: rob3 has no allowed grip"):
-        walk_windows(
-            pose_decisions(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)]), Watch()
-        )
-
-
 @pytest.mark.parametrize(
     ("name", "options", "said"),
     [
