@@ -16,7 +16,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import _chooser_of
 from seqopt.errors import (
     InfeasibleError,
     ProblemError,
@@ -45,8 +44,6 @@ from seqopt.sequence.steps import Step
 from seqopt.work._clock import INTERRUPT, Clock
 
 RANGE = "how far it leaves the linear range"  # what it is called where there was no time for it
-JOINT_LIMITS = "whether joints stay within their elastic limits"
-MOST_MODELS = 250  # up to which a problem is solved again: one may take a second where joints open
 NONE_KEEPS = "no plan keeps it"
 UNKNOWN = "whether any plan keeps it is not known"
 INTERRUPTED = f"{UNKNOWN} (interrupted)"
@@ -353,24 +350,3 @@ def _best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Clo
     except KeyboardInterrupt:
         found, why = _interrupted(plan), INTERRUPTED
     return replace(found, beyond=why)
-
-
-def at_sufficient_level(plan: Plan, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:
-    """Return a plan, or that of the next engine if steps exceed the elastic limits of joints.
-
-    Candidates are compared with joints that never fail; within the limits a more detailed engine
-    gives the same responses. The plan stays if solving again is much work or fails: it reports
-    the limits that its steps exceed.
-    """
-    chooser, problem = _chooser_of(plan.engine), plan.problem
-    if chooser is None or not isinstance(problem, Problem) or plan.ended is End.INTERRUPTED:
-        return plan
-
-    def found() -> Plan:
-        kept = plan.models > MOST_MODELS or plan._within.keeps_limits(plan.steps)
-        return plan if kept else solved(problem.but(engine=chooser))
-
-    try:
-        return clock.spare(JOINT_LIMITS, found, plan)
-    except SeqoptError:
-        return plan

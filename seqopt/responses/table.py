@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats, Ints
-from seqopt.contact._elastic_limits import _STRESS_MARGIN, find_elastic_limits
+from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY, _mortar_name
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import (
@@ -151,16 +151,6 @@ class LinearRange:
             for what, values, most, say in found
             if (over := ~(values <= most)).any()  # what is not a number is not within
         )
-
-    def keeps_limits(self, steps: Sequence[Step]) -> bool:
-        """Return whether joints stay within their elastic limits, if any, in all steps."""
-        if self._limits is None or isinstance(self._engine, OpeningEngine):
-            return True
-        scene = self._network.scene
-        keys = [(step.bricks, scene.grip_numbers(step.grips, step.bricks)) for step in steps]
-        self._ask(keys)
-        margin = _STRESS_MARGIN * self._limits.assembly.stress_scale
-        return all(self._known[key][2] <= margin for key in keys)
 
     def seen(self, step: Step, fields: Fields) -> Fields:
         """Return all fields of a step, and cache its measures."""

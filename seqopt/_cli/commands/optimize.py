@@ -22,8 +22,7 @@ from seqopt.graph.formulation import End, Run, as_formulation, trace_rows
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import graph_of
-from seqopt.plan.solve import _solve_run, at_sufficient_level
-from seqopt.problem.problem import Problem
+from seqopt.plan.solve import _solve_run
 from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import OUTSIDE
@@ -191,18 +190,12 @@ def find(asked: Optimize, change: Change | None = None) -> Found:
     run = Run(proof=asked.proof, lazy=asked.lazy, options=how, progress=tell, clock=clock)
     assemble = time.perf_counter() - start
 
-    def choose(problem: Problem) -> Plan:
-        if clock.interrupted:  # one that came between two plans ends the next
-            raise KeyboardInterrupt
-        try:
-            plan = _solve_run(problem, formulation, run)
-        except KeyboardInterrupt:
-            clock.interrupted = True
-            raise
-        clock.interrupted |= plan.ended is End.INTERRUPTED
-        return plan
-
-    plan = at_sufficient_level(choose(posed.problem), choose, clock)
+    try:
+        plan = _solve_run(posed.problem, formulation, run)
+    except KeyboardInterrupt:
+        clock.interrupted = True
+        raise
+    clock.interrupted |= plan.ended is End.INTERRUPTED
     prover = inputs.find_prover(asked, plan.engine.network)
     return Found(posed, plan, assemble, prover, clock)
 
