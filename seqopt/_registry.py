@@ -24,7 +24,6 @@ VIEWS = {
     "Schedule.gantt": "seqopt.report._gantt:gantt_picture",
     "ShownBuild.plot": "seqopt.report._pictures:steps_picture",
     "ShownBuild.gantt": "seqopt.report._gantt:gantt_picture",
-    "ShownBuild.animate": "seqopt.report._pictures:Film",
     "ShownBuild.report": "seqopt.report._pages:build_page",
     "Stability.plot": "seqopt.report.charts:tilt_picture",
     "FailureMap.plot": "seqopt.report.charts:failure_figure",

@@ -446,5 +446,5 @@ def test_values_name_nothing_that_shows_them():
     assert named_views('display("gantt_picture")(self)') == ["gantt_picture"]
     inner = [path for path in sources("seqopt") if room(dotted(path)) not in OUTER | TOP]
     texts = {path.name: path.read_text("utf-8") for path in inner if path.stem != "_registry"}
-    words = {"Film", "card"}  # which mean other things, too
+    words = {"card"}  # which means other things, too
     assert {n: found for n, t in texts.items() if (found := {*named_views(t)} - words)} == {}

@@ -58,7 +58,7 @@ def met(problem25):
     values += assess_steps(network, plan.steps[:1], seqopt.DRY)
     values += [seqopt.DRY, seqopt.CRITERIA, seqopt.formulations(), seqopt.Limit("F_largest", 300.0)]
     values += [ArchForm(span=2.0, rise=0.8), DomeShape(courses=4, around=12)]
-    values += [seqopt.StepCost("own", ("F_largest",), max), free.animate()]
+    values += [seqopt.StepCost("own", ("F_largest",), max)]
     values += [network, seqopt.Sphere(center=(0.0, 0.0, 0.0), radius=1.0)]
     values += [seqopt.Site.after(free.steps, 3), seqopt.Prop(node=3)]
     values += [seqopt.GivenSequence(problem25.engine, seqopt.sequential(network))]

@@ -217,15 +217,6 @@ class ShownBuild(Shown):
         figure: Figure = draw(scene, self.steps, responses, (first, last), clock)
         return figure
 
-    def animate(self, *, forces: bool = False, magnify: float = 0.0, seconds: float = 0.4) -> Any:
-        """Return the build as a film, with one picture per step.
-
-        ``forces``, ``magnify``: as of `plot`; ``seconds``: how long a step is shown, s. Result: a
-        notebook plays the film; ``save("build.gif")`` writes it to a file. Raises `ExtraError` if
-        matplotlib is not installed (extra ``plot``).
-        """
-        return display(ShownBuild, "animate")(self.engine, self.steps, forces, magnify, seconds)
-
     def report(self, *others: ShownBuild) -> Page:
         """Return a page that shows the build step by step, in three dimensions.
 

@@ -1,25 +1,19 @@
-"""Pictures of scenes, networks, the steps of builds and their grips, and films (``plot``)."""
+"""Pictures of scenes, networks, the steps of builds and their grips (``plot``)."""
 
 from __future__ import annotations
 
-import io
-import tempfile
-from base64 import b64encode
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from numbers import Integral
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from PIL import Image  # comes with matplotlib
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
-from seqopt.errors import FileError, StepError
+from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._robots import Arms, Cell, _known_arms, _require_arms
@@ -104,63 +98,6 @@ def _bricks(scene: Scene, bricks: int | None) -> int:
     return bricks
 
 
-class Stage:
-    """Draws steps of a build, all of the same size: the one of `steps_picture` and of films.
-
-    ``forces``: the network, colored by axial force, instead of bricks and robots; ``magnify``: how
-    many times larger displacements are drawn, 0 for not at all; ``arms``: what is known of them in
-    all steps; by default their postures, where robots of the scene have arms.
-    """
-
-    def __init__(
-        self,
-        engine: Engine,
-        steps: Sequence[Step],
-        *,
-        forces: bool,
-        magnify: float,
-        arms: Arms | None,
-    ) -> None:
-        scene = engine.network.scene
-        if arms is None:
-            arms = {} if forces else _known_arms(scene, steps)
-        _require_arms(scene, steps, arms)
-        self.engine, self.steps, self._forces, self._magnify = engine, steps, forces, magnify
-        self.cell = Cell(scene, arms)
-        self.box = _build_box(self.cell)
-
-    def fields(self, at: int) -> Fields:
-        """Return forces and displacements of a step, by its place."""
-        want = Want.EDGES | Want.DISPLACEMENTS | Want.BRICKS
-        return step_fields(self.engine, self.steps[at], want)
-
-    def draw(self, axes: Axes, at: int, largest_force: float | None = None) -> None:
-        """Draw a step, by its place; the largest force, N, is drawn widest."""
-        step, network = self.steps[at], self.engine.network
-        fields = self.fields(at) if self._forces or self._magnify else None
-        how: dict[str, Any] = {"magnify": self._magnify or 1.0}
-        if fields is not None and self._forces:
-            how |= {"displacement": fields.displacement[0]} if self._magnify else {}
-            how |= {"edge_force": fields.edge_force[0], "largest_force": largest_force}
-            draw_network(axes, network, step.bricks, VIEW, **how)
-        else:
-            _draw_robots(axes, self.cell, self.cell.arms(step, at), VIEW)
-            _draw_props(axes, network.scene, step.bricks, held=bool(step.held), view=VIEW)
-            if fields is not None:
-                draw_bricks(axes, network, step.bricks, VIEW, alpha=0.15)
-                how["twist"] = fields.brick_twist[0]
-            draw_bricks(axes, network, step.bricks, VIEW, **how)
-        newest = network.scene.placed[step.bricks - (step.kind is not StepKind.REMOVE)].name
-        what = {
-            StepKind.REMOVE: f"brick {newest} is removed",
-            StepKind.PLACE: f"brick {newest} is placed",
-            StepKind.RELEASE: "a robot lets go",
-            StepKind.REPOSITION: "a robot takes a grip",
-        }[step.kind]
-        axes.set_title(f"step {step.number} of {self.steps[-1].number}: {what}", loc="center")
-        axes.set(xlim=(self.box[0][0], self.box[1][0]), ylim=(self.box[0][1], self.box[1][1]))
-
-
 def _build_box(cell: Cell) -> Box:
     """Return what is seen of a build: robots too, as far as they are near, and known arms whole."""
     low, high = _seen_box(cell.scene)
@@ -182,30 +119,78 @@ def steps_picture(
     magnify: float = 0.0,
     arms: Arms | None = None,
 ) -> Figure:
-    """Return a picture of steps of a build, by their numbers from 1; how, see `Stage`.
+    """Return a picture of steps of a build, by their numbers from 1, all of one size.
 
-    By default `FRAMES` of them, spread over the build.
+    By default `FRAMES` of them, spread over the build. ``forces``: the network, colored by axial
+    force, instead of bricks and robots; ``magnify``: how many times larger displacements are drawn,
+    0 for not at all; ``arms``: what is known of them in all steps, by default their postures.
     """
     picked, scene = _picked(steps, chosen), engine.network.scene
-    stage = Stage(engine, steps, forces=forces, magnify=magnify, arms=arms)
-    figure, panels = _panels(stage.box, len(picked), WIDTH, 0.35)
+    if arms is None:
+        arms = {} if forces else _known_arms(scene, steps)
+    _require_arms(scene, steps, arms)
+    cell = Cell(scene, arms)
+    low, high = box = _build_box(cell)
+    figure, panels = _panels(box, len(picked), WIDTH, 0.35)
+    want = Want.EDGES | Want.DISPLACEMENTS | Want.BRICKS
+    asked = picked if forces or magnify else []
+    fields = {at: step_fields(engine, steps[at], want) for at in asked}
     largest = None
     if forces:  # of any edge in these steps, N
-        each = (stage.fields(at).edge_force for at in picked)
-        largest = max(float(np.abs(force).max(initial=0.0)) for force in each)
+        largest = max(float(np.abs(f.edge_force).max(initial=0.0)) for f in fields.values())
     key: dict[int, Line2D] = {}
     for axes, at in zip(panels, picked, strict=True):
-        stage.draw(axes, at, largest)
-        if len(picked) == 1:
-            draw_grips(axes, engine.network, steps[at].grips, VIEW)
+        step, found = steps[at], fields.get(at)
+        if forces and found is not None:
+            _draw_forces(axes, engine.network, step.bricks, found, magnify, largest)
         else:
-            key |= _mark_grips(axes, scene, steps[at].grips)
+            _draw_robots(axes, cell, cell.arms(step, at), VIEW)
+            _draw_built(axes, engine.network, step, found, magnify)
+        axes.set_title(_said(scene, step, steps[-1].number), loc="center")
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        if len(picked) == 1:
+            draw_grips(axes, engine.network, step.grips, VIEW)
+        else:
+            key |= _mark_grips(axes, scene, step.grips)
     handles = [key[robot] for robot in sorted(key)]
     handles += [Line2D([], [], **PROP_MARK, ms=8, label="prop holds")] if scene.props else []
     handles += [] if largest is None else force_key(largest)
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
+
+
+def _draw_forces(
+    axes: Axes, network: Network, bricks: int, found: Fields, magnify: float, largest: float | None
+) -> None:
+    """Draw the network, colored by axial force; the largest force, N, is drawn widest."""
+    how: dict[str, Any] = {"edge_force": found.edge_force[0], "largest_force": largest}
+    how |= {"displacement": found.displacement[0], "magnify": magnify} if magnify else {}
+    draw_network(axes, network, bricks, VIEW, **how)
+
+
+def _draw_built(
+    axes: Axes, network: Network, step: Step, found: Fields | None, magnify: float
+) -> None:
+    """Draw props and bricks, moved and where they would be, pale, if fields are given."""
+    _draw_props(axes, network.scene, step.bricks, held=bool(step.held), view=VIEW)
+    if found is None:
+        draw_bricks(axes, network, step.bricks, VIEW)
+        return
+    draw_bricks(axes, network, step.bricks, VIEW, alpha=0.15)
+    draw_bricks(axes, network, step.bricks, VIEW, twist=found.brick_twist[0], magnify=magnify)
+
+
+def _said(scene: Scene, step: Step, last: int) -> str:
+    """Return what a step does, as the title of its picture."""
+    newest = scene.placed[step.bricks - (step.kind is not StepKind.REMOVE)].name
+    what = {
+        StepKind.REMOVE: f"brick {newest} is removed",
+        StepKind.PLACE: f"brick {newest} is placed",
+        StepKind.RELEASE: "a robot lets go",
+        StepKind.REPOSITION: "a robot takes a grip",
+    }
+    return f"step {step.number} of {last}: {what[step.kind]}"
 
 
 def _mark_grips(axes: Axes, scene: Scene, grips: Grips) -> dict[int, Line2D]:
@@ -244,79 +229,3 @@ def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[i
         if not isinstance(number, Integral) or not first <= int(number) <= last:
             raise StepError(f"step {short(number)}: the build has steps {first} to {last}")
     return [int(number) - first for number in numbers]
-
-
-_DPI, _WIDTH, _COLORS = 80, 6.0, 128  # of a GIF; inches
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Film:
-    """A build as a film: a notebook plays it, `save` writes it; see `steps_picture`."""
-
-    engine: Engine
-    steps: Sequence[Step]
-    forces: bool = False
-    magnify: float = 0.0
-    seconds: float = 0.4
-    arms: Arms | None = None
-
-    def __repr__(self) -> str:
-        name, count = self.engine.network.scene.name, len(self.steps)
-        return f"<Film of {name}: {count} steps; save('build.gif') writes it>"
-
-    def _repr_html_(self) -> str:
-        """Return the film as an animated GIF: it plays without scripts, and without a network."""
-        with tempfile.TemporaryDirectory() as folder:
-            film = self.save(Path(folder) / "film.gif").read_bytes()
-        source = f"data:image/gif;base64,{b64encode(film).decode()}"
-        return f'<img alt="{len(self.steps)} steps of a build" src="{source}">'
-
-    @styled
-    def save(self, path: str | Path) -> Path:
-        """Write the film to a file that ends in ``.gif``. Raises `FileError` if it cannot."""
-        path = Path(path)
-        self.require(path)
-        try:
-            path.write_bytes(_gif(self._figures(), self.seconds))
-        except OSError as error:
-            raise FileError(f"cannot write {path}: {error.strerror}; name another") from error
-        return path
-
-    @staticmethod
-    def require(path: Path) -> None:
-        """Raise what `save` would, as far as it is known before anything is drawn."""
-        if path.suffix != ".gif":
-            raise FileError(f"film {path}: give a name that ends in .gif")
-        if not path.parent.is_dir():
-            raise FileError(f"cannot write {path}: there is no folder {path.parent}; name another")
-
-    def _figures(self) -> Iterator[Figure]:
-        """Yield a figure for every step: the same one, drawn anew."""
-        how: Any = {"forces": self.forces, "magnify": self.magnify, "arms": self.arms}
-        stage = Stage(self.engine, self.steps, **how)
-        wide, tall = stage.box[1] - stage.box[0]
-        figure = new_picture(_WIDTH, max(_WIDTH * tall / wide, 2.0) + 0.5, "none")
-        axes = figure.add_axes((0.02, 0.02, 0.96, 0.88))
-        for at, step in enumerate(self.steps):
-            axes.clear()
-            stage.draw(axes, at)
-            draw_grips(axes, self.engine.network, step.grips, VIEW)
-            yield figure
-
-
-def _gif(figures: Iterator[Figure], seconds: float) -> bytes:
-    """Return figures as a GIF of few colors, those of the middle one: less than half the bytes."""
-    frames = []
-    for figure in figures:
-        shown = io.BytesIO()
-        figure.savefig(shown, format="png", dpi=_DPI)
-        frames.append(Image.open(shown).convert("RGB"))
-    colors = frames[len(frames) // 2].quantize(_COLORS, Image.Quantize.FASTOCTREE)
-    palette = np.array(colors.getpalette()).reshape(-1, 3)
-    palette[palette.sum(axis=1).argmax()] = 255  # the background stays white
-    colors.putpalette(palette.ravel().tolist())
-    first, *more = (frame.quantize(palette=colors, dither=Image.Dither.NONE) for frame in frames)
-    out = io.BytesIO()
-    how: Any = {"save_all": True, "append_images": more, "loop": 0, "optimize": True}
-    first.save(out, format="GIF", duration=round(1000 * seconds), **how)
-    return out.getvalue()

@@ -49,7 +49,7 @@ def told():
 
 
 # commands that take as long as all others
-LONG = ("--order search", "seqopt pareto arch25", "tolerance,minmax", "--film")
+LONG = ("--order search", "seqopt pareto arch25", "tolerance,minmax")
 
 
 def shown(name, *, long):

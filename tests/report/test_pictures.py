@@ -7,10 +7,9 @@ import io
 import pytest
 from PIL import Image
 
-from seqopt._cli.main import main
-from seqopt.errors import FileError, StepError
+from seqopt.errors import StepError
 from seqopt.plan.build import GivenSequence
-from seqopt.report._pictures import Film, spread_steps
+from seqopt.report._pictures import spread_steps
 from seqopt.sequence.methods import sequential
 
 
@@ -76,44 +75,6 @@ def test_a_notebook_shows_a_figure_once(build):
     picture = Image.open(io.BytesIO(build.plot(5)._repr_png_()))
     assert picture.format == "PNG"
     assert picture.width > 500
-
-
-def test_a_film_has_a_picture_for_every_step(build, tmp_path):
-    short = Film(build.engine, build.steps[:5], seconds=0.5)
-    with Image.open(short.save(tmp_path / "build.gif")) as film:
-        assert film.n_frames == 5
-        assert film.convert("RGB").getpixel((0, 0)) == (255, 255, 255)
-        assert film.info["duration"] == 500
-    assert short._repr_html_().startswith('<img alt="5 steps of a build" src="data:image/gif')
-    for wrong in ("build.avi", "no folder/build.gif"):
-        with pytest.raises(FileError, match=r"ends in \.gif|cannot write"):
-            short.save(tmp_path / wrong)
-    assert isinstance(build.animate(), Film)
-
-
-def test_a_command_writes_a_film(tmp_path, capsys):
-    folder, film = tmp_path / "plan", tmp_path / "build.gif"
-    assert main(["optimize", "chain:bricks=7", "--schedule", "free", "--out", str(folder)]) == 0
-    assert main(["report", str(folder), "--film", str(film), "--quiet"]) == 0
-    assert str(film) in capsys.readouterr().out
-    with Image.open(film) as found:
-        assert found.n_frames == len((folder / "plan.csv").read_text("utf-8").splitlines()) - 1
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("build.mp4", "give a name that ends in .gif"),
-        ("no folder/build.gif", "there is no folder no folder; name another"),
-    ],
-)
-def test_a_film_that_cannot_be_written_is_refused_before_the_page_is(
-    tmp_path, monkeypatch, capsys, name, said
-):
-    monkeypatch.chdir(tmp_path)
-    assert main(["report", "chain:bricks=7", "--film", name, "--out", "page.html"]) == 2
-    assert said in capsys.readouterr().err
-    assert not (tmp_path / "page.html").exists()
 
 
 def test_pictures_of_a_build_are_spread_over_it(build):

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Any
 
 from seqopt._cli import inputs, options, outputs
 from seqopt._cli.answer import Answer
 from seqopt._files import require_folder, write_folder, write_text
-from seqopt._showing import PAGE, display
+from seqopt._showing import PAGE
 from seqopt.network.build import build_network
-from seqopt.plan.build import ShownBuild
 from seqopt.report._pages import folder_builds, folder_page
-from seqopt.stability._builds import BuildProver
 
 
 class Report(options.Written, options.Postures, options.Judged, options.Built):
@@ -25,15 +22,12 @@ class Report(options.Written, options.Postures, options.Judged, options.Built):
     What is written and printed?
     out : FILE
         page to write (default: report.html in DIR, of a scene its name with .html)
-    film : FILE
-        also write a film of the first plan, a .gif (needs matplotlib)
     figures : FOLDER
         also write figures there as PNG and SVG: steps, who holds what when, and responses along the
         build (needs matplotlib)
     """
 
     folder: options.BuiltFrom = field(kw_only=False, metadata={"place": True})
-    film: options.File | None = None
     figures: options.File | None = None
     scene: options.BuiltFrom = options.word("arch25", place=True)
 
@@ -50,18 +44,14 @@ def run(asked: Report) -> Answer:
     seqopt report best
     seqopt report my.json plans --out plans.html
     seqopt report best --figures pictures
-    seqopt report best --film build.gif
     """
-    film, figures = (None if p is None else Path(p) for p in (asked.film, asked.figures))
-    draws: Any = None if film is None else display(ShownBuild, "animate")
-    if film is not None:
-        draws.require(film)
+    figures = None if asked.figures is None else Path(asked.figures)
     folder, taken = inputs.plan_folder(asked, asked.folder)
     if (folder / "scene.json").is_file():  # plans go with the scene that stands beside them
         asked = replace(asked, scene=folder / "scene.json")
     scene = inputs.find_scene(asked)
     path = asked.path or _page(asked, folder, scene.name)
-    outputs.keep_apart(asked, path, film)
+    outputs.keep_apart(asked, path)
     if figures is not None:
         require_folder(figures)
     trouble = inputs.posture_trouble(asked, scene)
@@ -76,10 +66,6 @@ def run(asked: Report) -> Answer:
         asked.tell("drawing figures")
         write_folder(figures, plan_figures(engine, folder_builds(engine, folder, prover)))
         written.append(figures)
-    if film is not None:
-        asked.tell("drawing the film")
-        first = folder_builds(engine, folder, BuildProver(engine.network, {}))[0]
-        written.append(draws(engine, first.steps).save(film))
     text = f"written to {' and '.join(map(str, written))}"
     drawn = (f"arms: drawn without postures; {trouble}",) if trouble else ()
     notes = (*taken, *drawn, *left)
