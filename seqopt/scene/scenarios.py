@@ -23,18 +23,22 @@ from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 
 _End = TypeVar("_End", Joint, Ground)
-_Part = TypeVar("_Part", Brick, Joint, Ground)
+_Part = TypeVar("_Part", Brick, Joint, Ground, Load)
+
+
+def _scaled(values: Any, factor: float) -> Any:
+    """Return a stiffness in three directions times a factor; None of what is rigid."""
+    return None if values is None else as_vector(factor * np.array(values))
 
 
 def _stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
     """Return a scene stiffer by factors (J + G,), one for every joint, then every ground end."""
 
     def stiffer(spring: _End, shift: float, turn: float) -> _End:
-        (x, y, z), (a, b, c) = spring.translational_stiffness, spring.rotational_stiffness
         return replace(
             spring,
-            translational_stiffness=(shift * x, shift * y, shift * z),
-            rotational_stiffness=(turn * a, turn * b, turn * c),
+            translational_stiffness=_scaled(spring.translational_stiffness, shift),
+            rotational_stiffness=_scaled(spring.rotational_stiffness, turn),
         )
 
     shift, turn, count = translational.tolist(), rotational.tolist(), len(scene.joints)
@@ -48,8 +52,7 @@ def _gripped(scene: Scene, factors: Floats) -> Scene:
 
     def stiffer(robot: Robot, factor: float) -> Robot:
         shift, turn = (
-            None if each is None else as_vector(factor * np.array(each))
-            for each in (robot.stiffness, robot.rotational_stiffness)
+            _scaled(each, factor) for each in (robot.stiffness, robot.rotational_stiffness)
         )
         joints = () if robot.arm is None else (factor * k for k in robot.arm.joint_stiffness)
         arm = robot.arm and replace(robot.arm, joint_stiffness=tuple(joints))
@@ -65,36 +68,30 @@ def weighed(scene: Scene, factors: Floats) -> Scene:
     return replace(scene, bricks=tuple(replace(b, density=b.density * f) for b, f in pairs))
 
 
+def _moved(part: _Part, step: Floats) -> _Part:
+    """Return a part somewhere else, m; a load that acts at a centroid stays there."""
+    if part.position is None:
+        return part
+    return replace(part, position=as_vector(np.array(part.position) + step))
+
+
 def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
     """Return a scene moved up to a size along every axis, m, uniformly and piece by piece.
 
     A brick takes its nodes and loads with it, a ground end its fixed point.
     """
-
-    def moved(part: _Part) -> _Part:
-        step = rng.uniform(-size, size, 3)
-        new: dict[str, Any] = {"position": as_vector(np.array(part.position) + step)}
-        if isinstance(part, Ground):
-            new["anchor"] = as_vector(np.array(part.anchor) + step)
-        return replace(part, **new)
-
-    grounds = tuple(map(moved, scene.grounds))  # the first to draw
-    bricks, joints = tuple(map(moved, scene.bricks)), tuple(map(moved, scene.joints))
-    steps = {
-        old.name: np.subtract(new.position, old.position)
-        for old, new in zip(scene.bricks, bricks, strict=True)
-    }
-    loads = _loads_with(scene, steps)
-    return replace(scene, bricks=bricks, joints=joints, grounds=grounds, loads=loads)
-
-
-def _loads_with(scene: Scene, steps: Mapping[int, Floats]) -> tuple[Load, ...]:
-    """Return the loads where bricks take them that move by steps, m."""
-    return tuple(
-        replace(load, position=as_vector(np.array(load.position) + steps[load.brick]))
-        if load.position
-        else load
-        for load in scene.loads
+    parts = scene.grounds, scene.bricks, scene.joints  # in which order they draw
+    ends, steps, gaps = (rng.uniform(-size, size, (len(some), 3)) for some in parts)
+    of_brick = {brick.name: step for brick, step in zip(scene.bricks, steps, strict=True)}
+    return replace(
+        scene,
+        grounds=tuple(
+            replace(_moved(ground, step), anchor=as_vector(np.array(ground.anchor) + step))
+            for ground, step in zip(scene.grounds, ends, strict=True)
+        ),
+        bricks=tuple(map(_moved, scene.bricks, steps)),
+        joints=tuple(map(_moved, scene.joints, gaps)),
+        loads=tuple(_moved(load, of_brick[load.brick]) for load in scene.loads),
     )
 
 
@@ -117,17 +114,13 @@ def as_built(scene: Scene, measured: Mapping[int, Sequence[float]]) -> Scene:
                 f"measured brick {name}: it is {off:.3g} m from where it was planned, more "
                 f"than its {most:.3g} m; give positions of centroids in the frame of the scene, m"
             )
-
-    def moved(spring: _Part, step: Floats) -> _Part:
-        return replace(spring, position=as_vector(np.array(spring.position) + step))
-
-    joints = (moved(j, 0.5 * (steps[j.bricks[0]] + steps[j.bricks[1]])) for j in scene.joints)
+    joints = (_moved(j, 0.5 * (steps[j.bricks[0]] + steps[j.bricks[1]])) for j in scene.joints)
     return replace(
         scene,
-        bricks=tuple(moved(brick, steps[brick.name]) for brick in scene.bricks),
+        bricks=tuple(_moved(brick, steps[brick.name]) for brick in scene.bricks),
         joints=tuple(joints),
-        grounds=tuple(moved(ground, 0.5 * steps[ground.brick]) for ground in scene.grounds),
-        loads=_loads_with(scene, steps),
+        grounds=tuple(_moved(ground, 0.5 * steps[ground.brick]) for ground in scene.grounds),
+        loads=tuple(_moved(load, steps[load.brick]) for load in scene.loads),
     )
 
 
@@ -180,11 +173,6 @@ class Scenarios:
         ``factors``: the least and the largest by which the stiffness of grips is multiplied, the
         same for all robots that give way alike, joints of arms with them; log-uniform. Rigid grips
         stay rigid.
-
-        >>> import seqopt
-        >>> drawn = seqopt.scenarios(seqopt.load_scene("arch25").with_grips(1e6), count=2)
-        >>> [f"{each.robots[0].stiffness[0]:.3g}" for each in drawn.with_grips((0.5, 2)).scenes]
-        ['1.44e+06', '1.72e+06']
         """
         held = _factors("grips", factors)
         if self.grips != _ALIKE:
@@ -236,32 +224,29 @@ def scenarios(
     <5 scenarios of arch25: stiffness times 0.333 to 3, density within 10 %, ... seed 1>
     """
     low, high = _factors("stiffness", stiffness)
-    spread = _from_zero("density", density, most=1.0)
-    shift = _from_zero("position", position, most=math.inf)
+    for name, given, most in (("density", density, 1.0), ("position", position, math.inf)):
+        if isinstance(given, bool) or not isinstance(given, Real) or not 0 <= given < most:
+            limit = f" to below {most:g}" if math.isfinite(most) else ""
+            raise SceneError(f"{name} is {short(given)}; give a number from 0{limit}")
     number = whole_between("count", count, 1, MOST)
     seed = whole_between("seed", seed, 0, 2**63)
-    drawn = tuple(_sample(scene, (low, high), spread, shift, (seed, i)) for i in range(number))
-    return Scenarios(scene, (low, high), spread, shift, seed, drawn)
+    drawn = Scenarios(scene, (low, high), float(density), float(position), seed, ())
+    return replace(drawn, scenes=tuple(_sample(drawn, i) for i in range(number)))
 
 
-def _sample(
-    scene: Scene,
-    factors: tuple[float, float],
-    density: float,
-    position: float,
-    stream: tuple[int, int],
-) -> Scene:
-    """Return one scenario; each kind of change has random numbers of its own."""
-    stiff, heavy, moved = (np.random.default_rng([*stream, kind]) for kind in range(3))
-    low, high = map(math.log, factors)
+def _sample(of: Scenarios, number: int) -> Scene:
+    """Return one scenario, by number; each kind of change has random numbers of its own."""
+    scene = of.nominal
+    stiff, heavy, moved = (np.random.default_rng([of.seed, number, kind]) for kind in range(3))
+    low, high = map(math.log, of.stiffness)
     logs = stiff.uniform(low, high, (2, len(scene.joints) + len(scene.grounds)))
     shares = heavy.uniform(-1.0, 1.0, len(scene.bricks))
     try:
-        out = weighed(_stiffened(scene, *np.exp(logs)), 1.0 + density * shares)
-        return shifted(out, position, moved) if position else out
+        out = weighed(_stiffened(scene, *np.exp(logs)), 1.0 + of.density * shares)
+        return shifted(out, of.position, moved) if of.position else out
     except SceneError as error:
         raise SceneError(
-            f"scenario {stream[1] + 1} of {scene.name} is not a valid scene ({error}); let "
+            f"scenario {number + 1} of {scene.name} is not a valid scene ({error}); let "
             "positions, densities and stiffnesses vary less"
         ) from error
 
@@ -277,14 +262,6 @@ def _factors(name: str, given: Sequence[float]) -> tuple[float, float]:
             f"{1 / _LARGEST_FACTOR:g} to {_LARGEST_FACTOR:g}"
         )
     return low, high
-
-
-def _from_zero(name: str, given: float, most: float) -> float:
-    """Return a number from zero to below a limit."""
-    if isinstance(given, bool) or not isinstance(given, Real) or not 0 <= given < most:
-        limit = f" to below {most:g}" if math.isfinite(most) else ""
-        raise SceneError(f"{name} is {short(given)}; give a number from 0{limit}")
-    return float(given)
 
 
 def require_alike(nominal: Scene, scene: Scene, number: int) -> None:
