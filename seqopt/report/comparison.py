@@ -35,11 +35,11 @@ from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import Departure, LinearRange, _steps_in_table, analyze, force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence.methods import METHODS, degeneration, modified_sequential
+from seqopt.sequence.methods import METHODS, modified_sequential
 from seqopt.sequence.rules import FREE, FreeRules, Newest, Payload
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import MOST, find_schedule, parse_plan
-from seqopt.sequence.steps import _idle_note
+from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.study.published import PUBLISHED, paper_models, published_about, published_choice
@@ -342,6 +342,7 @@ def _method_tables(
     tables: dict[str, pd.DataFrame] = {}
     refused: dict[str, StepError | MechanismError] = {}
     notes: list[str] = []
+    built: dict[str, tuple[Step, ...]] = {}
     for name, method in METHODS.items():
         try:
             steps = method(engine.network, robots[:2])
@@ -349,8 +350,9 @@ def _method_tables(
         except (StepError, MechanismError) as error:
             refused[name] = error
             continue
-        why = degeneration(engine.network, name)
-        notes += [f"{name}: {why}"] if why else []
+        if alike := [other for other, own in built.items() if own == steps]:
+            notes.append(f"{name}: it is the {alike[0]} method here")
+        built[name] = steps
         notes += _idle_note(scene, name, steps)
     if tables and (known := published_about(scene)) is not None:
         tables[PUBLISHED] = analyze(engine, known.steps)

@@ -245,31 +245,6 @@ def _begins_elsewhere(network: Network) -> frozenset[int]:
     return frozenset(out)
 
 
-def degeneration(network: Network, method: str) -> str:
-    """Return why a method of `METHODS` degenerates to another one on a structure; else empty.
-
-    >>> import seqopt
-    >>> shape = seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V")
-    >>> degeneration(seqopt.build_network(seqopt.arch_scene(shape)), "cantilever")
-    'every brick lies along the structure: it is the sequential method here'
-    """
-    if method != "cantilever":
-        return ""
-    between = {brick.name for brick in network.scene.placed[1:-1]}  # after the last all let go
-    along = lies_along(network)
-    swaps = along | _begins_elsewhere(network)
-    if swaps >= between:
-        why = "no brick extends one that is held, as each begins elsewhere or lies along"
-        if along >= between:
-            why = "every brick lies along the structure"
-        if not between:
-            why = "no bricks lie between the first and the last"
-        return f"{why}: it is the sequential method here"
-    first = network.scene.placed[0].name
-    held = f"no brick lies along the structure: brick {first} is held until the end"
-    return "" if swaps & between else held
-
-
 def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     """Return the node at which a robot holds a brick that it places.
 

@@ -121,11 +121,11 @@ class FreeRules:
                 raise StepError(f"rule {name}: {twice[0]} occurs twice; name it once")
             settle(self, **{name: tuple(names)})
         for name in _COUNTS:
-            if (count := getattr(self, name)) is None:
-                continue
-            if not isinstance(count, Integral) or isinstance(count, bool) or count < 0:
+            count = getattr(self, name)
+            whole = isinstance(count, Integral) and not isinstance(count, bool) and count >= 0
+            if not (count is None or whole):
                 raise StepError(f"rule {name}: {short(count)}; give a whole number from 0 on")
-            settle(self, **{name: int(count)})
+            settle(self, **{name: None if count is None else int(count)})
         for name in ("begin", "finish"):
             if not isinstance(getattr(self, name), Site | None):
                 raise StepError(f"rule {name}: {short(getattr(self, name))}; give a seqopt.Site")
