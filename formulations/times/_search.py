@@ -31,11 +31,11 @@ from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
 from seqopt.graph.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
-from seqopt.graph.states._visits import seen_steps, steps_of
+from seqopt.graph.states._visits import seen_steps
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.problem.amounts import MINMAX, SUM, Amount
-from seqopt.sequence._rule_space import FreeSpace, node_numbers
+from seqopt.sequence._rule_space import node_numbers
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._fall_cuts import FallCuts
 from seqopt.times._graph import timed_graph
@@ -87,15 +87,14 @@ class Waits:
         """
         space, scene = problem.space, problem.network.scene
         waits = None if self._builds is None else self._builds.waits
-        steps, grips = steps_of(space, states), tuple[tuple[int, ...], ...]()
-        if isinstance(space, FreeSpace):
-            kind = {robot: k for k, each in enumerate(space.kinds) for robot in each.robots}
-            steps = reassigned_steps(
-                *(scene, steps, lambda r, hold: kind[r] == kind[hold.robot], [*kind], waits),
-                begin=problem.rules.begin,
-            )
-            place = {node: i for i, node in enumerate(node_numbers(space.network), start=1)}
-            grips = tuple(tuple(0 if n is None else place[n] for n in step.grips) for step in steps)
+        kind = {robot: k for k, each in enumerate(space.kinds) for robot in each.robots}
+        steps = reassigned_steps(
+            *(scene, space.steps(states), lambda r, hold: kind[r] == kind[hold.robot]),
+            *([*kind], waits),
+            begin=problem.rules.begin,
+        )
+        place = {node: i for i, node in enumerate(node_numbers(space.network), start=1)}
+        grips = tuple(tuple(0 if n is None else place[n] for n in step.grips) for step in steps)
         times: tuple[StepTime, ...] = step_times(scene, steps, waits, problem.rules.begin)
         starts = () if waits is None else tuple(time.start for time in times)
         return Soonest(grips, times[-1].end, starts)

@@ -23,7 +23,6 @@ from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import solve_sets
 from seqopt.sequence._rule_check import RuleBook
-from seqopt.sequence.rules import Payload
 from seqopt.sequence.schedule import Schedule
 
 FEW = 500  # grip sets of which all digits take no longer than to ask some of them twice
@@ -348,7 +347,7 @@ class StateEvaluator:
 def largest_load(problem: States, robot: int, *, stand: bool) -> float:
     """Return the most that a robot of the scene may carry, or has to hold with, N."""
     rules, own = problem.rules, problem.network.scene.robots[robot]
-    kept = stand if isinstance(rules, Schedule) else rules.payload is Payload.KEPT
+    kept = rules.keeps_payloads(stands=stand)
     most = min(own.payload if kept else np.inf, problem.caps.get(own.name, np.inf))
     return float(most * (1 + LIMIT_TOLERANCE))
 

@@ -50,10 +50,9 @@ from seqopt.responses.quantities import (
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_check import RuleBook, unbearable
-from seqopt.sequence._rule_space import loads
 from seqopt.sequence.methods import _enough_reach
 from seqopt.sequence.rules import FREE, FreeRules, Payload
-from seqopt.sequence.schedule import OpenStep
+from seqopt.sequence.schedule import OpenStep, loads
 from seqopt.sequence.steps import Step
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none

@@ -18,7 +18,6 @@ from seqopt.graph.formulation import Formulation, Solution, as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
 from seqopt.graph.space import Space
-from seqopt.graph.states._visits import steps_of
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import States
 from seqopt.judge._schedules import ordered, plan_values
@@ -144,7 +143,7 @@ class FrontProblem:
 
     def steps(self, plan: Solution) -> tuple[Step, ...]:
         """Return the checked steps of a plan."""
-        return steps_of(self._of_plan(plan).space, plan.states)
+        return self._of_plan(plan).space.steps(plan.states)
 
     def values(self, plan: Solution) -> Floats:
         """Return the goals' values (k,) of a plan, from its responses, rounded; SI units."""

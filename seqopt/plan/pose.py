@@ -166,8 +166,6 @@ def _of_states(problem: Problem) -> States:
 
 def _states(problem: Problem) -> States:
     """Return the graph of states of a problem, with goals, constraints and scenarios."""
-    from seqopt.sequence._rule_space import FreeSpace  # noqa: PLC0415  # of states alone
-
     over = problem.over if problem.scenarios else WORST_PEAK
     goals = problem.goals or (AIMS[over.aim],)
     asked = problem.engine, problem.moves, problem.criterion, goals, problem.limits
@@ -176,8 +174,7 @@ def _states(problem: Problem) -> States:
     found = replace(found, resources=problem.resources, filters=problem.filters)
     found = replace(found, paths=problem.paths)
     space = found.space
-    ends = isinstance(space, FreeSpace) and space.first == space.levels
-    if ends and space.ended(space.start()).all():
+    if space.first == space.levels and space.ended(space.start()).all():
         raise ProblemError("nothing is left to plan: the build begins as it may end")
     if problem.is_timed and found.free_rules.takes_down:
         raise ProblemError(

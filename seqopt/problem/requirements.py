@@ -32,9 +32,8 @@ from seqopt.responses.quantities import (
 from seqopt.responses.table import _analyzed, _Columns, _steps_in_table, force_column
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence._rule_space import carried, loads
 from seqopt.sequence.methods import METHODS
-from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule import Schedule, carried, loads
 from seqopt.sequence.steps import AnyStep
 
 LEVEL = 1e-9  # heights this close, over the height of the structure, are equal

@@ -15,58 +15,19 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, pairwise
-from math import prod
 from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, frozen
-from seqopt.errors import StepError
+from seqopt.errors import SolverError, StepError
 from seqopt.network.network import Network
 from seqopt.scene._armed import go_together, within_reach
-from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import placing_node
 from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
-from seqopt.sequence.schedule import OpenGrip, Schedule, holds, islands
-from seqopt.sequence.steps import AnyStep, Site, Step, StepKind, _begin_step, check_sequence
-
-_ROUNDING = 1e-9  # over a payload, by which a load may exceed it
-
-
-class Carried(NamedTuple):
-    """A brick that a robot places or removes."""
-
-    step: int  # its number
-    robot: int  # index among the scene's robots
-    brick: int  # its name
-
-
-def carried(scene: Scene, steps: Sequence[AnyStep]) -> Iterator[Carried]:
-    """Yield robot and brick of every transport in steps, whose grips may be open.
-
-    The robot that removes a brick held it before: unknown if the first step removes one.
-    """
-    removals = {step.number - 1: step for step in steps if step.kind is StepKind.REMOVE}
-    for hold in holds(scene, steps):
-        if hold.places is not None:
-            yield Carried(hold.first, hold.robot, hold.places)
-        if (step := removals.get(hold.last)) is not None:  # in which nobody else lets go
-            yield Carried(step.number, hold.robot, scene.placed[step.bricks].name)
-
-
-def loads(scene: Scene, robot: Robot) -> Floats:
-    """Return the load of a robot with every brick in build order, its tool included, (B,), N."""
-    tool = 0.0 if robot.arm is None else robot.arm.tool_mass
-    gravity = scene.weight_factor * float(np.linalg.norm(scene.gravity))
-    return gravity * (np.array([brick.mass for brick in scene.placed]) + tool)
-
-
-def can_carry(scenes: Sequence[Scene], robot: int) -> Bools:
-    """Return whether a robot can carry each brick in build order in all scenes, (B,)."""
-    pairs = [(scene, scene.robots[robot]) for scene in scenes]
-    within = [loads(scene, own) <= own.payload * (1 + _ROUNDING) for scene, own in pairs]
-    return np.asarray(np.all(within, axis=0))
+from seqopt.sequence.schedule import can_carry, islands
+from seqopt.sequence.steps import Site, Step, StepKind, _begin_step, check_sequence
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -389,6 +350,41 @@ class FreeSpace(StateRows):
             sort_entries(held, first, end)
         return np.asarray((held == self._row(self.rules.finish).clip(min=0)).all(axis=1))
 
+    def steps(self, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
+        """Return the checked steps that lead from one state to the next.
+
+        ``states``: as of a `seqopt.graph.formulation.Solution`. Raises `SolverError` if they are
+        none of this space; `StepError` if no single step leads from one to the next.
+        """
+        numbers = [None, *node_numbers(self.network)]
+        begin = _begin_step(self.network.scene, self.rules.begin)
+        grips: list[int | None] = [*begin.grips]
+        stays = self._stays()  # where a robot was last, as a place from 1
+        before, out = begin.bricks, list[Step]()
+        for level, *entries in states:
+            if len(entries) < self.robots or not all(abs(n) < len(numbers) for n in entries):
+                raise SolverError(f"the state {[level, *entries]} is none of this free schedule")
+            bricks = self.bricks_at(level)
+            took = False
+            for kind, (first, end) in zip(self.kinds, self.slots, strict=True):
+                took |= _follow(kind.robots, entries[first:end], grips, stays, numbers)
+            stays = stays if self.parks else {}
+            step = StepKind.PLACE if bricks > before else StepKind.REPOSITION
+            number = begin.number + len(out) + 1
+            other = StepKind.REMOVE if bricks < before else StepKind.RELEASE
+            out.append(Step(number, step if took else other, bricks, tuple(grips)))
+            before = bricks
+        return check_sequence(self.network.scene, out, begin)
+
+    def _stays(self) -> dict[int, int]:
+        """Return where robots hold, or held last, where a build begins: places from 1."""
+        site, numbers = self.rules.begin, node_numbers(self.network)
+        if site is None:
+            return {}
+        lasts = (site.grips or (), site.stays)
+        found = [(r, n) for nodes in lasts for r, n in enumerate(nodes) if n is not None]
+        return {robot: numbers.index(node) + 1 for robot, node in found}
+
     @cached_property
     def _near(self) -> tuple[list[int], ...]:
         """By brick count the nodes of placed bricks that may be gripped."""
@@ -436,6 +432,34 @@ class FreeSpace(StateRows):
     def _lawful_only(self, bricks: int, moves: Moves) -> Moves:
         ok = self.lawful(bricks, moves.states) & self.for_arms(bricks, moves.states)
         return Moves(moves.source[ok], moves.states[ok], moves.way[ok])
+
+
+def _follow(
+    robots: Sequence[int],
+    entries: Sequence[int],
+    grips: list[int | None],
+    stays: dict[int, int],
+    numbers: Sequence[int | None],
+) -> bool:
+    """Assign robots of a kind to the nodes of their entries; return whether one took a grip."""
+    wanted = {numbers[n]: n for n in entries if n > 0}
+    left = [-n for n in entries if n <= 0]
+    for robot in robots:
+        if grips[robot] is not None and grips[robot] not in wanted:
+            grips[robot] = None
+    fresh = [node for node in wanted if node not in [grips[robot] for robot in robots]]
+    for node in fresh:
+        free = [robot for robot in robots if grips[robot] is None]
+        if not free:
+            raise SolverError(f"node {node} is held in a state, and no robot is free to hold it")
+        for robot in reversed(free):
+            if stays.get(robot, 0) in left and len(free) > 1:  # it is seen to stay free
+                left.remove(stays.get(robot, 0))
+                free = [r for r in free if r != robot]
+        robot = free[0]
+        grips[robot] = node
+        stays[robot] = wanted[node]
+    return bool(fresh)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -498,134 +522,3 @@ def free_space(
     space = (_TakeDownSpace if rules.takes_down else FreeSpace)(network, rules, kinds, parks)
     space.require_codes(rules.regrips or 0)
     return space
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ScheduleSpace(StateRows):
-    """The states of a schedule and the moves between them; a level for every step."""
-
-    network: Network
-    schedule: Schedule
-    caps: Mapping[str, float]  # largest forces of robots' grips, by their names, N
-    parks: bool = False  # free robots stay where they were, for their travel
-    worlds: tuple[Scene, ...] = ()  # of scenarios, in which robots must carry their bricks as well
-
-    def __post_init__(self) -> None:
-        self.require_codes()
-
-    first = 0  # the level before the first step
-
-    @property
-    def levels(self) -> int:
-        """Number of steps, equal for all builds."""
-        return len(self.schedule.steps)
-
-    @property
-    def fewest_steps(self) -> int:
-        """Number of steps."""
-        return self.levels
-
-    @property
-    def ends_bare(self) -> bool:
-        """Whether the last step has no grips."""
-        return all(grip is None for grip in self.schedule.steps[-1].grips)
-
-    def steps_to_go(self, level: int, states: Ints) -> Floats:
-        """Return the number of steps to the end, (n,)."""
-        return np.full(len(states), float(self.levels - level))
-
-    def bricks_at(self, level: int) -> int:
-        """Return the brick count after a number of steps."""
-        return self.schedule.steps[level - 1].bricks if level else self._begin.bricks
-
-    @cached_property
-    def _begin(self) -> Step:
-        return _begin_step(self.network.scene, self.schedule.begin)
-
-    def may_place(self, level: int, states: Ints) -> Bools:
-        """Return from which states the next step is feasible: all, (n,)."""
-        return np.ones(len(states), dtype=bool)
-
-    @cached_property
-    def kinds(self) -> tuple[RobotKind, ...]:  # type: ignore[override]  # no field here
-        """A kind per robot: robots of a schedule are not interchangeable, steps say who carries."""
-        every = np.ones(2 * len(self.network.inner), dtype=bool)
-        caps = [self.caps.get(robot.name, np.inf) for robot in self.network.scene.robots]
-        return tuple(RobotKind((i,), every, every, every[::2], c) for i, c in enumerate(caps))
-
-    @cached_property
-    def _too_heavy(self) -> frozenset[int]:
-        """Numbers of the steps in which a brick exceeds the payload of its robot."""
-        scene = self.network.scene
-        able = [can_carry((scene, *self.worlds), robot) for robot in range(self.robots)]
-        every = carried(scene, (self._begin, *self.schedule.steps))
-        return frozenset(c.step for c in every if not able[c.robot][scene.since[c.brick] - 1])
-
-    def start(self) -> Ints:
-        """Return the initial state, (1, robots) int."""
-        held, site = self._begin.grips, self.schedule.begin
-        stays = site.stays if site and site.stays and self.parks else (None,) * self.robots
-        out = [self._place.get(n, -self._place.get(s, 0)) for n, s in zip(held, stays, strict=True)]
-        return np.array([out], dtype=np.int32)
-
-    def within(
-        self, level: int, states: Ints, *, regrips: bool = True
-    ) -> tuple[tuple[Moves, bool], ...]:
-        """Return the moves that stay in a step: there are none."""
-        return ()
-
-    def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
-        """Return the moves to the next step, and whether they are regrips."""
-        step = self.schedule.steps[level]
-        before = self.schedule.steps[level - 1].grips if level else self._begin.grips
-        after, fresh = states.copy(), []
-        for robot, grip in enumerate(step.grips):
-            if grip is None:
-                after[:, robot] = -np.abs(states[:, robot]) if self.parks else 0
-            elif not isinstance(grip, OpenGrip):
-                after[:, robot] = self._place[grip]
-            elif before[robot] != grip:
-                open_to = self.schedule.moves[grip.move].candidates
-                fresh.append((robot, [self._place[node] for node in open_to]))
-        grids = np.meshgrid(*(places for _, places in fresh), indexing="ij")
-        count = prod(len(places) for _, places in fresh)
-        source, after = (np.repeat(rows, count, axis=0) for rows in (np.arange(len(states)), after))
-        for (robot, _), places in zip(fresh, grids, strict=True):
-            after[:, robot] = np.tile(places.ravel(), len(states))
-        held = self.held(after)
-        kept = ~((held[:, 1:] == held[:, :-1]) & (held[:, 1:] > 0)).any(axis=1)  # a node each
-        kept &= self.for_arms(step.bricks, after) & (step.number not in self._too_heavy)
-        source, after = source[kept], after[kept]
-        way, came = np.zeros(len(source)), states[source]
-        if self.parks:
-            gone = (after > 0) & (after != came) & (came != 0)
-            moved = self._at[np.abs(after)] - self._at[np.abs(came)]
-            way = (np.linalg.norm(moved, axis=2) * gone).sum(axis=1)
-        return ((Moves(source, after, way), step.kind is StepKind.REPOSITION),)
-
-    @cached_property
-    def _at(self) -> Floats:
-        """Positions of nodes (2B + 1, 3), m, instead of the much larger matrix of distances."""
-        return np.pad(self.network.node_position[self.network.inner.ravel()], ((1, 0), (0, 0)))
-
-    def without_choice(self) -> Iterator[tuple[int, Ints]]:
-        """Yield the levels, last first, of steps without an open grip, and their state (1, r)."""
-        for level, step in reversed([*enumerate(self.schedule.steps, start=1)]):
-            held = [grip for grip in step.grips if not isinstance(grip, OpenGrip)]
-            if len(held) == len(step.grips):
-                places = [self._place.get(grip, 0) for grip in held]
-                yield level, np.array([places], dtype=np.int32)
-
-    def ended(self, states: Ints) -> Bools:
-        """Return which states of the last step end the build: all, (n,)."""
-        return np.ones(len(states), dtype=bool)
-
-    def steps(self, rows: Ints) -> tuple[Step, ...]:
-        """Return the checked steps of a sequence of states (levels, robots)."""
-        numbers = np.array([None, *node_numbers(self.network)])
-        grips = numbers[rows.clip(min=0)].tolist()
-        steps = [
-            Step(s.number, s.kind, s.bricks, tuple(nodes))
-            for s, nodes in zip(self.schedule.steps, grips, strict=True)
-        ]
-        return check_sequence(self.network.scene, steps, self._begin)

@@ -6,8 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from numbers import Integral
+from typing import NoReturn
 
-from seqopt.errors import StepError, did_you_mean
+import numpy as np
+
+from seqopt.arrays import Bools, Ints
+from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene
@@ -158,6 +162,25 @@ class FreeRules:
     def takes_down(self) -> bool:
         """Whether bricks are removed."""
         return self.direction is Direction.TAKE_DOWN
+
+    def free(self) -> FreeRules:
+        """Return these rules: who asks for the moves of a schedule gets an error from that."""
+        return self
+
+    def given(self) -> NoReturn:
+        """Raise a `ProblemError`: no step is given."""
+        raise ProblemError("the free schedule has no open grips; it has states")
+
+    def keeps_payloads(self, *, stands: bool) -> bool:
+        """Return whether robots hold no more than their payloads, also where nothing limits it.
+
+        ``stands``: whether it is asked where states must stand.
+        """
+        return self.payload is Payload.KEPT
+
+    def places(self, before: Ints, after: Ints) -> Bools:
+        """Return which moves from levels to levels, (m,), place a brick."""
+        return np.asarray(after > before)
 
     def begun(self, scene: Scene) -> FreeRules:
         """Return the rules with the beginning of a take-down, by default without grips."""

@@ -14,14 +14,15 @@ from functools import cache, cached_property, partial
 from itertools import groupby
 from numbers import Integral
 from operator import itemgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 import numpy as np
 
 from seqopt._showing import Shown, display
-from seqopt.arrays import Terse
-from seqopt.errors import StepError, did_you_mean
+from seqopt.arrays import Bools, Floats, Ints, Terse
+from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import GROUND, Network
+from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import AnyStep, Site, Step, StepKind, _begin_step, check_sequence
 
@@ -203,6 +204,30 @@ class Schedule(Shown):
         """Return the number of last steps that only release against rules: zero, without rules."""
         return 0
 
+    def free(self) -> NoReturn:
+        """Raise a `ProblemError`: steps are given."""
+        raise ProblemError(
+            f"schedule {self.method}: its steps are given; orders, and steps or regrips in a "
+            "Pareto set, go with the free schedule"
+        )
+
+    def given(self) -> Schedule:
+        """Return the schedule: free rules raise an error here."""
+        return self
+
+    def begun(self, scene: Scene) -> Schedule:
+        """Return the schedule, which says itself where it begins."""
+        return self
+
+    def keeps_payloads(self, *, stands: bool) -> bool:
+        """Return whether robots hold no more than their payloads: where states must stand."""
+        return stands
+
+    def places(self, before: Ints, after: Ints) -> Bools:
+        """Return which moves from levels to levels, (m,), place a brick."""
+        kinds = [False, *(step.kind is StepKind.PLACE for step in self.steps)]
+        return np.array(kinds)[after]
+
     def in_scene(self, scene: Scene) -> Schedule:
         """Return the same steps of another scene with the same bricks, nodes and robots."""
         return replace(self, scene=scene)
@@ -323,3 +348,41 @@ def _always_tied(network: Network) -> bool:
     springs = network.springs
     at_once = springs.stiffness.any(axis=1) & (springs.since == springs.bodies[:, 1] + 1)
     return len(np.unique(springs.bodies[at_once, 1])) == len(network.scene.placed)
+
+
+_ROUNDING = 1e-9  # over a payload, by which a load may exceed it
+
+
+class Carried(NamedTuple):
+    """A brick that a robot places or removes."""
+
+    step: int  # its number
+    robot: int  # index among the scene's robots
+    brick: int  # its name
+
+
+def carried(scene: Scene, steps: Sequence[AnyStep]) -> Iterator[Carried]:
+    """Yield robot and brick of every transport in steps, whose grips may be open.
+
+    The robot that removes a brick held it before: unknown if the first step removes one.
+    """
+    removals = {step.number - 1: step for step in steps if step.kind is StepKind.REMOVE}
+    for hold in holds(scene, steps):
+        if hold.places is not None:
+            yield Carried(hold.first, hold.robot, hold.places)
+        if (step := removals.get(hold.last)) is not None:  # in which nobody else lets go
+            yield Carried(step.number, hold.robot, scene.placed[step.bricks].name)
+
+
+def loads(scene: Scene, robot: Robot) -> Floats:
+    """Return the load of a robot with every brick in build order, its tool included, (B,), N."""
+    tool = 0.0 if robot.arm is None else robot.arm.tool_mass
+    gravity = scene.weight_factor * float(np.linalg.norm(scene.gravity))
+    return gravity * (np.array([brick.mass for brick in scene.placed]) + tool)
+
+
+def can_carry(scenes: Sequence[Scene], robot: int) -> Bools:
+    """Return whether a robot can carry each brick in build order in all scenes, (B,)."""
+    pairs = [(scene, scene.robots[robot]) for scene in scenes]
+    within = [loads(scene, own) <= own.payload * (1 + _ROUNDING) for scene, own in pairs]
+    return np.asarray(np.all(within, axis=0))

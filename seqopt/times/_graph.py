@@ -10,8 +10,6 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._explore import Visited
 from seqopt.graph.graph import HELD, NOW, Graph, TimedGraph
 from seqopt.graph.states.states import States
-from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.steps import StepKind
 from seqopt.times._durations import require_durations
 from seqopt.times._fall_cuts import CuringStates, FallCuts
 
@@ -74,10 +72,7 @@ def _moves(problem: States, graph: Graph, rows: Ints, levels: Ints) -> _Moves:
         had, has = ((old[:, :, None] == each[:, None]).sum(axis=2) for each in (old, new))
         able[:, first:end] = (old <= 0) & (had > has)
         able[~taken[:, first:end].any(axis=1), first:end] = False
-    places = levels[graph.target] > levels[graph.source]
-    if isinstance(problem.rules, Schedule):
-        kinds = [False, *(step.kind is StepKind.PLACE for step in problem.rules.steps)]
-        places = np.array(kinds)[levels[graph.target]]
+    places = problem.rules.places(levels[graph.source], levels[graph.target])
     return _Moves(before, after, taken, dropped, able, places)
 
 

@@ -21,8 +21,7 @@ from seqopt.network.network import Network
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence._rule_space import can_carry, carried
-from seqopt.sequence.schedule import Hold
+from seqopt.sequence.schedule import Hold, can_carry, carried
 from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
 from seqopt.times._curing import JointsInTime, Waits
 from seqopt.times._steps import StepTime, reassigned_steps, step_times

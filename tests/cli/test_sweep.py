@@ -101,7 +101,7 @@ def test_scenes_of_ones_own_and_any_function(tmp_path):
     scenes = [seqopt.load_scene(f"chain:bricks={count}") for count in (7, 9)]
     path = tmp_path / "rows.csv"
     found = sweep(scenes, free, mortars=["dry"], out=path)
-    again = sweep(scenes, lambda scene: pytest.fail(), mortars=["dry"], out=path)
+    again = sweep(scenes, lambda scene: pytest.fail("it is known"), mortars=["dry"], out=path)
     assert list(found["scene"]) == [scene.name for scene in scenes]
     assert {*found["falls_dry"]} <= {*range(20)}
     assert list(again["F_largest"]) == pytest.approx(list(found["F_largest"]), rel=1e-8)

@@ -17,8 +17,8 @@ from seqopt.plan.pose import states_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.scene.arm import Arm
 from seqopt.sequence._rule_check import check_carried, too_heavy
-from seqopt.sequence._rule_space import can_carry, loads
 from seqopt.sequence.rules import FreeRules
+from seqopt.sequence.schedule import can_carry, loads
 from seqopt.sequence.steps import StepKind
 from tests.brute_force import ONES, best_values
 from tests.builders import turned_round

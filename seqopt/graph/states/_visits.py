@@ -16,48 +16,9 @@ from seqopt.problem.amounts import NONE, STEPS, MoveArrays
 from seqopt.problem.resources import StepArrays
 from seqopt.scene.scene import Order
 from seqopt.sequence import _rule_space as free_space
-from seqopt.sequence._rule_space import FreeSpace, ScheduleSpace, node_numbers
-from seqopt.sequence.steps import Step, StepKind, _begin_step, check_sequence
-
-
-def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
-    """Return the checked steps that lead from one state to the next.
-
-    ``states``: as of a `seqopt.graph.formulation.Solution`. Raises
-    `SolverError` if the states are none of this space; `StepError` if no single step leads from one
-    state to the next.
-    """
-    if isinstance(space, ScheduleSpace):
-        return _scheduled_steps(space, states)
-    numbers = [None, *node_numbers(space.network)]
-    begin = _begin_step(space.network.scene, space.rules.begin)
-    grips: list[int | None] = [*begin.grips]
-    stays = _stays(space)  # where a robot was last, as a place from 1
-    before, out = begin.bricks, list[Step]()
-    for level, *entries in states:
-        if len(entries) < space.robots or not all(abs(n) < len(numbers) for n in entries):
-            raise SolverError(f"the state {[level, *entries]} is none of this free schedule")
-        bricks = space.bricks_at(level)
-        took = False
-        for kind, (first, end) in zip(space.kinds, space.slots, strict=True):
-            took |= _follow(kind.robots, entries[first:end], grips, stays, numbers)
-        stays = stays if space.parks else {}
-        step = StepKind.PLACE if bricks > before else StepKind.REPOSITION
-        number = begin.number + len(out) + 1
-        other = StepKind.REMOVE if bricks < before else StepKind.RELEASE
-        out.append(Step(number, step if took else other, bricks, tuple(grips)))
-        before = bricks
-    return check_sequence(space.network.scene, out, begin)
-
-
-def _stays(space: FreeSpace) -> dict[int, int]:
-    """Return where robots hold, or held last, where a build begins: places from 1."""
-    site, numbers = space.rules.begin, node_numbers(space.network)
-    if site is None:
-        return {}
-    lasts = (site.grips or (), site.stays)
-    found = [(r, n) for nodes in lasts for r, n in enumerate(nodes) if n is not None]
-    return {robot: numbers.index(node) + 1 for robot, node in found}
+from seqopt.sequence._rule_space import FreeSpace, node_numbers
+from seqopt.sequence._schedule_space import ScheduleSpace
+from seqopt.sequence.steps import Step, _begin_step, check_sequence
 
 
 def steps_in_hands(
@@ -70,7 +31,7 @@ def steps_in_hands(
     ``grips``: of every step, the place that each robot holds, 0 for none. Raises `SolverError` if
     they are not those of the states.
     """
-    steps = steps_of(space, states)
+    steps = space.steps(states)
     if not grips:
         return steps
     numbers = [None, *node_numbers(space.network)]
@@ -85,46 +46,7 @@ def steps_in_hands(
             raise SolverError(f"step {step.number}: robots hold other nodes than its state says")
         out.append(own)
     scene = space.network.scene
-    rules = space.schedule if isinstance(space, ScheduleSpace) else space.rules
-    return check_sequence(scene, out, _begin_step(scene, rules.begin))
-
-
-def _scheduled_steps(space: ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
-    """Return the checked steps of states of a schedule, one for each of its steps."""
-    rows = np.array([row[1:] for row in states if len(row) == space.robots + 1], dtype=np.int64)
-    if len(rows) != space.levels or [row[0] for row in states] != [*range(1, space.levels + 1)]:
-        raise SolverError("the states are none of this schedule: it has one for every step")
-    if np.abs(rows).max() > 2 * len(space.network.inner):
-        raise SolverError("a state of a schedule holds a node that does not exist")
-    return space.steps(rows)
-
-
-def _follow(
-    robots: Sequence[int],
-    entries: Sequence[int],
-    grips: list[int | None],
-    stays: dict[int, int],
-    numbers: Sequence[int | None],
-) -> bool:
-    """Assign robots of a kind to the nodes of their entries; return whether one took a grip."""
-    wanted = {numbers[n]: n for n in entries if n > 0}
-    left = [-n for n in entries if n <= 0]
-    for robot in robots:
-        if grips[robot] is not None and grips[robot] not in wanted:
-            grips[robot] = None
-    fresh = [node for node in wanted if node not in [grips[robot] for robot in robots]]
-    for node in fresh:
-        free = [robot for robot in robots if grips[robot] is None]
-        if not free:
-            raise SolverError(f"node {node} is held in a state, and no robot is free to hold it")
-        for robot in reversed(free):
-            if stays.get(robot, 0) in left and len(free) > 1:  # it is seen to stay free
-                left.remove(stays.get(robot, 0))
-                free = [r for r in free if r != robot]
-        robot = free[0]
-        grips[robot] = node
-        stays[robot] = wanted[node]
-    return bool(fresh)
+    return check_sequence(scene, out, _begin_step(scene, space.rules.begin))
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,8 @@ from seqopt.stability.assessment import Stability
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
-    from seqopt.sequence._rule_space import FreeSpace, ScheduleSpace
+    from seqopt.sequence._rule_space import FreeSpace
+    from seqopt.sequence._schedule_space import ScheduleSpace
 
 COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
@@ -153,12 +154,7 @@ class States(Shown):
     @property
     def free_rules(self) -> FreeRules:
         """Its rules, if moves follow from any; a `ProblemError` says where they do not."""
-        if isinstance(self.rules, Schedule):
-            raise ProblemError(
-                f"schedule {self.rules.method}: its steps are given; orders, and steps or regrips "
-                "in a Pareto set, go with the free schedule"
-            )
-        return self.rules
+        return self.rules.free()
 
     @property
     def among(self) -> str:
@@ -296,13 +292,10 @@ class States(Shown):
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
-        # candidates need none
-        from seqopt.sequence._rule_space import ScheduleSpace, free_space  # noqa: PLC0415
+        from seqopt.sequence._schedule_space import _space_of  # noqa: PLC0415  # candidates need none
 
-        if isinstance(self.rules, Schedule):
-            return ScheduleSpace(self.network, self.rules, self.caps, self.parks, self.worlds)
         how = {"parks": self.parks, "timed": self.is_timed}
-        return free_space(self.network, self.rules, self.caps, **how, worlds=self.worlds)
+        return _space_of(self.rules, self.network, self.caps, **how, worlds=self.worlds)
 
     @property
     def worlds(self) -> tuple[Scene, ...]:
@@ -558,9 +551,10 @@ class States(Shown):
     @cached_property
     def _payloads(self) -> Floats:
         """What the robot of every column may carry where states must stand, N."""
-        if isinstance(self.rules, FreeRules):
+        if not self.rules.keeps_payloads(stands=True):
             return self._caps
-        payloads = np.array([robot.payload for robot in self.network.scene.robots])
+        robots = [robot for kind in self.space.kinds for robot in kind.robots]
+        payloads = np.array([self.network.scene.robots[robot].payload for robot in robots])
         return np.asarray(np.minimum(payloads, self._caps))
 
     def _grips(self, states: Ints) -> tuple[Ints, Floats]:
@@ -623,7 +617,7 @@ def build_states(
     States('arch25', minmax, steps, 0 limits)
     """
     named = _goals(goals, least=1)
-    rules = rules.begun(engine.network.scene) if isinstance(rules, FreeRules) else rules
+    rules = rules.begun(engine.network.scene)
     limits = checked_limits(limits, engine.network)
     if any(goal.of_criterion for goal in named):
         criterion = of_states(engine, criterion)
