@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+import tomllib
+from pathlib import Path
 
+import furo
 import pytest
 import yaml
 
@@ -24,49 +27,79 @@ def marked(name):
     return re.search(rf"<!-- {name} -->\n```sh\n(.*?)```", text, re.S)[1]
 
 
+@pytest.mark.parametrize(
+    ("system", "python", "folder"), [("", "python3", "bin"), ("Windows_NT", "python", "Scripts")]
+)
 @pytest.mark.parametrize("name", ["first", "tests"])
-def test_ci_reads_the_commands_of_the_readme(name):
-    found = subprocess.run([ROOT / ".ci" / "readme", name], capture_output=True, check=True)
-    assert found.stdout.decode() == marked(name)
+def test_ci_reads_the_commands_of_the_readme(name, system, python, folder):
+    env = {**os.environ, "OS": system}
+    found = subprocess.run(
+        ["bash", ROOT / ".ci" / "readme", name], capture_output=True, check=True, env=env
+    )
+    expected = marked(name).replace("python3", python).replace(".venv/bin", f".venv/{folder}")
+    assert found.stdout.decode() == expected
 
 
-@pytest.mark.parametrize(("system", "folder"), [("Linux", "bin"), ("Windows", "Scripts")])
-def test_the_workflow_runs_both_commands_on_every_system(tmp_path, system, folder):
-    """Its own script, with commands that write down that they were called."""
+def test_the_workflow_runs_both_commands(tmp_path):
+    """Its own script, which writes down the commands instead of running them."""
     job = loaded(WORKFLOW)["jobs"]["readme"]
     (script,) = (step["run"] for step in job["steps"] if "run" in step)
-    shown = script.replace('bash -euo pipefail -c "$command"', 'echo "$command" >> "$LOG"')
-    assert shown != script
-    shown = shown.replace("rm -rf .venv", ":")
-    log = tmp_path / "log"
-    env = {**os.environ, "RUNNER_OS": system, "LOG": str(log)}
-    subprocess.run(["bash", "-euo", "pipefail", "-c", shown], check=True, cwd=ROOT, env=env)
-    ran = log.read_text()
-    both = marked("first") + marked("tests")
-    expected = both.replace(".venv/bin", f".venv/{folder}")
-    assert ran == (expected.replace("python3", "python") if system == "Windows" else expected)
+    shown = script.replace("bash -euo pipefail -c", "printf '%s\\n'").replace("rm -rf .venv", ":")
+    assert "printf" in shown
+    assert ".venv" not in shown
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", shown],
+        capture_output=True,
+        check=True,
+        cwd=ROOT,
+        env={**os.environ, "OS": ""},
+    )
+    assert done.stdout.decode() == marked("first") + marked("tests")
 
 
 def test_workflows_cover_systems_versions_and_all_of_ci():
     jobs = loaded(WORKFLOW)["jobs"]
-    matrix = jobs["readme"]["strategy"]["matrix"]
     kinds = ("ubuntu-24.04", "ubuntu-24.04-arm", "macos", "windows")
-    assert all(any(system.startswith(kind) for system in matrix["system"]) for kind in kinds)
     oldest = re.search(r'requires-python = ">=(.*)"', (ROOT / "pyproject.toml").read_text())[1]
-    assert min(matrix["python"]) == oldest
+    for name in ("readme", "ci"):
+        matrix = jobs[name]["strategy"]["matrix"]
+        assert all(any(system.startswith(kind) for system in matrix["system"]) for kind in kinds)
+        assert matrix["python"][0] == oldest
+        assert len(matrix["python"]) > 1
     scripts = [step.get("run", "") for job in jobs.values() for step in job["steps"]]
     for script in (".ci/run", ".ci/versions python3.11 python3.13"):
         assert script in scripts
         assert os.access(ROOT / script.split()[0], os.X_OK)
 
 
+FOREIGN = r"secrets\.|password|://|index-url|pypi|conda|\btoken\b"
+
+
+def test_workflows_hold_no_secret_and_name_no_registry():
+    for path in WORKFLOW.parent.glob("*.yml"):
+        text = path.read_text(encoding="utf-8")
+        assert re.findall(FOREIGN, text, re.I) == []
+        assert loaded(path)["permissions"] == {"contents": "read"}
+        used = re.findall(r"uses: (\S+)", text)
+        assert {name for name in used if not re.fullmatch(r"actions/[\w-]+@v\d+", name)} == set()
+    assert re.findall(FOREIGN, "pip install --index-url https://a/simple", re.I)  # the control
+
+
 def test_hooks_check_what_ci_checks():
+    """With the same tools: ruff's rules are those of pyproject.toml, which no hook overrides."""
     hooks = loaded(ROOT / ".pre-commit-config.yaml")["repos"][0]["hooks"]
     entries = {hook["entry"].split(" --force")[0] for hook in hooks}
     run = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
-    checked = re.findall(r"^\.venv/bin/(?:ruff \w+(?: --check)?|mypy)", run, re.M)
-    assert entries == {*checked}
+    checked = re.findall(r"^\$bin/(ruff \w+(?: --check)?|mypy)", run, re.M)
+    assert entries == {"python -m mypy" if name == "mypy" else name for name in checked}
     assert len(checked) == 3
+    assert all(
+        "--config" not in hook["entry"] and "--select" not in hook["entry"] for hook in hooks
+    )
+    pinned = {pin for hook in hooks for pin in hook.get("additional_dependencies", [])}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert len(pinned) == 1
+    assert pinned <= {*project["project"]["optional-dependencies"]["test"]}
 
 
 def test_templates_are_forms_with_questions():
@@ -83,19 +116,51 @@ def test_one_version_is_said_everywhere():
     assert f"\n## [{project}] - " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
-def test_no_page_is_wider_than_the_window():
-    """The width of the text and of both side bars, by the numbers of the style sheet and of furo.
+FURO = (Path(furo.__file__).parent / "theme/furo/static/styles/furo.css").read_text("utf-8")
 
-    Furo: side bars of 15em, the right one from 82em on, the left one from 63em on; letters are a
-    tenth larger from 97em on. A scroll bar takes 17 pixels.
+
+def text_width(css, pixels):
+    """The width of the text in em and by how much a page is wider than the window, as boxes flex.
+
+    Letters are a tenth larger from 97em on. A scroll bar takes 17 pixels.
     """
-    css = (ROOT / "docs" / "_static" / "site.css").read_text(encoding="utf-8")
+    em = 17.6 if pixels >= 97 * 16 else 16
+    window = (pixels - 17) / em
     (width,) = map(float, re.findall(r"\.content \{ width: (\d+)em", css))
-    beside = [float(each) for each in re.findall(r"calc\(100vw - ([\d.]+)em\)", css)]
-    (half,) = map(float, re.findall(r"\.sidebar-drawer \{ width: calc\(50% - (\d+)em\)", css))
-    for pixels in range(1010, 2600):
-        em = pixels / (16 if pixels < 97 * 16 else 17.6)
-        two = pixels > 82 * 16
-        left = max(15.0, (pixels - 17) / pixels * em / 2 - half)
-        text = min(width, em - beside[0 if two else 1])
-        assert left + text + 15.0 * two <= em * (pixels - 17) / pixels, pixels
+    (padding,) = map(float, re.findall(r"\.content\{[^}]*padding:0 (\d+)em;width", FURO))
+    (bar,) = map(float, re.findall(r"\.toc-drawer\{box-sizing:border-box;width:(\d+)em", FURO))
+    wide = re.search(
+        r"\(min-width: 82.01em\) \{ \.sidebar-drawer \{ width: calc\(50% - (\d+)em", css
+    )
+    half = re.search(r"\.sidebar-drawer\{[^}]*width:calc\(50% - (\d+)em\)", FURO)
+    left = max(bar, window / 2 - float((wide or half)[1])) if pixels > 82 * 16 else 18.5
+    left = max(bar, window / 2 - left) if pixels <= 82 * 16 else left
+    beside = left + (bar if pixels > 82 * 16 else 0) + 2 * padding
+    shrinks = re.search(r"\.main, \.content \{ min-width: 0; \}", css)
+    text = min(width, window - beside) if shrinks else width
+    return text, beside + text - window
+
+
+def test_no_page_is_wider_than_the_window():
+    css = (ROOT / "docs" / "_static" / "site.css").read_text(encoding="utf-8")
+    for pixels in range(68 * 16, 2600):
+        text, over = text_width(css, pixels)
+        assert over <= 1e-9, pixels
+        assert text >= 43, pixels
+    assert text == 56
+    fixed = css.replace("min-width: 0", "")  # the control
+    assert [text_width(fixed, pixels)[1] > 3 for pixels in (1366, 1400, 1900)] == [
+        True,
+        True,
+        False,
+    ]
+
+
+def test_every_thumbnail_leads_to_a_page_that_shows_it():
+    text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    thumbs = re.search(r"\{container\} thumbs\n(.*?)````", text, re.S)[1]
+    links = re.findall(r"^\[!\[.+\]\((.+)\) .+\]\(([^#)]+).*\)$", thumbs, re.M)
+    assert len(links) == thumbs.count("![") >= 12
+    for picture, page in links:
+        shown = (ROOT / "docs" / page).read_text(encoding="utf-8")
+        assert Path(picture).name in shown, (picture, page)
