@@ -353,7 +353,7 @@ def _always_tied(network: Network) -> bool:
 _ROUNDING = 1e-9  # over a payload, by which a load may exceed it
 
 
-class Carried(NamedTuple):
+class _Carried(NamedTuple):
     """A brick that a robot places or removes."""
 
     step: int  # its number
@@ -361,7 +361,7 @@ class Carried(NamedTuple):
     brick: int  # its name
 
 
-def carried(scene: Scene, steps: Sequence[AnyStep]) -> Iterator[Carried]:
+def carried(scene: Scene, steps: Sequence[AnyStep]) -> Iterator[_Carried]:
     """Yield robot and brick of every transport in steps, whose grips may be open.
 
     The robot that removes a brick held it before: unknown if the first step removes one.
@@ -369,9 +369,9 @@ def carried(scene: Scene, steps: Sequence[AnyStep]) -> Iterator[Carried]:
     removals = {step.number - 1: step for step in steps if step.kind is StepKind.REMOVE}
     for hold in holds(scene, steps):
         if hold.places is not None:
-            yield Carried(hold.first, hold.robot, hold.places)
+            yield _Carried(hold.first, hold.robot, hold.places)
         if (step := removals.get(hold.last)) is not None:  # in which nobody else lets go
-            yield Carried(step.number, hold.robot, scene.placed[step.bricks].name)
+            yield _Carried(step.number, hold.robot, scene.placed[step.bricks].name)
 
 
 def loads(scene: Scene, robot: Robot) -> Floats:
