@@ -25,7 +25,6 @@ VIEWS = {
     "ShownBuild.plot": "seqopt.report._pictures:steps_picture",
     "ShownBuild.gantt": "seqopt.report._gantt:gantt_picture",
     "ShownBuild.report": "seqopt.report._pages:build_page",
-    "Stability.plot": "seqopt.report.charts:tilt_picture",
     "FailureMap.plot": "seqopt.report.charts:failure_figure",
     "RegretTable.plot": "seqopt.report._regret._chart:regret_chart",
 }

@@ -2,8 +2,7 @@
 
 trimesh reads PLY, STL and GLB. Of an OBJ it keeps triangles alone, cut as fans, which a face that
 is not convex does not survive, and it joins all objects; so this has a few lines of its own here.
-rhino3dm does not mesh: polysurfaces with flat faces are read face by face, for others the file must
-hold the mesh with which Rhino last rendered it.
+rhino3dm does not mesh: polysurfaces are read face by face, and their faces must be flat.
 """
 
 from __future__ import annotations
@@ -259,31 +258,16 @@ def _solids(
                 yield moved(vertices, matrix), faces
 
 
-def _extrusion(where: str, shape: Any) -> _Solid:
-    """Return an extrusion; if it is round, its mesh is its own and not that of its faces."""
-    solid = shape.ToBrep(True)  # noqa: FBT003  # in faces without kinks
-    mesh = shape.GetMesh(import_module("rhino3dm").MeshType.Any)
-    flat = None if solid is None or not solid.IsSolid else _flat(where, solid)
-    if flat is None and mesh is not None:
-        return _joined(where, [mesh])
-    return _polysurface(where, solid) if flat is None else flat
-
-
 def _polysurface(where: str, solid: Any) -> _Solid:
-    """Return a closed polysurface: its own faces if these are flat, else its render mesh."""
-    if not solid.IsSolid:
+    """Return a closed polysurface by its own faces, if these are flat."""
+    if solid is None or not solid.IsSolid:
         raise SceneError(f"{where} is an open surface; close it (Cap), or hide it")
     flat = _flat(where, solid)
-    if flat is not None:
-        return flat
-    every = import_module("rhino3dm").MeshType.Any
-    meshes = [solid.Faces[i].GetMesh(every) for i in range(len(solid.Faces))]
-    if any(mesh is None for mesh in meshes):
+    if flat is None:
         raise SceneError(
-            f"{where} has faces that are curved or have holes, and the file no mesh of it; in "
-            "Rhino, turn it into a mesh (Mesh), or shade it and save with render meshes"
+            f"{where} has faces that are curved or have holes; in Rhino, turn it into a mesh (Mesh)"
         )
-    return _joined(where, meshes)
+    return flat
 
 
 def _flat(where: str, solid: Any) -> _Solid | None:
@@ -305,15 +289,11 @@ def _flat(where: str, solid: Any) -> _Solid | None:
     return points, faces
 
 
-def _joined(where: str, meshes: Sequence[Any]) -> _Solid:
-    """Return meshes as one; a triangle of Rhino names its last corner twice."""
-    rows: list[Any] = []
-    faces: list[Sequence[int]] = []
-    for mesh in meshes:
-        sides = (mesh.Faces[i] for i in range(len(mesh.Faces)))
-        faces += [[len(rows) + v for v in dict.fromkeys(side)] for side in sides]
-        rows += [mesh.Vertices[i] for i in range(len(mesh.Vertices))]
-    return _points(where, rows), faces
+def _mesh(where: str, mesh: Any) -> _Solid:
+    """Return a mesh; a triangle of Rhino names its last corner twice."""
+    sides = (mesh.Faces[i] for i in range(len(mesh.Faces)))
+    rows = [mesh.Vertices[i] for i in range(len(mesh.Vertices))]
+    return _points(where, rows), [[*dict.fromkeys(side)] for side in sides]
 
 
 def _points(where: str, rows: Sequence[Any]) -> Floats:
@@ -324,7 +304,7 @@ def _points(where: str, rows: Sequence[Any]) -> Floats:
 
 
 _READERS: dict[str, Callable[[str, Any], _Solid]] = {
-    "Mesh": lambda where, shape: _joined(where, [shape]),
-    "Extrusion": _extrusion,
+    "Mesh": _mesh,
+    "Extrusion": lambda where, shape: _polysurface(where, shape.ToBrep(True)),  # noqa: FBT003  # in faces without kinks
     "Brep": _polysurface,
 }

@@ -18,7 +18,6 @@ import numpy as np
 
 from seqopt._showing import display
 from seqopt.errors import ExtraError, ProblemError
-from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
@@ -30,7 +29,6 @@ from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability._builds import BuildProver
-from seqopt.stability.assessment import Stability
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -106,21 +104,6 @@ def _scene(value: Scene) -> _Card:
         **({"beside the weight": value.loading} if value.loading else {}),
     }
     return _Card(f"Scene {value.name}", rows, lambda: [display(Scene, "plot")(value, width=WIDTH)])
-
-
-@facts.register
-def _network(value: Network) -> _Card:
-    supports = len(value.springs.support)
-    rows = {
-        "bricks": len(value.inner),
-        "nodes": len(value.node_kind),
-        "of these to hold": 2 * len(value.inner) - len(value.scene.blocked_nodes),
-        "edges": len(value.edge_kind),
-        "springs of joints": len(value.springs.since) - supports,
-        "springs of supports": supports,
-    }
-    name = f"Network of {value.scene.name}"
-    return _Card(name, rows, lambda: [display(Network, "plot")(value, width=WIDTH)])
 
 
 @facts.register
@@ -208,22 +191,3 @@ def _computed(value: ShownBuild) -> Rows:
     verdicts = prover.of_builds({"": value.steps}).get("", ())
     said = {f"stability, {each.how}": str(each).partition(": ")[2] for each in verdicts}
     return rows | (said or {"stability": f"not proven; {prover.refusal}"})
-
-
-@facts.register
-def _stability(value: Stability) -> _Card:
-    rows: dict[str, object] = {"verdict": value.verdict.value, "proven by": value.proof}
-    names = ("bond needed, Pa", "friction needed", "largest grip force, N")
-    margins = dict(zip(names, (value.bond, value.friction, value.grip), strict=True))
-    rows |= {name: f"{found:.4g}" for name, found in margins.items() if not np.isnan(found)}
-    if value.jammed:
-        rows["jammed"] = "stands only because it is wedged in place: do not trust it"
-    if np.isfinite(value.tilt):
-        rows["tilt survived, degrees"] = f"{np.degrees(value.tilt):.3g}"
-    if value.first_block:
-        joint = f", joint {value.first_contact}" if value.first_contact else ""
-        rows["fails first"] = f"block {value.first_block}{joint}"
-    title = f"Stability: {value.verdict.value}"
-    if not np.isfinite(value.tilt):
-        return _Card(title, rows)
-    return _Card(title, rows, lambda: [display(Stability, "plot")(value)])

@@ -1,4 +1,4 @@
-"""Charts of comparisons, plans, Pareto sets, maps of failure and tilts (extra ``plot``)."""
+"""Charts of comparisons, plans, Pareto sets and maps of failure (extra ``plot``)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from seqopt.report._failures import AXIS_WORDS
 from seqopt.report._gantt import gantt_picture
 from seqopt.report._pictures import steps_picture
 from seqopt.report._style import (
-    BLUE,
     GRAY,
     SKY,
     SMALL,
@@ -27,7 +26,6 @@ from seqopt.report._style import (
     dress,
     looks,
     new_figure,
-    new_picture,
     picture_files,
     plain,
     styled,
@@ -35,7 +33,7 @@ from seqopt.report._style import (
 from seqopt.report.comparison import _in_shown_unit, _worst_of
 from seqopt.report.page import Build
 from seqopt.report.text import in_words, typed
-from seqopt.stability.assessment import Stability, Verdict
+from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import FailureMap
 
 COLUMNS = {
@@ -246,17 +244,3 @@ def _draw_along(axes: Axes, steps: pd.DataFrame, rows: list[tuple[str, str]]) ->
         words["some step is undecided"] = Verdict.UNDECIDED
     marks = [Patch(color=VERDICTS[verdict.value], label=word) for word, verdict in words.items()]
     axes.legend(handles=marks, loc="upper right", bbox_to_anchor=(1.0, 1.25), ncols=len(marks))
-
-
-@styled
-def tilt_picture(value: Stability) -> Figure:
-    """Return the tilt that a step which stands survives in every direction."""
-    figure = new_picture(3.0, 3.0)
-    axes = figure.add_subplot(projection="polar")
-    angles = 2 * np.pi * np.arange(len(value.pull) + 1) / len(value.pull)
-    tilts = np.degrees(np.arctan(value.pull))
-    axes.plot(angles, [*tilts, tilts[0]], "o-", color=BLUE, ms=4)
-    axes.fill(angles, [*tilts, tilts[0]], color=BLUE, alpha=0.15)
-    axes.set_title("tilt survived, degrees", loc="center")
-    axes.set_yticks([float(f"{np.nanmax(tilts) / 2:.2g}"), float(f"{np.nanmax(tilts):.2g}")])
-    return figure

@@ -13,9 +13,7 @@ from compas_model.elements import BeamElement, ColumnElement, PlateElement
 from compas_model.models import Model
 
 from seqopt.errors import FileError, SceneError
-from seqopt.exchange._content import FileBlock, Given
-from seqopt.exchange._mesh_files import _polysurface
-from seqopt.exchange._meshes import object_content, repair_shape
+from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene, read_content
 
 DENSE, GIVEN = Given(density=2000.0), Given(unit="m", density=2000.0)
@@ -167,54 +165,9 @@ def test_a_rhino_extrusion_that_is_not_convex_keeps_its_polygons(tmp_path):
     assert sorted(map(len, scene.bricks[0].shape.faces)) == [4] * 6 + [6] * 2
 
 
-class Drum:
-    """A round polysurface with the meshes by which Rhino last drew it.
-
-    They stand beside it here: rhino3dm cannot give a face a mesh without losing it.
-    """
-
-    def __init__(self):
-        cylinder = rhino.Cylinder(rhino.Circle(1.0), 2.0)
-        self.own = rhino.Brep.CreateFromCylinder(cylinder, capBottom=True, capTop=True)
-        self.Faces = [Face(self.own.Faces[i]) for i in range(len(self.own.Faces))]
-
-    def __getattr__(self, name):
-        return getattr(self.own, name)
-
-
-class Face:
-    """A face of a drum, and its mesh of twelve sides."""
-
-    def __init__(self, own):
-        self.own, self.mesh = own, rhino.Mesh()
-        ends, turns = own.GetBoundingBox(), np.linspace(0, 2 * np.pi, 12, endpoint=False)
-        for x, y in zip(np.cos(turns), np.sin(turns), strict=True):
-            self.mesh.Vertices.Add(x, y, ends.Min.Z)
-            self.mesh.Vertices.Add(x, y, ends.Max.Z)
-        for a, b in zip(range(0, 24, 2), (*range(2, 24, 2), 0), strict=True):
-            if ends.Max.Z > ends.Min.Z:
-                self.mesh.Faces.AddFace(a, b, b + 1, a + 1)
-            elif a and b:
-                self.mesh.Faces.AddFace(0, a, b)
-
-    def GetMesh(self, kind):  # noqa: N802  # as rhino3dm calls it
-        assert self.own.GetMesh(kind) is None
-        return self.mesh
-
-    def __getattr__(self, name):
-        return getattr(self.own, name)
-
-
-def test_round_rhino_solids_need_the_mesh_of_the_file(tmp_path):
-    content = object_content([FileBlock("drum", *_polysurface("drum", Drum()))], "drum")
-    solid = repair_shape(content.blocks[0]).solid
-    assert solid.volume == pytest.approx(12 * 0.5 * np.sin(np.pi / 6) * 2, rel=1e-6)
-    model = Rhino()
-    model.add(Drum().own, "drum")
-    with pytest.raises(
-        SceneError, match=r"object 'drum' has faces that are curved .* turn it into"
-    ):
-        import_scene(model.written(tmp_path), given=DENSE)
+def drum(*_):
+    cylinder = rhino.Cylinder(rhino.Circle(1.0), 2.0)
+    return rhino.Brep.CreateFromCylinder(cylinder, capBottom=True, capTop=True)
 
 
 @pytest.mark.parametrize(
@@ -227,6 +180,7 @@ def test_round_rhino_solids_need_the_mesh_of_the_file(tmp_path):
             lambda *_: rhino.Brep.CreateTrimmedPlane(rhino.Plane.WorldXY(), profile()),
             "'foot' is an open surface; close it",
         ),
+        ("Meters", drum, r"object 'foot' has faces that are curved .* turn it into a mesh"),
         (
             "Meters",
             lambda *_: rhino.Point(rhino.Point3d(0, 0, 0)),

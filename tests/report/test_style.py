@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import combinations
 from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.colors import to_rgb
 
-from seqopt.report._style import COLORS, look, looks, new_figure, picture_files, plain, styled
+from seqopt.report._style import look, looks, new_figure, picture_files, plain, styled
 from seqopt.report.charts import _merged, front_figure, responses_figure
 from seqopt.report.draw import POINTS, _aside
 from seqopt.report.text import WORDS, in_words, typed
@@ -25,40 +22,6 @@ def test_seventy_series_differ_and_ten_do_without_color():
     assert len({one.marker for one in every[:10]}) == 10
     assert len({one.color for one in every[:7]}) == 7
     assert list(looks(["a", "b", "a"])) == ["a", "b"]
-
-
-DEFAULT = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd")  # of matplotlib
-TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
-
-
-def seen(color: str, matrix: list[list[float]]) -> np.ndarray:
-    """Return the CIELAB coordinates of a color as people see it who lack a kind of cone."""
-    sent = np.array(to_rgb(color))
-    linear = np.where(sent <= 0.04045, sent / 12.92, ((sent + 0.055) / 1.055) ** 2.4)
-    tristimulus = TO_XYZ @ np.clip(np.array(matrix) @ linear, 0, 1) / [0.9505, 1.0, 1.089]
-    f = np.where(tristimulus > 0.008856, np.cbrt(tristimulus), 7.787 * tristimulus + 16 / 116)
-    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
-
-
-def nearest(colors: Sequence[str], matrix: list[list[float]]) -> float:
-    """Return the smallest difference of two colors; 2.3 is one that is just noticed."""
-    at = [seen(color, matrix) for color in colors]
-    return min(float(np.linalg.norm(a - b)) for a, b in combinations(at, 2))
-
-
-@pytest.mark.parametrize(
-    "matrix",
-    [
-        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
-         [-0.003882, -0.048116, 1.051998]],
-        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
-         [-0.011820, 0.042940, 0.968881]],
-    ],
-)  # fmt: skip
-def test_colors_differ_for_people_without_red_or_green_cones(matrix):
-    """Matrices for full protanopia and deuteranopia: Machado, Oliveira and Fernandes (2009)."""
-    assert nearest(COLORS, matrix) > 15
-    assert nearest(DEFAULT, matrix) < 10
 
 
 def test_the_style_is_left_where_it_ends():
