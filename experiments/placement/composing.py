@@ -42,7 +42,7 @@ SCHEDULES = {
 }
 WORTH = ["--criteria", "worst-ratio-published"]
 STATES = ["--aim", "minmax"]
-SCENARIOS = ["--scenarios", "2", "--unseen", "1"]
+SCENARIOS = ["--scenarios", "2"]
 OVER_STATES = ("path_dp", "path_labels", "path_beam", "best_first", "flow_lp", "flow_mip")
 GOES = {
     "as it is": [],

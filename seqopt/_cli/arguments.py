@@ -37,6 +37,8 @@ GONE = {
     "--keep": "--to 12 leaves the first 12 bricks of --order",
     "--load-factor": "in Python seqopt.stability.load_factors has it",
     "--staged": "in Python seqopt.responses.analyze_staged has it",
+    "--stiffens": "give a scene whose joints are softer, as seqopt scene --export writes it",
+    "--unseen": "in Python seqopt.plan.out_of_sample.judge_unseen has it",
 }  # options that there were, and what to do in their place
 MISSING = "the following arguments are required"
 

@@ -344,7 +344,7 @@ class Moves(Judged, Aimed, Stands, Team, Built):
 class Chosen(Ranks, Timed, Moves):
     """In which scenarios is it good?
 
-    --scenarios, --unseen, --seed and --vary go with --robust alone.
+    --scenarios, --seed and --vary go with --robust alone.
 
     robust : AIM
         what is to be as small as possible over all scenarios, in place of --formulation: worst-peak
@@ -352,9 +352,6 @@ class Chosen(Ranks, Timed, Moves):
         of the worst tenth)
     scenarios : N
         how many samples of the scene (default: 30)
-    unseen : N
-        how many other samples, of the next seed, judge the plan (default: none; as many as there
-        are scenarios double the time)
     seed : N
         which samples are drawn (default: 0)
     vary : NAME=VALUE
@@ -392,7 +389,6 @@ class Chosen(Ranks, Timed, Moves):
 
     robust: str | None = word(None, shell=True)
     scenarios: int | None = word(None, most=MOST, shell=True)
-    unseen: int | None = word(None, most=MOST, shell=True)
     seed: int = word(0, least=0, most=MOST, shell=True)
     vary: Numbers = word((), shell=True)
     budgets: Words = word((), flag="--budget")

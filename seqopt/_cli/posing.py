@@ -22,7 +22,7 @@ from seqopt.times._curing import CuringBuilds
 from seqopt.times._steps import step_times
 from seqopt.workflow import DEFAULTS, SEARCH, Robust, _chooses_states, _find_moves, _pose_words
 
-ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
+ALONE = ("scenarios", "seed", "vary")  # options that mean something with --robust alone
 SPREADS = ("stiffness", "density", "position", "grips")
 _NOT_FREE = "the free schedule has no such; leave it out"
 _NOT_STATES = "aims and --stands have no such; leave it out"
@@ -44,12 +44,11 @@ Change: TypeAlias = Callable[[Scene, inputs.Place], tuple[Scene, inputs.Place, s
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PosedProblem:
-    """The problem of a command, its scenarios, and those of the out-of-sample evaluation."""
+    """The problem of a command, and its scenarios."""
 
     problem: Problem
     robust: Robust | None = None
     known: Scenarios | None = None
-    unseen: Scenarios | None = None
 
 
 def pose_problem(asked: options.Moves, change: Change | None = None) -> PosedProblem:
@@ -73,7 +72,7 @@ def pose_problem(asked: options.Moves, change: Change | None = None) -> PosedPro
     most = None if choice.max_memory is None else grammar.parse_size(choice.max_memory)
     tell = None if of_states else asked.tell
     resources = Resources(choice.workers, None, most, tell)
-    robust, known, unseen = _scenarios(choice, scene)
+    robust, known = _scenarios(choice, scene)
     engine = inputs.find_engine(asked, build_network(scene))
     named, rules = grammar.parse_robots(robots) or None, asked.rules or None
     every = _find_moves(engine.network, asked.schedule, named, choice.candidates, rules, "--rule")
@@ -86,7 +85,7 @@ def pose_problem(asked: options.Moves, change: Change | None = None) -> PosedPro
     moves = inputs.between(every, begin, end)
     states = _chooses_states(moves, choice.formulation, limits, (aim, stands, sought))
     problem = _pose_words(engine, moves, criterion, aim, states=states, **words)
-    return PosedProblem(problem, robust, known, unseen)
+    return PosedProblem(problem, robust, known)
 
 
 def _aged(scene: Scene, begin: inputs.Place, standing: Standing | None) -> inputs.Place:
@@ -133,12 +132,10 @@ def _require_known(asked: options.Moves, choice: options.Chosen, *, of_states: b
             raise ProblemError(f"--{'rule' if name == 'rules' else name}: {why}")
 
 
-def _scenarios(
-    asked: options.Chosen, scene: Scene
-) -> tuple[Robust | None, Scenarios | None, Scenarios | None]:
-    """Return the robust aim, the scenarios, and the unseen ones of the next seed."""
+def _scenarios(asked: options.Chosen, scene: Scene) -> tuple[Robust | None, Scenarios | None]:
+    """Return the robust aim, and the scenarios."""
     if asked.robust is None:
-        return None, None, None
+        return None, None
     vary = grammar.parse_numbers(
         "--vary", asked.vary, SPREADS, zero=True, advice=", as stiffness=3"
     )
@@ -148,9 +145,6 @@ def _scenarios(
         raise ProblemError(f"--robust: {error}") from error
     robust = Robust(aim=aim, vary=vary, count=asked.scenarios or Robust.count, seed=asked.seed)
     try:
-        known = robust.draw(scene)
+        return robust, robust.draw(scene)
     except ProblemError as error:
         raise ProblemError(f"--{error}") from None
-    if asked.unseen is None:
-        return robust, known, None
-    return robust, known, replace(robust, count=asked.unseen, seed=asked.seed + 1).draw(scene)

@@ -17,11 +17,10 @@ from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.decision_costs import LayeredCosts, ScenarioCosts, best_in_order
 from seqopt.graph.states.states import States, over_scenarios
-from seqopt.judge._schedules import plan_values
 from seqopt.plan.plan import Plan
-from seqopt.problem.problem import WORST_PEAK, Aim
+from seqopt.problem.problem import Aim
 from seqopt.scene.scenarios import Scenarios
-from seqopt.scene.scene import Scene, in_order
+from seqopt.scene.scene import Scene
 
 PLANS = ("robust", "nominal", "knows_it")
 
@@ -89,19 +88,6 @@ def judge_unseen(plan: Plan, scenes: States | Scenarios | Sequence[Scene]) -> Tr
         for i, costs in enumerate(found, start=1)
     ]
     return Trial(plan, graph, chosen, pd.DataFrame(rows))
-
-
-def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
-    """Return the worst values of a plan, without margins, over unseen scenarios."""
-    graph = plan.states
-    goals = tuple(goal for goal in graph.goals if not goal.margins)
-    if not goals:
-        return {}
-    scenes = [in_order(scene, graph.network.scene.build_order) for scene in unseen.scenes]
-    free = replace(graph, limits=(), standing=None, settled=(), budgets=())
-    alone = replace(free, goals=goals, scenarios=(), over=WORST_PEAK)
-    judged = over_scenarios(alone, scenes, graph.over)
-    return dict(zip(judged.names, plan_values(judged, plan.steps), strict=True))
 
 
 def best_choice(costs: LayeredCosts, aim: Aim) -> tuple[int, ...]:

@@ -8,72 +8,17 @@ while they were softer, is left out, and so is what creeps.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 
-import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats
-from seqopt.contact.mortar import Curing
-from seqopt.engines.registry import USUAL, make_engine
-from seqopt.errors import SceneError, StepError
-from seqopt.network.network import Network
+from seqopt.errors import StepError
 from seqopt.problem.requirements import LIMIT_TOLERANCE
-from seqopt.responses.table import analyze, force_column
+from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, can_carry, carried
-from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
-from seqopt.times._curing import JointsInTime, Waits
-from seqopt.times._steps import StepTime, reassigned_steps, step_times
-
-SHARE = "least_share"
-
-
-def aged_table(
-    network: Network, steps: Sequence[Step], times: Sequence[StepTime], law: Curing
-) -> pd.DataFrame:
-    """Return the responses of every step with joints as stiff as they are when it begins.
-
-    ``times``: of the steps, of a whole build; ``law``: which share of its stiffness a joint has at
-    an age. Result: as of `seqopt.analyze`, and before these ``start_s`` and `SHARE`, that of the
-    softest joint. Raises `SceneError` if a joint has no stiffness when it is closed.
-    """
-    joints, placed = JointsInTime(network, law), list[float]()
-    _require_some(joints, law)
-    out = []
-    for step, time in zip(steps, times, strict=True):
-        since = np.full((1, step.bricks), np.inf)
-        since[0, : len(placed)] = placed
-        shares = joints.at(step.bricks, np.array([time.start]), since)[0]
-        row = analyze(make_engine(USUAL, _softened(network, shares)), [step])
-        row.insert(1, "start_s", time.start)
-        row.insert(2, SHARE, shares.min(initial=1.0))
-        out.append(row)
-        placed += [time.end] * (step.kind is StepKind.PLACE)
-    return pd.concat(out, ignore_index=True)
-
-
-def _require_some(joints: JointsInTime, law: Curing) -> None:
-    for name in joints.names:
-        points = law.points_of(name)
-        if not points or points[0][0] > 0:
-            since = f"before {points[0][0]:g} s" if points else "ever"
-            raise SceneError(
-                f"stiffness of joint {name}: it has none {since}, and what is placed would hang on "
-                "nothing; give a share from 0 s on, as 0s=0.05,15min=1"
-            )
-
-
-def _softened(network: Network, shares: Floats) -> Network:
-    """Return a network whose first joints (j,) have shares of their stiffness."""
-    springs = network.springs
-    own = np.ones((len(springs.since), 1))
-    own[springs.acting(len(network.inner))[: len(shares)], 0] = shares
-    softer = {
-        name: own * getattr(springs, name)
-        for name in ("translational_stiffness", "rotational_stiffness")
-    }
-    return replace(network, springs=replace(springs, **softer))
+from seqopt.sequence.steps import Site, Step, idle_robots
+from seqopt.times._curing import Waits
+from seqopt.times._steps import reassigned_steps, step_times
 
 
 def times_table(
@@ -201,31 +146,6 @@ def _who_carries(scene: Scene, steps: Sequence[Step]) -> Callable[[int, Hold], b
         return all(able[robot][scene.since[brick] - 1] for brick in both if brick is not None)
 
     return carries
-
-
-def softer_lines(
-    scene: Scene, full: pd.DataFrame, aged: pd.DataFrame, over: Sequence[str]
-) -> Iterator[str]:
-    """Yield what a build comes to with joints as stiff as they are, beside full stiffness.
-
-    ``over``: payloads that are exceeded then.
-    """
-    softest = 100 * aged[SHARE].min()
-    yield (
-        f"with joints as stiff as they are when each step begins, from {softest:.3g} % on, beside "
-        "full stiffness:"
-    )
-    columns = {"D_max_1e-3mm": "displacements up to", "F_max_N": "tension up to"}
-    columns |= {force_column(robot): f"{robot.name} holds up to" for robot in scene.robots}
-    for column, what in columns.items():
-        was, now = (table.set_index("step")[column].abs() for table in (full, aged))
-        if now.notna().any():
-            unit = "µm" if column.startswith("D_") else "N"
-            most = f"{now.max():.4g} {unit} in step {now.idxmax()}"
-            yield f"  {what} {most}, not {was.max():.4g} {unit}"
-    yield from (f"  payload exceeded: {each}" for each in over)
-    if not over:
-        yield "  no payload is exceeded"
 
 
 def spent_lines(busy: pd.DataFrame) -> Iterator[str]:

@@ -34,7 +34,7 @@ def optimize(capsys, tmp_path, scene, *words):
 
 @pytest.mark.parametrize("aim", ["worst-peak", "worst-total", "cvar=0.5"])
 def test_a_plan_over_scenarios_is_written(capsys, tmp_path, scene, aim):
-    words = ("--robust", aim, "--scenarios", "4", "--unseen", "3", "--seed", "5")
+    words = ("--robust", aim, "--scenarios", "4", "--seed", "5")
     more = ("--criteria", "weighted-published", "--vary", "stiffness=2", "--vary", "position=0")
     status, out, err = optimize(capsys, tmp_path, scene, *words, *more)
     assert (status, beside_models(err)) == (0, "")
@@ -42,8 +42,6 @@ def test_a_plan_over_scenarios_is_written(capsys, tmp_path, scene, aim):
     assert "optimal over 4 scenarios" in out
     folder = tmp_path / "out"
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    table = pd.read_csv(folder / "scenarios.csv")
-    assert table["set"].tolist() == ["nominal", *["optimized"] * 4, *["unseen"] * 3]
     assert summary["scenarios"] == {
         "count": 4,
         "stiffness": [0.5, 2.0],
@@ -51,34 +49,12 @@ def test_a_plan_over_scenarios_is_written(capsys, tmp_path, scene, aim):
         "position_m": 0.0,
         "seed": 5,
     }
-    assert summary["unseen"]["seed"] == 6
     assert summary["aims"] == [aim]
     assert summary["status"].endswith("optimal")
-    assert summary["worth"]["optimized"]["robust"] == pytest.approx(summary["objective"][aim])
     assert summary["bound"][aim] <= summary["objective"][aim]
-    if aim != "cvar=0.5":
-        column = "robust_peak" if aim == "worst-peak" else "robust_total"
-        rows = table[table["set"] == "optimized"]
-        assert rows[column].max() == pytest.approx(summary["objective"][aim], rel=1e-5)
     steps = ("analyze", str(scene), "--plan", str(folder / "plan.csv"))
     assert main(list(steps)) == 0  # it can be read as a plan
     assert len(pd.read_csv(folder / "selection.csv")) > 0
-
-
-@pytest.mark.parametrize("more", [(), ("--schedule", "free")])
-def test_other_scenarios_judge_only_where_that_is_asked(capsys, tmp_path, scene, monkeypatch, more):
-    for name in ("judge_unseen", "worst_values"):
-        home = f"seqopt.plan.out_of_sample.{name}"
-        monkeypatch.setattr(home, lambda *_, name=name: pytest.fail(name))
-    words = ("--robust", "worst-peak", "--scenarios", "2", "--vary", "position=0", *more)
-    status, out, _ = optimize(capsys, tmp_path, scene, *words)
-    assert status == 0
-    assert ("over 2 scenarios (worst-peak)" in out) == (not more)
-    assert "unseen" not in out
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
-    assert summary["scenarios"]["count"] == 2
-    assert "unseen" not in summary
-    assert not (tmp_path / "out" / "scenarios.csv").exists()
 
 
 @pytest.mark.parametrize(
@@ -93,7 +69,8 @@ def test_other_scenarios_judge_only_where_that_is_asked(capsys, tmp_path, scene,
         (["--scenarios", "3", "--formulation", "minimax"], "--scenarios: plans over scenarios"),
         (["--seed", "3", "--schedule", "free"], "--seed: plans over scenarios alone"),
         (["--robust", "worst-peak", "--scenarios", "x"], "--scenarios x: give a whole number"),
-        (["--robust", "worst-peak", "--unseen", "0"], "--unseen 0: give a whole number from 1"),
+        (["--robust", "worst-peak", "--scenarios", "0"], "--scenarios 0: give a whole number"),
+        (["--robust", "worst-peak", "--unseen", "3"], "seqopt.plan.out_of_sample.judge_unseen"),
         (["--robust", "worst-peak", "--vary", "foo=1"], "--vary foo=1 does not exist"),
         (["--robust", "worst-peak", "--vary", "density=-1"], "not a positive number"),
         (["--robust", "worst-peak", "--vary", "stiffness=0.5"], "give a factor from 1"),

@@ -91,7 +91,9 @@ def test_an_option_before_its_command_is_told_where_it_stands(capsys):
     assert "--json (options stand after the command)" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("words", ["assess --load-factor", "analyze --staged fitted"])
+@pytest.mark.parametrize(
+    "words", ["assess --load-factor", "analyze --staged fitted", "optimize --unseen 3"]
+)
 def test_an_option_that_is_gone_is_told_what_takes_its_place(capsys, words):
     assert main(words.split()) == 2
     err = capsys.readouterr().err
@@ -132,7 +134,6 @@ SELDOM = (
     *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
     *("seqopt.engines.rigid._refinement", "seqopt.graph._orders"),
     *("seqopt.plan._states", "seqopt.judge._proof", "seqopt.scene.library"),
-    "seqopt.sequence._rule_space",
 )
 
 

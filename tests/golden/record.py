@@ -48,13 +48,11 @@ SLOW = {
     "free, sum of tension": f"{FREE} --aim sum(T_max) {WORST}",
     "free, budget": f"{FREE} --aim minmax --budget sum(T_max)=1150 {WORST}",
     "free, budget of regrips": f"{FREE} --aim steps,minmax --budget regrips=1",
-    "free, worst of scenarios": f"{FREE} {WORST} --robust worst-peak --scenarios 5 --unseen 1",
+    "free, worst of scenarios": f"{FREE} {WORST} --robust worst-peak --scenarios 5",
     "free, total of scenarios": f"optimize chain:bricks=9 --schedule free {WORST} "
-    "--robust worst-total --scenarios 3 --unseen 1",
-    "loop, total of scenarios": f"optimize arch25 {WORST} --robust worst-total --scenarios 5 "
-    "--unseen 1",
-    "loop, tail of scenarios": f"optimize arch25 {WORST} --robust cvar=0.5 --scenarios 5 "
-    "--unseen 1",
+    "--robust worst-total --scenarios 3",
+    "loop, total of scenarios": f"optimize arch25 {WORST} --robust worst-total --scenarios 5",
+    "loop, tail of scenarios": f"optimize arch25 {WORST} --robust cvar=0.5 --scenarios 5",
     "free, time": "optimize chain:bricks=7 --schedule free --aim makespan,steps "
     f"--durations {DURATIONS}",
     "taken down": f"{FREE} --direction take-down {WORST}",

@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
@@ -32,11 +32,8 @@ from seqopt.study.published import paper_models
 from seqopt.work._clock import Clock
 from seqopt.work.progress import within
 
-if TYPE_CHECKING:
-    from seqopt.plan.out_of_sample import Trial
-
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
-VERDICTS, UNSEEN = "which steps stand", "its values in unseen scenarios"
+VERDICTS = "which steps stand"
 
 
 class Optimize(options.Written, options.Strict, options.Limited, options.Cured, options.Chosen):
@@ -87,16 +84,6 @@ class Found:
     clock: Clock = field(default_factory=Clock)
 
     @cached_property
-    def trial(self) -> Trial | None:
-        """The out-of-sample evaluation, if candidates were chosen over scenarios."""
-        unseen = self.posed.unseen
-        if unseen is None or not self.plan.graph.candidates:
-            return None
-        from seqopt.plan.out_of_sample import judge_unseen  # noqa: PLC0415  # few plans are robust
-
-        return self.clock.spare(UNSEEN, lambda: judge_unseen(self.plan, unseen), None)
-
-    @cached_property
     def analyzed(self) -> bool:
         """Whether responses, linear range and overloads of the plan were computed in time."""
 
@@ -135,21 +122,10 @@ class Found:
             "stability": {v.mortar: v.facts() for v in self.verdicts.get(plan.title, ())},
         }
         out |= {"left_out": dict(self.clock.left_out)} if self.clock.left_out else {}
-        known, unseen = self.posed.known, self.posed.unseen
-        if known is None:
+        if self.posed.known is None:
             return out
         assert self.posed.robust is not None
-        out |= {"robust": str(self.posed.robust.aim), "scenarios": known.settings}
-        if unseen is None:
-            return out
-        if self.trial is not None:
-            return out | {"unseen": unseen.settings, "worth": self.trial.summary()}
-        worst = None
-        if not self.plan.graph.candidates:
-            from seqopt.plan.out_of_sample import worst_values  # noqa: PLC0415
-
-            worst = self.clock.spare(UNSEEN, lambda: worst_values(self.plan, unseen), None)
-        return out | {"unseen": {**unseen.settings, "worst": worst}}
+        return out | {"robust": str(self.posed.robust.aim), "scenarios": self.posed.known.settings}
 
 
 def run(asked: Optimize) -> Result:
@@ -208,7 +184,7 @@ def answered(asked: Optimize, found: Found) -> Answer:
         if asked.path is not None and found.analyzed and found.summary:  # what says most is first
             tables = partial(outputs.plan_files, found.plan, choices=asked.tables == "all")
             made = found.clock.spare("its tables", tables, made)
-        _ = found.verdicts, found.trial
+        _ = found.verdicts
         return _answer(asked, found, outputs.write_outputs(asked, lambda: _files(found, made)))
 
 
@@ -222,8 +198,6 @@ def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes |
         shown = partial(plan_page, plan, found.prover, tasks=tasks)
         content = found.clock.spare(PAGE, shown, None)
         made |= {} if content is None else {PAGE: content}
-    if found.trial is not None:
-        made["scenarios.csv"] = csv_text(found.trial.table)
     if rows := trace_rows(plan.trace):
         made["trace.csv"] = csv_text(pd.DataFrame(rows))
     table = plan.responses() if found.analyzed else outputs.steps_table(plan)
@@ -311,12 +285,7 @@ def _value(found: Found) -> str:
     known = found.posed.known
     if known is None or not plan.graph.candidates:
         return plan._value
-    value = f"{plan._value} over {len(known.scenes)} scenarios ({plan.title})"
-    if found.trial is None:
-        return value
-    unseen = found.trial.summary()["unseen"]
-    others = f"{unseen['robust']:.6g}, the nominal plan {unseen['nominal']:.6g}"
-    return f"{value}; over unseen ones {others}"
+    return f"{plan._value} over {len(known.scenes)} scenarios ({plan.title})"
 
 
 def _counted(count: int, what: str) -> str:

@@ -53,8 +53,8 @@ def run(asked: Sweep) -> Answer:
 
     Examples
     --------
-    seqopt sweep arch:span=2..3/5,rise=0.7..0.9/3 --schedule free --aim F_largest --out designs
-    seqopt sweep arch25 --over payload=250..400/4 --schedule free --workers 2 --out payloads
+    seqopt sweep arch:span=2..3/5,rise=0.7..0.9/3 --schedule free --out designs
+    seqopt sweep arch25 --over payload=250..400/4 --workers 2 --out payloads
     """
     outputs.require_out(asked, ROWS)
     cases = _cases(asked)

@@ -7,24 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
 from seqopt.arms._kept import arm_faults
-from seqopt.contact.mortar import _find_curing
 from seqopt.engines.registry import USUAL, make_engine
-from seqopt.errors import ProblemError, SceneError, StepError
+from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.times._durations import has_durations
 from seqopt.times._step_check import check_cured
-from seqopt.times._steps import step_times
-from seqopt.times._tables import aged_table, busy_table, softer_lines, spent_lines, total_lines
+from seqopt.times._tables import busy_table, spent_lines, total_lines
 
 USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
@@ -39,18 +35,12 @@ class Times(options.Cured, options.Timed, options.Fixed):
     What must hold?
     --stands, --friction and --tilt go with --curing alone.
 
-    stiffens : WORDS
-        which share of its stiffness a joint has at an age, in the words of --curing, from 0 s on,
-        as 0s=0.05,15min=1: responses of every step with joints as stiff as they are when it begins,
-        beside the payloads
-
     What is written and printed?
     out : DIR
         folder to write plan.csv, times.csv and a chart to
     """
 
     reassign: bool = False
-    stiffens: options.Words = ()
 
 
 def run(asked: Times) -> Answer:
@@ -77,13 +67,11 @@ def run(asked: Times) -> Answer:
     scene = inputs.in_seconds(asked, scene)
     named = inputs.find_steps(asked, network := build_network(scene))
     build, given, least = _build(asked, network, named.steps)
-    timed, aged = build.times(), _aged(asked, build)
-    written, where = _write(asked, build, aged)
+    timed = build.times()
+    written, where = _write(asked, build)
     timed.attrs["robots"] = busy = busy_table(scene, build.steps, build._waits)
     lines = [*total_lines(scene.name, len(build.steps), given, least)]
     lines += [*remarks.waits_said(build), *spent_lines(busy)]
-    if aged is not None:
-        lines += softer_lines(scene, build.responses(), aged, remarks.exceeded(scene, aged))
     lines.append(where)
     trouble = inputs.posture_trouble(asked, scene)
     cannot = (f"not checked; {trouble}",) if trouble else arm_faults(scene, build.steps)
@@ -91,19 +79,16 @@ def run(asked: Times) -> Answer:
     notes += (*_idle_note(scene, "robots", build.steps), *(f"arms: {each}" for each in cannot))
     facts: dict[str, Any] = {"makespan_s": given, "reassigned_s": least}
     facts |= {"robots": busy, "steps": timed}
-    facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
+    facts |= {"arms_cannot": cannot} if cannot else {}
     answer = Answer(
         facts, "\n".join(map(wrapped, lines)), notes=(*notes, *outputs.figure_notes(written))
     )
     return replace(answer, scene=scene, written=written, value=timed)
 
 
-def _write(
-    asked: Times, build: GivenSequence, aged: pd.DataFrame | None
-) -> tuple[tuple[Path, ...], str]:
+def _write(asked: Times, build: GivenSequence) -> tuple[tuple[Path, ...], str]:
     """Write the tables and the chart of a build, if requested, and say where."""
     tables = {"plan.csv": build.responses, "times.csv": build.times}
-    tables |= {} if aged is None else {"aged.csv": lambda: aged}
 
     def files() -> dict[str, bytes | str]:
         texts = {name: csv_text(table()) for name, table in tables.items()}
@@ -136,15 +121,3 @@ def _build(
     if standing is not None:
         check_cured(network, build.steps, standing, build.times()["start_s"].tolist())
     return build, given, least
-
-
-def _aged(asked: Times, build: GivenSequence) -> pd.DataFrame | None:
-    """Return the responses of a build with the stiffness of joints at their age, if requested."""
-    if not asked.stiffens:
-        return None
-    network = build.engine.network
-    times = step_times(network.scene, build.steps, build._waits)
-    try:
-        return aged_table(network, build.steps, times, _find_curing(asked.stiffens))
-    except SceneError as error:
-        raise SceneError(f"--stiffens: {error}") from None
