@@ -1,9 +1,4 @@
-"""Builds in time: who does what when, the same grips by other robots, and joints of every age.
-
-A joint has a share of its full stiffness at its age, as it has of its bond. Every step is computed
-as if all of its loads came when it begins, on joints as they are then: what was locked in before,
-while they were softer, is left out, and so is what creeps.
-"""
+"""Builds in time: who does what when, and the same grips by other robots."""
 
 from __future__ import annotations
 
