@@ -7,6 +7,7 @@ fixed base node. So the parts of a partial structure come first in every array.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -114,18 +115,11 @@ class Springs(FrozenValue):
 class Compliances(FrozenValue):
     """The compliance of every grip by M kinds: of grippers, and of arms behind them.
 
-    Attributes
-    ----------
-    compliance : (M, 6, 6) float
-        How a node shifts and turns against the hand that holds it for a force and a moment on it,
-        m and rad for N and N m; zero of a rigid grip.
-    transmits_moment : (M,) bool
-        Which kinds bear moments; others let their nodes turn.
-    index : (K, N) int
-        The kind of a grip of each kind of robots at each node, -1 where it is not known; one column
-        where nodes do not matter.
-    nodes : (N,) int
-        Numbers of nodes, ascending.
+    ``compliance`` (M, 6, 6): how a node shifts and turns against the hand that holds it for a force
+    and a moment on it, m and rad for N and N m; zero of a rigid grip. ``transmits_moment`` (M,):
+    which kinds bear moments; others let their nodes turn. ``index`` (K, N): the kind of a grip of
+    each kind of robots at each node, -1 where it is not known; one column where nodes do not
+    matter. ``nodes`` (N,): numbers of nodes, ascending.
     """
 
     compliance: Floats
@@ -352,41 +346,24 @@ class Network(Shown, FrozenValue):
         figure: Figure = display(Network, "plot")(self, bricks)
         return figure
 
-    @cached_property
-    def _graph(self) -> nx.Graph[object]:
-        """The whole network as a graph."""
-        import networkx as nx  # noqa: PLC0415  # 0.12 s, and only connectivity asks for it
-
-        graph: nx.Graph[object] = nx.Graph(name=self.scene.name)
-        places = zip(self.node_kind, self.node_since, self.node_position, strict=True)
-        for name, (kind, since, position) in zip(self.node_name, places, strict=True):
-            graph.add_node(
-                name, kind=PartKind(kind), since=int(since), position=tuple(position.tolist())
-            )
-        lengths = np.linalg.norm(np.diff(self.node_position[self.edge_nodes], axis=1)[:, 0], axis=1)
-        each = zip(self.edge_nodes, self.edge_kind, self.edge_since, lengths.tolist(), strict=True)
-        for number, ((a, b), kind, since, length) in enumerate(each, start=1):
-            ends = self.node_name[a], self.node_name[b]
-            kinds = {"kind": PartKind(kind), "since": int(since)}
-            graph.add_edge(*ends, number=number, length=length, **kinds)
-        found: nx.Graph[object] = nx.freeze(graph)
-        return found
-
     def graph(self, bricks: int) -> nx.Graph[object]:
-        """Return a partial structure as a view of the network's graph.
+        """Return a partial structure as a graph.
 
         Nodes have a ``kind`` (`PartKind`), ``since``, the brick count that brings them, and a
         ``position``, m; edges a ``kind``, ``since``, their ``number`` and ``length``, m.
         """
-        from networkx import subgraph_view  # noqa: PLC0415  # as for the whole graph
+        import networkx as nx  # noqa: PLC0415  # 0.12 s, and only connectivity asks for it
 
-        nodes, edges = self._graph.nodes, self._graph.edges
-        view: nx.Graph[object] = subgraph_view(
-            self._graph,
-            filter_node=lambda name: nodes[name]["since"] <= bricks,
-            filter_edge=lambda a, b: edges[a, b]["since"] <= bricks,
-        )
-        return view
+        out: nx.Graph[object] = nx.Graph(name=self.scene.name)
+        for i, name in enumerate(self.node_name[: self.count_nodes(bricks)]):
+            own = {"kind": PartKind(self.node_kind[i]), "since": int(self.node_since[i])}
+            out.add_node(name, **own, position=tuple(self.node_position[i].tolist()))
+        for e, (a, b) in enumerate(self.edge_nodes[: self.count_edges(bricks)].tolist()):
+            own = {"kind": PartKind(self.edge_kind[e]), "since": int(self.edge_since[e])}
+            length = math.dist(self.node_position[a], self.node_position[b])
+            out.add_edge(self.node_name[a], self.node_name[b], number=e + 1, length=length, **own)
+        found: nx.Graph[object] = nx.freeze(out)
+        return found
 
     def bodies(self, bricks: int) -> nx.Graph[int]:
         """Return the graph of bricks and ground of a partial structure, connected by springs.
@@ -394,7 +371,7 @@ class Network(Shown, FrozenValue):
         Bricks are indices in build order, the ground is `GROUND`. A spring without stiffness is no
         edge.
         """
-        from networkx import Graph  # noqa: PLC0415  # as for the whole graph
+        from networkx import Graph  # noqa: PLC0415  # as above
 
         graph: nx.Graph[int] = Graph()
         springs = self.springs
