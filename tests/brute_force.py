@@ -44,6 +44,8 @@ def rigid_props(scene, bricks, held):
 
 def allowed(engine, rules, bricks, grips):
     """The four worst responses of a state; None where it is loose or a payload is exceeded."""
+    if not bricks:
+        return np.zeros(4)
     found = responses(engine, bricks, grips)
     if found is None:
         return None

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from seqopt.errors import SceneError
@@ -42,29 +41,6 @@ def test_an_l_shape_in_closed_form():
     assert shape.centroid == pytest.approx([(3 * 1.5 + 0.5) / 4, (3 * 0.5 + 1.5) / 4, 1.0])
     assert shape.contains(np.array([0.5, 1.5, 1.0]))
     assert not shape.contains(np.array([2.0, 1.5, 1.0]))
-
-
-def test_axes_are_those_of_the_second_moments():
-    """A wedge of random points against the mean of squares over many points inside."""
-    rng = np.random.default_rng(0)
-    points = rng.normal(size=(12, 3)) * [3.0, 2.0, 1.0]
-    hull = ConvexHull(points)
-    faces = [
-        tuple(face if np.linalg.det(points[face] - points.mean(axis=0)) > 0 else face[::-1])
-        for face in hull.simplices
-    ]
-    used = sorted({i for face in faces for i in face})
-    place = {int(v): k for k, v in enumerate(used)}
-    shape = Polyhedron(
-        as_vectors(points[used]), tuple(tuple(place[int(i)] for i in face) for face in faces)
-    )
-    assert shape.volume == pytest.approx(hull.volume)
-    tries = rng.uniform(points.min(axis=0), points.max(axis=0), (200_000, 3))
-    inside = tries[(tries @ hull.equations[:, :3].T + hull.equations[:, 3] <= 0).all(axis=1)]
-    assert shape.centroid == pytest.approx(inside.mean(axis=0), abs=0.02)
-    moments = shape.axes @ np.cov(inside.T) @ shape.axes.T
-    assert np.abs(moments - np.diag(np.diag(moments))).max() < 0.02 * moments[0, 0]
-    assert (np.diff(np.diag(moments)) < 0).all()
 
 
 def test_nodes_lie_a_quarter_out_along_the_longest_axis():

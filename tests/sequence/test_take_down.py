@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise, permutations
 
-import networkx as nx
 import numpy as np
 import pytest
 
@@ -23,7 +22,7 @@ from seqopt.plan.plan import Status
 from seqopt.responses import analyze_staged
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Site, Step, StepKind, check_sequence
-from tests.brute_force import ONES, allowed
+from tests.brute_force import ONES, allowed, best_values
 from tests.builders import turned_round
 from tests.plain_rules import PlainBook
 
@@ -40,66 +39,6 @@ def small_wall():
     return seqopt.make_engine("compliance", scene)
 
 
-def lawful(scene, rules, bricks, grips):
-    held = {n for n in grips if n is not None}
-    enough = len(held) >= (rules.fewest_grips(scene) if bricks > 1 else 0)
-    return bricks == 0 or (enough and bool(held & {*scene.placed[bricks - 1].nodes}))
-
-
-def taken(scene, rules, bricks, grips):
-    """What follows where a free robot takes hold."""
-    if lawful(scene, rules, bricks, grips) or bricks == len(scene.placed):
-        nodes = [n for brick in scene.placed[:bricks] for n in brick.nodes]
-        for node in {*nodes} - {*grips} - {*scene.blocked_nodes}:
-            for r in (r for r, held in enumerate(grips) if held is None):
-                yield bricks, (*grips[:r], node, *grips[r + 1 :])
-
-
-def dropped(scene, rules, bricks, grips):
-    """What follows where a robot lets go, or takes the newest brick away that it alone holds."""
-    newest = [n for n in grips if n in scene.placed[bricks - 1].nodes]
-    for r in (r for r, held in enumerate(grips) if held is not None):
-        free = (*grips[:r], None, *grips[r + 1 :])
-        if lawful(scene, rules, bricks, free):
-            yield bricks, free
-        alone = newest == [grips[r]] and lawful(scene, rules, bricks, grips)
-        if alone and lawful(scene, rules, bricks - 1, free):
-            yield bricks - 1, free
-
-
-def enumerated(engine, rules):
-    """Every state of a take-down, by its words alone, and what it costs."""
-    scene = engine.network.scene
-    start, end = ((count, (None,) * len(scene.robots)) for count in (len(scene.placed), 0))
-    graph, work = nx.DiGraph(), [start]
-    known = {start: np.zeros(4), end: np.zeros(4)}
-    while work:
-        state = work.pop()
-        for new in (*taken(scene, rules, *state), *dropped(scene, rules, *state)):
-            if new not in known:
-                known[new] = allowed(engine, rules, *new)
-                work += [new] if known[new] is not None else []
-            if known[new] is not None:
-                graph.add_edge(state, new)
-    scales = np.array([scale for _, scale in ONES.limits])
-    costs = {s: float((worst / scales).max()) for s, worst in known.items() if worst is not None}
-    return graph, costs, start, end
-
-
-def by_hand(engine, rules, aim):
-    """The least of an aim of all take-downs."""
-    graph, costs, start, end = enumerated(engine, rules)
-    if aim == "steps":
-        return float(nx.shortest_path_length(graph, start, end))
-    if aim == "sum":
-        return nx.shortest_path_length(graph, start, end, weight=lambda _, b, __: costs[b])
-    for value in sorted(costs.values()):
-        kept = graph.subgraph([s for s, cost in costs.items() if cost <= value])
-        if start in kept and end in kept and nx.has_path(kept, start, end):
-            return value
-    return None
-
-
 def posed(engine, aims, rules=DOWN):
     return seqopt.pose(engine, rules, ONES, aims)
 
@@ -112,7 +51,9 @@ def test_best_take_down_is_that_of_all(made, aim, least):
     engine, rules = made(), replace(DOWN, least_grips=least)
     plan = seqopt.solve(posed(engine, aim, rules))
     assert plan.status == "optimal"
-    assert plan.selection.objective[0] == pytest.approx(by_hand(engine, rules, aim), rel=1e-9)
+    assert plan.selection.objective[0] == pytest.approx(
+        best_values(engine, rules, aim)[0], rel=1e-9
+    )
 
 
 @pytest.mark.slow
