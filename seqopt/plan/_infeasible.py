@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import chain, combinations, islice
 
 import numpy as np
@@ -288,6 +288,7 @@ class Look:
 
 
 LOOK = Look()
+OF_ROBOTS = ("rules", "arms")  # filters that leave the finished structure as it is
 
 
 def worst_least(problem: States, response: str, look: Look = LOOK) -> float:
@@ -331,57 +332,62 @@ class Remedies:
 
         ``finished``: whether the finished structure without grips is infeasible.
         """
-        if finished:  # no robot can do anything about it
-            ways = [*self._stronger(), *self._limits()]
-            if not ways:
-                return (
-                    "; no robot helps: it needs more bond or friction, less load, or other limits"
-                )
-        else:
-            ways = [*self._alone()]
-            if all(way.of_arms for way in ways):  # of the same arms two rules may ask less
-                ways += [*islice(self._in_pairs(ways), 1)]
-            if not ways:
-                return ", whatever two rules or limits are loosened; extend a reach or add a robot"
+        ways = [*self._alone(finished=finished)]
+        if not finished and all(way.of_arms for way in ways):  # of the same arms two rules ask less
+            ways += islice(self._in_pairs(ways), 1)
+        if not ways and finished:  # no robot can do anything about it
+            return "; no robot helps: it needs more bond or friction, less load, or other limits"
+        if not ways:
+            return ", whatever two rules or limits are loosened; extend a reach or add a robot"
         enough = dict.fromkeys(text for way in ways if (text := way.enough()))
         if enough:
             return f"; it becomes possible with {' or '.join(enough)}"
         return f"; robots would have to carry more than all weights and loads; {HARD}"
 
-    def _alone(self) -> Iterator[Remedy]:
-        """Yield every single relaxation that suffices; of each rule only the least."""
-        done: set[str] = set()
-        for _, text, problem in self._ways("rules"):
-            rule, _, _ = text.partition("=")
-            if rule not in done and self.look.exists(problem):
-                done.add(rule)
-                enough = partial(str, f"{text} (--rule {text})")
-                if text == IGNORED:
-                    enough = partial(self._payload_if_ignored, problem)
-                yield Remedy(text, enough, (text,))
-        yield from self._stronger()
-        arms = (text for _, text, problem in self._ways("arms") if self.look.exists(problem))
-        yield from (_as_it_is(text, of_arms=True) for text in islice(arms, 1))
+    def _alone(self, *, finished: bool = False) -> Iterator[Remedy]:
+        """Yield every single relaxation that suffices; of each rule, and of arms, only the least.
+
+        ``finished``: as of `said`; rules, arms and reaches are then left out.
+        """
+        done = set[tuple[str, str]]()
+        for each in self.problem.every_filter:
+            if (finished and each.name in OF_ROBOTS) or each.name in self._idle:
+                continue
+            for text, problem in each.ways(self.problem):
+                key = each.name, text.partition("=")[0] * (each.name == "rules")
+                if key not in done and self.look.exists(problem):
+                    done.add(key)
+                    yield self._remedy(each.name, text, problem)
+        if not finished:
+            yield from (Remedy(words, partial(str, words)) for words in self._in_other_scenes())
+
+    def _remedy(self, name: str, text: str, relaxed: States) -> Remedy:
+        """Return the remedy of a filter, whose relaxation in words is known to suffice."""
+        if name == "rules":
+            said = partial(str, f"{text} (--rule {text})")
+            ignored = partial(self._payload_if_ignored, relaxed)
+            return Remedy(text, ignored if text == IGNORED else said, (text,))
+        enough = {limit.label: partial(self._enough_limit, limit) for limit in self.problem.limits}
+        enough |= {"stands": self._enough_bond, "payload": self._enough_payload}
+        return Remedy(text, enough.get(name, partial(str, text)), of_arms=name == "arms")
+
+    def _in_other_scenes(self) -> Iterator[str]:
+        """Yield reaches and softer grips with which a plan exists, in words."""
         scene = self._scene
-        if self._is_made and not (scene.has_arms or self.problem.scenarios):
-            yield from map(_as_it_is, _enough_reach(scene, self._exists_in))
-        yield from self._limits()
-        moves = ground_moves(scene) and not self.problem.scenarios
-        if moves and (soft := self._softer()):
-            yield _as_it_is(soft)
+        if self.problem.scenarios or recipe_of(self.problem.engine) is None:
+            return
+        if not scene.has_arms:
+            yield from _enough_reach(scene, self._exists_in)
+        if ground_moves(scene) and (soft := self._softer()):
+            yield soft
 
     def _in_pairs(self, alone: list[Remedy]) -> Iterator[Remedy]:
         """Yield pairs of a relaxed rule and a remedy; other arms only if insufficient alone."""
-        for _, text, problem in self._ways("rules"):
+        (rules,) = (each for each in self.problem.every_filter if each.name == "rules")
+        for text, problem in rules.ways(self.problem):
             for other in Remedies(problem, self.look)._alone():
                 if not (alone and other.of_arms):
                     yield other.beside(text)
-
-    def _ways(self, *names: str) -> Iterator[tuple[str, str, States]]:
-        """Yield relaxations of a kind of filter: name, words, and the relaxed problem."""
-        for each in self.problem.every_filter:
-            if each.name in names:
-                yield from ((each.name, *way) for way in each.ways(self.problem))
 
     def _payload_if_ignored(self, problem: States) -> str:
         """Return the least payload, as the peak force of a problem without payloads; in words."""
@@ -389,23 +395,6 @@ class Remedies:
         if held > whole_load(problem.network):
             return self._softer()
         return _payload_said(max(held, _heaviest(self.problem)))
-
-    def _stronger(self) -> Iterator[Remedy]:
-        """Yield relaxations of stability and payload that suffice alone."""
-        enough = {"stands": self._enough_bond}
-        if self._held_within_payloads or _unbearable(self.problem):
-            enough["payload"] = self._enough_payload
-        for name, text, problem in self._ways(*enough):
-            if self.look.exists(problem):
-                yield Remedy(text, enough[name])
-
-    def _limits(self) -> Iterator[Remedy]:
-        """Yield the limits, and filters of plug-ins, whose removal alone suffices."""
-        labels = {limit.label: limit for limit in self.problem.limits}
-        for name, text, problem in self._ways(*labels, *map(str, self.problem.filters)):
-            if self.look.exists(problem):
-                raised = partial(self._enough_limit, labels[name]) if name in labels else None
-                yield _as_it_is(text) if raised is None else Remedy(text, raised)
 
     def _softer(self) -> str:
         """Describe the stiffest sufficient grips; empty if none suffice."""
@@ -472,27 +461,19 @@ class Remedies:
     def _is_free(self) -> bool:
         return self.problem.rules.method == FREE
 
-    @property
-    def _held_within_payloads(self) -> bool:
-        """Whether states must stand, held by what robots carry."""
+    @cached_property
+    def _idle(self) -> tuple[str, ...]:
+        """Payloads where no state is held within them, and every robot bears its brick."""
         kept = self._is_free and self.problem.free_rules.payload is Payload.KEPT
-        return kept and bool(self.problem.demands)
+        asked = (kept and self.problem.demands) or _unbearable(self.problem)
+        return () if asked else ("payload",)
 
     @property
     def _scene(self) -> Scene:
         return self.problem.network.scene
 
-    @property
-    def _is_made(self) -> bool:
-        """Whether the engine can be rebuilt for another scene."""
-        return recipe_of(self.problem.engine) is not None
-
     def _exists_in(self, scene: Scene) -> bool:
         return self.look.exists(self.problem.in_scene(scene))
-
-
-def _as_it_is(words: str, *, of_arms: bool = False) -> Remedy:
-    return Remedy(words, lambda: words, of_arms=of_arms)
 
 
 def _payload_said(newton: float) -> str:
