@@ -30,19 +30,11 @@ from seqopt.graph.paths import (
     tied,
 )
 from seqopt.graph.states.states import States
-from seqopt.judge._bounds import is_beyond
+from seqopt.judge._bounds import Book, Closed, SumBook, TwinBook, is_beyond, kept_below, limit_below
 from seqopt.judge._rule_moves import RuleTables, Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator
 from seqopt.judge._twin import twin_of
-from seqopt.judge.arithmetic import (
-    Book,
-    Closed,
-    SumBook,
-    TwinBook,
-    budget_bounds,
-    kept_below,
-    limit_below,
-)
+from seqopt.judge.arithmetic import budget_bounds
 from seqopt.network.build import build_network
 from seqopt.problem.amounts import NONE
 from seqopt.problem.resources import StepArrays

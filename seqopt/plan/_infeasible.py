@@ -367,7 +367,9 @@ class Remedies:
             said = partial(str, f"{text} (--rule {text})")
             ignored = partial(self._payload_if_ignored, relaxed)
             return Remedy(text, ignored if text == IGNORED else said, (text,))
-        enough = {limit.label: partial(self._enough_limit, limit) for limit in self.problem.limits}
+        enough = dict[str, Callable[[], str]]()
+        for limit in self.problem.limits:
+            enough[limit.label] = partial(self._enough_limit, limit)
         enough |= {"stands": self._enough_bond, "payload": self._enough_payload}
         return Remedy(text, enough.get(name, partial(str, text)), of_arms=name == "arms")
 
