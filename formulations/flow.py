@@ -35,7 +35,7 @@ took no search is taken.
 
 After a sum of value :math:`z` the row :math:`\sum_a c_a y_a \le z` stays, after a peak moves that
 take more are left out. The epigraph says little where :math:`y` may be fractions, since a flow that
-spreads over many states has a small peak. Integers earn their price where budgets couple all moves;
+spreads over many states has a small peak. Integers pay where budgets couple all moves;
 without these dynamic programming gives the same answer hundreds of times faster.
 """
 

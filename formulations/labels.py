@@ -21,7 +21,7 @@ find its highest point,
 
    \max_{\lambda \ge 0, \, \theta} \; \theta \quad \text{s.t.} \quad
    \theta \le c(p) + \sum_b \lambda_b \left( a_b(p) - B_b \right)
-   \quad \text{for every path } p \text{ met so far.}
+   \quad \text{for every path } p \text{ found so far.}
 
 Its height is a bound on what any path within the budgets costs, the same as that of the linear
 program, and the multipliers are its duals. The path is the cheapest within the budgets among those
@@ -72,7 +72,7 @@ LABELS = on_graph(
 )
 LAGRANGIAN = on_graph(
     "lagrangian",
-    "full overlap, prices for budgets",
+    "full overlap, multipliers of budgets",
     relaxed,
     FormulationKind.BOUND,
     aim=Aim.SUM,

@@ -17,7 +17,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Vector = tuple[float, float, float]
 _Content = TypeVar("_Content")
-_LONGEST = 240  # letters of what is shown of a value, its name aside
+_LONGEST = 240  # letters of what is shown of a value without its name
 
 _COMPRESSED = (sparse.csr_array, sparse.csc_array)
 

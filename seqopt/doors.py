@@ -62,7 +62,7 @@ __all__ = [
 FLAG = re.compile(r"--([a-z][a-z-]*)")
 OTHERWISE = {
     "stability": "Whether it is proven which steps stand.",
-    "progress": "Told how far it is; by default a notebook or a terminal shows it.",
+    "progress": "Called with the progress; by default a notebook or a terminal shows it.",
 }  # what a parameter is that the command line has in another way
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -171,7 +171,7 @@ replan = _function(
 analyze = _function(
     Analyze,
     pd.DataFrame,
-    "A row per step, units in the names of columns. ``attrs['notes']`` says what is worth\n"
+    "A row per step, units in the names of columns. ``attrs['notes']`` says what is to be\n"
     "    knowing, ``attrs['failures']`` which steps are mechanisms, or were not solved.",
 )
 times = _function(

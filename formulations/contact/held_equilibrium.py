@@ -13,7 +13,7 @@ with n the normal and d_j tangents of a contact, v_j unit vectors, and the other
 `seqopt.stability.limit_analysis.Case`; s is cut off at c / m, the tip of the cone, which takes
 nothing away where c >= m s. The multipliers of the first line are a motion. Where it closes a
 contact or outruns a payload more than the directions there are can see, the best direction of that
-corner or grip joins them, whose price is known in closed form, until the answer is enough.
+corner or grip joins them, whose reduced cost has a closed form, until the answer is enough.
 
 One program serves all grips of a structure: those not held are fixed at zero, and the simplex
 method goes on from the basis of the set before.

@@ -259,7 +259,7 @@ def selected(space: Space, visited: Visited, best: Best | Within) -> Solution:
 
 @dataclass(frozen=True)
 class Options:
-    """Options of a search; ``dear``: whether a first plan is sought only at the lower bounds."""
+    """Options of a search; ``dear``: filters are expensive, so first plans keep to lower bounds."""
 
     width: int
     growth: float
@@ -401,7 +401,7 @@ def search_states(problem: States, options: Options, tell: Watching) -> Solution
         many = sets * problem.space.levels > MANY
         for wider in (1, WIDER):
             if wider > 1 and not many and (search.incumbent or options.dear):
-                break  # it is worth its time where the first one found nothing
+                break  # it pays where the first one found nothing
             if wider > 1 and search.incumbent and search.misses_floor():
                 break
             plans = [search.incumbent, _first(problem, options, search.floors, wider, tell)]

@@ -3,7 +3,7 @@
 A label of a state is when the last step ended, since when the robots of its columns are free, what
 sums took by then, and what further resources came to (`seqopt.graph._labels`).
 
-Whatever a build does, it takes no less than the time of all that its steps take one after the
+Every build takes at least the time of all that its steps take one after the
 other, and no less than the time of any robot: preparing, acting, and holding while others act. With
 multipliers from 0 that add up to one over these, the weighted time of moves is a sum along a path,
 and the shortest path bounds every build (`seqopt.graph._multipliers`).
@@ -24,17 +24,18 @@ from seqopt.graph.paths import distances, fewest_moves, moves_along
 from seqopt.problem.resources import Resource, StepArrays
 
 ROUNDS = 25  # of cutting planes
-CLOSED = 1e-7  # share of the bound to which prices are the best
+CLOSED = 1e-7  # relative tolerance of the multipliers
 TIGHT = 1e-9  # of a distance: by how much moves of a shortest path may be off
-KEPT = 3  # prices that bound labels, those with the highest bounds
+KEPT = 3  # multipliers that bound labels, those with the highest bounds
 
 
 @dataclass(frozen=True, eq=False)
 class Prices:
     """Multipliers of the robots' time, and bounds by them.
 
-    ``each`` (L, 1 + k): of the time of all, and of a robot of every kind; ``left`` (L, n): priced
-    time from states to ends at least; ``kinds`` (c,): of columns; ``bound``: of any build, s.
+    ``each`` (L, 1 + k): multipliers of the time of all, and of a robot of every kind; ``left`` (L,
+    n): weighted time from states to ends at least; ``kinds`` (c,): of columns; ``bound``: of any
+    build, s.
     """
 
     each: Floats
@@ -119,8 +120,8 @@ class InTime(Carried):
 
     Values are, in this order: the end of the last step, s; since when robots of columns are free,
     s, zero where they hold; and where mortar cures when bricks were in their places, s, zero of
-    those that are not. ``prices``: bound how long builds take from any state; ``acts`` (a,): that
-    may be taken; ``most``: the end of the build, s.
+    those that are not. ``prices``: multipliers that bound the makespan from any state; ``acts``
+    (a,): that may be taken; ``most``: the end of the build, s.
     """
 
     def __init__(self, timed: TimedGraph, prices: Prices, acts: Ints, most: float) -> None:

@@ -47,8 +47,8 @@ class Asked:
     """The problem of the least makespan of a build in time.
 
     ``carrying``: states, moves and resources; ``kept`` (m,): the moves that may be taken; ``caps``:
-    what paths must keep to; ``prices``: bound builds; ``first``: a first path, of no states if none
-    was found; ``watch``: says when to stop.
+    what paths must keep to; ``prices``: multipliers that bound builds; ``first``: a first path, of
+    no states if none was found; ``watch``: says when to stop.
     """
 
     carrying: Carrying

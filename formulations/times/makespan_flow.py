@@ -12,7 +12,7 @@ of the robots of a kind :math:`K`, who prepare (:math:`p_a`), act and hold (:mat
    + p_a \, [r_a \in K] \bigr) .
 
 It does not know when robots are free, only how much they have to do: a relaxation, in which nobody
-ever waits. The multipliers of its linear program are the prices of ``makespan_labels``. Its plan is
+ever waits. The multipliers of its linear program are those of ``makespan_labels``. Its plan is
 the best of a first one and that of the flow.
 """
 

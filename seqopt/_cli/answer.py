@@ -70,7 +70,7 @@ class Answer:
     text: str = ""  # lines on standard output
     data: str = ""  # a table as CSV for standard output, where no file is written for it
     written: tuple[Path, ...] = ()
-    notes: tuple[str, ...] = ()  # what else is worth knowing: lines on standard error
+    notes: tuple[str, ...] = ()  # further remarks: lines on standard error
     failures: tuple[str, ...] = ()  # what went wrong although there is an answer: as notes
     status: Status = Status.DONE
     faults: tuple[str, ...] = ()  # what --strict makes failures

@@ -165,7 +165,7 @@ class Request:
     strict: bool = False
 
     def result(self, progress: Any = None) -> Any:
-        """Run the command and return its result; ``progress``: told how far it is."""
+        """Run the command and return its result; ``progress`` is called with its progress."""
         from seqopt._cli.signatures import signature_of  # noqa: PLC0415  # help needs none of it
 
         function = find_command(self.name).load()

@@ -1,7 +1,7 @@
-"""How grips of arms give way whose joints do: in the one posture in which each holds each node.
+"""Compliance of grips by the joints of arms: of the one posture in which each holds each node.
 
 An arm whose joints have stiffnesses holds a node in one posture, the same in all build orders and
-plans, so that it is known how its grip gives way. It is chosen by the bricks that it hits, by how
+plans, so that the compliance of its grip is known. It is chosen by the bricks that it hits, by how
 often it is in the way of those of other arms, and, where that leaves a choice, by how stiff it is.
 """
 
@@ -15,7 +15,7 @@ from seqopt.scene.scene import Scene
 
 
 def compute_held_postures(scene: Scene) -> HeldPostures:
-    """Return the postures in which arms of a scene hold whose joints give way."""
+    """Return the postures in which arms with compliant joints hold."""
     from seqopt.arms._tables import held_by  # noqa: PLC0415  # few scenes have arms
 
     table = find_postures(scene)
@@ -35,5 +35,5 @@ def hold_alike(nominal: Scene, scene: Scene) -> Scene:
 
 
 def _bare(arm: Arm | None) -> object:
-    """Return what counts of an arm for its postures, and whether its joints give way."""
+    """Return what determines the postures of an arm, and whether its joints are compliant."""
     return arm and (replace(arm, postures=1, joint_stiffness=()), bool(arm.joint_stiffness))

@@ -1,8 +1,8 @@
 """Which states arms can be in, as a judge sees them: looked up, one by one.
 
 A second route to what `seqopt.arms._permits.Permits` says: it takes from there with which postures
-plans are made, and asks the table itself what these hit. How grips give way by the joints of arms
-is found by moving every joint a little, from places of the flange, without the Jacobian.
+plans are made, and asks the table itself what these hit. The compliance of grips by the joints of
+arms is found by moving every joint a little, from places of the flange, without the Jacobian.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class PostureRules:
 def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
     """Raise a `StepError` if arms have no postures that go together in a step.
 
-    Or if their grips give way in another way than their joints do.
+    Or if the compliance of their grips is not that of their joints.
     """
     rules = PostureRules(scene, range(len(scene.robots)))
     place = {None: 0} | {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
@@ -100,7 +100,7 @@ _REACHED = 1e-3  # how far a node may be off the tip of the tool, over its lengt
 
 
 def _check_grips(scene: Scene) -> None:
-    """Raise a `StepError` if a grip gives way in another way than the joints of its arm.
+    """Raise a `StepError` if the compliance of a grip is not that of the joints of its arm.
 
     Or if an arm is not at its node. A proof uses all nodes, so all are looked at.
     """

@@ -196,10 +196,11 @@ class ArmModel:
         return np.asarray(turned)
 
     def grip_compliance(self, posture: Floats) -> Floats:
-        """Return how a grip gives way in a posture (6, 6): J diag(1/k) Jᵀ, of the node held.
+        """Return the compliance of a grip in a posture (6, 6): J diag(1/k) Jᵀ, of the node held.
 
         Motion by force, translations first, in the axes of the scene: m/N, rad/N, m/(N m) and
-        rad/(N m). Links and tool are rigid here; joints alone give way, each by its own stiffness.
+        rad/(N m). Links and tool are rigid here; joints alone are compliant, each by its own
+        stiffness.
         """
         stiffness = np.array(self.arm.joint_stiffness)
         if not len(stiffness):

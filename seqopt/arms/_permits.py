@@ -1,7 +1,7 @@
 """What arms allow in the build order of a scene: who reaches which node, and who together.
 
 Of a state it is asked whether there are postures that go together; with one posture of every robot
-at every node this is the one that a robot keeps while it holds. An arm whose joints give way has
+at every node this is the one that a robot keeps while it holds. An arm with compliant joints has
 one, whose stiffness is that of its grip.
 """
 

@@ -2,7 +2,7 @@
 
 A robot keeps its posture from the step in which it takes a node to the last in which it holds it.
 In every step no arm may hit a brick that stands, and no two arms each other. All postures of the
-table are tried, not only those with which plans are made here; of arms whose joints give way that
+table are tried, not only those with which plans are made here; of arms with compliant joints that
 one alone in which it is known how.
 """
 

@@ -43,7 +43,7 @@ class PostureTable(FrozenValue):
     collide : (P, P) bool
         Which pairs of postures, of different robots, are in each other's way.
     compliance : (P, 6, 6) float
-        How a grip gives way in it by the joints of the arm, m/N and rad/(N m); NaN if not known.
+        Compliance of a grip in it by the joints of the arm, m/N and rad/(N m); NaN if not known.
     found : (R, N) int
         How many postures were found, of which at most `MOST` are kept.
     why : (R, N) str

@@ -271,8 +271,8 @@ def reached_alone(site: Site, most: int) -> Reached:
     """Return the postures of the one robot of a site at all nodes: at most so many at each.
 
     They touch neither the ground, which is level with the lower one of its base and of the lowest
-    brick, nor the arm itself, nor, the tool aside, the brick that is gripped: where they hold, and
-    on the way there and back, if that is checked.
+    brick, nor the arm itself, nor, except by its tool, the brick that is gripped: where they hold,
+    and on the way there and back, if that is checked.
     """
     (robot,) = site.robots
     assert robot.arm is not None

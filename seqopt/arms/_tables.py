@@ -1,4 +1,4 @@
-"""How postures are found, kept in a folder, and chosen for arms whose joints give way."""
+"""How postures are found, kept in a folder, and chosen for arms with compliant joints."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _collisions(site: Site, reached: list[Reached], robot: Ints) -> Bools:
 
 
 def _with_compliance(table: PostureTable, arms: Sequence[tuple[str, Arm]]) -> PostureTable:
-    """Return a table with how grips give way by the joints of the arms, as far as it is known.
+    """Return a table with the compliance of grips by the joints of the arms, where it is known.
 
     Raises `SceneError` if an arm does not give a stiffness for every joint.
     """
@@ -224,7 +224,7 @@ def _known(site: Site) -> dict[Path | _Arms | None, PostureTable]:  # noqa: ARG0
 
 
 def held_by(scene: Scene, table: PostureTable) -> HeldPostures:
-    """Return the postures in which arms of a scene hold whose joints give way."""
+    """Return the postures in which arms with compliant joints hold."""
     arms = tuple((robot.name, robot.arm) for robot in scene.robots)
     return _held(Site.of(scene), table, arms)
 

@@ -104,7 +104,7 @@ def shape_notes(scene: Scene) -> tuple[str, ...]:
 
 
 def _followed(robot: _Link) -> list[str]:
-    """Return the links, the root aside, that have a joint at a distance from their own."""
+    """Return the links except the root that have a joint at a distance from their own."""
     joints = [each for each in robot.findall("joint") if each.find("child") is not None]
     moved = {each.find("child").get("link") for each in joints}  # type: ignore[union-attr]
     out = []

@@ -28,7 +28,7 @@ def find_postures(
     cache : pathlib.Path or str, optional
         A folder that keeps the table by content; it is made if it is not there.
     progress : callable, optional
-        Told in a few words how far it is.
+        Called with the progress as a few words.
 
     Returns
     -------

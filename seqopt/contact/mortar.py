@@ -66,7 +66,7 @@ MORTARS = {"epoxy": EPOXY, "dry": DRY}
 
 
 def _is_as_strong(mortar: Mortar, other: Mortar) -> bool:
-    """Return whether a mortar carries whatever another one does: what stands with that, stands.
+    """Return whether a mortar is at least as strong as another one in everything.
 
     Friction takes from what is carried in shear where a contact is pulled: there it must be equal.
     """

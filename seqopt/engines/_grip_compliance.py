@@ -106,7 +106,7 @@ def read_compliance(
 def _in_place(network: Network, grips: Ints) -> GripCompliance:
     """Return the compliance of grips (S, r) in their places.
 
-    Raises `GripError` if nobody knows how one gives way: the posture of an arm is missing.
+    Raises `GripError` if the compliance of one is not known: the posture of an arm is missing.
     """
     if network.scene.grip_kinds.rigid:
         return RIGID

@@ -175,7 +175,7 @@ SHAPES = dict.fromkeys(FLAGS, (6,)) | {"edge_force": (), "displacement": (3,)}
 
 @cache
 def names_wanted(want: Want) -> frozenset[str]:
-    """Return the names of the fields that are asked for, grip forces aside."""
+    """Return the names of the requested fields except grip forces."""
     return frozenset(name for name, flag in FLAGS.items() if want & flag)
 
 
@@ -287,7 +287,7 @@ def _empty_site(network: Network) -> Fields:
 
 
 def _counts_of_fields(network: Network, bricks: int) -> dict[str, int]:
-    """Return of how many edges, nodes, ends, springs or bricks each field tells."""
+    """Return the number of edges, nodes, ends, springs or bricks of each field."""
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     ends, springs = len(network.springs.support), len(network.springs.since)
     return dict(zip(FLAGS, (edges, nodes, ends, springs, bricks), strict=True))
@@ -328,7 +328,7 @@ class NamedEngine:
 class SerialEngine(NamedEngine, ABC):
     """Base of engines that solve grip sets one after the other, each from scratch.
 
-    All fields are evaluated whatever is asked: the solution dominates the cost.
+    All fields are evaluated for every request: the solution dominates the cost.
     """
 
     @_failing_in_a_line

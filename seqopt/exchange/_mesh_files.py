@@ -145,7 +145,7 @@ def _loaded(content: bytes, source: str, form: str, loader: str) -> Any:
         return load(io.BytesIO(content), file_type=form, process=False, **joined)
     except MemoryError:
         raise
-    except Exception as error:  # whatever a reader of broken bytes may raise
+    except Exception as error:  # a reader of broken bytes may raise any error
         said = short(str(error) or type(error).__name__, 80)
         raise SceneError(f"{source}: no {form} file that can be read: {said}") from error
 

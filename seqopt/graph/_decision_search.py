@@ -3,8 +3,8 @@ r"""Searches that solve a decision at a time: move by move, and the proof from f
 Move by move, what costs least after the choice before it is chosen (equation 1 of Bruun et al.).
 An optimum is proven from those pairs of candidates alone that lie on a best path.
 
-A pair costs no less than some floor until it is solved: zero for sizes, one for ranks. With the
-floor in its place every choice looks as cheap as it is, or cheaper, so that the least of this
+A pair that is not solved has a lower bound: zero for sizes, one for ranks. With the
+bound in its place every choice looks as cheap as it is, or cheaper, so that the least of this
 graph is a lower bound,
 
 .. math::
@@ -13,8 +13,8 @@ graph is a lower bound,
 
 The pairs of the candidates on its best path are solved, those of every move at once, and it is
 sought again, until all pairs on it are known: then its cost is the bound (Dellin and Srinivasa,
-2016). Of largest costs it is the path on which the fewest pairs are not known. Whoever ends before
-has a bound, too, and the judge is given the graph of floors.
+2016). Of largest costs it is the path on which the fewest pairs are not known. A search that ends
+before has a bound, too, and the judge is given the graph of lower bounds.
 """
 
 from __future__ import annotations
@@ -185,9 +185,10 @@ EQUAL = 1e-9  # of a value: two that differ by less are one, found in another or
 class PairBounds:
     """Costs of candidates alone, and of pairs: exact where they were solved, else a lower bound.
 
-    ``single`` (list of (C_k,) float): of candidates; infinite where not allowed; ``floor``: what a
-    pair costs at least; ``aim``: whether costs add up or the largest counts; ``rows``: by move and
-    candidate of the move before, what pairs cost (C_k,); NaN where they were passed over.
+    ``single`` (list of (C_k,) float): of candidates; infinite where infeasible; ``floor``: lower
+    bound of what a pair costs at least; ``aim``: whether costs add up or the largest counts;
+    ``rows``: by move and candidate of the move before, what pairs cost (C_k,); NaN where they were
+    passed over.
     """
 
     single: list[Floats]
@@ -244,7 +245,7 @@ class PairBounds:
         """Return the graph of solved pairs, or of all, and which nodes it has of all.
 
         Nodes are the start, the candidates of every move, and by move the one that leads on from
-        all candidates of which no pair was solved, at the floor.
+        all candidates of which no pair was solved, at the lower bound.
         """
         sizes = [len(own) for own in self.single]
         count, firsts = len(sizes), np.cumsum([1, *sizes])
@@ -282,7 +283,8 @@ def prove_lazily(problem: Decisions, formulation: Formulation, watch: Watch) -> 
     """Solve pairs of candidates until a best path of their lower bounds has no unsolved one.
 
     Raises `InfeasibleError` if no choice is allowed; `ProblemError` if the formulation is not
-    exact, there are budgets, or costs have no floor; `TimeUpError` if no choice is known in time.
+    exact, there are budgets, or costs have no lower bound; `TimeUpError` if no choice is known in
+    time.
     """
     search = _Search(problem, formulation)
     with answered(watch.interrupt):

@@ -21,7 +21,7 @@ NEW, PENDING, OPEN, CLOSED = range(4)  # of a state: above the threshold, visite
 ARRAYS = ("values", "mark", "exact", "floor", "spent", "to_go")  # of a part, a row for every state
 
 Valued = Callable[[Ints], tuple[Floats, Bools, float]]
-"""Returns values of states, which are allowed, and above which the first goal's are floors."""
+"""Returns values, feasibility, and from which value of the first goal on they are lower bounds."""
 
 
 class Part:

@@ -9,12 +9,12 @@ a bound on what is sought, concave and piecewise linear:
    L(\lambda) = \min_p \; \bigl( c(p) + \lambda^T s(p) \bigr) .
 
 An oracle finds a shortest path at given multipliers. The next ones are the highest point of the
-planes that were met so far (Kelley, The cutting-plane method, 1960),
+planes found so far (Kelley, The cutting-plane method, 1960),
 
 .. math::
 
    \max_{\lambda \in \Lambda, \, \theta} \; \theta \quad\text{s.t.}\quad
-   \theta \le c(p) + \lambda^T s(p) \quad \text{for every path } p \text{ met so far,}
+   \theta \le c(p) + \lambda^T s(p) \quad \text{for every path } p \text{ found so far,}
 
 until :math:`\theta`, which is above :math:`L` everywhere, is no higher than the best bound. What
 the multipliers are of differs:

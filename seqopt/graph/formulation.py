@@ -193,7 +193,7 @@ class End(Enum):
 
     DONE = "done"
     STOPPED = "stopped"  # before it could keep what it promises; its choice and bound stand
-    INTERRUPTED = "interrupted"  # by whoever asked for an end; its choice and bound stand
+    INTERRUPTED = "interrupted"  # by a request to end; its incumbent and bound stand
 
 
 @dataclass(frozen=True, repr=False)
@@ -345,7 +345,7 @@ def _loaded(group: str) -> dict[str, Formulation]:
 def _load(entry: EntryPoint) -> Formulation:
     try:
         found = entry.load()
-    except Exception as error:  # whatever a package of others may raise
+    except Exception as error:  # foreign code may raise any error
         raise ProblemError(
             f"formulation {entry.name!r}: {entry.value} cannot be loaded: {message_of(error)}; "
             "reinstall it or remove it"
@@ -414,8 +414,8 @@ class Solution(FrozenValue):
     ``objective``: claimed value of every goal; ``bound``: claimed lower bound of every goal, those
     before it being at their values; ``visited`` (tuple of (n, c) int): states that a better plan
     could pass, by brick count, if the formulation knows them: the proof looks at these together,
-    and depends on them in nothing but its time; ``prices``: by goal, what a unit of every budget
-    and of every sum before it is worth: they prove the bounds where there are budgets; ``stopped``:
+    and depends on them in nothing but its time; ``prices``: multipliers by goal, of every budget
+    and of every sum before it: they prove the bounds where there are budgets; ``stopped``:
     why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if it
     did not; ``grips``: where it counts who of a kind acts, after every step the place that each
     robot of the scene holds, 0 for none; ``proofs``: of the makespan and the goals after it, of all

@@ -112,7 +112,7 @@ class Graph(FrozenValue):
 
     @property
     def goals(self) -> int:
-        """How many columns are to be made small, those with caps left out."""
+        """Number of columns that are minimized, those with caps left out."""
         return len(self.peaks) - len(self.caps)
 
     def moves_from(self, state: int) -> slice:
@@ -144,8 +144,8 @@ class Graph(FrozenValue):
 class LabelProof(NamedTuple):
     """Labels of a build in time that show that no path is better in one goal.
 
-    Whatever follows from a label by one act is a label of which another one of these is nowhere
-    above it, or prices and sums to go say that it is no better.
+    Every successor of a label by one act is a label that another one of these
+    dominates, or a bound by multipliers and sums to go says that it is no better.
 
     ``states`` (N, 1 + c): how many bricks stand, and entries of a state; ``labels`` (N,
     1 + c + q): when the last step ended, since when robots of columns are free, zero where they

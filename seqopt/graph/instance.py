@@ -25,7 +25,7 @@ SUM, PEAK, TAIL, TIME = "sum", "peak", "tail", "time"
 
 
 class _Target(NamedTuple):
-    """What is to be made small of a path.
+    """What is minimized along a path.
 
     ``kind``: ``sum`` or ``peak`` of one column, ``tail``: the mean of the largest sums of several
     columns, no one of which weighs more than ``most``, or ``time``: when the last act ends.
@@ -49,7 +49,7 @@ class _Cap(NamedTuple):
 class Instance(FrozenValue, Shown):
     """A graph with amounts of its arcs, goals and caps of paths through it; no scene is needed.
 
-    A path leads from node 0 to one of the ends. Goals are made small one after the other: of the
+    A path leads from node 0 to one of the ends. Goals are minimized one after the other: of the
     paths that are best in the first, the best in the second, and so on.
 
     Attributes
@@ -65,7 +65,7 @@ class Instance(FrozenValue, Shown):
     amounts : (m, c) float
         How much they take, a column for every name.
     goals, caps : tuple
-        What is to be made small, and which sums are capped.
+        What is minimized, and which sums are capped.
     states : (n, s) int
         What nodes stand for; the first column is the level: no arc leads to a lower one.
     timed : TimedGraph or None
@@ -100,7 +100,7 @@ class Instance(FrozenValue, Shown):
 
     def __post_init__(self) -> None:
         if not self.goals:
-            raise ProblemError(f"instance {self.name}: nothing is to be made small; name a goal")
+            raise ProblemError(f"instance {self.name}: nothing is to be minimized; name a goal")
         for name in ("source", "target"):
             rows = np.ascontiguousarray(getattr(self, name), dtype=np.int32)
             if len(rows) and not (rows.min() >= 0 and rows.max() < self.nodes):

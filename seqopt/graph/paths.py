@@ -1,6 +1,6 @@
 """Best paths of a graph, goal after goal, by scipy.sparse.csgraph; the best move of every state.
 
-Where it is dear to ask whether a state passes, only states on a path are asked, that on which the
+Where filters of states are expensive, only states on a path are asked, that on which the
 fewest are not known (Dellin and Srinivasa, A unifying formalism for shortest path problems with
 expensive edge evaluations, 2016). Where a part of the graph turned paths down before, it is asked
 first, and more of it each time: what is left without a path there is a cut.
@@ -224,7 +224,7 @@ def _lazy_path(
 
     ``parts`` (n,): of every state, from 0; those of one are tested together; ``known`` (n,): 1
     where a state passes, -1 where it does not, else 0; updated in place; ``ask``: tests states;
-    what stays open counts as failed; ``recall``: verdicts that need no test; ``tell``: called
+    what stays open counts as failed; ``recall``: cached verdicts; ``tell``: called
     before every path.
     """
     failed = Counter[int]()

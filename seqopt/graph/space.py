@@ -5,7 +5,7 @@ lies on a *level*, and every move stays within its part or leads to one of the n
 space can be explored level by level, whole batches of states at a time, and only as far as a proof
 needs it (`seqopt.graph._explore.Explorer`). Three spaces are built in
 `seqopt.graph.states.explored`: the open grips of a schedule, free rules, and all orders of the
-bricks, where a part is a set of bricks. Whatever has the members below is explored, solved and
+bricks, where a part is a set of bricks. Anything with the members below is explored, solved and
 judged in the same way: a puzzle without bricks is, in `tests/formulations/test_toy_space.py`.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 
 Key: TypeAlias = Any
-"""Which part, whatever a space calls it; it can be hashed, and differs from level to level."""
+"""Key of a part, of any kind that the space uses: hashable, and different in every level."""
 
 Found: TypeAlias = Sequence[tuple[int, Key, Ints]]
 """Level, part and state (c,) of all states of a path, the start left out."""
@@ -122,7 +122,7 @@ class Space(Protocol):
         rough : bool
             Whether single precision is enough.
         most : float
-            Where there are floors, values of a state in which the first goal is larger may be
+            Where there are lower bounds, values of a state in which the first goal is larger may be
             lower bounds above this.
 
         Returns

@@ -39,8 +39,8 @@ def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certi
     Returns
     -------
     Certificate
-        Values and lower bounds: by what is given; where nothing is, by potentials, a cut or prices
-        that the judge finds itself. A bound without proof counts as claimed.
+        Values and lower bounds: by what is given; where nothing is, by potentials, a cut or
+        multipliers that the judge finds itself. A bound without proof counts as claimed.
 
     Raises
     ------

@@ -1,9 +1,9 @@
 r"""Lower bounds of paths by what proves them: multipliers of caps, and labels.
 
 It shares nothing with the formulations that it judges. Every multiplier :math:`\lambda \ge 0` of
-the caps proves a bound, the least priced cost of any path. The best ones are duals of the cheapest
-mixture :math:`w` of the paths :math:`p` that were met so far, with what it exceeds caps by at a
-largest price :math:`\bar\lambda`,
+the caps proves a Lagrangian bound: the least cost of any path with them. The best ones are duals of
+the best mixture :math:`w` of the paths :math:`p` found so far, with what it exceeds caps by at a
+largest multiplier :math:`\bar\lambda`,
 
 .. math::
 
@@ -11,10 +11,10 @@ largest price :math:`\bar\lambda`,
    \quad\text{s.t.}\quad \sum_p w_p = 1, \qquad \sum_p a_b(p) \, w_p \le B_b + z_b
    \quad \text{for every cap } b ;
 
-a path that is cheaper at these is met next (Dantzig and Wolfe, 1960). Then paths are laid down from
-their ends back to the start. One is dropped that cannot cost less than the answer, or exceeds a
+a path of less cost at these is added next (Dantzig and Wolfe, 1960). Then labels are extended
+from the ends back to the start. One is dropped that cannot cost less than the answer, or exceeds a
 cap, or is dominated by another from the same state on. If none is left the answer is the best; if
-too many are, the least bound of those left aside holds for all.
+there are too many, the least bound of those pruned holds for all.
 
 Labels that a formulation hands over say of some states what paths to them have come to in all
 resources. They prove that no path is better if every successor of one of them is dominated by

@@ -179,7 +179,7 @@ class Rebuilt:
         level, evaluator = space.at(part)
         start = evaluator.tables.start()
         self._peaks = tuple(goal.is_peak for goal in evaluator.problem.goals)
-        self.parts, self.states = [part], [start]  # the start passes whatever it takes
+        self.parts, self.states = [part], [start]  # the start needs no test
         self.levels, self.evaluators = [level], [evaluator]
         self._ends, self._count, self._spent = [np.zeros(1, dtype=bool)], 1, np.zeros(1)
         none = np.zeros(0, dtype=np.int64)

@@ -278,7 +278,7 @@ class RuleTables(_Tables):
         return np.asarray(~np.any([each for each, _ in self._broken(bricks, states)], axis=0))
 
     def _broken(self, bricks: int, states: Ints) -> list[tuple[Bools, str]]:
-        """Return which states (n, c) break which rules, the ending aside, and that in words."""
+        """Return which states (n, c) break which rules, and that in words; the ending apart."""
         grips = states[:, : self.robots].clip(min=0)
         count = np.count_nonzero(grips, axis=1)
         struck = (bricks == self._book.span[1]) & (count == 0)  # where nobody holds, props are
@@ -431,7 +431,7 @@ class ScheduleTables(_Tables):
 def check_free(
     network: Network, rules: FreeRules, steps: Sequence[Step], worlds: tuple[Scene, ...] = ()
 ) -> None:
-    """Require that a checked sequence keeps the rules of a free schedule, forces of grips aside."""
+    """Require that a checked sequence keeps the rules of a free schedule; forces are not asked."""
     tables, heavy = RuleTables(RuleBook(network, rules, worlds), []), dict[int, str]()
     if rules.payload is Payload.KEPT:
         heavy = unbearable((network.scene, *worlds), steps, rules.begun(network.scene).begin)

@@ -37,7 +37,7 @@ from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
 
-ENDED = ("time", "memory", "interrupt")  # searches that were told to end: no bound is proven
+ENDED = ("time", "memory", "interrupt")  # searches that were stopped: no bound is proven
 TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what the engine says
 Bounds = tuple[float, ...]
 
@@ -194,7 +194,7 @@ def _multipliers(problem: States, selection: Solution) -> Sequence[Sequence[floa
 
 
 def _require_promised(problem: States, bounds: Bounds, promised: Sequence[float]) -> None:
-    """Raise a `SolverError` if a proven bound, margins aside, is below the claimed one."""
+    """Raise a `SolverError` if a proven bound, except one of margins, is below the claimed one."""
     for goal, bound, least in zip(problem.aims, bounds, promised, strict=False):
         if not goal.margins and not bound >= least - BELOW * abs(least):
             if not problem.budgets:

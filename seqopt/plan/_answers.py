@@ -81,7 +81,7 @@ def called(name: str, kind: type[Result], solve: Callable[[], object]) -> Result
         found = solve()
     except (SeqoptError, MemoryError, KeyboardInterrupt):
         raise
-    except BaseException as error:  # whatever a formulation of others may raise, exits too
+    except BaseException as error:  # foreign code may raise any error, exits too
         raise SolverError(f"formulation {name} failed: {message_of(error)}") from error
     if not isinstance(found, kind):
         raise SolverError(
@@ -261,7 +261,7 @@ def _selected(
     if any(len(state) != 1 for state in selection.states):
         raise SolverError(f"formulation {name} returned nonsense: a state is no node of the graph")
     stopped = INTERRUPT if watch.interrupted else selection.stopped
-    watch.tell(selection.objective[0], selection.bound[0])  # one that is not watched tells nothing
+    watch.tell(selection.objective[0], selection.bound[0])  # without a clock there is no log
     return replace(selection, stopped=stopped, trace=watch.trace)
 
 

@@ -77,7 +77,7 @@ def call(what: str, function: Any, arrays: StateArrays | MoveArrays) -> np.ndarr
     count = len(arrays.possible if isinstance(arrays, StateArrays) else arrays.regrips)
     try:
         found = np.asarray(function(arrays))
-    except Exception as error:  # whatever a function of others may raise
+    except Exception as error:  # foreign code may raise any error
         raise ProblemError(f"{what}: its function failed: {message_of(error)}") from error
     if found.shape != (count,):
         raise ProblemError(
@@ -115,7 +115,7 @@ class Amount:
     of_criterion : bool
         Whether it is the criterion's.
     needs_stays : bool or callable
-        Whether states must tell where a free robot held last, as for its travel; or takes the
+        Whether states must contain where a free robot held last, as for its travel; or takes the
         scene and returns that.
     check : callable, optional
         Takes the problem; raises an error where it cannot be asked for.
@@ -176,7 +176,7 @@ class Amount:
         return values
 
     def tracks_free_robots(self, scene: Scene) -> bool:
-        """Return whether states of a scene must tell where a free robot held last."""
+        """Return whether states of a scene must contain where a free robot held last."""
         return self.needs_stays(scene) if callable(self.needs_stays) else self.needs_stays
 
     def shown(self, value: float) -> float:

@@ -355,7 +355,7 @@ class StepCost:
         try:
             with np.errstate(all="ignore"):
                 found = np.array(self.function(given, bricks), dtype=float)
-        except Exception as error:  # whatever a function of others may raise
+        except Exception as error:  # foreign code may raise any error
             raise ProblemError(f"{what} failed: {message_of(error)}") from error
         if found.shape != impossible.shape:
             raise ProblemError(

@@ -1,4 +1,4 @@
-"""The problem: what is asked of a build, whatever graph of choices answers it."""
+"""The problem: what is asked of a build, independent of the graph that answers it."""
 
 from __future__ import annotations
 

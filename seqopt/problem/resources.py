@@ -5,11 +5,11 @@ and a step from state :math:`s` to :math:`s'` extends it,
 
 .. math:: z' = f(s, s', z), \qquad z' = \infty \; \text{ where the step may not follow this path.}
 
-Of two labels of one state the first *dominates* the other one if whatever may follow that may
-follow it: by default where none of its values is larger, so :math:`f` must not fall in :math:`z`.
-When robots are free, how old mortar is and sums within budgets are carried by labels in the same
-way (`seqopt.graph._labels`). A further resource is registered (`seqopt.register`) and named as a
-limit.
+Of two labels of one state the first *dominates* the other one if every extension of that
+one is feasible for it: by default where none of its values is larger, so :math:`f` must not fall
+in :math:`z`. When robots are free, how old mortar is and sums within budgets are carried by labels
+in the same way (`seqopt.graph._labels`). A further resource is registered (`seqopt.register`) and
+named as a limit.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Resource:
         """Return values after steps, (N, k); a `ProblemError` if its function fails."""
         try:
             found = np.asarray(self.extend(steps, values), dtype=float)
-        except Exception as error:  # whatever a function of others may raise
+        except Exception as error:  # foreign code may raise any error
             raise ProblemError(
                 f"resource {self.name}: its function failed: {message_of(error)}"
             ) from error

@@ -150,7 +150,7 @@ def plan_page(
     left = plan._within.of_builds(tables)  # knows the plan's own steps
     first, *rest = _builds(scene, tables, left, verdicts)
     along = None
-    if isinstance(plan, Plan):  # what it made small, where it is the largest step that counts
+    if isinstance(plan, Plan):  # its objective, where it is the largest step that counts
         criterion = plan._of_scene.criterion
         with suppress(SeqoptError):  # what no table has
             along = _worst_along(scene, first.table, plan.goals[0], criterion)

@@ -282,7 +282,7 @@ def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
 
 
 def _row(plan: Plan) -> dict[str, object]:
-    """Return what a plan is worth, and the seconds that it alone took."""
+    """Return the objective of a plan, and the seconds that it alone took."""
     assert plan.certificate is not None  # asked for
     return {
         "problem": plan.method,
@@ -297,7 +297,7 @@ def _row(plan: Plan) -> dict[str, object]:
 def _facts(
     problem: Decisions, rows: Mapping[str, dict[str, object]], robots: Sequence[str]
 ) -> LoopFacts:
-    """Return the facts of a loop, and add to the published plan's row what it is worth."""
+    """Return the facts of a loop, and add the objective to the published plan's row."""
     method = problem.schedule.method
     if PUBLISHED in rows and not robots:
         choice = published_choice(problem)
@@ -421,7 +421,7 @@ def fixed_methods(engine: Engine) -> dict[str, pd.DataFrame]:
 
 
 def _free_row(plan: Plan) -> dict[str, object]:
-    """Return what a free schedule is worth, for a row: its objective is its worst step."""
+    """Return the objective of a free schedule for a row: its worst step."""
     bound, value = plan.selection.bound[0], plan.selection.objective[0]
     return {
         "problem": FREE,

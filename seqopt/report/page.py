@@ -292,7 +292,7 @@ def _fields(
 
 
 def _packed(values: Floats) -> dict[str, object]:
-    """Return fields (steps, …) as compressed whole numbers, and what one is worth in each step."""
+    """Return fields (steps, …) as compressed whole numbers, and their unit in each step."""
     flat = values.reshape(len(values), -1)
     size = np.abs(flat).max(axis=1, initial=0.0)
     scale = np.where(size > 0, size / LARGEST, 1.0)

@@ -54,7 +54,7 @@ class Block(FrozenValue):
     names: tuple[str, ...]  # responses of `seqopt.responses.quantities.CHOSEN_BY`
     screen: bool = True  # whether six digits are enough
     props: tuple[int, ...] = ()  # numbers of grips that all of them have beside these
-    compiled: bool = False  # whether there is so much to do that compiled loops are worth loading
+    compiled: bool = False  # whether there is so much to do that loading compiled loops pays
 
     @property
     def work(self) -> float:
@@ -130,7 +130,7 @@ def packed(engine: Engine) -> bytes:
     recipe = _known_recipe(engine)
     try:
         return pickle.dumps(engine if recipe is None else recipe)
-    except Exception as error:  # whatever objects of others may raise
+    except Exception as error:  # foreign code may raise any error
         raise SceneError(
             f"engine {type(engine).__name__}: it cannot be sent to other processes ({error}); take "
             "one of seqopt.make_engine, or let this process work alone"

@@ -106,10 +106,10 @@ def _left_out(
     tables = builds.values()
     cells = (cell for t in tables for r in robots for cell in t[f"{r.name}_node"])
     if any(_node(cell) is not None for cell in cells):
-        yield f"that robots give way{_off(within, builds)}"
+        yield f"compliance of robots{_off(within, builds)}"
     props = within.engine.network.scene.props
     if any(prop.stiffness is None for prop in props):
-        yield "that props give way"
+        yield "compliance of props"
     if any(prop.direction for prop in props):
         yield "that props lift off which only push (plans in which one would pull are not allowed)"
     if not staged and any(len(table["step"]) > 1 for table in tables):

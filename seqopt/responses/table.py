@@ -201,7 +201,7 @@ class LinearRange:
         if fields is not None:
             return np.concatenate([self._of(each) for each in fields])
         if isinstance(self._engine, OpeningEngine):
-            return np.full((len(table["step"]), 4), -np.inf)  # whoever goes far is unstable there
+            return np.full((len(table["step"]), 4), -np.inf)  # far motions are unstable
         keys = self._keys(table)
         self._ask(keys)
         return np.array([self._known[key] for key in keys])

@@ -1,4 +1,4 @@
-"""What arms of robots allow, and how their grips give way by the joints.
+"""What arms of robots allow, and the compliance of their grips by the joints.
 
 A room of its own works it out and offers it in `seqopt._registry`: no other one imports it. Nobody
 is asked where robots have no arms.
@@ -89,7 +89,7 @@ def go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
 
 
 def can_hold(scene: Scene, kind: int, node: int) -> bool:
-    """Return whether it is known how grips of a kind give way at a node."""
+    """Return whether the compliance of grips of a kind is known at a node."""
     held = scene.held_postures
     if held is None or not scene.grip_kinds.arms[kind]:
         return True
@@ -123,7 +123,7 @@ def posture_rules(scene: Scene, team: Sequence[int]) -> _NoRules:
 def check_postures(scene: Scene, steps: Sequence[object]) -> None:
     """Raise a `StepError` if arms have no postures that go together in a step.
 
-    Or if their grips give way in another way than their joints do.
+    Or if the compliance of their grips is not that of their joints.
     """
     if scene.has_arms:
         from_arms("check_postures")(scene, steps)

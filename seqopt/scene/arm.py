@@ -75,7 +75,7 @@ class Arm(Terse):
     tool_mass : float
         Of the tool, kg: the robot that places a brick, or takes it away, carries both.
     joint_stiffness : tuple of float
-        Of every joint, N m/rad; N/m if it slides; empty for joints that do not give way. Where it
+        Of every joint, N m/rad; N/m if it slides; empty for rigid joints. Where it
         is given, an arm holds each node in one posture, which makes its grip as stiff as it is.
 
     Examples
@@ -126,7 +126,7 @@ class Arm(Terse):
 
     @property
     def choices(self) -> int:
-        """With how many postures at each node plans are made, as it is: one if joints give way."""
+        """With how many postures at each node plans are made; one if joints are compliant."""
         return 1 if self.joint_stiffness else self.postures
 
     @property
@@ -138,7 +138,7 @@ class Arm(Terse):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HeldPostures(FrozenValue):
-    """The postures of A arms whose joints give way, at N nodes, one of each arm at each node.
+    """The postures of A arms with compliant joints, at N nodes, one of each arm at each node.
 
     ``robots`` (A,): indices of the scene's robots; ``nodes`` (N,): ascending; ``rows`` (A, N):
     postures of the table, -1 for none; ``jacobians``: by arm (N, 6, J), how a node moves with
@@ -158,7 +158,7 @@ class HeldPostures(FrozenValue):
         return int(self.rows[own[0], np.searchsorted(self.nodes, node)])
 
     def compliance(self, arms: Sequence[Arm | None]) -> Floats:
-        """Return how grips give way by the joints alone, (A, N, 6, 6); m and rad, N and N m.
+        """Return the compliance of grips by the joints alone, (A, N, 6, 6); m and rad, N and N m.
 
         ``arms``: of all robots of the scene.
         """

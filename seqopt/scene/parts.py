@@ -501,14 +501,14 @@ class Robot(Terse):
 class _GripKinds(FrozenValue):
     """The K kinds of a scene's robots, in the order of their first ones.
 
-    Robots that give way alike and carry as much are one kind; one with an arm whose joints give way
+    Robots of one compliance and payload are one kind; one with an arm whose joints are compliant
     is a kind by itself. Engines are asked about grips by number: that of the node, and for a robot
     of kind k more by k times the span of all node numbers.
 
     ``compliance`` (K, 6, 6): how a node shifts and turns, m and rad, against the hand that holds
     it for a force and a moment on it, N and N m; zero where the hand is rigid. ``arms`` (K,):
-    whether the joints of an arm give way beside it, as `seqopt.arms` knows of every node.
-    ``turns`` (K,): whether hands of a kind bear moments; others let their nodes turn. ``payload``
+    whether the joints of an arm are compliant, too, as `seqopt.arms` knows of every node.
+    ``turns`` (K,): whether grips of a kind bear moments; others let their nodes turn. ``payload``
     (K,): N. ``of_robot`` (R,): the kind of every robot. ``first``, ``span``: the least node number,
     and how far apart kinds are.
     """
@@ -523,12 +523,12 @@ class _GripKinds(FrozenValue):
 
     @cached_property
     def rigid(self) -> bool:
-        """Whether all hands are rigid and let their nodes turn."""
+        """Whether all grips are rigid and let their nodes turn."""
         return not (self.compliance.any() or self.turns.any() or self.arms.any())
 
     @property
     def gives(self) -> Bools:
-        """Which kinds (K,) give way to forces."""
+        """Which kinds (K,) are compliant to forces."""
         return np.asarray(self.compliance[:, :3, :3].any(axis=(1, 2)) | self.arms)
 
     def numbers(self, nodes: Ints, robots: Sequence[int]) -> Ints:
@@ -630,7 +630,7 @@ class Prop(Terse):
 
     @property
     def as_robot(self) -> Robot:
-        """A robot that gives way and carries as much."""
+        """A robot of the same compliance and payload."""
         payload = math.nextafter(math.inf, 0) if self.capacity is None else self.capacity
         return Robot(name=self.label, payload=payload, stiffness=self.stiffness)
 

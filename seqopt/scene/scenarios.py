@@ -171,7 +171,7 @@ class Scenarios:
         """Return the same scenarios with grips that vary as well.
 
         ``factors``: the least and the largest by which the stiffness of grips is multiplied, the
-        same for all robots that give way alike, joints of arms with them; log-uniform. Rigid grips
+        same for all robots of one compliance, with the joints of arms; log-uniform. Rigid grips
         stay rigid.
         """
         held = _factors("grips", factors)
@@ -280,6 +280,6 @@ def require_alike(nominal: Scene, scene: Scene, number: int) -> None:
     if meant(nominal) != meant(scene):
         raise ProblemError(
             f"scenario {number}: it has other bricks, nodes, joints, robots or props, or another "
-            f"build order than {nominal.name}, or other robots give way alike; vary stiffnesses, "
-            "densities and positions alone"
+            f"build order than {nominal.name}, or other robots share a compliance; vary "
+            "stiffnesses, densities and positions alone"
         )

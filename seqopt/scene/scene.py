@@ -293,7 +293,7 @@ class Scene(Shown):
     ) -> Scene:
         """Return the same scene with grips of all robots of a given stiffness.
 
-        Joints of arms give way no more: what is given stands for them as well.
+        Joints of arms count as rigid then: what is given includes them.
 
         ``stiffness``, ``rotational_stiffness``: as of `Robot`; None for rigid grips, and for such
         as let their nodes turn.
@@ -346,13 +346,13 @@ class Scene(Shown):
 
     @cached_property
     def grip_kinds(self) -> _GripKinds:
-        """How its robots give way where they hold, and after them its props."""
+        """Compliance of its robots where they hold, and after them of its props."""
         holders = [*self.robots, *(prop.as_robot for prop in self.props)]
         return _grip_kinds(holders, [*self.brick_of_node])
 
     @cached_property
     def held_postures(self) -> HeldPostures | None:
-        """The postures in which arms hold whose joints give way; None if there are no such arms.
+        """The postures in which arms with compliant joints hold; None if there are no such arms.
 
         They are computed once, and go along to other processes.
         """

@@ -65,7 +65,7 @@ class _FallingMotion(FrozenValue):
     """A motion of the blocks, and what counts for any grips.
 
     ``work``, ``growth``: of the loads, less what contacts take up, and its growth with z;
-    ``closing``: by which contacts close, priced by the largest corner force; ``speed`` (G,): of
+    ``closing``: by which contacts close, weighted by the largest corner force; ``speed`` (G,): of
     every node.
     """
 

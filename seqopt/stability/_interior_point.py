@@ -1,6 +1,6 @@
 """Forces that hold an assembly, or a motion in which it falls, sought by an interior-point method.
 
-All that contacts and grips can bear is raised by the same force t, which is made small::
+All that contacts and grips can bear is raised by the same force t, which is minimized::
 
     minimize    t
     subject to  E f + w = 0                        every block in equilibrium

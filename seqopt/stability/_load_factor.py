@@ -115,7 +115,7 @@ def load_factors(
     mortar : Mortar or str
         The mortar of all joints, or its name.
     progress : callable, optional
-        Told as a `seqopt.work.Stage` how far it is, step by step.
+        Called with a `seqopt.work.Stage`, step by step.
 
     Returns
     -------

@@ -82,9 +82,9 @@ class Prover:
         return Proven(value, proven, held, answer)
 
     def _refuted(self, case: Case) -> Answer:
-        """Return the answer with hands at every block, as weak as possible, at the largest z.
+        """Return the answer at the largest z, with the weakest external support of every block.
 
-        If hands are needed there, no z will do. The value is what the motion proves they must bear.
+        If these are needed there, no z will do. The value is what the motion proves they must bear.
         """
         assembly = self.assembly
         blocks = len(assembly.centroid)

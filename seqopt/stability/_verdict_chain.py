@@ -1,7 +1,8 @@
 """Whether the steps of a build stand, one after the other: what proves one is tried on the next.
 
-Whatever is tried is a claim: forces hold a step by `seqopt.stability.limit_analysis.violation`
-alone, and a motion makes it fall by `bound` alone. What is left open is solved as a cone program.
+Every answer of a solver is a claim: forces hold a step by
+`seqopt.stability.limit_analysis.violation` alone, and a motion makes it fall by `bound` alone. What
+is left open is solved as a cone program.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ def _labeled(proven: Proven | None, way: Way) -> _Tried:
 class VerdictChain:
     """Proves of one partial structure after the other whether it stands with a mortar.
 
-    Forces and a motion are remembered in N, m and rad. Where not the cone program proves a case, z
+    Forces and a motion are cached in N, m and rad. Where not the cone program proves a case, z
     is only as good as the answer to whether it is zero.
     What is sought is sought near what has changed first.
     """

@@ -129,7 +129,7 @@ def failure_map(
     values : sequence of float, optional
         On the axis.
     progress : callable, optional
-        Told as a `seqopt.work.Stage` how far it is.
+        Called with a `seqopt.work.Stage`.
 
     Returns
     -------

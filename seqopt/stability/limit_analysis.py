@@ -28,7 +28,7 @@ from seqopt.errors import plugins
 EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and max(1, z)
 GAP = 1e-3  # largest difference between the two proofs, relative to max(1, z)
 ROUNDING = 1e-12  # work in a motion treated as zero, over the largest entry of the motion
-LARGEST_FORCE = 10.0  # of a corner, over all loads and payloads: prices motions that violate
+LARGEST_FORCE = 10.0  # of a corner, over all loads and payloads: weight of motions that violate
 _CLOSING = 1e-4  # by which a motion that proves may close a corner, over its largest entry
 CAP = 1e5  # z is sought between 0 and this
 

@@ -40,7 +40,7 @@ def assess_steps(
         Of ``bond``, ``friction``, ``tilt`` and ``payload``, or ``all``; others are NaN. Each takes
         several times as long as a verdict.
     progress : callable, optional
-        Told as a `seqopt.work.Stage` how far it is, step by step.
+        Called with a `seqopt.work.Stage`, step by step.
     workers : int or concurrent.futures.Executor, optional
         Processes to share the steps among, or any executor, which the caller ends.
 

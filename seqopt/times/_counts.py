@@ -2,8 +2,8 @@
 
 Who holds which node is forgotten: what is left is how many bricks stand, and how many robots of
 every kind hold. Every build is a path through these counts that takes as much of the time of all
-and of robots, ways aside; so the time of the shortest one, by multipliers, bounds all builds. There
-are a few hundred counts where there are millions of states.
+and of robots, without travel; so the time of the shortest one, by multipliers, bounds all builds.
+There are a few hundred counts where there are millions of states.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A motion of the blocks takes up work in joints in proportion to their bonds, and in grips. Where
 loads do more, the state falls: an inequality on the bonds of its joints, of all states with as many
-bricks at once. Who has motions has a floor under every wait.
+bricks at once. A set of motions gives a lower bound of every wait.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class _Cut(NamedTuple):
     """A motion: it makes fall where loads do more work than joints and grips take up.
 
     ``work``: of the loads; ``taken`` (j,): by joints with full bond; ``speed`` (2 b + 1,): of nodes
-    and none; ``closing``: by which contacts close, priced; ``needed``: work that is clearly some.
+    and none; ``closing``: by which contacts close, weighted; ``needed``: work that is clearly some.
     """
 
     work: float
@@ -143,9 +143,10 @@ class _Floor(Protocol):
 class CuringStates(NamedTuple):
     """What states of a build in time ask of mortar that cures.
 
-    ``floor``: under waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): the grips, as
-    of `FallCuts`; ``full`` (b,): at which age all joints that a brick closes have their full bond,
-    s; ``placed`` (b,): when bricks that stand at first were in their places, s, zero of others.
+    ``floor``: lower bound of waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): the
+    grips, as of `FallCuts`; ``full`` (b,): at which age all joints that a brick closes have their
+    full bond, s; ``placed`` (b,): when bricks that stand at first were in their places, s, zero of
+    others.
     """
 
     floor: _Floor

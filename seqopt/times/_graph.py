@@ -113,7 +113,7 @@ def _origins(
     """Return from where columns of the states after acts have their readiness, (a, c).
 
     Entries of a kind are sorted, held ones first: those of free robots come in the same order in
-    the state before, who takes a grip aside, and with those who let go.
+    the state before, except for who takes a grip, and with those who let go.
     """
     out = np.full((len(move), found.after.shape[1]), HELD)
     for first, end in slots:

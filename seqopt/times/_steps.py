@@ -2,7 +2,7 @@ r"""When every step of a build begins and ends, from how long robots take.
 
 Two things take time. A robot that holds nothing *prepares* what it does next, from when it let go:
 it fetches the brick that it will place, or comes to the brick that it will hold. Robots prepare at
-the same time, whatever others do. What changes the structure, *acting*, happens one after the
+the same time, independent of others. What changes the structure, *acting*, happens one after the
 other, in the order of the steps, since every state between two steps is one that was looked at:
 with :math:`e_{i-1}` the end of the step before, :math:`r` when the robot of step :math:`i` let go
 last (0 at first), and :math:`p`, :math:`a` what it takes to prepare and to act,

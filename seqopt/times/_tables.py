@@ -90,7 +90,7 @@ def reassign(
     """Return the same grips in the same order by robots with which the build takes least.
 
     ``responses``: of the steps, as of `seqopt.analyze`. A robot may have a grip if it reaches the
-    node, gives way there as the one who had it, and carries the largest force of the grip, and the
+    node, has the same compliance there, and carries the largest force of the grip, and the
     brick that it places or takes away, within its payload; who carried more before may go on. Where
     mortar cures (``waits``, ``begin``: as of `step_times`) its payload is no less than that of the
     one who had it. A `StepError` says that robots have arms.

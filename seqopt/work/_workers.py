@@ -101,7 +101,7 @@ class Crew:
         """Replace workers that died; return whether there are workers again."""
         try:
             self.executor.submit(_nothing)  # an executor's workers are its own matter
-        except Exception:  # whatever an executor of others may raise where it is broken
+        except Exception:  # a broken foreign executor may raise any error
             return False
         return True
 
@@ -156,7 +156,7 @@ class _Processes(Crew):
         return True
 
     def end(self, *, now: bool) -> None:
-        """End the processes, at once or when all is done that was given out; wait for it."""
+        """End the processes, at once or when all dispatched tasks are done; wait for it."""
         if self._leash is not None and now:
             self._leash.close()
         if self._pool is not None:
@@ -246,7 +246,7 @@ def keep(executor: Executor | None = None, workers: int = 1) -> Iterator[None]:
 
 _Task = TypeVar("_Task")
 _Result = TypeVar("_Result")
-_UNDER_WAY = 4  # tasks given out or waiting to be taken, for every worker
+_UNDER_WAY = 4  # tasks dispatched or queued, for every worker
 _PATIENCE = 1.0  # s without an answer, after which workers are looked after
 _FAILURES = 3  # times in a row that workers may end without any answer
 
@@ -268,7 +268,7 @@ def map_ordered(
     crew : Crew, optional
         From `hire`; by default this process.
     done : callable, optional
-        Told here of every task and its result, as soon as there is one.
+        Called with every task and its result, as soon as there is one.
 
     Yields
     ------
@@ -304,7 +304,7 @@ class _Course(Generic[_Task, _Result]):
     function: Callable[[_Task], _Result]
     crew: Crew
     done: Callable[[_Task, _Result], None]
-    waiting: dict[int, _Task] = field(default_factory=dict)  # to be given out
+    waiting: dict[int, _Task] = field(default_factory=dict)  # to be dispatched
     running: dict[Future[Any], tuple[int, _Task]] = field(default_factory=dict)
     ready: dict[int, tuple[bool, Any]] = field(default_factory=dict)
     failures: int = 0
@@ -343,7 +343,7 @@ class _Course(Generic[_Task, _Result]):
             task = self.waiting[number]
             try:
                 future = self.crew.submit(_attempt, self.function, task)
-            except Exception as error:  # whatever an executor of others may raise
+            except Exception as error:  # foreign code may raise any error
                 self._failed(error)
                 return
             self.running[future] = number, self.waiting.pop(number)
@@ -351,7 +351,7 @@ class _Course(Generic[_Task, _Result]):
     def _collect(self) -> None:
         """Wait for at least one answer; tasks whose workers died wait again."""
         failure: BaseException | None = None
-        if not self.running:  # nothing could be given out
+        if not self.running:  # nothing could be dispatched
             return
         while not (ended := wait(self.running, _PATIENCE, FIRST_COMPLETED).done):
             self.crew.look_after()

@@ -11,7 +11,7 @@ from typing import TypeAlias, TypeVar
 _QUIET = 1.0  # s after which a computation says how far it is
 _PAUSE = 0.2  # s between two lines of that
 
-Tell: TypeAlias = Callable[[object], object]  # told in words, or a `Stage`, how far something is
+Tell: TypeAlias = Callable[[object], object]  # called with the progress, in words or as a `Stage`
 _Item = TypeVar("_Item")
 
 

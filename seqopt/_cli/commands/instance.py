@@ -43,8 +43,8 @@ class Instance(Optimize):
 def run(asked: Instance) -> Result:
     """Write the graph of a problem: its nodes and arcs, what they take, what is small and capped.
 
-    Whoever reads it needs no scene. The options are those of optimize; what concerns the search
-    alone is left aside.
+    Reading it needs no scene. The options are those of optimize; what concerns the search
+    alone has no effect.
 
     Usage
     [SCENE] [--out FILE] [options of optimize]

@@ -27,7 +27,7 @@ def run(instance: Path, solution: Path, *, bound: Path | None = None) -> Answer:
         file with the nodes of a path, or after the word arcs its arcs, after acts its acts: text,
         CSV or JSON
     bound : FILE
-        JSON file with a bound for every goal and what proves it: potentials, a cut, prices,
+        JSON file with a bound for every goal and what proves it: potentials, a cut, multipliers,
         weights, shares, labels (default: the judge looks for a proof itself)
 
     Examples

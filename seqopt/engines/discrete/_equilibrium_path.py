@@ -73,7 +73,7 @@ class Held(FrozenValue):
     def left_faces(self, state: Settled) -> bool:
         """Return whether joints that can open let a brick move by more than its length.
 
-        It has then left the faces it stood on, whatever rounding makes of its balance.
+        It has then left the faces it stood on, and no residual below rounding counts.
         """
         return bool(state.broken.any() and np.abs(state.motion).max(initial=0) > self.system.length)
 

@@ -1,4 +1,4 @@
-"""A partial structure as bodies, elastic layers and beds, ready to be settled.
+"""A partial structure as bodies, elastic layers and beds, ready for the solver.
 
 Points of a bed are springs until a bond breaks, then contact and friction. A bond breaks where
 tension exceeds the strength or shear exceeds cohesion and friction, and is then lost for good. What

@@ -8,7 +8,7 @@ a `BedStiffness` the bed alone is the joint, as in the discrete-element models o
 
 One grip set at a time: Newton's method with the exact tangent, the load in steps once a bond
 breaks. What it finds is an equilibrium within all limits, reached from rest with grips that only
-react. `seqopt.stability` asks less: that forces exist, whatever brings them about.
+react. `seqopt.stability` asks less: only that balanced forces exist.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ def _compliances(network: Network, first: int) -> Floats:
 
 TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
 _AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
-_LEAST = 4  # times as many, from which on a thread more is worth starting
+_LEAST = 4  # times as many, from which on one more thread pays
 _SUMMED = 2**22  # the same, where much is done with each, brick after brick
 _TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
 _WORSE = 10.0  # times the rounding that was left when they were summed anew

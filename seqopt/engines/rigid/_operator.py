@@ -162,9 +162,9 @@ class ComplianceOperator(FrozenValue):
 
         Where there are fewer sets than loads of all bricks, their twists and wrenches are summed
         and mapped; else those of the loads are mapped, once, and then summed, all fields together.
-        So are reactions, which few of the wrenches tell.
+        So are reactions, which few of the wrenches determine.
         """
-        few = self.few_loads(len(index))  # whatever was asked before: answers do not depend on it
+        few = self.few_loads(len(index))  # independent of earlier requests
         at_once = tuple(name for name in names if few or name == "support")
         found = {name: self._mapped(name, index, force) for name in names if name not in at_once}
         if not at_once:

@@ -235,7 +235,7 @@ _HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into
 
 
 class Refinement:
-    """Answers grip sets of one partial structure to rounding, whatever is loose in it.
+    """Answers grip sets of one partial structure to rounding, also with loose parts.
 
     ``tied``: whether springs are known to tie every brick to the ground; ``hanging``: of the
     network.

@@ -110,7 +110,7 @@ def _solve_fast(
     """Return what an operator alone says about grip sets, and which of them it answers well enough.
 
     ``compliance``: in the operator's directions; ``even``: whether the joints are about equally
-    stiff: where not, pivots do not tell the whole error; ``accuracy``: largest error of fields,
+    stiff: where not, pivots do not bound the error; ``accuracy``: largest error of fields,
     over the largest entry of each, that is accepted.
     """
     sets, index, pairs = len(columns), operator.load_index(columns), pairs_of(operator, columns)
@@ -165,7 +165,7 @@ def _solve_grown_extremes(
 
 _KEPT = 32e6  # bytes of operators that may stay when another is made
 _SCREEN = 1e-6  # the same, of what is only to be compared
-_EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
+_EVEN = 5e-5  # softest over stiffest joint from which on pivots bound the error
 
 
 class ComplianceEngine(NamedEngine):

@@ -1,1 +1,1 @@
-"""The states of a build and the moves between them, whatever the schedule."""
+"""The states of a build and the moves between them, of every kind of schedule."""

@@ -64,7 +64,7 @@ def floors_of_goals(problem: States) -> tuple[float, ...]:
             out[k] = float(values[0, k])
         if goal.least is not None:
             out[k] = goal.least(space)
-    if problem.orders is not None:  # whatever the order, the whole is passed
+    if problem.orders is not None:  # every order passes the finished structure
         out[0] = max(out[0], whole_bound(problem))
     return tuple(out)
 
@@ -218,7 +218,7 @@ def bisected(name: str, exists: Callable[[float], bool]) -> tuple[float, float]:
     low, high = 0.0, FIRST[name]
     while not exists(high):
         if high >= WORST[name]:
-            raise InfeasibleError("no plan of the free schedule stands, whatever the margin")
+            raise InfeasibleError("no plan of the free schedule stands, at any margin")
         low, high = high, min(WORST[name], 4 * high)
     while high - low > 0.6 * slack(name, high):  # the rest is for sets that stay open
         middle = (low + high) / 2

@@ -336,7 +336,7 @@ class States(Shown):
 
     @property
     def aims(self) -> tuple[Amount, ...]:
-        """The goals that are to be made small."""
+        """The goals that are minimized."""
         return self.goals[: len(self.goals) - len(self.budgets)]
 
     @cached_property

@@ -261,7 +261,7 @@ def _scales(axes: Axes, table: RegretTable, seen: pd.DataFrame) -> None:
 
 
 def _ways_with_parts(table: RegretTable) -> pd.DataFrame:
-    """Return the ways whose parts are shown: what no other beats, and the usual of each engine."""
+    """Return the ways whose parts are shown: not dominated, or the default of an engine."""
     own = table.table.assign(kept=table.kept)
     usual = own["formulation"].isin(USUAL_NAMES) | own["kept"]
     seen: pd.DataFrame = own[usual & np.isfinite(own["regret"].to_numpy(float))]

@@ -13,7 +13,7 @@ counts for all: a loop leaves its robots where they are, and what then bears its
 as of a free schedule. Beside it stand its parts: the *gap* of the plan to the bound that the way
 proves, in its own model, and the *error* of the worst step that its own model promised.
 
-All ways share the time that is given: whoever needs less leaves more to those after it. Each is
+All ways share the time limit: one that needs less leaves more to those after it. Each is
 repeated up to `TIMES` times where that takes little; the least time counts.
 """
 
@@ -248,7 +248,7 @@ def measure_regret(
         the scene has. Where the engine has a mortar, every step has to stand with it, too, which is
         proven by its joints' equilibrium; ``discrete`` lets these open and slip instead.
     progress, timer : callable, Timer, optional
-        Called with the progress; tells the time.
+        Called with the progress.
 
     Returns
     -------

@@ -159,7 +159,7 @@ class RegretTable:
         }
 
     def lines(self) -> Iterator[str]:
-        """Yield the table in at most `COLUMNS` letters: ``*`` marks what no other way beats."""
+        """Yield the table in at most `COLUMNS` letters: ``*`` marks ways that are not dominated."""
         zero = "proven best of the free schedule" if self.is_proven else "of the best plan known"
         yield from _wrapped(
             f"Regret: what the worst step ({self.worst}) takes, valued by {self.valued}, above "
