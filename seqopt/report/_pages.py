@@ -20,7 +20,7 @@ from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import overloads
 from seqopt.report._regret._table import RegretTable
 from seqopt.report._robots import _known_arms
-from seqopt.report.comparison import CLOSED, Comparison, fixed_methods, largest, shown_table
+from seqopt.report.comparison import CLOSED, Comparison, largest, method_tables, shown_table
 from seqopt.report.page import Build, Scatter, _Drawn, report_page
 from seqopt.report.text import IN_UNITS, _worst_along, in_words
 from seqopt.responses.table import (
@@ -144,7 +144,7 @@ def plan_page(
     tables = {name: plan.responses() if table is None else table, **(others or {})}
     small = len(scene.bricks) <= SMALL
     if small:
-        tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
+        tables |= {key: each for key, each in method_tables(engine)[0].items() if key not in tables}
     prover = prover or BuildProver(engine.network, SHOWN if small else {})
     verdicts = prover.of_builds({key: _steps_in_table(scene, t) for key, t in tables.items()})
     left = plan._within.of_builds(tables)  # knows the plan's own steps

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -145,7 +144,7 @@ def compare(
     Comparison
     """
     asked, engine = engine, simplest(engine)
-    scene, (tables, notes, refused) = engine.network.scene, _method_tables(engine, robots)
+    scene, (tables, notes, refused) = engine.network.scene, method_tables(engine, robots)
     maxima = pd.DataFrame({name: _quantities(scene, t) for name, t in tables.items()})
     known = published_about(scene) if tables else None
     printed = None if known is None else known.maxima.set_axis(maxima.index)
@@ -310,7 +309,7 @@ def _facts(
 
 def method_tables(
     engine: Engine, robots: Sequence[str] = ()
-) -> tuple[dict[str, pd.DataFrame], list[str]]:
+) -> tuple[dict[str, pd.DataFrame], list[str], dict[str, StepError | MechanismError]]:
     """Return the responses of every method without open grips, and of the published plan.
 
     Parameters
@@ -327,17 +326,9 @@ def method_tables(
     notes : list of str
         Why other methods cannot build the scene or are not what they are called, and which robots
         never grip.
+    refused : dict of str to StepError or MechanismError
+        Why each method that is left out is.
     """
-    tables, notes, refused = _method_tables(engine, robots)
-    if not tables:
-        raise next(iter(refused.values()))
-    return tables, notes
-
-
-def _method_tables(
-    engine: Engine, robots: Sequence[str]
-) -> tuple[dict[str, pd.DataFrame], list[str], dict[str, StepError | MechanismError]]:
-    """Return the same, though it may be none, and why each method that is left out is."""
     scene = engine.network.scene
     tables: dict[str, pd.DataFrame] = {}
     refused: dict[str, StepError | MechanismError] = {}
@@ -411,13 +402,6 @@ def _free_plan(
             said = [f"{how} (least_grips=0, newest=free{kept})"] if alone else []
             break
     return None if plan is None else on_the_way(plan), said
-
-
-def fixed_methods(engine: Engine) -> dict[str, pd.DataFrame]:
-    """Return the responses of every method without open grips, as `method_tables`; or of none."""
-    with suppress(StepError, MechanismError):
-        return method_tables(engine)[0]
-    return {}
 
 
 def _free_row(plan: Plan) -> dict[str, object]:
@@ -505,13 +489,6 @@ def format_comparison(
     str
         Of many lines.
     """
-    return "\n\n".join(_comparison_blocks(comparison, scene, criterion, width))
-
-
-def _comparison_blocks(
-    comparison: Comparison, scene: Scene, criterion: Criterion, width: int
-) -> list[str]:
-    """Return blocks of lines, each of which begins with its heading."""
     blocks = [
         [f"{scene.name}: {len(scene.bricks)} bricks, {len(scene.robots)} robots"],
         ["Largest response of any step", *_responses(comparison), "", _about(comparison)],
@@ -535,7 +512,7 @@ def _comparison_blocks(
         how: Any = {"break_long_words": False, "break_on_hyphens": False}
         return textwrap.fill(line, width, subsequent_indent=rest, **how)
 
-    return ["\n".join(map(wrapped, block)) for block in blocks]
+    return "\n\n".join("\n".join(map(wrapped, block)) for block in blocks)
 
 
 def _unlike(table: pd.DataFrame) -> dict[str, int]:

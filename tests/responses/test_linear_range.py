@@ -262,7 +262,7 @@ def test_a_set_that_is_printed_makes_neither_page_nor_verdicts(
     assert main([*asked, "--out", str(tmp_path / "out")]) == 1
     written = json.loads(capsys.readouterr().out)
     home = "seqopt._cli.commands.pareto"
-    for name in ("front_page", "fixed_methods", "csv_text"):
+    for name in ("front_page", "method_tables", "csv_text"):
         monkeypatch.setattr(f"{home}.{name}", lambda *_, name=name: pytest.fail(name))
     monkeypatch.setattr(BuildProver, "_ask", lambda *_: pytest.fail("what stands"))
     assert main(asked) == 1

@@ -20,7 +20,7 @@ from seqopt.network.build import build_network
 from seqopt.problem.requirements import Criterion
 from seqopt.report._pages import comparison_page
 from seqopt.report._regret._measure import check_reference
-from seqopt.report.comparison import Comparison, _comparison_blocks, _printed_largest, compare
+from seqopt.report.comparison import Comparison, _printed_largest, compare, format_comparison
 from seqopt.responses.table import builds_in_words
 from seqopt.stability._builds import BuildProver
 from seqopt.workflow import DEFAULTS
@@ -93,7 +93,7 @@ def _answer(
     scene = engine.network.scene
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
     about = {"criteria": criteria, **provenance(engine)}
-    blocks = _comparison_blocks(result, scene, criterion, columns())
+    blocks = [format_comparison(result, scene, criterion, columns())]
     if result.speed is not None:
         blocks.append("\n".join([SPEED, str(result.speed)]))
     written: tuple[Path, ...] = ()

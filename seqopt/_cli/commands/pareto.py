@@ -27,7 +27,7 @@ from seqopt.problem.amounts import judged_by
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import _said_limits
 from seqopt.report._pages import front_page, plan_page
-from seqopt.report.comparison import fixed_methods, shown_table
+from seqopt.report.comparison import method_tables, shown_table
 from seqopt.report.page import task_texts
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import Departure, LinearRange, _analyze_builds, builds_in_words
@@ -128,7 +128,7 @@ class Found:
     def methods(self) -> Mapping[str, pd.DataFrame]:
         """Plans of fixed methods for comparison, if computed in time."""
         return self.clock.spare(
-            "fixed methods beside", lambda: fixed_methods(self.problem.engine), {}
+            "fixed methods beside", lambda: method_tables(self.problem.engine)[0], {}
         )
 
     @cached_property
