@@ -145,7 +145,15 @@ def compare(
     """
     asked, engine = engine, simplest(engine)
     scene, (tables, notes, refused) = engine.network.scene, method_tables(engine, robots)
-    maxima = pd.DataFrame({name: _quantities(scene, t) for name, t in tables.items()})
+    largest_by_robot: dict[str, dict[str, float]] = {
+        name: {
+            f"{robot_response(r.name)} [N]": table[force_column(r)].abs().max()
+            for r in scene.robots
+        }
+        | {f"{n} [{LARGEST[n]}]": v for n, v in largest(scene, table).items() if n != "F_rob"}
+        for name, table in tables.items()
+    }
+    maxima = pd.DataFrame(largest_by_robot)
     known = published_about(scene) if tables else None
     printed = None if known is None else known.maxima.set_axis(maxima.index)
     rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
@@ -269,15 +277,6 @@ def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
     forces = table[[force_column(robot) for robot in scene.robots]].abs()
     worst = {name: float(table[RESPONSES[name].column].max()) for name in [*LARGEST][1:]}
     return {"F_rob": float(np.nanmax(forces.to_numpy(float))), **worst}
-
-
-def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
-    """Return the largest responses of any step, the force of every robot for itself."""
-    forces = {
-        f"{robot_response(r.name)} [N]": table[force_column(r)].abs().max() for r in scene.robots
-    }
-    worst = {f"{n} [{LARGEST[n]}]": v for n, v in largest(scene, table).items() if n != "F_rob"}
-    return pd.Series(forces | worst)
 
 
 def _row(plan: Plan) -> dict[str, object]:

@@ -153,7 +153,10 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
 
 def _alone(table: RegretTable, width: float) -> Figure:
     """Return the chart of one scene: regret over time, and its parts way by way."""
-    parts = _ways_with_parts(table)
+    own = table.table.assign(kept=table.kept)  # those not dominated, and defaults
+    shown = (own["formulation"].isin(USUAL_NAMES) | own["kept"]) & np.isfinite(own["regret"])
+    by = ["regret", "seconds"]
+    parts = own[shown].sort_values(by, ascending=False, kind="stable")
     said = table.sentence.replace("_", " ")  # no name of the code
     lines = textwrap.wrap(said, int((width - 0.2) / LETTER), break_on_hyphens=False)
     figure = new_figure(4.3 + 0.15 * len(lines) + 0.3 * len(parts), width)
@@ -188,7 +191,9 @@ def _height(regret: float) -> float:
 def _regrets(axes: Axes, table: RegretTable) -> tuple[list[Label], list[tuple[Axes, float, float]]]:
     """Draw regret over time; return words for points, and where these are."""
     seen = table.table.assign(kept=table.kept)
-    seen = seen[np.isfinite(seen["regret"].to_numpy(float))].sort_values("kept")
+    seen = seen[np.isfinite(seen["regret"].to_numpy(float))].sort_values(
+        ["kept", "seconds"], ascending=[True, False]
+    )
     taken, labels, named = (
         list[tuple[Axes, float, float]](),
         list[Label](),
@@ -211,17 +216,12 @@ def _regrets(axes: Axes, table: RegretTable) -> tuple[list[Label], list[tuple[Ax
             engine = f"{row['engine']}: " * (row["engine"] != table.reference)
             words = textwrap.fill(engine + _words(row), LINE)
             labels.append(Label(axes, at, words, bool(row["kept"])))
-    _frontier(axes, seen)
+    kept = seen[seen["kept"]][::-1]  # no way lies below these steps
+    steps: dict[str, Any] = {"color": INK, "lw": 0.8, "drawstyle": "steps-post", "zorder": 1}
+    axes.plot(kept["seconds"], kept["regret"].cummin().map(_height), **steps)
     _curves(axes, table)
     _scales(axes, table, seen)
     return labels, taken
-
-
-def _frontier(axes: Axes, seen: pd.DataFrame) -> None:
-    """Draw the steps below which no way lies."""
-    kept = seen[seen["kept"]].sort_values("seconds")
-    least = kept["regret"].cummin().map(_height)
-    axes.plot(kept["seconds"], least, color=INK, lw=0.8, drawstyle="steps-post", zorder=1)
 
 
 def _curves(axes: Axes, table: RegretTable) -> None:
@@ -258,14 +258,6 @@ def _scales(axes: Axes, table: RegretTable, seen: pd.DataFrame) -> None:
         spot: dict[str, Any] = {"xycoords": "axes fraction", "ha": "right", "va": "top"}
         text = axes.annotate(words, (0.995, 0.99 - 0.07 * line), fontsize=SMALL, color=GRAY, **spot)
         text.set_in_layout(False)
-
-
-def _ways_with_parts(table: RegretTable) -> pd.DataFrame:
-    """Return the ways whose parts are shown: not dominated, or the default of an engine."""
-    own = table.table.assign(kept=table.kept)
-    usual = own["formulation"].isin(USUAL_NAMES) | own["kept"]
-    seen: pd.DataFrame = own[usual & np.isfinite(own["regret"].to_numpy(float))]
-    return seen.sort_values(["regret", "seconds"], ascending=False, kind="stable")
 
 
 def _parts(axes: Axes, rows: pd.DataFrame, decades: int) -> None:

@@ -260,8 +260,13 @@ def measure_regret(
         If there is no such reference, or no way finds a plan that stands in it.
     """
     start = timer.now()
-    mortar = _mortar_of(engine)
-    named = _find_reference(engine, reference, mortar)
+    check_reference(reference)
+    recipe, named = recipe_of(engine), engine
+    options = {} if recipe is None else dict(recipe.options)
+    mortar = options["mortar"] if isinstance(options.get("mortar"), Mortar) else None
+    if reference or recipe is not None:  # else an object of one's own
+        joints = mortar if reference in LIMITED else None
+        named = make_engine(reference or USUAL_ENGINE, engine.network, joints)
     worst = WORST_OVER_METHODS if isinstance(criterion, RankSum) else criterion
     problem = pose(named, rules, worst, "minmax")
     course = _Course(problem, criterion, _loop(engine), rules, mortar, timer)
@@ -279,8 +284,12 @@ def measure_regret(
         if rows[-1]["status"] == CUT and way.formulation not in FEW:
             late.add((way.engine, way.schedule))
         curves[done] = tuple(course.findings)
-    table = _with_regret(pd.DataFrame(rows))
-    if not np.isfinite(table["value"].min()):
+    table = pd.DataFrame(rows)
+    best = table["value"].min()
+    regret = ((table["value"] - best) / (abs(best) or 1.0)).clip(lower=0.0)
+    regret, error = (e.where(~(e < NOTHING), 0.0) for e in (regret, table["error"]))
+    table = table.assign(regret=regret, error=error)
+    if not np.isfinite(best):
         why = next((f": {row['engine']}, {row['why']}" for row in rows if row["why"]), "")
         raise NothingFoundError(f"regret: no plan holds in the reference{why}; give more seconds")
     scene = engine.network.scene
@@ -295,25 +304,11 @@ def _name_of(engine: Engine) -> str:
     return type(engine).__name__ if recipe is None else recipe.name
 
 
-def _mortar_of(engine: Engine) -> Mortar | None:
-    recipe = recipe_of(engine)
-    found = dict(recipe.options).get("mortar") if recipe else None
-    return found if isinstance(found, Mortar) else None
-
-
 def check_reference(name: str) -> None:
     """Raise a `ProblemError` if no engine that can value plans has a name; the empty one may."""
     known = [each for each in ENGINES if each != "auto"]
     if name and name not in known:
         raise ProblemError(f"reference {name!r} does not exist; give one of {', '.join(known)}")
-
-
-def _find_reference(engine: Engine, name: str, mortar: Mortar | None) -> Engine:
-    """Return the engine that values plans: the most detailed one that the scene has data for."""
-    check_reference(name)
-    if recipe_of(engine) is None and not name:
-        return engine  # an object of one's own
-    return make_engine(name or USUAL_ENGINE, engine.network, mortar if name in LIMITED else None)
 
 
 def _loop(engine: Engine) -> Schedule | None:
@@ -374,11 +369,3 @@ def _formulations(kind: str) -> list[str]:
         return slow, each.name != "path_dp"
 
     return [each.name for each in sorted(known, key=late)]
-
-
-def _with_regret(table: pd.DataFrame) -> pd.DataFrame:
-    """Return rows with their regret; less than `NOTHING` is none."""
-    best = table["value"].min()
-    regret = ((table["value"] - best) / (abs(best) or 1.0)).clip(lower=0.0)
-    regret, error = (e.where(~(e < NOTHING), 0.0) for e in (regret, table["error"]))
-    return table.assign(regret=regret, error=error)
