@@ -21,7 +21,7 @@ from seqopt.exchange._compas_models import (
 from seqopt.exchange._compas_shapes import kind, payload
 from seqopt.exchange._content import Content, assembly_json
 from seqopt.exchange._mesh_files import read_3dm, read_glb, read_mesh, read_obj, write_obj
-from seqopt.exchange._tables import boxes_csv, plan_csv, plan_json, read_boxes
+from seqopt.exchange._tables import plan_csv, plan_json, read_boxes
 from seqopt.exchange._tasks import Task, tasks_csv, tasks_in_postures, tasks_json
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
@@ -157,13 +157,7 @@ BUILT_IN = {
             lost=("densities", *_NEVER),
         ),
         *(Format(n, read=partial(_document, n)) for n in [*DOCUMENTS][1:]),
-        Format(
-            "boxes",
-            ("csv",),
-            partial(_of_text, read_boxes),
-            lambda scene, _: boxes_csv(scene),
-            lost=("shapes other than boxes", *_NEVER, "steps"),
-        ),
+        Format("boxes", ("csv",), partial(_of_text, read_boxes)),
         Format(
             "obj",
             ("obj",),

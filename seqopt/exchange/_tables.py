@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import math
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -172,24 +171,3 @@ def _number(where: str, row: dict[str, str], name: str, otherwise: str = "") -> 
     if abs(value) > LARGEST or (text and math.isnan(value)):
         raise SceneError(f"{where}: {name} is {short(text)}; give a number")
     return value
-
-
-def boxes_csv(scene: Scene) -> str:
-    """Return bricks as the table of boxes that ``import`` reads, in m and degrees.
-
-    A brick of another shape is as long, wide and high as it extends.
-    """
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    turns, sizes = ("roll", "pitch", "yaw"), ("length", "width", "height")
-    writer.writerow(["name", "x", "y", "z", *sizes, *turns, "density", "course"])
-    for brick in scene.bricks:
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to import
-
-        turn = Rotation.from_matrix(brick.frame.T)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of many angles for a turn one is enough
-            angles = turn.as_euler("xyz", degrees=True).tolist()
-        numbers = [*brick.position, *brick.dimensions, *angles, brick.density]
-        writer.writerow([brick.name, *map(repr, numbers), scene.since[brick.name]])
-    return out.getvalue()

@@ -31,6 +31,7 @@ from seqopt.sequence.rules import with_robots
 from seqopt.sequence.schedule_file import read_site
 from tests.arms.scenes import two_arms
 from tests.builders import small_arch
+from tests.documents import BOXES
 from tests.quality.fuzz_cases import CHANGES, _changed_plan, _noise, pick, plan_text
 
 Read = Callable[[Path], object]
@@ -124,9 +125,10 @@ def _of_imports() -> Iterator[tuple[str, File]]:
 
     scene = seqopt.load_scene(RIGHT)
     steps = seqopt.sequential(seqopt.build_network(scene))
-    for form, end in (("compas_assembly", "json"), ("boxes", "csv"), ("obj", "obj")):
+    for form, end in (("compas_assembly", "json"), ("obj", "obj")):
         text = export_plan(scene, steps, form)
         yield form, (f"i.{end}", text.encode() if isinstance(text, str) else text, brought)
+    yield "boxes", ("i.csv", BOXES.encode(), brought)
     made = trimesh.Scene([trimesh.creation.box((0.2, 0.1, 0.1))])
     for end in ("glb", "ply", "stl"):
         whole = made if end == "glb" else made.to_mesh()
