@@ -68,14 +68,6 @@ def test_within_a_budget_a_poor_answer_is_seen_and_prices_need_not_be_believed(p
             answer(costs, told(costs, poor, value, prices=prices))
 
 
-@pytest.mark.parametrize("choice", [(1,), (0,)])
-def test_a_choice_that_is_not_allowed_has_no_node(choice):
-    costs = Costs(LayeredCosts((np.array([0.0, np.inf]),), (np.zeros((1, 2)),)))
-    assert path_of(costs.compiled(), choice) == ((1,) if choice == (0,) else ())
-    with pytest.raises(SolverError):
-        answer(costs, told(costs, (1,), 0.0))
-
-
 def proven(costs, aim):
     """What the judge proves of any choice, given one."""
     choice = next(iter(costs.within(aim)))
@@ -99,15 +91,6 @@ def test_the_least_is_found_among_costs_of_any_size_and_sign(seed):
     costs = Costs(LayeredCosts(single, shared))
     for aim in Aim:
         assert proven(costs, aim) == pytest.approx(costs.best(aim), rel=1e-12, abs=1e-12)
-
-
-@pytest.mark.parametrize("others", [(), (7.0,), (7.0, 9.0), (7.0, 9.0, np.inf)])
-def test_the_least_peak_may_be_the_lowest_or_the_highest_of_all_costs(others):
-    costs = LayeredCosts((np.array([5.0, *others]),), (np.full((1, 1 + len(others)), 5.0),))
-    assert proven(Costs(costs), Aim.PEAK) == 5
-    high = LayeredCosts((np.array([5.0, *others]), np.array([11.0])), (
-        costs.shared[0], np.full((1 + len(others), 1), 6.0)))  # fmt: skip
-    assert proven(Costs(high), Aim.PEAK) == 11
 
 
 def signed(*bounds):

@@ -10,7 +10,6 @@ import pytest
 import seqopt
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SolverError, StepError
-from seqopt.graph.formulation import find_formulation
 from seqopt.graph.states.states import build_states, within
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
@@ -65,21 +64,6 @@ def test_a_limit_that_is_exceeded_is_seen(plan):
     capped = replace(plan.problem, limits=(Limit("M_sup", 0.99 * worst),))
     with pytest.raises(SolverError, match="exceeds the limit on M_sup"):
         judge_schedule(capped, plan.selection, plan.steps)
-
-
-def test_problems_go_to_their_own_formulations(plan):
-    """Whatever chooses a path through a graph takes states; what finds other things does not."""
-    for own in ("minmax", seqopt.formulations()["pareto_zones"], "order_search"):
-        with pytest.raises(ProblemError):
-            solve(plan.graph, own)
-    with pytest.raises(ProblemError, match=r"are asked for; use .*schedule_search"):
-        solve(plan.graph, "pareto_zones")
-    found = solve(plan.graph, "minimax")
-    assert found.objective["minmax"] == pytest.approx(plan.objective["minmax"])
-    with pytest.raises(ProblemError, match="and Pareto sets are asked for; use pareto_zones"):
-        find_front(FrontProblem(posed("F_largest")), "schedule_search")
-    with pytest.raises(ProblemError, match="a object is not a problem"):
-        solve(object(), find_formulation("schedule_search"))
 
 
 @pytest.mark.parametrize(

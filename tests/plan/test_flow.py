@@ -127,11 +127,6 @@ def test_multipliers_are_costs_over_amounts(unit):
         assert found.prices["use"] == pytest.approx(1.0 / unit, rel=1e-5)
 
 
-def test_costs_of_nothing_have_a_scale():
-    free = Costs(LayeredCosts(*amounts(([0, 0],), ([[0, 0]],))))
-    assert np.isfinite(flow_through(free).cost).all()
-
-
 @pytest.mark.parametrize(
     "sizes", [(3, 2), (3, 2, 3), (3, 2, 1), (4, 2, 2), (2, 2, 2), (3, 2, 2, 1)]
 )

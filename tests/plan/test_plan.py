@@ -10,9 +10,9 @@ import pytest
 import seqopt
 from seqopt import Search
 from seqopt.engines.interface import Want
-from seqopt.errors import ProblemError, StepError
+from seqopt.errors import ProblemError
 from seqopt.graph.decision_costs import LayeredCosts
-from seqopt.graph.decisions import pose_decisions, travel
+from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import FormulationKind
 from seqopt.study.published import find_criterion
 from seqopt.workflow import Robust
@@ -117,17 +117,6 @@ def test_a_plan_of_costs_alone_has_a_path_and_no_steps():
 
 
 @pytest.mark.parametrize("name", seqopt.formulations("costs"))
-def test_budgets_are_refused_by_those_that_do_not_take_them(problem25, name):
-    problem = replace(problem25, budgets=(travel(problem25, 1e3),))
-    formulation = seqopt.formulations()[name]
-    if formulation.takes_budgets:
-        assert seqopt.solve(problem, name).certificate.spent
-        return
-    with pytest.raises(ProblemError, match="couples all moves; use labels or lagrangian"):
-        seqopt.solve(problem, name)
-
-
-@pytest.mark.parametrize("name", seqopt.formulations("costs"))
 def test_without_proof_only_windows_are_searched(counted, name):
     engine, problem = counted
     formulation = seqopt.formulations()[name]
@@ -149,31 +138,6 @@ def test_the_short_cut_does_what_the_long_way_does(arch25, engine25):
         short = seqopt.optimize(scene)
         assert short.nodes == plan.nodes
         assert short.certificate.objective == pytest.approx(plan.certificate.objective, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "error", "message"),
-    [
-        ({"scene": "arch26"}, seqopt.SeqoptError, "no such built-in scene or file"),
-        ({"schedule": "ring"}, StepError, "give one of three-robot, modified-sequential"),
-        ({"criterion": "ranks"}, ProblemError, "give one of equations-2-3"),
-        ({"formulation": "dp"}, ProblemError, "give one of beam, best_first, cascade"),
-        (
-            {"search": Search(options={"width": 3})},
-            ProblemError,
-            "option width: overlap_dp has seconds, max_memory",
-        ),
-        (
-            {"formulation": "beam", "search": Search(options={"horizon": 3})},
-            ProblemError,
-            "option horizon: beam has seconds, max_memory",
-        ),
-        ({"engine": "x"}, seqopt.SeqoptError, "known are auto"),
-    ],
-)
-def test_a_wrong_word_gets_the_words_there_are(arch25, wrong, error, message):
-    with pytest.raises(error, match=message):
-        seqopt.optimize(**({"scene": arch25} | wrong))
 
 
 def test_every_plan_has_one_summary():

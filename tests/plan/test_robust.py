@@ -296,19 +296,6 @@ def largest_force(scene, plan):
     return rows[["F_rob1_N", "F_rob2_N", "F_rob3_N"]].abs().max().max()
 
 
-def test_peaks_of_scenarios_join_into_one():
-    problem = posed()
-    some = scenarios(problem.schedule.scene, count=3)
-    found = graph_of(robust(problem, some, WORST_PEAK))
-    layers = [costs.peaks for costs in found.costs_in_scenarios]
-    joined = largest_of(layers)
-    choice = seqopt.solve(problem, "overlap_dp").choice
-    assert joined.worst(choice) == max(costs.worst(choice) for costs in layers)
-    best = found.decisions.compiled(Aim.PEAK, each=found.costs_in_scenarios)
-    assert seqopt.solve(found).objective["worst-peak"] == joined.least(Aim.PEAK)
-    assert best.instance.goals[0].name == "minmax (worst-peak)"
-
-
 # bad input
 
 
