@@ -17,7 +17,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.graph import TimedGraph
 from seqopt.network.network import Network
-from seqopt.problem.amounts import BUILT_IN, Amount, MoveArrays, StateArrays
+from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays
 from seqopt.problem.requirements import Limit
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.sequence.rules import FreeRules
@@ -73,24 +73,15 @@ def _none(states: StateArrays) -> Floats:
     return np.zeros(len(states.possible))
 
 
-def _count(moves: MoveArrays) -> Floats:
-    return np.full(moves.regrips.shape, 1.0)
-
-
-def _taken(moves: MoveArrays) -> Floats:
-    return np.where(moves.regrips > 0, 1.0, 0.0)
-
-
-def _gone(moves: MoveArrays) -> Floats:
-    return np.abs(moves.distances)
-
-
 TWINS = {
     "minmax": Twin(_criterion),
     "sum": Twin(_criterion),
-    "steps": Twin(_count, lambda tables, level, states: tables.steps_to_go(level, states)),
-    "regrips": Twin(_taken),
-    "travel": Twin(_gone),
+    "steps": Twin(
+        lambda moves: np.full(moves.regrips.shape, 1.0),
+        lambda tables, level, states: tables.steps_to_go(level, states),
+    ),
+    "regrips": Twin(lambda moves: np.where(moves.regrips > 0, 1.0, 0.0)),
+    "travel": Twin(lambda moves: np.abs(moves.distances)),
 }
 
 

@@ -70,10 +70,10 @@ def judge_unseen(plan: Plan, scenes: States | Scenarios | Sequence[Scene]) -> Tr
     scene and of the scenarios that it was made for. Raises `ProblemError` if a scenario has other
     bricks or nodes.
     """
-    graph, own = plan.graph, getattr(plan.graph, "decisions", None)
+    graph = plan.graph.alone_in_scene
+    own = graph.decisions
     if own is None or not graph.scenarios:
         raise ProblemError("the plan was not chosen over scenarios; pose with scenarios")
-    assert isinstance(graph, States)  # as one that has decisions
     aim = graph.over.aim
     known = ScenarioCosts(own.sums, own.peaks, 0, 0.0)
     chosen = best_choice(aim.costs(own), aim)

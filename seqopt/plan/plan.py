@@ -306,13 +306,6 @@ class Plan(ShownBuild):
         return window_models(self.decisions.schedule, self.choice)
 
     @property
-    def _models_in_proof(self) -> int | None:
-        """How many models prove it: those solved anew, or all where costs are given."""
-        if self.gap is None or self.certificate is None:
-            return None
-        return self.certificate.models or self.models
-
-    @property
     def regrips(self) -> int:
         """Number of grips taken besides those that place a brick."""
         return sum(step.kind is StepKind.REPOSITION for step in self.steps)
@@ -377,6 +370,7 @@ class Plan(ShownBuild):
             return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}
         graph, proof, scene = self._of_scene, self.certificate, self.engine.network.scene
         asked = self.problem if isinstance(self.problem, Problem) else graph
+        in_proof = None if proof is None or self.gap is None else proof.models or self.models
         return {
             "scene": scene.name,
             "schedule": self.method,
@@ -396,7 +390,7 @@ class Plan(ShownBuild):
             "payload_exceeded": [str(excess) for excess in self.overloads],
             "models_evaluated": self.models,
             "models_in_six_digits": graph.six_digit_models,
-            "models_in_proof": self._models_in_proof,
+            "models_in_proof": in_proof,  # all where costs are given
             "states_in_proof": 0 if proof is None else proof.states,
             **self._of_order(),
             "seconds": dict(self.seconds),

@@ -15,7 +15,7 @@ from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.responses.table import analyze
 from seqopt.scene._armed import check_postures
 from seqopt.scene.scene import Scene, in_order
-from seqopt.sequence.rules import FreeRules, Payload
+from seqopt.sequence.rules import Payload
 from seqopt.sequence.steps import Site, Step, _begin_step
 
 
@@ -75,7 +75,6 @@ def goes_on(states: States, steps: Sequence[Step]) -> dict[str, float]:
     Raises a `SeqoptError` that names what they break.
     """
     rules = states.free_rules
-    assert isinstance(rules, FreeRules)
     scene, kept = states.network.scene, rules.payload is Payload.KEPT
     begun = (_begin_step(scene, rules.begin), *steps)
     if kept and (over := _carrying_excesses(scene, begun)):

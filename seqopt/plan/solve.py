@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
 
-from seqopt.engines.interface import Engine
 from seqopt.errors import (
     InfeasibleError,
     ProblemError,
@@ -156,7 +155,10 @@ def _chosen(graph: States | Instance, formulation: Formulation, run: Run) -> Pla
     options are incompatible; `SolverError` if an answer fails its check.
     """
     if isinstance(graph, Instance):
-        found = _from_arcs(graph, formulation, run)
+        require_time(formulation, run.time_limit)
+        if run.lazy:
+            raise ProblemError("an instance has all its costs; leave out lazy")
+        found = find_path(graph, formulation, run)
     elif graph.decisions is not None:
         found = _from_decisions(graph, graph.decisions, formulation, run)
     else:
@@ -164,14 +166,6 @@ def _chosen(graph: States | Instance, formulation: Formulation, run: Run) -> Pla
 
         found = find_states(graph, formulation, run)
     return Plan(graph, graph.at(found.selection.order), formulation, *found)
-
-
-def _from_arcs(instance: Instance, formulation: Formulation, run: Run) -> Found:
-    """Choose a path through an instance; it has no steps."""
-    require_time(formulation, run.time_limit)
-    if run.lazy:
-        raise ProblemError("an instance has all its costs; leave out lazy")
-    return find_path(instance, formulation, run)
 
 
 def _from_decisions(
@@ -308,17 +302,13 @@ def keeping(found: Kept, moved: Moved, again: Callable[[], Kept]) -> tuple[Kept,
         return found, f"{UNKNOWN} ({message_of(error)})"
 
 
-def _engines(plan: Plan) -> Sequence[Engine]:
-    """Return the engines whose responses are constrained: of all scenarios, or of the scene."""
-    return plan.graph.scenarios or (plan.engine,)
-
-
 def _measured(plan: Plan, clock: Clock) -> Plan:
     """Return a plan with its largest displacement, if it can be computed in time."""
     known = {} if plan.search is None or plan.graph.scenarios else plan.search.fields
+    engines = plan.graph.scenarios or (plan.engine,)
 
     def largest() -> Moved | None:
-        each = (most_moved(engine, plan.steps, known) for engine in _engines(plan))
+        each = (most_moved(engine, plan.steps, known) for engine in engines)
         return max(each, key=lambda moved: moved.share)
 
     moved = clock.spare(RANGE, largest, None)
