@@ -7,36 +7,30 @@ lever, so that they are forces and lengths.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError
 from seqopt.network.network import Network
-
-_Number = TypeVar("_Number", np.float64, np.bool_)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GripCompliance(FrozenValue):
     """The compliance of the grips of S grip sets, and their offsets.
 
-    ``moved`` (S, r, 3): how far each is from where it should be, m; None if none is. ``matrix``
-    (K, w, w): compliance of each kind of grip, m/N, first of forces, then of
-    moments over the lever if any grip of the scene transmits any; None if all are rigid and
-    transmit none. ``transmits_moment`` (K,): which kinds do; None if none of the scene does.
-    ``kind`` (S, r): of every grip; (1, 1) if all are of one: that of its robot, or of its robot at
-    its node where it has an arm with compliant joints. ``lever``: m.
+    ``moved`` (S, r, 3): how far each is from where it should be, m; None if none is. ``matrix`` (S,
+    r, w, w): m/N, of forces, then of moments over the lever if any grip of the scene transmits any
+    (w = 6, else 3), infinite on the diagonal of those that a grip does not transmit; None if all
+    are rigid and transmit none. ``lever``: m.
     """
 
     moved: Floats | None = None
     matrix: Floats | None = None
-    transmits_moment: Bools | None = None
-    kind: Ints = field(default_factory=lambda: np.zeros((1, 1), dtype=np.int64))
     lever: float = 1.0
 
     @property
@@ -49,38 +43,31 @@ class GripCompliance(FrozenValue):
         if self.rigid:
             return self
         moved = None if self.moved is None else self.moved[which]
-        kind = self.kind if self.alike else self.kind[which]
-        return replace(self, moved=moved, kind=kind)
-
-    @property
-    def alike(self) -> bool:
-        """Whether all grips are of one kind."""
-        return self.matrix is None or len(self.matrix) == 1
+        return replace(
+            self, moved=moved, matrix=None if self.matrix is None else self.matrix[which]
+        )
 
     def offsets(self, sets: int, grips: int) -> Floats:
-        """Return how far the grips are moved (S, r, 3), in space."""
+        """Return how far the grips are moved (S, r, 3)."""
         return np.zeros((sets, grips, 3)) if self.moved is None else self.moved
 
-    def soft(self, sets: int, grips: int) -> Bools:
+    def compliant(self, sets: int, grips: int) -> Bools:
         """Return which grips (S, r) are compliant to forces."""
         if self.matrix is None:
             return np.zeros((sets, grips), dtype=bool)
-        return self._each(np.asarray(self.matrix[:, :3, :3].any(axis=(1, 2))), sets, grips)
+        return np.asarray(self.matrix[..., :3, :3].any(axis=(2, 3)))
 
-    def matrices(self, sets: int, grips: int) -> Floats:
-        """Return the compliance of every grip, (S, r, w, w); they must not all be rigid."""
-        assert self.matrix is not None
-        return self._each(self.matrix, sets, grips)
-
-    def transmit_moments(self, sets: int, grips: int) -> Bools:
+    def transmits(self, sets: int, grips: int) -> Bools:
         """Return which grips (S, r) transmit moments."""
-        if self.transmits_moment is None:
+        if self.matrix is None or self.matrix.shape[3] == 3:
             return np.zeros((sets, grips), dtype=bool)
-        return self._each(self.transmits_moment, sets, grips)
+        return np.isfinite(self.matrix[..., 5, 5])
 
-    def _each(self, of_kind: NDArray[_Number], sets: int, grips: int) -> NDArray[_Number]:
-        """Return what kinds have (K, ...) for every grip, (S, r, ...)."""
-        return np.broadcast_to(of_kind[self.kind], (sets, grips, *of_kind.shape[1:]))
+    @property
+    def transmitted(self) -> Floats:
+        """The compliance to what grips transmit, (S, r, w, w); they must not all be rigid."""
+        assert self.matrix is not None
+        return np.where(np.isinf(self.matrix), 0.0, self.matrix)
 
 
 RIGID = GripCompliance()
@@ -120,15 +107,21 @@ def _in_place(network: Network, grips: Ints) -> GripCompliance:
             f"robot {name} has no posture at node {node[at]}, so nobody knows how its grip gives "
             "way; move its base, or leave out joint_stiffness"
         )
-    bears = known.transmits_moment if known.transmits_moment.any() else None
-    return GripCompliance(None, compliance_by_kind(network), bears, kind, network.lever)
+    matrix = _by_kind(network)
+    one = len(matrix) == 1
+    every = np.broadcast_to(matrix[0], (*grips.shape, *matrix.shape[1:])) if one else matrix[kind]
+    return GripCompliance(None, every, network.lever)
 
 
-def compliance_by_kind(network: Network) -> Floats:
+def _by_kind(network: Network) -> Floats:
     """Return the compliance (M, w, w) of each kind of grip, m/N, as of `GripCompliance`."""
     known, scale = network.compliances, np.repeat([1.0, network.lever], 3)
     matrix = known.compliance * np.outer(scale, scale)
-    return matrix if known.transmits_moment.any() else matrix[:, :3, :3]
+    if not known.transmits_moment.any():
+        return matrix[:, :3, :3]
+    turning = np.where(known.transmits_moment, 0.0, np.inf)
+    matrix[:, [3, 4, 5], [3, 4, 5]] += turning[:, None]
+    return matrix
 
 
 _RIGID = 1e-9  # compliance in a direction, over the largest, that stands for none
@@ -163,11 +156,11 @@ def grip_springs(compliance: GripCompliance, grips: int) -> list[GripSpring]:
     """Return the compliant ones of the grips of one set, in space."""
     if compliance.matrix is None:
         return []
-    soft, turns = compliance.soft(1, grips)[0], compliance.transmit_moments(1, grips)[0]
-    matrix, offset = compliance.matrices(1, grips)[0], compliance.offsets(1, grips)[0]
+    yields, turns = compliance.compliant(1, grips)[0], compliance.transmits(1, grips)[0]
+    matrix, offset = compliance.matrix[0], compliance.offsets(1, grips)[0]
     out = []
     for grip in range(grips):
-        ways = [way for way in range(6) if (soft[grip] if way < 3 else turns[grip])]
+        ways = [way for way in range(6) if (yields[grip] if way < 3 else turns[grip])]
         if ways:
             scale = np.repeat([1.0, compliance.lever], 3)[ways]
             own = invertible(matrix[grip][np.ix_(ways, ways)]) / np.outer(scale, scale)
@@ -201,10 +194,10 @@ def _follow_bricks(
     ends = network.node_position[network.inner]
     steps = ends[:, 1] - ends[:, 0]
     axes = steps / np.linalg.norm(steps, axis=1, keepdims=True)
-    soft = compliance.soft(*columns.shape)
+    yields = compliance.compliant(*columns.shape)
     for i, j in combinations(range(columns.shape[1]), 2):
         one = columns[:, i] // 2 == columns[:, j] // 2
-        both = np.flatnonzero(one & ~soft[:, i] & ~soft[:, j])
+        both = np.flatnonzero(one & ~yields[:, i] & ~yields[:, j])
         axis = axes[columns[both, i] // 2]
         stretch = np.einsum("si,si->s", offsets[both, j] - offsets[both, i], axis)
         offsets[both, i] += 0.5 * stretch[:, None] * axis

@@ -171,10 +171,10 @@ def _off_grips(moved: Floats, borne: Floats, compliance: GripCompliance) -> Floa
     if compliance.moved is not None:
         out[:, :3] -= compliance.moved[0]
     if compliance.matrix is not None:
-        flexibility = compliance.matrices(1, len(moved))[0]
+        flexibility = compliance.transmitted[0]
         ways = flexibility.shape[2]
         out[:, :ways] += np.einsum("rij,rj->ri", flexibility, bears[:, :ways])
-    out[~compliance.transmit_moments(1, len(moved))[0], 3:] = 0.0
+    out[~compliance.transmits(1, len(moved))[0], 3:] = 0.0
     return np.asarray(out)
 
 

@@ -116,7 +116,7 @@ class _Holds(NamedTuple):
 def _hold(network: Network, columns: Ints, compliance: GripCompliance, size: int) -> _Holds:
     """Return how the grips of one set hold a frame with as many motions."""
     grips, at = len(columns), 6 * network.inner.ravel()[columns][:, None] + np.arange(6)
-    rigid, turns = ~compliance.soft(1, grips)[0], compliance.transmit_moments(1, grips)[0]
+    rigid, turns = ~compliance.compliant(1, grips)[0], compliance.transmits(1, grips)[0]
     spring: list[Floats] = [np.zeros((0, size))]
     stiffness: list[float] = []
     stretched: list[float] = []

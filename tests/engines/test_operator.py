@@ -98,7 +98,6 @@ def test_flexibility_is_symmetric_and_costs_work(name):
     assert np.abs(flexibility - flexibility.T).max() <= 1e-12 * flexibility.max()
     values = np.linalg.eigvalsh(flexibility)
     assert values[0] >= -1e-12 * values[-1]
-    assert operator.directions == 3
     weight = net.inner_weight.ravel()
     assert operator.dead_displacement == pytest.approx(flexibility @ weight, rel=1e-12)
 
@@ -155,7 +154,6 @@ def test_which_loads_act_at_a_grip():
     assert operator.load_index(columns).tolist() == index
     assert (operator.loose, operator.softness) == (0, 0.0)  # nothing is
     held = replace(operator, loose=2, flexibility=np.zeros((32, 32)))
-    assert held.directions == 3
     assert held.load_index(columns).tolist() == [[*row, 30, 31] for row in index]
 
 

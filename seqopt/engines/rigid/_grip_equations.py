@@ -26,7 +26,7 @@ class Pairs(NamedTuple):
     """Two grips on one brick.
 
     ``sets``, ``first``, ``second``, ``brick`` (p,): the grip set, which two of its grips, and the
-    brick; ``axis`` (p, d): unit vectors from the first grip to the second.
+    brick; ``axis`` (p, 3): unit vectors from the first grip to the second.
     """
 
     sets: Ints
@@ -47,8 +47,8 @@ class Pairs(NamedTuple):
 
     def rigid(self, compliance: GripCompliance, sets: int, grips: int) -> Bools:
         """Return which pairs (p,) have two rigid grips, in so many sets."""
-        soft = compliance.soft(sets, grips)
-        return np.asarray(~soft[self.sets, self.first] & ~soft[self.sets, self.second])
+        yields = compliance.compliant(sets, grips)
+        return np.asarray(~yields[self.sets, self.first] & ~yields[self.sets, self.second])
 
 
 def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
@@ -57,51 +57,32 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     one, other = columns.T.take(couples, axis=0)
     same = one ^ 1 == other  # the two nodes of a brick
     if not np.count_nonzero(same):
-        return _none(operator.axis.shape[1])
+        return _none()
     couple, sets = same.nonzero()
     node, (first, second) = one[same], couples.take(couple, axis=1)
     return Pairs(sets, first, second, node // 2, operator.across.take(node, axis=0))
 
 
 @cache
-def _none(directions: int) -> Pairs:
+def _none() -> Pairs:
     none = frozen(np.empty(0, dtype=np.int64))
-    return Pairs(none, none, none, none, frozen(np.empty((0, directions))))
+    return Pairs(none, none, none, none, frozen(np.empty((0, 3))))
 
 
-def _count_grips(operator: ComplianceOperator, count: int) -> int:
-    """Return how many grips sets of as many unknowns have."""
-    return (count - operator.loose) // (operator.directions + operator.moments)
-
-
-def _by_grip(operator: ComplianceOperator, force: Floats, grips: int) -> Floats:
-    """Return forces and moments of grips, (S, r, w), of unknowns (S, k)."""
-    width = operator.directions
-    first, last = grips * width, grips * (width + operator.moments)
-    shift = force[:, :first].reshape(len(force), grips, width)
-    if not operator.moments:
-        return shift
-    return np.dstack([shift, force[:, first:last].reshape(len(force), grips, operator.moments)])
-
-
-def _as_rows(operator: ComplianceOperator, each: Floats) -> Floats:
+def _as_rows(each: Floats) -> Floats:
     """Return numbers of grips (S, r, w) as rows (k, S) of unknowns, loose motions left out."""
-    width, sets = operator.directions, len(each)
-    first = each[:, :, :width].reshape(sets, each.shape[1] * width)
-    if each.shape[2] == width:
-        return np.ascontiguousarray(first.T)
-    rest = each[:, :, width:].reshape(sets, each.shape[1] * (each.shape[2] - width))
-    return np.ascontiguousarray(np.hstack([first, rest]).T)
+    return np.ascontiguousarray(each.reshape(len(each), each.shape[1] * each.shape[2]).T)
 
 
-def _brace(system: Floats, pairs: Pairs) -> None:
-    """Give the force between two grips on one brick a flexibility, so that there is one answer."""
+def _brace(system: Floats, pairs: Pairs, width: int) -> None:
+    """Give the force between two grips on one brick a flexibility, so that there is one answer.
+
+    ``width``: unknowns of each grip.
+    """
     count, sets = system.shape[1:]
-    width = pairs.axis.shape[1]
-    blocks = system.reshape(count // width, width, count // width, width, sets)
-    every = np.arange(count)[:, None]
-    scaled = system[every, every, pairs.sets].sum(axis=0)[:, None] * pairs.axis
-    block = scaled[:, :, None] * pairs.axis[:, None]
+    blocks = system.reshape(count // width, width, count // width, width, sets)[:, :3, :, :3]
+    trace = np.einsum("ririt->t", blocks)[pairs.sets]
+    block = (trace[:, None] * pairs.axis)[:, :, None] * pairs.axis[:, None]
     rows = np.array([pairs.first, pairs.second, pairs.second])
     columns = np.array([pairs.first, pairs.second, pairs.first])
     blocks[rows, :, columns, :, pairs.sets] += np.array([block, block, -block])
@@ -186,11 +167,11 @@ def grip_forces(
     `share_pairs` says how they share it.
 
     ``index`` (S, k): the loads at the grips, from `ComplianceOperator.load_index`; ``pairs``: of
-    the sets, if they are known; ``compliance``: in the operator's directions.
+    the sets, if they are known; ``compliance``: of the sets.
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
-    off = None if compliance.moved is None else _in_rows(operator, -compliance.moved)
+    off = None if compliance.moved is None else _as_rows(-_offsets(operator, compliance.moved))
     dead = operator.dead_displacement.take(rows)
     force, pivot = _solved(operator, pairs, rows, dead, compliance, off)
     return _GripForces(force.T, pivot)
@@ -259,22 +240,19 @@ def _with_compliance(
     ``size`` (k, S): of the forces, N; ``flexibility`` (k, S): the diagonal, m/N.
     """
     given, softer = np.zeros_like(own), np.zeros_like(own)
-    nodes, grips = len(own) - operator.loose, _count_grips(operator, len(own))
+    nodes = len(own) - operator.loose
     if compliance.moved is not None:
-        moved = _in_rows(operator, np.abs(compliance.moved))
-        given[: len(moved)] += moved
+        given[:nodes] += _as_rows(_offsets(operator, np.abs(compliance.moved)))
     if compliance.matrix is not None:
-        parts = np.abs(compliance.matrices(own.shape[1], grips))
-        bears = _by_grip(operator, size.T, grips)
-        given[:nodes] += _as_rows(operator, np.einsum("srij,srj->sri", parts, bears))
-        softer[:nodes] = _as_rows(operator, np.diagonal(parts, axis1=2, axis2=3))
+        parts = np.abs(compliance.transmitted)
+        given[:nodes] += _as_rows(np.einsum("srij,srj->sri", parts, operator.by_grip(size.T)))
+        softer[:nodes] = _as_rows(np.diagonal(parts, axis1=2, axis2=3))
     return np.asarray((own * flexibility + given) / (flexibility + softer))
 
 
-def _in_rows(operator: ComplianceOperator, moved: Floats) -> Floats:
-    """Return offsets of grips (S, r, d) as rows of all unknowns (k, S), loose motions left out."""
-    rows = _as_rows(operator, moved)
-    return np.pad(rows, ((0, moved.shape[1] * operator.moments), (0, 0)))
+def _offsets(operator: ComplianceOperator, moved: Floats) -> Floats:
+    """Return offsets of grips (S, r, 3) beside rotations that are none, (S, r, w)."""
+    return np.pad(moved, ((0, 0), (0, 0), (0, operator.moments)))
 
 
 def still_forces(
@@ -292,7 +270,7 @@ def still_forces(
     counted. Between two rigid grips on one brick there is no force.
     """
     pairs, rows = pairs_of(operator, columns), np.ascontiguousarray(index.T)
-    apart = None if off is None else _as_rows(operator, off)
+    apart = None if off is None else _as_rows(off)
     return _solved(operator, pairs, rows, np.ascontiguousarray(moved.T), compliance, apart)[0].T
 
 
@@ -322,9 +300,7 @@ def share_pairs(
     else:
         found = operator.answer("edge_force", index[sets], force[sets])
         between = found[np.arange(len(sets)), edges]
-    shift = between[:, None] * pairs.axis
-    own = _count_grips(operator, force.shape[1]) * operator.directions
-    nodes = force[:, :own].reshape(len(force), -1, pairs.axis.shape[1])
+    shift, nodes = between[:, None] * pairs.axis, operator.by_grip(force)[..., :3]
     nodes[sets, pairs.first] += shift
     nodes[sets, pairs.second] -= shift
 
@@ -344,7 +320,7 @@ def _solved(
     count, sets = rows.shape
     size = len(operator.flexibility)
     system = np.empty((count + 1, count, sets))
-    step = operator.directions if sets > _MANY else max(count, 1)
+    step = 3 if sets > _MANY else max(count, 1)
     for i in range(0, count, step):  # what is above the diagonal is not read
         mine = slice(i, min(i + step, count))
         entries = rows[mine, None] * size + rows[: mine.stop]
@@ -352,15 +328,14 @@ def _solved(
         operator.flexibility.take(entries, out=part, mode="clip")  # others copy once more
     np.negative(dead, out=system[-1])
     scale = 1 / operator.softness if operator.loose else 1.0
-    nodes = _count_grips(operator, count) * operator.directions
+    nodes = count - operator.loose
     if compliance.matrix is not None:
-        _add_compliance(system, operator, compliance)
-        _release_moments(system, operator, compliance)
-        pairs = pairs.only(pairs.rigid(compliance, sets, nodes // operator.directions))
+        _add_compliance(system, compliance.matrix)
+        pairs = pairs.only(pairs.rigid(compliance, sets, nodes // operator.width))
     if off is not None:
         system[-1, : len(off)] -= off
     if len(pairs.sets):
-        _brace(system[:nodes, :nodes], pairs)
+        _brace(system[:nodes, :nodes], pairs, operator.width)
     return _solve_positive(system, operator.loose, scale)
 
 
@@ -377,54 +352,30 @@ def nearly_rigid(
     out = np.zeros(len(index), dtype=bool)
     if compliance.matrix is None or not len(pairs.sets):
         return out
-    width, grips = operator.directions, _count_grips(operator, index.shape[1])
-    each = compliance.matrices(len(index), grips)
-    own = (each[pairs.sets, pairs.first] + each[pairs.sets, pairs.second])[:, :width, :width]
+    each, width = compliance.matrix, operator.width
+    own = (each[pairs.sets, pairs.first] + each[pairs.sets, pairs.second])[:, :3, :3]
     along = np.einsum("pi,pij,pj->p", pairs.axis, own, pairs.axis)
-    rows = index[pairs.sets[:, None], width * pairs.second[:, None] + np.arange(width)]
+    rows = index[pairs.sets[:, None], width * pairs.second[:, None] + np.arange(3)]
     brick = operator.flexibility.diagonal()[rows].mean(axis=1)
-    close = (along < _CLOSE * brick) & ~pairs.rigid(compliance, len(index), grips)
+    close = (along < _CLOSE * brick) & ~pairs.rigid(compliance, *each.shape[:2])
     out[pairs.sets[close]] = True
     return out
 
 
-def _rows_of(operator: ComplianceOperator, grips: int, grip: int, ways: int) -> list[int]:
-    """Return the rows of the unknowns of a grip, of which there are as many."""
-    width = operator.directions
-    force = [grip * width + way for way in range(width)]
-    rest = ways - width
-    return force + [grips * width + grip * rest + way for way in range(rest)]
+def _add_compliance(system: Floats, matrix: Floats) -> None:
+    """Add to equations, in place, the compliance (S, r, w, w) of every grip.
 
-
-def _add_compliance(
-    system: Floats, operator: ComplianceOperator, compliance: GripCompliance
-) -> None:
-    """Add to equations, in place, the compliance of every grip."""
-    grips = _count_grips(operator, system.shape[1])
-    assert compliance.matrix is not None
-    ways, used = compliance.matrix.shape[2], np.asarray(compliance.matrix.any(axis=0))
+    Moments to which it is infinite are none.
+    """
+    grips, ways = matrix.shape[1:3]
     for grip in range(grips):
-        rows = _rows_of(operator, grips, grip, ways)
+        first = ways * grip
         for a, b in zip(*np.tril_indices(ways), strict=True):
-            if used[a, b]:
-                own = compliance.kind[:, 0 if compliance.alike else grip]
-                system[rows[a], rows[b]] += compliance.matrix[own, a, b]
-
-
-def _release_moments(
-    system: Floats, operator: ComplianceOperator, compliance: GripCompliance
-) -> None:
-    """Release the moments of grips that transmit none, where others of the scene do, in place."""
-    count, sets = system.shape[1:]
-    grips = _count_grips(operator, count)
-    free = ~compliance.transmit_moments(sets, grips)
-    if not operator.moments or not free.any():
-        return
-    for grip in range(grips):
-        mine = np.flatnonzero(free[:, grip])
-        for row in _rows_of(operator, grips, grip, operator.directions + operator.moments)[
-            operator.directions :
-        ]:
-            system[row][:, mine] = 0.0
-            system[:, row, mine] = 0.0
-            system[row, row, mine] = 1.0
+            own = matrix[:, grip, a, b]
+            if own.any():
+                system[first + a, first + b] += own
+        if ways > 3 and (free := np.flatnonzero(np.isinf(matrix[:, grip, 5, 5]))).size:
+            for row in range(first + 3, first + 6):
+                system[row][:, free] = 0.0
+                system[:, row, free] = 0.0
+                system[row, row, free] = 1.0

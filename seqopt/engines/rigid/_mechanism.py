@@ -160,7 +160,7 @@ def free_motion(
     """
     parts = ungripped_system(network, bricks)
     node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
-    turned = columns[compliance.transmit_moments(1, len(columns))[0]] // 2
+    turned = columns[compliance.transmits(1, len(columns))[0]] // 2
     turns = (6 * turned[:, None] + np.arange(3, 6)).ravel()  # that grips resist
     resisted = np.zeros((len(turns), 6 * bricks))
     resisted[np.arange(len(turns)), turns] = 1.0

@@ -127,7 +127,7 @@ class MixedSystem(FrozenValue):
 
     forbidden: sparse.csr_array  # (c, 6b); scaled twists that the grips forbid
     matrix: sparse.csc_array  # (6s + 6b + c,)
-    force: Floats  # (wr, c); forces of the grips, then moments over a lever, for unit multipliers
+    force: Floats  # (rw, c); forces of each grip, then its moments, for unit multipliers
     weight: Floats  # (c,); by which the grips' equations are multiplied
 
 
@@ -169,40 +169,32 @@ def _with_flexibility(
 
     After the multipliers of rigid grips, ``rows`` (c, 6b) and ``force`` (3r, c), there is one for
     the force between two grips on one brick of which one is soft, which moves no brick, and those
-    of moments. Results: ``rows`` (n, 6b); ``force`` (wr, n): forces, then moments over the lever;
-    ``flexibility`` (n, n): m/N.
+    of moments. Results: ``rows`` (n, 6b); ``force`` (rw, n): of each grip, then its moments over
+    the lever; ``flexibility`` (n, n): m/N.
     """
     network, count = parts.network, len(grips)
-    soft, turns = compliance.soft(1, count)[0], compliance.transmit_moments(1, count)[0]
+    yields, turns = compliance.compliant(1, count)[0], compliance.transmits(1, count)[0]
+    own = compliance.transmitted[0]
+    width = own.shape[2]
     between = []
     for i, j in permutations(range(count), 2):
-        if i < j and grips[i] // 2 == grips[j] // 2 and (soft[i] or soft[j]):
+        if i < j and grips[i] // 2 == grips[j] // 2 and (yields[i] or yields[j]):
             step = np.diff(network.node_position[network.inner[grips[i] // 2]], axis=0)[0]
             pull = np.zeros((count, 3))
             pull[i], pull[j] = -step / np.linalg.norm(step), step / np.linalg.norm(step)
             between.append(pull.ravel())
     shifts = np.column_stack([force, *between])
     turned = np.zeros((3 * int(turns.sum()), 6 * parts.bricks))
-    bearing = np.zeros((3 * count, len(turned)))
+    out = np.zeros((count, width, shifts.shape[1] + len(turned)))
+    out[:, :3, : shifts.shape[1]] = shifts.reshape(count, 3, shifts.shape[1])
     for n, grip in enumerate(np.flatnonzero(turns)):
-        brick, own = grips[grip] // 2, slice(3 * n, 3 * n + 3)
-        turned[own, 6 * brick + 3 : 6 * brick + 6] = compliance.lever * np.eye(3)
-        bearing[3 * grip : 3 * grip + 3, own] = np.eye(3)
+        brick, mine = grips[grip] // 2, slice(3 * n, 3 * n + 3)
+        turned[mine, 6 * brick + 3 : 6 * brick + 6] = compliance.lever * np.eye(3)
+        out[grip, 3:, shifts.shape[1] + 3 * n : shifts.shape[1] + 3 * n + 3] = np.eye(3)
     still = np.zeros((len(between), 6 * parts.bricks))
-    out = linalg.block_diag(shifts, bearing)
-    if not turns.any():
-        out = out[: 3 * count]
-    whole = compliance.matrices(1, count)[0]
-    flexibility = linalg.block_diag(*whole[:, :3, :3]) if count else np.zeros((0, 0))
-    if turns.any():
-        corner = [linalg.block_diag(*whole[:, a, b]) for a, b in _QUARTERS]
-        flexibility = np.block([corner[:2], corner[2:]])
+    flexibility = np.einsum("gim,gij,gjn->mn", out, own, out)
     every = sparse.csr_array(sparse.vstack([rows, sparse.csr_array(np.vstack([still, turned]))]))
-    return every, out, out.T @ flexibility @ out
-
-
-_FORCE, _MOMENT = slice(3), slice(3, 6)
-_QUARTERS = ((_FORCE, _FORCE), (_FORCE, _MOMENT), (_MOMENT, _FORCE), (_MOMENT, _MOMENT))
+    return every, out.reshape(count * width, out.shape[2]), flexibility
 
 
 def bordered(
@@ -290,7 +282,9 @@ def solve_load(
     load = np.zeros(system.matrix.shape[0])
     load[:joints], load[joints:last] = moved, pull
     if compliance.moved is not None:
-        load[last:] = system.weight * (system.force[: 3 * len(grips)].T @ compliance.moved.ravel())
+        width = len(system.force) // len(grips) if len(grips) else 3
+        moved = np.pad(compliance.moved[0], ((0, 0), (0, width - 3)))
+        load[last:] = system.weight * (system.force.T @ moved.ravel())
     try:
         factors = splu(system.matrix)
     except RuntimeError as error:
@@ -335,16 +329,14 @@ def _corrected(
 def borne(
     force: Floats, grips: int, compliance: GripCompliance
 ) -> tuple[Floats, Floats, Bools | None]:
-    """Return forces, N, and moments, N m, of grips (S, r, 3), and which are soft.
+    """Return forces, N, and moments, N m, of grips (S, r, 3), and which are compliant.
 
-    ``force`` (S, wr): forces, then moments over the lever if grips transmit any.
+    ``force`` (S, rw): of each grip, then its moments over the lever if grips transmit any.
     """
-    sets = len(force)
-    moment = np.zeros((sets, grips, 3))
-    if force.shape[1] > 3 * grips:
-        moment = compliance.lever * force[:, 3 * grips :].reshape(sets, grips, 3)
-    soft = compliance.soft(sets, grips)
-    return force[:, : 3 * grips].reshape(sets, grips, 3), moment, soft
+    sets, width = len(force), force.shape[1] // grips if grips else 3
+    each = force.reshape(sets, grips, width)
+    moment = compliance.lever * each[..., 3:] if width > 3 else np.zeros((sets, grips, 3))
+    return each[..., :3], moment, compliance.compliant(sets, grips)
 
 
 def unchanged(

@@ -65,19 +65,18 @@ class Doubts(FrozenValue):
 class ComplianceOperator(FrozenValue):
     """What loads on a partial structure of b bricks move and stress; rows of arrays are loads.
 
-    Row ``dm + i`` is a unit force in direction ``i`` of d at the ``m``-th inner node
-    (`Network.inner`) of the h bricks that are loaded, l = 2dh loads in all: d = 3 in space, 2 in a
-    plane. Where grips transmit moments, those on a brick, over a lever, follow the forces at its
-    nodes, and what they move are rotations times the lever: see `load_rows`. One more row at the
-    end of all but the first two arrays is the weight of the b bricks, with what else loads them and
-    how the ground moves.
+    Row ``3m + i`` is a unit force in direction ``i`` at the ``m``-th inner node (`Network.inner`)
+    of the h bricks that are loaded, l = 6h loads in all. Where grips transmit moments, those on a
+    brick, over a lever, follow the forces at its nodes, and what they move are rotations times the
+    lever: see `load_rows`. One more row at the end of all but the first two arrays is the weight of
+    the b bricks, with what else loads them and how the ground moves.
 
     ``held`` (h,): the bricks that are loaded, ascending. ``flexibility`` (l, l): displacements of
     their inner nodes, m/N. ``dead_displacement`` (l,): displacements of these under the weight with
-    no grip, m. ``twist`` (l + 1, kb): of the bricks, in k directions. ``wrench`` (l + 1, ks): of
+    no grip, m. ``twist`` (l + 1, 6b): of the bricks. ``wrench`` (l + 1, 6s): of
     the s springs that act on their second bodies. ``maps``: what these mean. ``at_second`` (b,):
-    along every brick's inner edge, the weight at its second node, N. ``axis`` (b, d): unit vectors
-    along the inner edges, in the directions of the loads. ``inner_edge`` (b,): the inner edge of
+    along every brick's inner edge, the weight at its second node, N. ``axis`` (b, 3): unit vectors
+    along the inner edges. ``inner_edge`` (b,): the inner edge of
     each brick. ``loss`` (l,): how many last digits of the flexibility of each load are rounding.
     ``loose``: how many loose motions come after the loads, as further rows and unknowns; see
     `seqopt.engines.rigid._refinement`. ``softness``: of the springs that they stand on, m/N.
@@ -103,9 +102,14 @@ class ComplianceOperator(FrozenValue):
         return len(self.axis)
 
     @property
-    def directions(self) -> int:
-        """In how many directions a node is loaded and held, d."""
-        return int(self.axis.shape[1])
+    def width(self) -> int:
+        """How many unknowns each grip has: forces, and then moments."""
+        return 3 + self.moments
+
+    def by_grip(self, force: Floats) -> Floats:
+        """Return a view (S, r, w) of unknowns (S, k) without loose motions."""
+        own = force[:, : force.shape[1] - self.loose]
+        return own.reshape(len(force), own.shape[1] // self.width, self.width)
 
     @property
     def nbytes(self) -> int:
@@ -124,12 +128,12 @@ class ComplianceOperator(FrozenValue):
     def _loads_at(self) -> Ints:
         """The loads at each inner node, (2b, w): forces, and then moments on its brick."""
         nodes = np.add.outer(2 * self.place, np.arange(2)).reshape(2 * self.bricks, 1)
-        return frozen(load_rows(nodes, self.directions, self.moments))
+        return frozen(load_rows(nodes, self.moments))
 
     @cached_property
     def across(self) -> Floats:
         """Unit vectors from each inner node to the other of its brick, (2b, d)."""
-        return frozen(np.stack([self.axis, -self.axis], axis=1).reshape(-1, self.directions))
+        return frozen(np.stack([self.axis, -self.axis], axis=1).reshape(-1, 3))
 
     @cached_property
     def doubts(self) -> Doubts:
@@ -142,12 +146,8 @@ class ComplianceOperator(FrozenValue):
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions, (S, k)."""
-        each, width = self._loads_at.take(columns, axis=0), self.directions
-        if self.moments:  # those of all grips come after all forces
-            parts = each[:, :, :width], each[:, :, width:]
-            rows = np.hstack([part.reshape(len(part), prod(part.shape[1:])) for part in parts])
-        else:
-            rows = each.reshape(len(each), prod(each.shape[1:]))
+        each = self._loads_at.take(columns, axis=0)
+        rows = each.reshape(len(each), prod(each.shape[1:]))
         if self.loose:
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
@@ -201,12 +201,11 @@ class ComplianceOperator(FrozenValue):
 
     def _add_grips(self, index: Ints, force: Floats, out: Floats) -> None:
         """Add to edge forces (S, E) what forces (S, k) at second nodes send into inner edges."""
-        width, moments = self.directions, self.moments
-        nodes = (index.shape[1] - self.loose) // (width + moments)
-        place, at = np.divmod(index[:, : nodes * width : width], 2 * width + moments)
-        brick, own = self.held[place], force[:, : nodes * width].reshape(len(index), nodes, width)
-        along = np.einsum("snd,snd->sn", own, self.axis[brick]) * (at // width)
-        for i in range(nodes):  # two may share an edge
+        own = self.by_grip(force)
+        place, at = np.divmod(self.by_grip(index)[..., 0], 6 + self.moments)
+        brick = self.held[place]
+        along = np.einsum("snd,snd->sn", own[..., :3], self.axis[brick]) * (at // 3)
+        for i in range(brick.shape[1]):  # two may share an edge
             out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
 
     def of_loads(self, *names: str) -> Floats:
@@ -219,10 +218,9 @@ class ComplianceOperator(FrozenValue):
         """Return a field under every load, (l + 1, Q), and keep it nowhere."""
         out = self.maps.apply(name, self._states(name))
         if name == "edge_force":
-            width = self.directions
             out[-1, self.inner_edge] += self.at_second
-            each = 2 * width + self.moments
-            rows = each * np.arange(len(self.held))[:, None] + width + np.arange(width)
+            each = 6 + self.moments
+            rows = each * np.arange(len(self.held))[:, None] + np.arange(3, 6)
             out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
         if name == "displacement":
             out[-1] += self.maps.ground
@@ -245,20 +243,17 @@ def are_few(unknowns: int, sets: int) -> bool:
     return 2 * unknowns <= max(_FEW, sets)
 
 
-def load_rows(nodes: Ints, directions: int, moments: int) -> Ints:
-    """Return the loads (S, k) at nodes (S, r): forces at all of them, then moments on bricks.
+def load_rows(nodes: Ints, moments: int) -> Ints:
+    """Return the loads (S, rw) at nodes (S, r): the forces at each, then the moments on its brick.
 
-    ``nodes``: as indices into ``network.inner.ravel()`` of the bricks that are loaded.
+    ``nodes``: as indices into ``network.inner.ravel()`` of the bricks that are loaded; ``moments``:
+    of a brick, three or none.
     """
-    if not moments:
-        rows = directions * nodes[:, :, None] + np.arange(directions)
-        return np.asarray(rows.reshape(len(nodes), nodes.shape[1] * directions))
-    first = (2 * directions + moments) * (nodes // 2)
-    force = (first + directions * (nodes % 2))[:, :, None] + np.arange(directions)
-    moment = (first + 2 * directions)[:, :, None] + np.arange(moments)
-    sets, grips = nodes.shape  # maybe no sets
-    parts = force.reshape(sets, grips * directions), moment.reshape(sets, grips * moments)
-    return np.hstack(parts)
+    first = ((6 + moments) * (nodes // 2))[..., None]
+    rows = first + 3 * (nodes % 2)[..., None] + np.arange(3)
+    if moments:
+        rows = np.concatenate([rows, first + np.arange(6, 9)], axis=2)
+    return np.asarray(rows.reshape(len(nodes), nodes.shape[1] * (3 + moments)))
 
 
 class OperatorBuilder:

@@ -32,13 +32,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
-from seqopt.engines.rigid._grip_equations import (
-    _by_grip,
-    grip_forces,
-    nearly_rigid,
-    pairs_of,
-    still_forces,
-)
+from seqopt.engines.rigid._grip_equations import grip_forces, nearly_rigid, pairs_of, still_forces
 from seqopt.engines.rigid._hanging import Hanging, HangingSystem
 from seqopt.engines.rigid._mechanism import (
     Shared,
@@ -207,8 +201,8 @@ def _operator(
     network, bricks = parts.network, parts.bricks
     moments = (len(states) - loose) // bricks - 6
     weight = np.zeros(len(states))
-    at = load_rows(np.arange(2 * bricks)[None], 3, moments)[0]
-    weight[at[: 6 * bricks]] = network.inner_weight[: 2 * bricks].ravel()
+    at = load_rows(np.arange(2 * bricks)[None], moments).reshape(2 * bricks, 3 + moments)
+    weight[at[:, :3].ravel()] = network.inner_weight[: 2 * bricks].ravel()
     wrench, twist = unscaled(parts, states)
     wrench = wrench[:, parts.acting].reshape(len(states), -1)
     inner_edge, axis, at_second = inner_edges(network, bricks)
@@ -324,11 +318,6 @@ class _Asked(NamedTuple):
     loads: Ints  # (S, k); rows of the operator's loads at the grips
     compliance: GripCompliance
 
-    @property
-    def grips(self) -> int:
-        """How many each holds."""
-        return int(self.columns.shape[1])
-
     def of(self, which: Ints) -> _Asked:
         """Return some of the sets."""
         compliance = self.compliance.select(which)
@@ -395,7 +384,7 @@ class _Corrector:
         operator, system, columns = self.operator, self.system, asked.columns
         parts, inner = system.parts, system.inner
         joints = len(parts.wrench_unit)
-        at = load_rows(columns, 3, 3 if operator.moments else 0)
+        at = load_rows(columns, operator.moments)
         load = np.zeros((len(at), inner.shape[0]))
         np.add.at(load, (np.arange(len(at))[:, None], at), force)  # a brick may be turned twice
         pulled = (inner.T @ load.T).T / parts.unit + parts.load
@@ -416,14 +405,13 @@ class _Corrector:
 
     def _off(self, asked: _Asked, force: Floats) -> Floats | None:
         """Return how far grips let their nodes be, (S, r, w); None if rigid and in place."""
-        compliance, grips = asked.compliance, asked.grips
+        compliance, width = asked.compliance, self.operator.width
+        borne = force.reshape(*asked.columns.shape, width)
         if compliance.rigid:
             return None
-        width, moments = self.operator.directions, self.operator.moments
-        out = np.zeros((len(force), grips, width + moments))
+        out = np.zeros(borne.shape)
         if compliance.matrix is not None:
-            bears = _by_grip(self.operator, force, grips)
-            out += np.einsum("srij,srj->sri", compliance.matrices(len(force), grips), bears)
+            out += np.einsum("srij,srj->sri", compliance.transmitted, borne)
         if compliance.moved is not None:
-            out[..., :width] -= compliance.moved
+            out[..., :3] -= compliance.moved
         return out

@@ -36,7 +36,6 @@ from seqopt.engines.interface import (
 from seqopt.engines.rigid._extremes import Extremes, GrownExtremes, can_compile, extremes_in
 from seqopt.engines.rigid._grip_equations import (
     Pairs,
-    _by_grip,
     _GripForces,
     grip_forces,
     nearly_rigid,
@@ -78,7 +77,7 @@ class _FastSolution:
     well_conditioned: Bools  # (S,); which sets it answers well enough
 
     def fields(self, want: Want) -> dict[str, Floats]:
-        """Return the fields of all sets by name, grip forces in the operator's directions."""
+        """Return the fields of all sets by name."""
         operator, columns = self.operator, self.columns
         force = self.force.copy() if len(self.pairs.sets) else self.force
         asked = names_wanted(want)
@@ -90,12 +89,11 @@ class _FastSolution:
                 flat.reshape(sets, flat.shape[1] // prod(shape), *shape) if shape else flat
             )
         share_pairs(operator, columns, self.index, force, found["edge_force"], self.pairs)
-        nodes = force[:, : columns.shape[1] * operator.directions]
-        found["grip_force"] = nodes.reshape(*columns.shape, operator.directions)
+        borne = operator.by_grip(force)
+        found["grip_force"] = borne[..., :3]
         found["grip_moment"] = np.zeros((*columns.shape, 3))
         if operator.moments:
-            borne = _by_grip(operator, force, columns.shape[1])[..., operator.directions :]
-            found["grip_moment"] = self.lever * borne
+            found["grip_moment"] = self.lever * borne[..., 3:]
         return found
 
 
@@ -109,8 +107,8 @@ def _solve_fast(
 ) -> _FastSolution:
     """Return what an operator alone says about grip sets, and which of them it answers well enough.
 
-    ``compliance``: in the operator's directions; ``even``: whether the joints are about equally
-    stiff: where not, pivots do not bound the error; ``accuracy``: largest error of fields,
+    ``even``: whether the joints are about equally stiff: where not, pivots do not bound the error;
+    ``accuracy``: largest error of fields,
     over the largest entry of each, that is accepted.
     """
     sets, index, pairs = len(columns), operator.load_index(columns), pairs_of(operator, columns)
@@ -154,7 +152,7 @@ def _solve_grown_extremes(
 
     These are the sets that what grows with the build answers not well enough.
     """
-    index = load_rows(columns, 3, 0)
+    index = load_rows(columns, 0)
     force, pivot = grown.forces(columns)
     apart = ~well_conditioned(grown, index, _GripForces(force, pivot), accuracy / _UNSEEN)
     force[apart] = 0.0
