@@ -29,12 +29,13 @@ class Shared(FrozenValue):
 
     ``statics``: of the network; ``gap`` (6S, 6B): deformation of every spring, in its own axes, for
     unit twists; ``inner`` (6B, 6B): displacements of the inner nodes for unit twists, in the order
-    of ``network.inner``.
+    of ``network.inner``; ``moved`` (S, 6): how the ground moves, in the springs' axes.
     """
 
     statics: Statics
     gap: sparse.csr_array
     inner: sparse.csr_array
+    moved: Floats
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,7 +45,7 @@ class Ungripped(FrozenValue):
     ``inner`` (6b, 6b): those of the inner nodes for scaled twists, in the order of
     ``network.inner``, m; ``statics``: of the network; ``deformation`` (6s, 6b): scaled deformation
     of the acting springs, in their own axes, for scaled twists; ``stiffness`` (6s,): over ``unit``;
-    ``matrix`` (6s + 6b,): the system without grips; ``load`` (6b,): weight and loads, scaled;
+    ``load`` (6b,): weight and loads, scaled;
     ``moved`` (6s,): what the ground's movement adds to the joints' equations; ``acting`` (s,);
     ``twist_unit``, ``wrench_unit`` (6b,), (6s,): what turns scaled twists into m and rad, scaled
     wrenches into N and N m; ``unit``: N/m.
@@ -56,13 +57,25 @@ class Ungripped(FrozenValue):
     statics: Statics
     deformation: sparse.csr_array
     stiffness: Floats
-    matrix: sparse.csc_array
     load: Floats
     moved: Floats
     acting: Ints
     twist_unit: Floats
     wrench_unit: Floats
     unit: float
+
+    @cached_property
+    def matrix(self) -> sparse.csc_array:
+        """The system without grips, (6s + 6b,)."""
+        return frozen(_side_by_side(self.deformation, self.stiffness))
+
+    def apply(self, states: Floats) -> Floats:
+        """Return the products (S, 6s + 6b) of the system without grips with states."""
+        joints, row = len(self.stiffness), 1 / np.maximum(1.0, self.stiffness)
+        parted = (self.deformation @ states[:, joints:].T).T
+        wrench = states[:, :joints]
+        borne = (self.deformation.T @ wrench.T).T
+        return np.hstack([row * wrench + row * self.stiffness * parted, -borne])
 
     @cached_property
     def motion(self) -> sparse.csr_array:
@@ -77,7 +90,8 @@ def share(network: Network) -> Shared:
     moved = point_motion(network.node_position[network.inner.ravel()] - network.centroid[brick])
     inner = spread(np.arange(size), brick, moved, (size, len(network.inner)))
     gap = deformation(springs.bodies, springs.position, network.centroid, springs.axes)
-    return Shared(build_statics(network), gap, inner)
+    shift = np.einsum("sij,shj->shi", springs.axes, springs.movement.reshape(-1, 2, 3))
+    return Shared(build_statics(network), gap, inner, shift.reshape(-1, 6))
 
 
 def ungripped_system(network: Network, bricks: int, shared: Shared | None = None) -> Ungripped:
@@ -97,7 +111,6 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
     inner: sparse.csr_array = sparse.csr_array(nodes, shape=(size, size))
     weight = network.inner_weight[: 2 * bricks].ravel()
     applied = network.applied(bricks).ravel()
-    shift = np.einsum("sij,shj->shi", springs.axes, springs.movement.reshape(-1, 2, 3))[acting]
     row = stiffness / np.maximum(1.0, stiffness)
     return Ungripped(
         network=network,
@@ -106,9 +119,8 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
         statics=shared.statics,
         deformation=gap,
         stiffness=stiffness,
-        matrix=_side_by_side(gap, stiffness),
         load=inner.T @ weight / unit + applied * twist_unit / unit,
-        moved=row * (shift.reshape(-1, 6) * lever).ravel(),
+        moved=row * (shared.moved[acting] * lever).ravel(),
         acting=acting,
         twist_unit=twist_unit,
         wrench_unit=unit * np.tile(lever, len(acting)),

@@ -113,9 +113,9 @@ class ComplianceOperator(FrozenValue):
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the arrays that there are by now."""
+        """Bytes of the dense arrays that there are by now."""
         made = self.flexibility, self.twist, self.wrench, *self._made.values()
-        return self.maps.nbytes + sum(int(each.nbytes) for each in made)
+        return sum(each.nbytes for each in made)
 
     @cached_property
     def place(self) -> Ints:

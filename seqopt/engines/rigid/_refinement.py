@@ -388,7 +388,7 @@ class _Corrector:
         load = np.zeros((len(at), inner.shape[0]))
         np.add.at(load, (np.arange(len(at))[:, None], at), force)  # a brick may be turned twice
         pulled = (inner.T @ load.T).T / parts.unit + parts.load
-        missing = -(parts.matrix @ states.T).T
+        missing = -parts.apply(states)
         missing[:, joints:] += pulled
         missing[:, :joints] += parts.moved
         answer, pull = system.held.solve(missing)

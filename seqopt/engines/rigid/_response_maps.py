@@ -14,7 +14,6 @@ from seqopt.engines.interface import SHAPES, _counts_of_fields
 from seqopt.network._mechanics import build_statics, node_motion
 from seqopt.network.network import Network
 
-_ENTRY = 12  # bytes of a number of a sparse matrix and of its column
 AT_ONCE = 2**18  # numbers mapped at a time: they stay in the processor's cache
 
 
@@ -74,14 +73,6 @@ class ResponseMaps(FrozenValue):
         entries = int(self.scene.motion.indptr[rows])
         alone = np.where(self.scene.since[:entries] > self.bricks, 2.0, 1.0)
         return frozen(_leading(self.scene.motion, rows, width, alone))
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes that the maps take at most, once they are made."""
-        network = self.scene.network
-        rows = network.count_edges(self.bricks), 3 * network.count_nodes(self.bricks)
-        maps = zip((self.scene.edge, self.scene.motion), rows, strict=True)
-        return sum(_ENTRY * int(each.indptr[count]) + 4 * count for each, count in maps)
 
     def count(self, name: str) -> int:
         """Return how many numbers a field has."""
