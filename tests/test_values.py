@@ -16,8 +16,7 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.engines._grip_compliance import RIGID, read_compliance
 from seqopt.engines.diagnosis import diagnose
-from seqopt.engines.discrete._equilibrium_path import settle
-from seqopt.engines.discrete._system import build_system
+from seqopt.engines.discrete._system import build_system, settle
 from seqopt.engines.discrete.engine import _held_nodes
 from seqopt.engines.interface import Fields, Want
 from seqopt.engines.rigid._growth import grow_tree

@@ -8,9 +8,9 @@ import pytest
 
 import seqopt
 from seqopt._cli.grammar import parse_options
-from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
+from seqopt.engines.registry import AutoEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
 from seqopt.graph.decisions import pose_decisions

@@ -31,10 +31,10 @@ from experiments.harness.results import best, drawn, two
 from experiments.harness.scenes import arch25
 from seqopt import DRY, Scene, build_network, sequential
 from seqopt.arrays import Floats, Ints
-from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine, Want
+from seqopt.engines.registry import AutoEngine
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, plain, styled
 
 EXACT, FRAME, WRONG = 1e-8, 1e-5, 0.1

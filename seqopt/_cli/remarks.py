@@ -8,9 +8,8 @@ from dataclasses import replace
 from seqopt._cli import options
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
-from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import Engine, Level
-from seqopt.engines.registry import _chooser_of
+from seqopt.engines.registry import AutoEngine, _chooser_of
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import (
     LIFTED,
@@ -26,7 +25,7 @@ from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import BuildProver, BuildVerdicts, _settlement_said
 from seqopt.stability.assessment import Verdict
-from seqopt.work._clock import INTERRUPT, TIME, Clock
+from seqopt.work.progress import INTERRUPT, TIME, Clock
 
 
 def size_line(scene: Scene) -> str:

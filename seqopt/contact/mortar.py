@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from math import inf
 
 from seqopt.arrays import Terse
 from seqopt.errors import SceneError, did_you_mean
@@ -273,3 +274,19 @@ def _seconds(word: str, text: str) -> float:
     if not 0 <= value < math.inf:
         raise SceneError(f"curing {word}: {short(text)} is no age; give zero or more")
     return value
+
+
+@dataclass(frozen=True)
+class BedStiffness:
+    """Stiffness of a joint or pad per area.
+
+    ``normal``, ``tangential``: N/m³. Raises `SceneError` if one is not a positive number.
+    """
+
+    normal: float
+    tangential: float
+
+    def __post_init__(self) -> None:
+        for name in ("normal", "tangential"):
+            if not 0 < getattr(self, name) < inf:
+                raise SceneError(f"bed: {name} is {getattr(self, name)}; give a positive number")

@@ -18,7 +18,7 @@ from seqopt.errors import PluginWarning, ProblemError, did_you_mean, message_of,
 from seqopt.graph.graph import LabelProof
 from seqopt.problem.problem import Aim
 from seqopt.scene.scene import Order
-from seqopt.work._clock import Clock
+from seqopt.work.progress import Clock
 
 GROUP = "seqopt.formulations"
 EXHIBITS = "seqopt.exhibits"

@@ -27,9 +27,8 @@ from seqopt.judge.certificate import Basis, Certificate
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.resources import StepArrays, _first_fault
 from seqopt.problem.standing import _size, slack
-from seqopt.responses._props import EXCESS_COLUMN
 from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along, tolerances_along
-from seqopt.responses.quantities import CHOSEN_BY, PROP_EXCESS
+from seqopt.responses.quantities import CHOSEN_BY, EXCESS_COLUMN, PROP_EXCESS
 from seqopt.responses.table import _analyzed, _Columns, force_column
 from seqopt.scene._armed import check_postures
 from seqopt.scene.scene import Order

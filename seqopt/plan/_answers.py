@@ -47,7 +47,7 @@ from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.problem.problem import AskedBudget
 from seqopt.scene._checks import LARGEST_NUMBER, short
 from seqopt.sequence.steps import Step
-from seqopt.work._clock import INTERRUPT
+from seqopt.work.progress import INTERRUPT
 
 if TYPE_CHECKING:
     from seqopt.graph._decision_search import Windows

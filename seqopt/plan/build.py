@@ -17,8 +17,8 @@ from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.responses._enough import Enough, what_was_enough
-from seqopt.responses._props import props_table
 from seqopt.responses._tolerance import tolerance_table
+from seqopt.responses.quantities import props_table
 from seqopt.responses.table import Departure, LinearRange, _Columns, analyze, grips_table
 from seqopt.sequence.steps import Site, Step, _check_part
 from seqopt.stability._step_verdicts import step_verdicts

@@ -31,9 +31,8 @@ from seqopt.responses._grip_sets import Moved, most_moved
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.work._clock import INTERRUPT, Clock
 from seqopt.work._workers import free_memory
-from seqopt.work.progress import Tell, with_progress
+from seqopt.work.progress import INTERRUPT, Clock, Tell, with_progress
 
 TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
 DIGITS = 9  # after the first

@@ -40,7 +40,7 @@ from seqopt.scene._armed import check_postures
 from seqopt.scene.arm import from_arms
 from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.steps import Step
-from seqopt.work._clock import INTERRUPT, Clock
+from seqopt.work.progress import INTERRUPT, Clock
 
 RANGE = "how far it leaves the linear range"  # what it is called where there was no time for it
 NONE_KEEPS = "no plan keeps it"

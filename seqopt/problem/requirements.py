@@ -18,9 +18,9 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
 from seqopt.responses._choices import CHOICE_RESPONSES
-from seqopt.responses._props import EXCESS_COLUMN
 from seqopt.responses._tolerance import Allowed, is_tolerance, misfits_along
 from seqopt.responses.quantities import (
+    EXCESS_COLUMN,
     NO_TOLERANCE,
     PROP_EXCESS,
     RESPONSES,

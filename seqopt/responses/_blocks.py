@@ -26,15 +26,16 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MemoryShortError, SceneError
-from seqopt.responses._props import excess_of, with_props
 from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits
 from seqopt.responses.quantities import (
     CHOSEN_BY,
     EXTREMES,
     PROP_EXCESS,
+    excess_of,
     lengths,
     require_finite,
     robot_response,
+    with_props,
 )
 from seqopt.scene._armed import go_together
 from seqopt.scene.scene import Scene
@@ -76,7 +77,7 @@ class Answers(FrozenValue):
 
     ``values`` (S,): the requested responses, SI units; ``forces`` (S, r): sizes of the forces of
     the grips, N; ``tally`` (object, int): what the engine counted meanwhile, if it counts:
-    `seqopt.engines._auto.AutoEngine`.
+    `seqopt.engines.registry.AutoEngine`.
     """
 
     values: Mapping[str, Floats]

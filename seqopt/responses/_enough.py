@@ -10,9 +10,8 @@ import numpy as np
 
 from seqopt.arrays import Terse
 from seqopt.contact.mortar import _mortar_name, _with_mortar
-from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import OpeningEngine
-from seqopt.engines.registry import recipe_of
+from seqopt.engines.registry import AutoEngine, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses._tolerance import each_tolerance, is_linear, is_tied
 from seqopt.responses.quantities import RESPONSES, _plain, length_text

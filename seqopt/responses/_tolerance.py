@@ -15,9 +15,8 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import Engine, OpeningEngine, Want, grip_columns, select_sets
-from seqopt.engines.registry import USUAL, Recipe, recipe_of
+from seqopt.engines.registry import USUAL, AutoEngine, Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network

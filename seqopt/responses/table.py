@@ -21,7 +21,6 @@ import pandas as pd
 from seqopt.arrays import Floats, Ints
 from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY, _mortar_name
-from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import (
     Engine,
     Fields,
@@ -31,16 +30,16 @@ from seqopt.engines.interface import (
     linear_limit,
     select_sets,
 )
-from seqopt.engines.registry import _chooser_of
+from seqopt.engines.registry import AutoEngine, _chooser_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.network import Network
-from seqopt.responses._props import prop_cells
 from seqopt.responses.quantities import (
     RESPONSES,
     _steps_in_words,
     grip_forces,
     length_text,
     lengths,
+    prop_cells,
     require_finite,
     robot_response,
     support_forces,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from seqopt.engines.discrete._bed import BedStiffness
+from seqopt.contact.mortar import BedStiffness
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.graph.decisions import Decisions
 from seqopt.problem.criteria import (

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from seqopt.contact.mortar import Mortar
-from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.registry import AutoEngine
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network

@@ -23,7 +23,7 @@ from seqopt.plan import _states
 from seqopt.plan.front import find_front
 from seqopt.plan.plan import Status
 from seqopt.sequence.schedule_file import read_plan
-from seqopt.work._clock import INTERRUPT, TIME, Clock
+from seqopt.work.progress import INTERRUPT, TIME, Clock
 from tests.builders import small_arch
 
 WALL = "wall:columns=2,courses=2"
@@ -51,7 +51,7 @@ def ended(words, when, how=KeyboardInterrupt):
 @pytest.mark.parametrize(("how", "status"), [(KeyboardInterrupt, 130), (TimeoutError, 0)])
 @pytest.mark.parametrize("words", [FREE, LOOP])
 def test_verdicts_that_are_ended_are_left_out(tmp_path, capsys, monkeypatch, words, how, status):
-    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
     out = tmp_path / "out"
     answer = ended([*words, "--out", out], "proving what stands", how)
     assert answer.status == status
@@ -88,7 +88,7 @@ def test_a_proof_that_is_ended_leaves_what_is_claimed(
     whole, out = tmp_path / "whole", tmp_path / "out"
     assert main([*words, "--out", str(whole)]) == 0
     in_the_midst(monkeypatch, module, judge, how)
-    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
     assert main([*words, "--out", str(out)]) == status
     known, found = (json.loads((f / "summary.json").read_text()) for f in (whole, out))
     assert found["objective"] == pytest.approx(known["objective"])
@@ -124,7 +124,7 @@ def test_a_limit_that_is_over_at_once_is_a_line(capsys, monkeypatch, tmp_path, w
     """Whatever comes first, and where nothing is late the same words have an answer."""
     monkeypatch.chdir(tmp_path)
     limit = () if words[0] == "pareto" else ("--time-limit", "0")
-    monkeypatch.setattr("seqopt.work._clock.GRACE", 0.0)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", 0.0)
     assert main([*words, *limit]) == 4
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
@@ -137,7 +137,7 @@ def test_a_limit_that_is_over_at_once_is_a_line(capsys, monkeypatch, tmp_path, w
 @pytest.mark.parametrize(("how", "status"), [(KeyboardInterrupt, 130), (TimeoutError, 0)])
 def test_a_page_that_is_ended_is_left_out(tmp_path, monkeypatch, how, status):
     """Without its tables too a plan is there, and its folder can be read again."""
-    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
     in_the_midst(monkeypatch, seqopt.report._pages, "plan_page", how)
     in_the_midst(monkeypatch, outputs, "plan_files", how)
     out = tmp_path / "out"
@@ -149,7 +149,7 @@ def test_a_page_that_is_ended_is_left_out(tmp_path, monkeypatch, how, status):
 
 
 def test_without_responses_a_plan_is_its_steps(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
     assert main([*FREE, "--out", str(tmp_path / "whole")]) == 0
     in_the_midst(monkeypatch, seqopt.plan.build, "what_was_enough", TimeoutError)
     capsys.readouterr()
@@ -169,7 +169,7 @@ def test_without_responses_a_plan_is_its_steps(tmp_path, capsys, monkeypatch):
 
 @pytest.mark.parametrize(("how", "status"), [(KeyboardInterrupt, 130), (TimeoutError, 0)])
 def test_a_pareto_set_that_is_ended_has_its_points(tmp_path, monkeypatch, how, status):
-    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
     words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
     out = tmp_path / "out"
     answer = ended([*words, "--out", out], "drawing and writing the page", how)
@@ -203,7 +203,7 @@ def test_a_pareto_set_whose_proof_is_ended_is_not_complete(monkeypatch):
 
 
 def test_the_comparison_of_a_new_plan_is_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
     assert main([*FREE, "--out", str(tmp_path / "a")]) == 0
     in_the_midst(monkeypatch, replan, "compared", TimeoutError)
     words = ["replan", str(tmp_path / "a"), "--at", "2", "--out", str(tmp_path / "b")]
@@ -213,7 +213,7 @@ def test_the_comparison_of_a_new_plan_is_left_out(tmp_path, monkeypatch):
 
 
 def test_what_is_said_of_steps_is_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
     words = ["analyze", WALL, "--method", "sequential", "--out", str(tmp_path / "a.csv")]
     for how, status in ((TimeoutError, 0), (KeyboardInterrupt, 130)):
         in_the_midst(monkeypatch, analyze, "what_was_enough", how)
@@ -235,7 +235,7 @@ def test_a_clock_ends_what_is_late_and_names_it():
 
 
 def test_a_clock_that_is_over_begins_with_nothing(monkeypatch):
-    monkeypatch.setattr("seqopt.work._clock.GRACE", 0.0)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", 0.0)
     clock, done = Clock(0.0), []
     assert clock.spare("a", lambda: done.append(1), "none") == "none"
     assert (done, clock.left_out, clock.left, clock.late) == ([], {"a": TIME}, 0.0, True)

@@ -165,7 +165,7 @@ def test_an_interrupt_of_analyze_leaves_the_rows_so_far(tmp_path):
 
 
 def test_a_time_limit_of_analyze_before_the_first_row_is_one_line(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)  # what comes before is not late
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)  # what comes before is not late
     path = tmp_path / "rows.csv"
     words = ("analyze", "--method", "cantilever", "--time-limit", "0", "--out", str(path))
     assert run(capsys, *words) == (
@@ -624,7 +624,7 @@ def test_a_budget_is_given_once(tmp_path, capsys):
 
 
 def test_a_time_limit_ends_with_a_choice_and_a_trace(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)  # choosing alone is late
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)  # choosing alone is late
     words = ("--formulation", "overlap_dp", "--time-limit", "0", "--no-stability")
     words = (*words, "--out", str(tmp_path / "a"))
     assert main(["optimize", "arch25", *words]) == 0

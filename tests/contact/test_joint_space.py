@@ -10,7 +10,7 @@ import pytest
 from experiments.harness.scenes import running_bond
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import DRY
-from seqopt.engines._auto import AutoEngine
+from seqopt.engines.registry import AutoEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene

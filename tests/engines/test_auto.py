@@ -10,8 +10,8 @@ import pytest
 from experiments.harness.scenes import running_bond
 from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
-from seqopt.engines._auto import _BEYOND, _SIMPLEST, AutoEngine, Level
 from seqopt.engines.interface import Want
+from seqopt.engines.registry import _BEYOND, _SIMPLEST, AutoEngine, Level
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seqopt.contact.mortar import DRY, EPOXY, Mortar
-from seqopt.engines.discrete._bed import BedStiffness
+from seqopt.contact.mortar import DRY, EPOXY, BedStiffness, Mortar
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine

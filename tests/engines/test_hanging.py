@@ -10,8 +10,7 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid import _grip_equations as equations
 from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid._grip_equations import _solve_positive
-from seqopt.engines.rigid._hanging import Hanging, HangingSystem
-from seqopt.engines.rigid._mechanism import share, ungripped_system
+from seqopt.engines.rigid._mechanism import Hanging, HangingSystem, share, ungripped_system
 from seqopt.engines.rigid._refinement import Refinement, _HeldSystem, _hold_loose
 
 CLOSE = 1e-9

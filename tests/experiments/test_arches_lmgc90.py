@@ -34,7 +34,7 @@ from experiments.discrete.parts.arches_lmgc90 import (
 )
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.harness.yardstick import error, moved
-from seqopt.engines.discrete._bed import BedStiffness
+from seqopt.contact.mortar import BedStiffness
 from seqopt.network.network import GROUND
 from seqopt.sequence.methods import sequential
 from seqopt.study.published import STUDY_BED, STUDY_PADS

@@ -17,8 +17,8 @@ from experiments.harness.scenes import longer
 from seqopt import Search
 from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
-from seqopt.engines._auto import AutoEngine, Level
 from seqopt.engines.interface import Want
+from seqopt.engines.registry import AutoEngine, Level
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError, TimeUpError
 from seqopt.graph.states.explored import explore

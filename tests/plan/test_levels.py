@@ -7,9 +7,9 @@ import pytest
 import seqopt
 from seqopt._cli.main import main
 from seqopt.contact.mortar import bond_mortar
-from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import (
+    AutoEngine,
     _chooser_of,
     engine_for,
     make_engine,

@@ -13,8 +13,8 @@ import pytest
 import seqopt
 from seqopt import Prop, Robot
 from seqopt.engines.interface import Want
-from seqopt.responses._props import excess_of
 from seqopt.responses._staged import analyze_staged
+from seqopt.responses.quantities import excess_of
 from tests.builders import small_arch
 
 UP = (0.0, 0.0, 1.0)

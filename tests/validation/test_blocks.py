@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from experiments.discrete.parts.arch_pads import AtCorners
-from seqopt.contact.mortar import DRY, Mortar
+from seqopt.contact.mortar import DRY, BedStiffness, Mortar
 from seqopt.engines._grip_compliance import RIGID
-from seqopt.engines.discrete._bed import BedStiffness
-from seqopt.engines.discrete._equilibrium_path import settle
-from seqopt.engines.discrete._system import build_system
+from seqopt.engines.discrete._system import build_system, settle
 from seqopt.engines.discrete.engine import DiscreteEngine, _held_nodes
 from seqopt.engines.interface import Want
 from seqopt.errors import MechanismError

@@ -24,11 +24,9 @@ from seqopt.arrays import Floats, Ints
 from seqopt.contact._elastic_limits import opening_maps
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly, step_assembly
-from seqopt.contact.mortar import EPOXY, Mortar
+from seqopt.contact.mortar import EPOXY, BedStiffness, Mortar
 from seqopt.engines._grip_compliance import GripCompliance
-from seqopt.engines.discrete._bed import BedStiffness
-from seqopt.engines.discrete._equilibrium_path import Held
-from seqopt.engines.discrete._system import System, build_system
+from seqopt.engines.discrete._system import Held, System, build_system
 from seqopt.engines.discrete.engine import DiscreteEngine, _Spring
 from seqopt.engines.interface import Fields, Want
 from seqopt.network._mechanics import point_motion

@@ -31,7 +31,7 @@ from experiments.harness.yardstick import error, inner_nodes, moved
 from seqopt import EPOXY, Step
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
-from seqopt.engines.discrete._bed import BedStiffness
+from seqopt.contact.mortar import BedStiffness
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network._mechanics import node_motion
 from seqopt.network.network import GROUND, Network

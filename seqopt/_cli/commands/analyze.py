@@ -18,10 +18,9 @@ from seqopt._interrupts import ending
 from seqopt.arms._kept import arm_faults
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._auto import AutoEngine
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import Engine, Fields, Level, OpeningEngine, Want
-from seqopt.engines.registry import provenance, recipe_of
+from seqopt.engines.registry import AutoEngine, provenance, recipe_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
 from seqopt.problem.requirements import _prop_faults, length_word, overloads
@@ -39,8 +38,7 @@ from seqopt.responses.table import (
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
-from seqopt.work._clock import Clock
-from seqopt.work.progress import with_progress
+from seqopt.work.progress import Clock, with_progress
 
 INTERRUPTED = "seqopt: interrupted; the steps are those that were computed"
 RANGE = "whether they are in the linear range"

@@ -17,7 +17,7 @@ from seqopt.graph.instance import Instance as Graph
 from seqopt.instances._files import WRITERS, save_instance
 from seqopt.instances.compiled import compile_instance
 from seqopt.judge.arithmetic import first_stage
-from seqopt.work._clock import Clock
+from seqopt.work.progress import Clock
 
 SAID = ("--quiet", "--json")
 

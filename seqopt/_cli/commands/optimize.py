@@ -29,8 +29,7 @@ from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.steps import _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
-from seqopt.work._clock import Clock
-from seqopt.work.progress import within
+from seqopt.work.progress import Clock, within
 
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 VERDICTS = "which steps stand"

@@ -36,8 +36,7 @@ from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.work._clock import INTERRUPT, Clock
-from seqopt.work.progress import within
+from seqopt.work.progress import INTERRUPT, Clock, within
 
 DETAILS = "responses, verdicts and the page"
 INTERRUPTED = "seqopt: interrupted; the points are those that were found"

@@ -7,7 +7,7 @@ carries), holds nodes, and follows the structure to rest.
 from typing import TYPE_CHECKING
 
 from seqopt._later import later
-from seqopt.engines.discrete._bed import BedStiffness
+from seqopt.contact.mortar import BedStiffness
 
 if TYPE_CHECKING:
     from seqopt.engines.discrete.engine import DiscreteEngine

@@ -19,11 +19,9 @@ import numpy as np
 from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
-from seqopt.contact.mortar import EPOXY, Mortar
+from seqopt.contact.mortar import EPOXY, BedStiffness, Mortar
 from seqopt.engines._grip_compliance import GripCompliance, grip_springs
-from seqopt.engines.discrete._bed import BedStiffness
-from seqopt.engines.discrete._equilibrium_path import Held, Settled, settle
-from seqopt.engines.discrete._system import System, build_system
+from seqopt.engines.discrete._system import Held, Settled, System, build_system, settle
 from seqopt.engines.interface import Fields, OpeningEngine
 from seqopt.engines.rigid._mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond

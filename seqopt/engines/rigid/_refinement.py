@@ -33,8 +33,9 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import grip_forces, nearly_rigid, pairs_of, still_forces
-from seqopt.engines.rigid._hanging import Hanging, HangingSystem
 from seqopt.engines.rigid._mechanism import (
+    Hanging,
+    HangingSystem,
     Shared,
     Ungripped,
     require_resistance,
