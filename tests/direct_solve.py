@@ -9,7 +9,7 @@ from scipy import linalg
 
 from seqopt.arrays import Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
-from seqopt.engines.interface import Fields, join_sets, no_sets
+from seqopt.engines.interface import Fields, _join_sets, no_sets
 from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond
 from seqopt.errors import SolverError
@@ -34,7 +34,7 @@ def solve_dense(
     far = compliance.offsets(*columns.shape)
     each = zip(columns, far, strict=True)
     answers = [_solve_one_dense(network, parts, *one) for one in each]
-    return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+    return _join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
 
 
 def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints, far: Floats) -> Fields:

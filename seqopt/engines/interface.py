@@ -298,15 +298,15 @@ def select_sets(answer: Fields, which: Bools | Ints) -> Fields:
     return Fields(**{name: getattr(answer, name)[which] for name in _NAMES})
 
 
-def join_sets(parts: Sequence[Fields]) -> Fields:
+def _join_sets(parts: Sequence[Fields]) -> Fields:
     """Return the fields of the grip sets of several answers, one after the other."""
     return Fields(**{n: np.concatenate([getattr(part, n) for part in parts]) for n in _NAMES})
 
 
-def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
+def _merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
     """Return the fields of grip sets, those of ``which`` (S,) from one answer, the rest not."""
     order = np.concatenate([np.flatnonzero(which), np.flatnonzero(~which)])
-    return select_sets(join_sets([inside, outside]), np.argsort(order))
+    return select_sets(_join_sets([inside, outside]), np.argsort(order))
 
 
 class NamedEngine:
@@ -346,7 +346,7 @@ class SerialEngine(NamedEngine, ABC):
         for i, held in enumerate(columns):
             own = compliance.select(slice(i, i + 1))
             answers.append(self._answer(bricks, held, own))
-        return require_finite(join_sets(answers), bricks, grips)
+        return require_finite(_join_sets(answers), bricks, grips)
 
     @abstractmethod
     def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance) -> Fields:

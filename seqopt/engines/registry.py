@@ -27,8 +27,8 @@ from seqopt.engines.interface import (
     NamedEngine,
     OpeningEngine,
     Want,
+    _merge_sets,
     keep_wanted,
-    merge_sets,
     select_sets,
 )
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -100,7 +100,7 @@ class AutoEngine(NamedEngine):
             sets = np.asarray(grips)[beyond]
             far = None if moved is None else np.asarray(moved, dtype=float)[beyond]
             found = self._discrete.solve(bricks, sets, asked, far)
-            fields = merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
+            fields = _merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
         levels = (_SIMPLEST, ~beyond), (_BEYOND, beyond)
         self.tally.update({level: int(mine.sum()) for level, mine in levels if mine.any()})
         return keep_wanted(fields, want)

@@ -18,7 +18,7 @@ from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import tolerance_table
-from seqopt.responses.quantities import props_table
+from seqopt.responses.quantities import _props_table
 from seqopt.responses.table import Departure, LinearRange, _Columns, analyze, grips_table
 from seqopt.sequence.steps import Site, Step, _check_part
 from seqopt.stability._step_verdicts import step_verdicts
@@ -115,7 +115,7 @@ class ShownBuild(Shown):
         ``largest_force_N``, ``at_step``, and of one that only pushes ``least_push_N``, negative
         where it would have to pull; no rows where there are no props.
         """
-        return props_table(self.engine, self.steps)
+        return _props_table(self.engine, self.steps)
 
     def tolerances(self) -> pd.DataFrame:
         """Return the tolerance of grip positions of every step, in the worst direction.

@@ -31,11 +31,11 @@ from seqopt.responses.quantities import (
     CHOSEN_BY,
     EXTREMES,
     PROP_EXCESS,
-    excess_of,
+    _excess_of,
+    _with_props,
     lengths,
     require_finite,
     robot_response,
-    with_props,
 )
 from seqopt.scene._armed import go_together
 from seqopt.scene.scene import Scene
@@ -97,7 +97,7 @@ def answer(engine: Engine, block: Block) -> Answers:
     asked = [CHOSEN_BY[name] for name in block.names if name in CHOSEN_BY]
     want = reduce(or_, (r.needs for r in asked), Want.SCREEN if block.screen else Want(0))
     before = Counter(tally_of(engine))
-    grips, robots = with_props(block.grips, block.props), block.grips.shape[1]
+    grips, robots = _with_props(block.grips, block.props), block.grips.shape[1]
     if isinstance(engine, ComplianceEngine) and set(block.names) <= EXTREMES.keys():
         with one_thread():
             found = engine._extremes(block.bricks, grips, want, compiled=block.compiled)
@@ -113,7 +113,7 @@ def answer(engine: Engine, block: Block) -> Answers:
             values[name] = misfits(engine, bricks, grips, allowed_by(name))
     if PROP_EXCESS in block.names:
         props = [network.scene.prop_of_number[number] for number in block.props]
-        values[PROP_EXCESS] = excess_of(props, fields.grip_force[:, robots:])
+        values[PROP_EXCESS] = _excess_of(props, fields.grip_force[:, robots:])
     return Answers(values, forces, tuple((Counter(tally_of(engine)) - before).items()))
 
 

@@ -272,12 +272,12 @@ def responses_of(network: Network, fields: Fields) -> dict[str, Floats]:
 EXCESS_COLUMN = "prop_excess_N"
 
 
-def with_props(grips: Ints, props: Sequence[int]) -> Ints:
+def _with_props(grips: Ints, props: Sequence[int]) -> Ints:
     """Return grip sets (S, r) with the grips of props, by number, after those of robots."""
     return np.hstack([grips, np.tile(np.array(props, dtype=np.int64), (len(grips), 1))])
 
 
-def excess_of(props: Sequence[Prop], force: Floats) -> Floats:
+def _excess_of(props: Sequence[Prop], force: Floats) -> Floats:
     """Return the largest violation (S,) of capacities by forces (S, p, 3) of props, N.
 
     Force above the capacity, or tension in a prop that only pushes; zero if there is none.
@@ -291,7 +291,7 @@ def excess_of(props: Sequence[Prop], force: Floats) -> Floats:
     return np.asarray(out)
 
 
-def prop_cells(scene: Scene, step: Step, force: Floats) -> dict[str, object]:
+def _prop_cells(scene: Scene, step: Step, force: Floats) -> dict[str, object]:
     """Return the cells of props in a table of steps, from their forces (p, 3)."""
     if not scene.props:
         return {}
@@ -302,11 +302,11 @@ def prop_cells(scene: Scene, step: Step, force: Floats) -> dict[str, object]:
         "props": len(props),
         "prop_node": props[most].node if len(props) else None,
         "F_prop_N": float(size[most]) if len(props) else np.nan,
-        EXCESS_COLUMN: float(excess_of(props, force[None])[0]),
+        EXCESS_COLUMN: float(_excess_of(props, force[None])[0]),
     }
 
 
-def props_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
+def _props_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     """Return a row per prop of a build: the steps in which it holds, and its forces.
 
     Columns: ``node``, ``brick``, ``from_step``, ``to_step``, ``largest_force_N``, ``at_step``, and

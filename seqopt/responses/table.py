@@ -35,11 +35,11 @@ from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.network import Network
 from seqopt.responses.quantities import (
     RESPONSES,
+    _prop_cells,
     _steps_in_words,
     grip_forces,
     length_text,
     lengths,
-    prop_cells,
     require_finite,
     robot_response,
     support_forces,
@@ -550,7 +550,7 @@ def _row(network: Network, step: Step, fields: Fields) -> dict[str, object]:
         if step.bricks:
             values = require_finite(response.name, response.of(network, fields), step.bricks)
             row[response.column] = values[0] * response.scale
-    row |= prop_cells(scene, step, fields.grip_force[0, len(step.held) :])
+    row |= _prop_cells(scene, step, fields.grip_force[0, len(step.held) :])
     acts = network.springs.since[network.springs.support] <= step.bricks
     carried = np.array([support_forces(network, fields)[0], support_moments(fields)[0]])
     cells = np.where(acts, carried, np.nan).T  # of ground ends; NaN where one does not act yet

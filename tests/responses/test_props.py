@@ -14,7 +14,7 @@ import seqopt
 from seqopt import Prop, Robot
 from seqopt.engines.interface import Want
 from seqopt.responses._staged import analyze_staged
-from seqopt.responses.quantities import excess_of
+from seqopt.responses.quantities import _excess_of
 from tests.builders import small_arch
 
 UP = (0.0, 0.0, 1.0)
@@ -88,10 +88,10 @@ def test_centering_leaves_robots_their_nodes():
 
 def test_excess_is_a_pull_or_what_is_beyond_a_capacity():
     force = np.array([[[0.0, 3.0, 4.0]], [[0.0, 0.0, -2.0]], [[0.0, 0.0, 9.0]]])
-    assert excess_of([Prop(node=1)], force).tolist() == [0, 0, 0]
-    assert excess_of([Prop(node=1, direction=UP)], force).tolist() == [0, 2, 0]
-    assert excess_of([Prop(node=1, capacity=5)], force).tolist() == [0, 0, 4]
-    assert excess_of([Prop(node=1, direction=UP, capacity=1)], force).tolist() == [4, 2, 8]
+    assert _excess_of([Prop(node=1)], force).tolist() == [0, 0, 0]
+    assert _excess_of([Prop(node=1, direction=UP)], force).tolist() == [0, 2, 0]
+    assert _excess_of([Prop(node=1, capacity=5)], force).tolist() == [0, 0, 4]
+    assert _excess_of([Prop(node=1, direction=UP, capacity=1)], force).tolist() == [4, 2, 8]
 
 
 def test_staged_construction_knows_props():

@@ -23,7 +23,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
-from seqopt.engines.interface import Fields, join_sets, no_sets
+from seqopt.engines.interface import Fields, _join_sets, no_sets
 from seqopt.engines.rigid._mechanism import Ungripped, require_resistance, ungripped_system
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import Statics
@@ -259,7 +259,7 @@ def solve_mixed(
         own = compliance.select(slice(i, i + 1))
         solution = solve_load(parts, grips, parts.load, parts.moved, own)
         answers.append(respond(network, parts.statics, parts.motion, grips[None], solution))
-    return join_sets(answers)
+    return _join_sets(answers)
 
 
 def solve_load(

@@ -31,7 +31,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
-from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
+from seqopt.engines.interface import Fields, _join_sets, _merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import grip_forces, nearly_rigid, pairs_of, still_forces
 from seqopt.engines.rigid._mechanism import (
     Hanging,
@@ -279,7 +279,7 @@ class Refinement:
         corrector = _Corrector(self, operator, largest)
         own = [compliance.select(part) for part in every]
         parts = (corrector.together(columns[p], h) for p, h in zip(every, own, strict=True))
-        return join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
+        return _join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
 
 
 class Refinements:
@@ -354,7 +354,7 @@ class _Corrector:
         if done.all():
             return fields
         rest = compliance.select(~done)
-        return merge_sets(done, fields, solve_mixed(network, parts.bricks, columns[~done], rest))
+        return _merge_sets(done, fields, solve_mixed(network, parts.bricks, columns[~done], rest))
 
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
         """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
