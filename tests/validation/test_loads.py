@@ -11,8 +11,8 @@ import seqopt
 from seqopt.engines.diagnosis import residual
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid._mixed import solve_mixed
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid._refinement import Refinement
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.responses._staged import staged_fields
 from seqopt.scene import Load
