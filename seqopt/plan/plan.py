@@ -364,10 +364,7 @@ class Plan(ShownBuild):
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
         if not self.steps:
-            known: dict[str, object] = getattr(self.problem, "facts_of", dict)()
-            spent = {} if self.certificate is None else dict(self.certificate.spent)
-            whole = {**self._named(), **known, **self._answer(), "budgets": spent}
-            return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}
+            return self._summary_of_costs()
         graph, proof, scene = self._of_scene, self.certificate, self.engine.network.scene
         asked = self.problem if isinstance(self.problem, Problem) else graph
         in_proof = None if proof is None or self.gap is None else proof.models or self.models
@@ -396,6 +393,13 @@ class Plan(ShownBuild):
             "seconds": dict(self.seconds),
             **provenance(self.engine),
         }
+
+    def _summary_of_costs(self) -> dict[str, object]:
+        """Return the summary of a path through an instance, or of given costs."""
+        known: dict[str, object] = getattr(self.problem, "facts_of", dict)()
+        spent = {} if self.certificate is None else dict(self.certificate.spent)
+        whole = {**self._named(), **known, **self._answer(), "budgets": spent}
+        return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}
 
     def brief(self) -> dict[str, object]:
         """Return the entries of the summary that need no responses."""
