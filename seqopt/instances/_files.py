@@ -305,8 +305,8 @@ def save_instance(instance: Instance, path: Path | str) -> None:
     if path.suffix == "":
         archive = stored(instance)
         text = Archive(archive, str(path)).text(TEXT)
-        names = {"instance.npz": archive, "instance.mps": as_mps(instance), TEXT: text}
-        write_folder(path, names)
+        programs = {"instance.mps": as_mps(instance), TEXT: text}
+        write_folder(path, {"instance.npz": archive, **programs})
         return
     if path.suffix not in WRITERS:
         known = ", ".join(WRITERS)

@@ -262,11 +262,11 @@ def measure_regret(
     start = timer.now()
     check_reference(reference)
     recipe, named = recipe_of(engine), engine
-    options = {} if recipe is None else dict(recipe.options)
-    mortar = options["mortar"] if isinstance(options.get("mortar"), Mortar) else None
+    joints = None if recipe is None else dict(recipe.options).get("mortar")
+    mortar = joints if isinstance(joints, Mortar) else None
     if reference or recipe is not None:  # else an object of one's own
-        joints = mortar if reference in LIMITED else None
-        named = make_engine(reference or USUAL_ENGINE, engine.network, joints)
+        own = mortar if reference in LIMITED else None
+        named = make_engine(reference or USUAL_ENGINE, engine.network, own)
     worst = WORST_OVER_METHODS if isinstance(criterion, RankSum) else criterion
     problem = pose(named, rules, worst, "minmax")
     course = _Course(problem, criterion, _loop(engine), rules, mortar, timer)
