@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ from seqopt.responses.resources import Resources
 from seqopt.responses.table import Departure, LinearRange, _steps_in_table, analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import METHODS, modified_sequential
-from seqopt.sequence.rules import FREE, FreeRules, Newest, Payload
+from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import MOST, find_schedule, parse_plan
 from seqopt.sequence.steps import Step, _idle_note
@@ -366,12 +366,6 @@ def _free_criterion(criterion: Criterion, rows: Sequence[Mapping[str, float]]) -
     return WorstRatio("worst-ratio-to-rows", tuple(limits))
 
 
-_LONE = (  # by which one robot builds, if any
-    FreeRules(least_grips=0, newest=Newest.FREE),
-    FreeRules(least_grips=0, newest=Newest.FREE, payload=Payload.IGNORED),
-)
-
-
 def _free_plan(
     engine: Engine,
     criterion: Criterion,
@@ -379,28 +373,17 @@ def _free_plan(
     robots: Sequence[str],
     progress: Tell,
 ) -> tuple[Plan | None, list[str]]:
-    """Return the shortest free schedule with the smallest worst step, and what is to say of it.
+    """Return the shortest free schedule with the smallest worst step, or why there is none.
 
-    That is why there is none, or by which rules alone one robot builds. ``fixed``: the largest
-    responses of fixed methods.
+    ``fixed``: the largest responses of fixed methods.
     """
-    criterion = _free_criterion(criterion, fixed)
-    usual = FreeRules(robots=tuple(robots))
-    alone = len(robots or engine.network.scene.robots) == 1 and not engine.network.scene.props
-    said, plan = list[str](), None
-    for rules in _LONE if alone else (usual,):
-        try:
-            asked = replace(rules, robots=usual.robots)
-            problem = pose(engine, asked, criterion, "minmax,steps")
-            plan = solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress)
-        except SeqoptError as error:
-            said = said or [f"{FREE}: {error}"]
-        else:
-            kept = "" if rules.payload is Payload.KEPT else ", payload=ignored"
-            how = f"{FREE}: one robot lets go of a brick before it brings the next"
-            said = [f"{how} (least_grips=0, newest=free{kept})"] if alone else []
-            break
-    return None if plan is None else on_the_way(plan), said
+    try:
+        rules, asked = FreeRules(robots=tuple(robots)), _free_criterion(criterion, fixed)
+        problem = pose(engine, rules, asked, "minmax,steps")
+        plan = solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress)
+    except SeqoptError as error:
+        return None, [f"{FREE}: {error}"]
+    return on_the_way(plan), []
 
 
 def _free_row(plan: Plan) -> dict[str, object]:

@@ -267,15 +267,13 @@ def test_one_robot_gets_one_advice_that_works(capsys, scene):
     assert run(capsys, *asked, *advice)[0] == 0
 
 
-@pytest.mark.parametrize("scene", ["wall:columns=2,courses=2", "chain:bricks=8"])
-def test_one_robot_is_compared_by_what_it_can_do_alone(capsys, tmp_path, scene):
-    """What needs two is named; with two nothing is left out."""
-    status, out, _ = run(capsys, "compare", scene, "--robots", "1", "--out", str(tmp_path / "c"))
-    assert status == 0
-    for name in ("sequential", "cantilever"):
-        assert f"- {name}: not possible here; scene" in out
-    assert "- free: one robot lets go of a brick before it brings the next" in out
-    assert [*pd.read_csv(tmp_path / "c" / "comparison.csv").iloc[:, 0]] == ["free"]
+def test_one_robot_has_nothing_to_compare(capsys, tmp_path):
+    """What needs two is named, and by which rules one builds; with two nothing is left out."""
+    scene = "wall:columns=2,courses=2"
+    status, _, err = run(capsys, "compare", scene, "--robots", "1", "--out", str(tmp_path / "c"))
+    assert status == 2
+    assert "this method needs two" in err
+    assert "--rule newest=free" in err
     status, out, _ = run(capsys, "compare", scene, "--robots", "2", "--no-stability")
     assert status == 0
     assert "not possible here" not in out
