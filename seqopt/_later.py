@@ -1,10 +1,24 @@
-"""Lazily loaded names of a package."""
+"""Modules, and names of a package, that are loaded when they are first used.
+
+The milliseconds beside a `Later` are those that other commands do without.
+"""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+
+class Later(ModuleType):
+    """A module by its name, loaded when something of it is first used."""
+
+    def __getattr__(self, name: str) -> Any:
+        if sys.modules.get(self.__name__) is self:
+            del sys.modules[self.__name__]
+        return getattr(import_module(self.__name__), name)
 
 
 def later(

@@ -7,8 +7,10 @@ is registered for them.
 from __future__ import annotations
 
 import tempfile
+import webbrowser
 from collections.abc import Callable
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -58,8 +60,6 @@ class Page:
 
     def _repr_html_(self) -> str:
         """Return an ``iframe`` with the page."""
-        from html import escape  # noqa: PLC0415  # for notebooks only
-
         return (
             f'<iframe srcdoc="{escape(self.text)}" width="100%" height="{self.height}" '
             'style="border:0;background:#fff" title="step viewer"></iframe>'
@@ -73,7 +73,5 @@ class Page:
     def open(self, path: str | Path | None = None) -> Path:
         """Write the page to a file, or a temporary one, and show it in a browser."""
         written = self.save(path or Path(tempfile.mkdtemp(prefix="seqopt-")) / "report.html")
-        import webbrowser  # noqa: PLC0415  # for pages that are opened only
-
         webbrowser.open(written.resolve().as_uri())
         return written

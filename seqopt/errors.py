@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import sys
 from collections.abc import Iterable
@@ -131,8 +132,6 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
     meant = {name.lower(): name for name in known}
     if not isinstance(given, str) or given in meant.values():
         return ""
-    import difflib  # noqa: PLC0415  # for errors only
-
     word = given.lower()
     near = difflib.get_close_matches(word, meant, 2)
     tied = len({difflib.SequenceMatcher(None, name, word).ratio() for name in near}) < len(near)

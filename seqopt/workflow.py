@@ -293,7 +293,8 @@ def _find_moves(
         given: dict[str, Any] = {"robots": robots, "candidates": candidates}
         return replace(found, **{name: each for name, each in given.items() if each is not None})
     if rules is not None:
-        raise ProblemError(f"{where}: only the free schedule has them; give schedule={FREE!r}")
+        give = f"--schedule {FREE}" if where.startswith("-") else f"schedule={FREE!r}"
+        raise ProblemError(f"{where}: only the free schedule has them; give {give}")
     if isinstance(robots, str) or not isinstance(robots, Sequence | None):
         raise ProblemError(f"robots {short(robots)}: give names, as ['rob1', 'rob2']")
     opened = find_schedule(network, schedule, robots or ())

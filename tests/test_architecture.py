@@ -100,7 +100,7 @@ def imports(path: Path) -> frozenset[str]:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: relative import"
             found.add(node.module or "")
-    return frozenset(found)
+    return frozenset(found) | {name for name in looked_up(path, "Later") if name != "?"}
 
 
 def graph(folder: str) -> nx.DiGraph:
@@ -154,12 +154,12 @@ def test_an_import_of_an_outer_room_is_seen():
     assert outward(modules) == ["seqopt.plan.plan imports seqopt.exchange.exports"]
 
 
-def looked_up(path: Path) -> list[str]:
+def looked_up(path: Path, by: str = "import_module") -> list[str]:
     """Return what a file imports by name as it runs; ``?`` where the name is made as it runs."""
     found = []
     for node in ast.walk(parsed(path)):
         called = node.func if isinstance(node, ast.Call) else None
-        if "import_module" in (getattr(called, "id", ""), getattr(called, "attr", "")):
+        if by in (getattr(called, "id", ""), getattr(called, "attr", "")):
             name = node.args[0]
             found.append(str(name.value) if isinstance(name, ast.Constant) else "?")
     return found
@@ -170,7 +170,8 @@ def hidden_arrows(files: list[Path]) -> list[str]:
     out = []
     for path in files:
         names = looked_up(path)
-        if any(name == "?" or name.startswith("seqopt") for name in names):
+        made = "?" in looked_up(path, "Later")  # others are arrows as any import
+        if made or any(name == "?" or name.startswith("seqopt") for name in names):
             out.append(dotted(path))
     return out
 
@@ -187,13 +188,21 @@ def test_rooms_are_looked_up_in_three_places_only():
     assert {room(module) for module in (*OFFERS.values(), *VIEWS.values())} <= OUTER
 
 
-@pytest.mark.parametrize("name", ["'seqopt.report.draw'", "f'seqopt.{x}'", "name"])
-def test_a_hidden_arrow_is_seen(tmp_path, monkeypatch, name):
+@pytest.mark.parametrize(
+    "call", ["import_module('seqopt.report.draw')", "import_module(name)", "Later(f'seqopt.{x}')"]
+)
+def test_a_hidden_arrow_is_seen(tmp_path, monkeypatch, call):
     path = tmp_path / "seqopt" / "scene" / "any.py"
     path.parent.mkdir(parents=True)
-    path.write_text(f"import importlib\n\nimportlib.import_module({name})\n", "utf-8")
+    path.write_text(f"import importlib\n\nimportlib.{call}\n", "utf-8")
     monkeypatch.setattr("tests.test_architecture.ROOT", tmp_path)
     assert hidden_arrows([path]) == ["seqopt.scene.any"]
+
+
+def test_a_module_that_is_loaded_later_is_an_arrow(tmp_path):
+    path = tmp_path / "any.py"
+    path.write_text("PAGES = Later('seqopt.report.page')\n", "utf-8")
+    assert imports(path) == {"seqopt.report.page"}
 
 
 def test_an_arrow_against_the_order_is_seen():

@@ -162,9 +162,7 @@ def plain(value: object) -> Any:
 
 def _unpacked(value: object) -> Any:
     """Return the contents of a table, an array, an enumeration's member or another value."""
-    import pandas as pd  # noqa: PLC0415  # help needs none of it
-
-    if isinstance(value, pd.DataFrame):
+    if hasattr(value, "to_csv"):
         return value.to_dict(orient="records")
     if isinstance(value, Mapping):
         return dict(value)

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 
 from seqopt._cli.answer import Status
 from seqopt._cli.terminal import columns, complain, show
+from seqopt._later import Later
 from seqopt._registry import COMMANDS, every_command, find_command
 from seqopt.errors import did_you_mean
 
@@ -28,12 +29,14 @@ EXAMPLES = """Three examples:
 seqopt --help names all commands, seqopt COMMAND --help what each is for, and
 seqopt COMMAND --help-all what it can do.
 """
+SIGNATURES = Later("seqopt._cli.signatures")  # 240 ms: it needs all that is computed
 LINES = 40  # of a screen
 ALL = "--help-all"
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
 PRINTED = ("quiet", "json", "strict")  # what concerns the printed answer alone
 GONE = {
+    "--crown": "in Python dataclasses.replace(seqopt.CRITERIA[...], crown=...) has it",
     "--keep": "--to 12 leaves the first 12 bricks of --order",
     "--load-factor": "in Python seqopt.stability.load_factors has it",
     "--staged": "in Python seqopt.responses.analyze_staged has it",
@@ -144,11 +147,9 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
         added = commands.add_parser(name, help=command.line, formatter_class=_layout)
         added.color = False
         if asked in (None, name):
-            from seqopt._cli.signatures import signature_of  # noqa: PLC0415  # help needs none of it
-
             all_help = "show every option of the command, and exit"
             added.add_argument(ALL, const=_Parser.format_help, help=all_help, **how)
-            signature_of(command.load()).fill(added)
+            SIGNATURES.signature_of(command.load()).fill(added)
         if asked == name:
             whole.asked, whole.spoken = name, tuple(added._option_string_actions)
     return whole
@@ -166,10 +167,8 @@ class Request:
 
     def result(self, progress: Any = None) -> Any:
         """Run the command and return its result; ``progress`` is called with its progress."""
-        from seqopt._cli.signatures import signature_of  # noqa: PLC0415  # help needs none of it
-
         function = find_command(self.name).load()
-        return signature_of(function).call({**self.values, "progress": progress})
+        return SIGNATURES.signature_of(function).call({**self.values, "progress": progress})
 
 
 def request(words: Sequence[str]) -> Request:

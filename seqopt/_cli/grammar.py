@@ -13,15 +13,14 @@ from seqopt.contact.mortar import MORTARS, Mortar, _find_curing, find_mortar
 from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.problem.criteria import Ranked, RankSum
-from seqopt.problem.requirements import LARGEST, NEVER, Criterion, number_word, split_word
+from seqopt.problem.requirements import LARGEST, Criterion, number_word, split_word
 from seqopt.problem.standing import Standing
 from seqopt.scene._checks import short
 from seqopt.scene.parts import Prop
 from seqopt.scene.scene import Scene
-from seqopt.study.published import CRITERIA, find_criterion
+from seqopt.study.published import find_criterion
 
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
-NAMED = (None, *CRITERIA)
 PROPS = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma push, capacity=300"
 
 
@@ -154,19 +153,14 @@ def parse_standing(asked: Stands) -> Standing | None:
 
 def parse_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
     """Return the criterion of the options; ``usual``: the default that options of ranks modify."""
-    said = {"crown": asked.crown, "ranked": asked.ranked}
-    given = {name: text for name, text in said.items() if text is not None}
-    named = asked.criterion
-    if named is None and not given:
-        return None
-    criterion = usual if named is None else find_criterion(named, "--criteria")
-    for name, text in given.items():
-        if not isinstance(criterion, RankSum) or (name == "crown" and named not in NAMED):
-            raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
-        crown = None if name == "ranked" or text == "none" else number_word(str(text), "--crown")
-        value: Any = Ranked(text) if name == "ranked" else NEVER if crown is None else crown
-        criterion = replace(criterion, **{name: value})
-    return criterion
+    named, ranked = asked.criterion, asked.ranked
+    criterion = None if named is None else find_criterion(named, "--criteria")
+    if ranked is None:
+        return criterion
+    criterion = criterion or usual
+    if not isinstance(criterion, RankSum):
+        raise ProblemError(f"--ranked {ranked}: {criterion.name} has no ranks; leave it out")
+    return replace(criterion, ranked=Ranked(ranked))
 
 
 def parse_size(text: str) -> float:

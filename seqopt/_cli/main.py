@@ -8,13 +8,15 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
-from types import ModuleType
 
 from seqopt._cli.answer import Status, answer_of, print_answer, status_of
 from seqopt._cli.arguments import EXAMPLES, named_command, request
 from seqopt._cli.terminal import flush, quiet_numbers, show, silence
+from seqopt._later import Later
 from seqopt._registry import COMMANDS
 from seqopt.errors import SeqoptError
+
+WATCHER = Later("seqopt._cli.watcher")  # 60 ms: it needs NumPy
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -35,15 +37,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-class _Later(ModuleType):
-    """Proxy of a library, loaded on first access."""
-
-    def __getattr__(self, name: str) -> object:
-        if sys.modules.get(self.__name__) is self:
-            del sys.modules[self.__name__]
-        return getattr(import_module(self.__name__), name)
-
-
 def load(words: Sequence[str]) -> None:
     """Load the libraries of the command among the words, if there is one.
 
@@ -53,19 +46,15 @@ def load(words: Sequence[str]) -> None:
     gc.disable()
     asked = named_command(words)
     if asked in COMMANDS:
-        import numpy as np  # noqa: PLC0415  # of which help needs nothing
-
+        np = import_module("numpy")
         # few commands need pandas, only the start of SciPy looks at these parts
-        sys.modules.setdefault("pandas", _Later("pandas"))
+        sys.modules.setdefault("pandas", Later("pandas"))
         for part in ("ctypeslib", "f2py", "fft", "polynomial", "testing"):
             if part not in vars(np):
-                vars(np)[part] = sys.modules.setdefault(f"numpy.{part}", _Later(f"numpy.{part}"))
-        if any(map(os.path.exists, words)):
-            import jsonschema  # noqa: F401, PLC0415  # scene files need it
-
-        import seqopt._cli.signatures  # noqa: PLC0415  # of which help needs nothing
-        import seqopt._cli.watcher  # noqa: F401, PLC0415
-
+                vars(np)[part] = sys.modules.setdefault(f"numpy.{part}", Later(f"numpy.{part}"))
+        needed = ["seqopt._cli.signatures", "seqopt._cli.watcher"]
+        for name in [*needed, *["jsonschema"] * any(map(os.path.exists, words))]:  # of scene files
+            import_module(name)
         COMMANDS[asked].load()
     gc.freeze()
     gc.enable()
@@ -79,9 +68,7 @@ def _run(words: Sequence[str]) -> int:
         asked = request(words)
     except SystemExit as stop:  # the parser has said why, or printed its help
         return int(stop.code or 0)
-    from seqopt._cli.watcher import Watcher  # noqa: PLC0415  # of which help needs nothing
-
-    with quiet_numbers(quiet=asked.quiet), Watcher(shows=not asked.quiet) as tell:
+    with quiet_numbers(quiet=asked.quiet), WATCHER.Watcher(shows=not asked.quiet) as tell:
         answer = answer_of(asked.result(tell))
     answer = answer.strictly() if asked.strict else answer
     return print_answer(answer, asked.name, quiet=asked.quiet, as_json=asked.json)

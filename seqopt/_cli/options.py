@@ -203,16 +203,12 @@ class Ranks(Asked):
         what a step costs: equations-2-3 (of Bruun et al.), worst-ratio (over the least worst of
         fixed methods), or responses to rank with weights, as T_max,M_sup=2,F_move; all names:
         {criteria} (default: equations-2-3; with --aim, --stands or --schedule free worst-ratio)
-    crown : BRICKS
-        for criteria of ranks: how many bricks are placed at the crown of an arch, or none (default:
-        derived from the scene)
     ranked : CHOICE
         for criteria of ranks: where two open grips meet in a step, rank all pairs of their nodes
         together, or only the pairs with the node chosen before (default: pairs)
     """
 
     criterion: Criterion | str | None = word(None, flag="--criteria")
-    crown: Number | None = word(None, shell=True)
     ranked: str | None = word(None, choices=[each.value for each in Ranked], shell=True)
 
 

@@ -19,11 +19,14 @@ from seqopt._files import (
     write_folder,
     write_text,
 )
+from seqopt._later import Later
 from seqopt._showing import PAGE
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
 
+CHARTS = Later("seqopt.report.charts")  # matplotlib is an extra
+TASKS = Later("seqopt.exchange._tasks")  # 13 ms, where files are written
 ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
 
 
@@ -38,10 +41,7 @@ def picture(name: str, draw: Callable[[Any], Any]) -> dict[str, bytes]:
     """Return files of a picture by name, empty without matplotlib; ``draw`` takes the charts."""
     if figure_notes():
         return {}
-    from seqopt.report import charts  # noqa: PLC0415  # matplotlib is an extra
-    from seqopt.report._style import picture_files  # noqa: PLC0415
-
-    return picture_files(name, draw(charts))
+    return CHARTS.picture_files(name, draw(CHARTS))
 
 
 def steps_table(plan: ShownBuild) -> pd.DataFrame:
@@ -89,12 +89,10 @@ def time_files(plan: ShownBuild) -> dict[str, bytes]:
 
 def task_files(plan: Plan) -> dict[str, str]:
     """Return the tasks of robots for their programming, by file name."""
-    from seqopt.exchange._tasks import plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
-
     scene = plan.engine.network.scene
     postures = None if plan.arms is None else plan.arms.postures
-    tasks = [*plan_tasks(scene, plan.steps, postures=postures)]
-    return {"tasks.json": tasks_json(scene, tasks), "tasks.csv": tasks_csv(tasks)}
+    tasks = [*TASKS.plan_tasks(scene, plan.steps, postures=postures)]
+    return {"tasks.json": TASKS.tasks_json(scene, tasks), "tasks.csv": TASKS.tasks_csv(tasks)}
 
 
 def _plain(value: object) -> Any:

@@ -11,7 +11,7 @@ from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.problem.filters import parse_limits
-from seqopt.problem.problem import Problem, parse_budgets, parse_robust
+from seqopt.problem.problem import Problem, parse_robust
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
 from seqopt.scene.scenarios import Scenarios
@@ -24,19 +24,6 @@ from seqopt.workflow import DEFAULTS, SEARCH, Robust, _chooses_states, _find_mov
 
 ALONE = ("scenarios", "seed", "vary")  # options that mean something with --robust alone
 SPREADS = ("stiffness", "density", "position", "grips")
-_NOT_FREE = "the free schedule has no such; leave it out"
-_NOT_STATES = "aims and --stands have no such; leave it out"
-_MORE = f"it needs more; give --stands MORTAR, or --schedule {FREE}"
-_WRONG = {
-    "free": {"ranked": _NOT_FREE},
-    "states": {"ranked": _NOT_STATES, "rules": _NOT_STATES},
-    "candidates": {
-        "rules": f"it needs more; give --schedule {FREE}",
-        "tilt": _MORE,
-        "friction": _MORE,
-    },
-}
-
 
 # the last is who takes part
 Change: TypeAlias = Callable[[Scene, inputs.Place], tuple[Scene, inputs.Place, str]]
@@ -59,31 +46,28 @@ def pose_problem(asked: options.Moves, change: Change | None = None) -> PosedPro
     """
     choice = asked if isinstance(asked, options.Chosen) else options.Chosen()  # of a Pareto set
     sought, aim = asked.order == SEARCH, str(asked.aim or "")
-    of_states = _chooses_states(asked.schedule, choice.formulation, (), (aim, asked.stands, sought))
-    _require_known(asked, choice, of_states=of_states)
-    usual = DEFAULTS[FREE if of_states else "any other"].criterion
-    criterion = grammar.parse_criterion(choice, usual)
+    _require_known(asked, choice)
     scene = inputs.find_scene(replace(asked, order=None) if sought else asked)
     stands = grammar.parse_standing(asked)
     scene, begin, end, robots = _ends(asked, inputs.in_seconds(choice, scene), stands, change)
     find_postures(scene, choice.cache, asked.tell)
     limits = parse_limits(asked.limits, scene, "--limit")
-    parse_budgets(choice.budgets, of_states=of_states)  # said before anything is built
     most = None if choice.max_memory is None else grammar.parse_size(choice.max_memory)
-    tell = None if of_states else asked.tell
-    resources = Resources(choice.workers, None, most, tell)
     robust, known = _scenarios(choice, scene)
     engine = inputs.find_engine(asked, build_network(scene))
     named, rules = grammar.parse_robots(robots) or None, asked.rules or None
     every = _find_moves(engine.network, asked.schedule, named, choice.candidates, rules, "--rule")
     if isinstance(every, FreeRules) and asked.direction is not None:
         every = replace(every, **dict[str, Any](direction=asked.direction))
-    words: dict[str, Any] = {"limits": limits, "budgets": choice.budgets, "stands": stands}
-    words |= {"sought": sought, "resources": resources}
-    if robust is not None:
-        words |= {"scenarios": known, "over": robust.aim}
     moves = inputs.between(every, begin, end)
     states = _chooses_states(moves, choice.formulation, limits, (aim, stands, sought))
+    usual = DEFAULTS[FREE if states else "any other"].criterion
+    criterion = grammar.parse_criterion(choice, usual)
+    words: dict[str, Any] = {"limits": limits, "budgets": choice.budgets, "stands": stands}
+    words |= {"sought": sought}
+    words["resources"] = Resources(choice.workers, None, most, None if states else asked.tell)
+    if robust is not None:
+        words |= {"scenarios": known, "over": robust.aim}
     problem = _pose_words(engine, moves, criterion, aim, states=states, **words)
     return PosedProblem(problem, robust, known)
 
@@ -116,20 +100,17 @@ def _ends(
     return scene, begin, end, robots
 
 
-def _require_known(asked: options.Moves, choice: options.Chosen, *, of_states: bool) -> None:
-    """Raise a `ProblemError` for options that states, or candidates, do not support."""
-    down, free = Direction.TAKE_DOWN.value, asked.schedule == FREE
+def _require_known(asked: options.Moves, choice: options.Chosen) -> None:
+    """Raise a `ProblemError` for options that go with another one alone."""
+    down = Direction.TAKE_DOWN.value
     for name in ALONE:
         if choice.robust is None and getattr(choice, name):
             raise ProblemError(
                 f"--{name}: plans over scenarios alone have it; give --robust worst-peak, "
                 "worst-total or as cvar=0.9"
             )
-    if asked.direction == down and not free:
+    if asked.direction == down and asked.schedule != FREE:
         raise ProblemError(f"--direction {down}: it goes with --schedule {FREE}")
-    for name, why in _WRONG["free" if free else "states" if of_states else "candidates"].items():
-        if getattr(asked, name, None):
-            raise ProblemError(f"--{'rule' if name == 'rules' else name}: {why}")
 
 
 def _scenarios(asked: options.Chosen, scene: Scene) -> tuple[Robust | None, Scenarios | None]:

@@ -15,7 +15,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
+from seqopt._later import Later
 from seqopt.errors import FileError, PluginWarning, SceneWarning
+
+NUMPY = Later("numpy")  # 50 ms
+CHECKS = Later("seqopt.scene._checks")  # 300 ms: names of others come with scenes
 
 NARROWEST, WIDEST = 40, 100  # columns that text is wrapped to
 CLEAR = "\r\033[K"  # of a terminal: the line it is on
@@ -63,9 +67,9 @@ def harmless(text: str, kept: str = "") -> str:
     """
     if text.translate(dict.fromkeys(map(ord, kept))).isprintable():
         return text
-    from seqopt.scene._checks import steers  # noqa: PLC0415  # names of others come with scenes
-
-    return "".join(repr(sign)[1:-1] if sign not in kept and steers(sign) else sign for sign in text)
+    return "".join(
+        repr(sign)[1:-1] if sign not in kept and CHECKS.steers(sign) else sign for sign in text
+    )
 
 
 def show(text: str) -> None:
@@ -122,9 +126,7 @@ def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
 
     NumPy's warnings are ignored: values that are not finite raise errors of their own.
     """
-    import numpy as np  # noqa: PLC0415  # help needs none of it
-
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
+    with warnings.catch_warnings(), NUMPY.errstate(all="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)
         warnings.simplefilter("ignore" if quiet else "always", SceneWarning)
         warnings.simplefilter("ignore" if quiet else "always", PluginWarning)

@@ -11,6 +11,7 @@ from seqopt._cli import grammar, inputs, options, outputs, remarks
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
+from seqopt._later import Later
 from seqopt._showing import PAGE
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar
 from seqopt.engines.registry import USUAL, make_engine, versions
@@ -25,6 +26,7 @@ from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import AXES, failure_map
 from seqopt.work.progress import with_progress
 
+MAP = Later("seqopt.report._failures")  # 24 ms, of pages
 STEEPEST = 45.0  # degrees
 
 
@@ -187,8 +189,6 @@ def _margins(asked: Assess, steps: Sequence[Step]) -> tuple[tuple[str, ...], ran
 
 def _map(asked: Assess, over: str, holds: Sequence[str]) -> Answer:
     """Return the failure map of builds over an axis and the mortar of joints."""
-    from seqopt.report._failures import failure_blocks, failure_page, usual_builds  # noqa: PLC0415  # verdicts load no pages
-
     scene = inputs.find_scene(asked)
     axis, values = _axis(over)
     for name in holds:
@@ -196,20 +196,20 @@ def _map(asked: Assess, over: str, holds: Sequence[str]) -> Answer:
     outputs.require_out(asked)
     network = build_network(scene)
     if asked.method is None and inputs.given_plan(asked) is None:
-        builds, notes = usual_builds(scene, asked.tell)
+        builds, notes = MAP.usual_builds(scene, asked.tell)
     else:
         name, steps, _ = inputs.find_steps(asked, network)
         builds, notes = {name: steps}, []
     found = failure_map(scene, builds, holds, axis, values, asked.tell)
 
     def files() -> dict[str, bytes | str]:
-        page = failure_page(make_engine(USUAL, network, None), builds, found)
+        page = MAP.failure_page(make_engine(USUAL, network, None), builds, found)
         tables = {"map.csv": csv_text(found.cases), "map_steps.csv": csv_text(found.steps)}
         picture = outputs.picture("map", lambda charts: charts.failure_figure(found))
         return {**tables, PAGE: page, **picture}
 
     written = outputs.write_outputs(asked, files)
-    blocks = failure_blocks(scene, found, wrapped)
+    blocks = MAP.failure_blocks(scene, found, wrapped)
     where = outputs.written_to(asked.path, tables="tables, a picture", what="how steps fall")
     falls = found.cases["fall"].any()
     return Answer(

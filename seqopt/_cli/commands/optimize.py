@@ -17,6 +17,7 @@ from seqopt._cli.answer import Answer, Result
 from seqopt._cli.posing import Change, PosedProblem, pose_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
+from seqopt._later import Later
 from seqopt._showing import PAGE
 from seqopt.graph.formulation import End, Run, as_formulation, trace_rows
 from seqopt.judge.certificate import TOLERANCE
@@ -31,6 +32,9 @@ from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
 from seqopt.work.progress import Clock, within
 
+PAGES = Later("seqopt.report._pages")  # 200 ms, where files are written
+TEXT = Later("seqopt.report.text")  # 40 ms, where there is a plan
+ADVICE = Later("seqopt.plan._infeasible")  # 20 ms: it needs all proofs
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 VERDICTS = "which steps stand"
 
@@ -192,9 +196,7 @@ def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes |
     plan, made = found.plan, dict[str, bytes | str]()
     tasks = {kind: str(tables[f"tasks.{kind}"]) for kind in ("csv", "json") if tables}
     if found.analyzed:
-        from seqopt.report._pages import plan_page  # noqa: PLC0415  # only where files are written
-
-        shown = partial(plan_page, plan, found.prover, tasks=tasks)
+        shown = partial(PAGES.plan_page, plan, found.prover, tasks=tasks)
         content = found.clock.spare(PAGE, shown, None)
         made |= {} if content is None else {PAGE: content}
     if rows := trace_rows(plan.trace):
@@ -234,9 +236,7 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
     plan, scene = found.plan, found.plan.engine.network.scene
     held = ""
     if found.analyzed:
-        from seqopt.report.text import _headline  # noqa: PLC0415  # where there is a plan
-
-        held = f"{OUTSIDE}: " * bool(plan.outside) + f"{_headline(scene, plan._columns)}; "
+        held = f"{OUTSIDE}: " * bool(plan.outside) + f"{TEXT._headline(scene, plan._columns)}; "
     yield f"{held}{_value(found)}"
     counts = [f"{len(plan.steps)} steps"]
     if not plan.graph.candidates:
@@ -251,9 +251,7 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
         yield wrapped(", ".join(map(str, plan.order)), first="order: ")
     yield from (f"payload exceeded: {excess}" for excess in over)
     if over and (loads := overloads(scene, plan._columns)):
-        from seqopt.plan._infeasible import payload_advice  # noqa: PLC0415  # with all proofs
-
-        yield payload_advice(plan.engine, plan.steps, loads)
+        yield ADVICE.payload_advice(plan.engine, plan.steps, loads)
 
 
 def _notes(asked: Optimize, found: Found) -> Iterator[str]:

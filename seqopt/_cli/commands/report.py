@@ -61,10 +61,10 @@ def run(asked: Report) -> Answer:
     write_text(path, folder_page(engine, folder, prover))
     written, left = [path], outputs.figure_notes(figures)
     if figures is not None and not left:
-        from seqopt.report.charts import plan_figures  # noqa: PLC0415  # needs an extra
-
         asked.tell("drawing figures")
-        write_folder(figures, plan_figures(engine, folder_builds(engine, folder, prover)))
+        write_folder(
+            figures, outputs.CHARTS.plan_figures(engine, folder_builds(engine, folder, prover))
+        )
         written.append(figures)
     text = f"written to {' and '.join(map(str, written))}"
     drawn = (f"arms: drawn without postures; {trouble}",) if trouble else ()

@@ -18,9 +18,11 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.commands import optimize
 from seqopt._cli.signatures import signature_of
 from seqopt._files import csv_text, make_folder, read_text, write_folder, write_text
+from seqopt._later import Later
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.sweep import MOST, WORDS, _plan_row, _solve_cases, _spread_values, _spread_words
 
+CHARTED = Later("seqopt.report._sweep_chart")  # matplotlib is an extra
 ROWS, ASKED, CHART = "sweep.csv", "sweep.json", "sweep"
 
 
@@ -133,6 +135,6 @@ def _chart(table: pd.DataFrame, names: list[str]) -> dict[str, bytes]:
     """Return files of the chart over what differs; none where nothing can be drawn."""
     if outputs.figure_notes() or not table.columns.str.endswith("_bound").any():
         return {}
-    from seqopt.report._sweep_chart import draw_sweep  # noqa: PLC0415  # matplotlib is an extra
-
-    return outputs.picture(CHART, lambda _: draw_sweep(table, [n for n in names if n in table]))
+    return outputs.picture(
+        CHART, lambda _: CHARTED.draw_sweep(table, [n for n in names if n in table])
+    )
