@@ -41,7 +41,8 @@ def picture(name: str, draw: Callable[[Any], Any]) -> dict[str, bytes]:
     """Return files of a picture by name, empty without matplotlib; ``draw`` takes the charts."""
     if figure_notes():
         return {}
-    return CHARTS.picture_files(name, draw(CHARTS))
+    files: dict[str, bytes] = CHARTS.picture_files(name, draw(CHARTS))
+    return files
 
 
 def steps_table(plan: ShownBuild) -> pd.DataFrame:
