@@ -24,12 +24,12 @@ from seqopt.errors import ProblemError, did_you_mean, message_of
 from seqopt.problem.requirements import Criterion, state_costs
 from seqopt.problem.standing import MARGINS, StandingSets
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE
+from seqopt.responses.quantities import NO_TOLERANCE, OFFERED, TOLERANCE
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 
 LARGEST = "F_largest"
-STATE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", LARGEST, TOLERANCE)
+STATE_RESPONSES = (*OFFERED, LARGEST, TOLERANCE)
 """Responses of a state, independent of the last move, for goals, criteria and limits."""
 NONE = -1  # in place of a node, of a robot that holds none
 

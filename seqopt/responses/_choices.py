@@ -43,12 +43,13 @@ from seqopt.responses._blocks import (
 )
 from seqopt.responses._grip_sets import answer_blocks
 from seqopt.responses._tolerance import is_tolerance, with_tolerances
+from seqopt.responses.quantities import OFFERED
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Grips, Step
 
-CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot
+CHOICE_RESPONSES = (*OFFERED, "F_move", "F_largest")  # and one per robot
 
 __all__ = ["CHOICE_RESPONSES", "Evaluation", "StepChoices", "Wanted"]
 

@@ -239,6 +239,9 @@ CHOSEN_BY: dict[str, Response] = {**RESPONSES, _C_MAX.name: _C_MAX}
 compression of any edge as a size, N (``F_min`` without its sign; zero if no edge is compressed).
 """
 
+OFFERED = ("T_max", "M_sup", "D_max", "C_max")
+"""Names of `CHOSEN_BY` that aims, criteria and limits take, of every kind of schedule."""
+
 
 EXTREMES: Mapping[str, Callable[[Extremes], Floats]] = {
     "T_max": lambda found: found.most,

@@ -164,3 +164,31 @@ def test_every_thumbnail_leads_to_a_page_that_shows_it():
     for picture, page in links:
         shown = (ROOT / "docs" / page).read_text(encoding="utf-8")
         assert Path(picture).name in shown, (picture, page)
+
+
+NAMED = re.compile(r"`((?:\w+/)*)(\w+)\.(?:py\b)?(\w*)`")  # a module, or a name in it
+
+
+def missing(text):
+    """Return what a text names that is not in the house: a module, or a name in a module."""
+    found = []
+    for folder, module, name in NAMED.findall(text):
+        at = f"{folder.removeprefix('seqopt/')}{module}"
+        paths = [
+            p for room in ("seqopt", "formulations", "") for p in (ROOT / room).glob(f"{at}.py")
+        ]
+        paths += (ROOT / "seqopt").glob(f"*/{at}.py") if not paths else []
+        if not any(re.search(rf"\b{name}\b", path.read_text(encoding="utf-8")) for path in paths):
+            found.append(f"{at}.{name}")
+    return found
+
+
+def test_the_architecture_names_what_exists():
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    table = text[text.index("## Where something new goes") :]
+    assert len(NAMED.findall(table)) >= 20
+    assert missing(table) == []
+    assert missing("`registry.NO_ENGINES` `seqopt/engines/gone.py` `registry.ENGINES`") == [
+        "registry.NO_ENGINES",
+        "engines/gone.",
+    ]
