@@ -46,7 +46,7 @@ class Compare(
         seconds together (60), each plan valued in the most detailed model that there is data for
     reference : ENGINE
         with --speed: the engine that values plans (compliance; with --mortar every step has to
-        stand, too; discrete lets joints open)
+        stand, too; discrete lets joints open; staged adds what earlier steps lock in)
     """
 
     speed: float = options.word(0.0, const="60", advice="; give seconds, and the scene before it")

@@ -49,8 +49,9 @@ from seqopt.plan.pose import pose, states_of
 from seqopt.plan.solve import on_the_way, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import Criterion
+from seqopt.problem.requirements import Criterion, _response_along
 from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, RegretTable
+from seqopt.responses._staged import analyze_staged
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
@@ -63,6 +64,7 @@ TIMES = 3
 SHARE = 4  # times its part of what is left that a way may take
 REPEAT = 0.1  # share of what it may take up to which a way is repeated
 LOOP = "loop"
+STAGED = "staged"  # responses with what earlier steps lock in, which no engine chooses by
 RIGID_GRIPS = "rigid grips"  # exactly rigid bricks, and grips too, though their stiffness is given
 USUAL = {LOOP: "overlap_dp", FREE: "schedule_search"}
 USUAL_RULES = FreeRules()
@@ -123,7 +125,8 @@ class Way:
 class _Course:
     """What all ways have in common.
 
-    ``reference``: the problem that values plans; ``criterion``: the objective of ways by ranks;
+    ``reference``: the problem that values plans; ``staged``: whether with what earlier steps lock
+    in; ``criterion``: the objective of ways by ranks;
     ``loop``: the schedule with open grips, if there is one; ``rules``: of the free one; ``mortar``:
     whose joints every step is asked to stand with; None where joints do not open.
     """
@@ -134,6 +137,7 @@ class _Course:
     rules: FreeRules
     mortar: Mortar | None
     timer: Timer
+    staged: bool = False
     findings: list[Finding] = field(default_factory=list)
     known: dict[Sequence[Step], Valued] = field(default_factory=dict)
 
@@ -204,9 +208,7 @@ class _Course:
         last, bare = steps[-1], (None,) * len(steps[-1].grips)
         end = [replace(last, grips=bare, kind=StepKind.RELEASE)] if last.held else []
         try:
-            along, *after = (
-                plan_values(states_of(self.reference), part)[0] for part in (steps, end) if part
-            )
+            along, *after = self._worst(steps, end)
         except MechanismError as error:
             return np.inf, np.nan, FALLS, str(error)
         except SeqoptError as error:  # a limit is exceeded
@@ -218,6 +220,20 @@ class _Course:
                     status = FALLS if verdict is Verdict.FALLS else FAILED
                     return np.inf, along, status, f"step {step.number} {verdict.value}"
         return max([along, *after]), along, DONE, ""
+
+    def _worst(self, steps: Sequence[Step], end: Sequence[Step]) -> list[float]:
+        """Return the worst step of a plan, and of its bare end, if there is one after it."""
+        problem = states_of(self.reference)
+        if not self.staged:
+            return [plan_values(problem, part)[0] for part in (steps, end) if part]
+        scene, criterion = problem.network.scene, problem.criterion
+        own = [replace(step, number=n) for n, step in enumerate([*steps, *end], start=1)]
+        table = analyze_staged(problem.network, own)
+        known = {n: np.nan_to_num(_response_along(scene, table, n)) for n in criterion.wanted(1)}
+        rows = ({n: v[k : k + 1] for n, v in known.items()} for k in range(len(own)))
+        pairs = zip(rows, own, strict=True)
+        costs = [float(criterion.costs(row, step.bricks, 1)[0]) for row, step in pairs]
+        return [max(costs[: len(steps)]), *costs[len(steps) :]]
 
 
 def measure_regret(
@@ -245,8 +261,9 @@ def measure_regret(
         For all ways together, s.
     reference : str, optional
         The engine that values plans; by default ``compliance``, with the stiffness of grips that
-        the scene has. Where the engine has a mortar, every step has to stand with it, too, which is
-        proven by its joints' equilibrium; ``discrete`` lets these open and slip instead.
+        the scene has; ``staged`` adds to that what earlier steps lock in. Where the engine has a
+        mortar, every step has to stand with it, too, which is proven by its joints' equilibrium;
+        ``discrete`` lets these open and slip instead.
     progress, timer : callable, Timer, optional
         Called with the progress.
 
@@ -266,12 +283,14 @@ def measure_regret(
     mortar = joints if isinstance(joints, Mortar) else None
     if reference or recipe is not None:  # else an object of one's own
         own = mortar if reference in LIMITED else None
-        named = make_engine(reference or USUAL_ENGINE, engine.network, own)
+        base = USUAL_ENGINE if reference in ("", STAGED) else reference
+        named = make_engine(base, engine.network, own)
     worst = WORST_OVER_METHODS if isinstance(criterion, RankSum) else criterion
     problem = pose(named, rules, worst, "minmax")
-    course = _Course(problem, criterion, _loop(engine), rules, mortar, timer)
-    name = _name_of(named)
-    ways, refused = _ways(course, name)
+    staged = reference == STAGED
+    course = _Course(problem, criterion, _loop(engine), rules, mortar, timer, staged)
+    ways, refused = _ways(course, _name_of(named))
+    name = reference if staged else _name_of(named)
     rows, curves = list[dict[str, object]](), dict[int, tuple[Finding, ...]]()
     late = set[tuple[str, str]]()  # engines and schedules that need too long to look at all
     for done, way in enumerate(ways):
@@ -306,7 +325,7 @@ def _name_of(engine: Engine) -> str:
 
 def check_reference(name: str) -> None:
     """Raise a `ProblemError` if no engine that can value plans has a name; the empty one may."""
-    known = [each for each in ENGINES if each != "auto"]
+    known = [*(each for each in ENGINES if each != "auto"), STAGED]
     if name and name not in known:
         raise ProblemError(f"reference {name!r} does not exist; give one of {', '.join(known)}")
 
