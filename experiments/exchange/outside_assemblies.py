@@ -177,7 +177,11 @@ def row_of(outside: Outside, path: Path, folder: Path) -> dict[str, object]:
         return row | {"outcome": "no plan", "said": said}
     summary = json.loads((plan / "summary.json").read_text(encoding="utf-8"))
     again, steps = silently(read_folder, plan)
-    outs = {form: ("--format", form, "--out", str(folder / form)) for form in writable()}
+    outs = {
+        form: ("--format", form, "--out", str(folder / form))
+        for form in writable()
+        if form != "compas_assembly"
+    }
     exported = [run("export", str(plan), *words)[0] for words in outs.values()]
     row |= {"outcome": PLAN if not any(exported) else "not exported", "said": summary["status"]}
     return row | {"steps": len(steps), **verdicts(again, steps)}

@@ -8,28 +8,22 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from seqopt._files import read_text
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError, StepError
 from seqopt.exchange._building import block_numbers
 from seqopt.exchange._compas_shapes import (
-    Document,
     held_by,
     kind,
-    mesh_data,
     payload,
     solid_of,
     solid_of_element,
     transformation_of,
-    typed,
 )
 from seqopt.exchange._content import (
     Content,
@@ -47,7 +41,6 @@ from seqopt.exchange._content import (
 from seqopt.exchange._meshes import object_content
 from seqopt.exchange._tables import step_states
 from seqopt.scene._checks import short
-from seqopt.scene.boxes import vertices_of
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
@@ -332,28 +325,22 @@ def _listed(
         yield FileBlock(key, *solid_of(where, value), group=group)
 
 
-def _read_source(scene: Scene, path: Path) -> tuple[Document, dict[int, str]]:
-    """Return the assembly from which a scene was imported, and the keys of its nodes by brick."""
-    document = assembly_json(read_text(path), str(path))
-    keys = [block.key for block in read_assembly(document, str(path)).blocks]
-    found = dict(zip(block_numbers(keys), keys, strict=True))
-    lost = [brick.name for brick in scene.bricks if brick.name not in found]
-    if lost:
-        raise StepError(f"the source has no block {lost[0]}; give the file that was imported")
-    return document, found
-
-
 def assembly_with_plan(
     scene: Scene, steps: Sequence[Step], source: Path | str | None = None
 ) -> str:
-    """Return an assembly of compas_assembly with the plan as attributes, JSON.
+    """Return the assembly from which a scene was imported with the plan as attributes, JSON.
 
-    A source stays as it is, with attributes added; otherwise blocks and faces are those of the
-    scene. Every node of a block that is built has ``order``, its place in the build, ``place_step``
-    and ``held``, a list of step, robot and node; the graph has ``plan``, a list of steps.
+    Every node of a block that is built has ``order``, its place in the build, ``place_step`` and
+    ``held``, a list of step, robot and node; the graph has ``plan``, a list of steps.
     """
-    keys = {brick.name: str(brick.name) for brick in scene.bricks}
-    whole, keys = (_assembly(scene), keys) if source is None else _read_source(scene, Path(source))
+    if source is None:
+        raise StepError("format compas_assembly: give the assembly that was imported (--source)")
+    whole = assembly_json(read_text(Path(source)), str(source))
+    own = [block.key for block in read_assembly(whole, str(source)).blocks]
+    keys = dict(zip(block_numbers(own), own, strict=True))
+    lost = [brick.name for brick in scene.bricks if brick.name not in keys]
+    if lost:
+        raise StepError(f"the source has no block {lost[0]}; give the file that was imported")
     graph = assembly_graph(whole, "source")[0]
     found = entry("source", graph, "node", "vertex")
     nodes = {brick.name: found[keys[brick.name]] for brick in scene.bricks}
@@ -370,46 +357,3 @@ def assembly_with_plan(
         kind = row.step.kind.value
         plan.append({"step": number, "type": kind, "placed": list(row.new), "holds": holds})
     return json.dumps(whole) + "\n"
-
-
-def _assembly(scene: Scene) -> Document:
-    """Return the blocks of a scene and the faces between them as an assembly.
-
-    Faces on the ground make a support of their own, a surface: a block that is not closed.
-    """
-    nodes: dict[str, Document] = {
-        str(brick.name): {"block": _written_block(*vertices_of(brick))} for brick in scene.bricks
-    }
-    faces = [(joint.bricks, joint.corners) for joint in scene.joints]
-    most = max(brick.name for brick in scene.bricks)
-    stands = [end for end in scene.grounds if end.corners is not None]
-    if stands:
-        most += 1
-        polygons = [end.corners for end in stands if end.corners is not None]
-        ends = np.cumsum([0, *map(len, polygons)]).tolist()
-        sheet = _written_block(np.concatenate(polygons), [range(a, b) for a, b in pairwise(ends)])
-        nodes[str(most)] = {"block": sheet, "is_support": True}
-        faces += [((most, end.brick), end.corners) for end in stands]
-    edges: dict[str, dict[str, Any]] = {name: {} for name in nodes}
-    for (a, b), corners in faces:
-        if corners is not None:
-            edge = edges[str(a)].setdefault(str(b), {"interfaces": []})
-            points = {"points": [list(corner) for corner in corners]}
-            edge["interfaces"].append(typed("compas_assembly.datastructures/Interface", points))
-    graph = {
-        "attributes": {"name": scene.name},
-        "default_node_attributes": {"block": None, "is_support": False},
-        "default_edge_attributes": {"interfaces": None},
-        "node": nodes,
-        "edge": edges,
-        "max_node": most,
-    }
-    data = {
-        "attributes": {"name": scene.name},
-        "graph": typed("compas.datastructures/Graph", graph),
-    }
-    return typed("compas_assembly.datastructures/Assembly", data)
-
-
-def _written_block(points: Floats, faces: Sequence[Iterable[int]]) -> Document:
-    return typed("compas_assembly.datastructures/Block", mesh_data(points, faces))

@@ -154,7 +154,6 @@ BUILT_IN = {
             read=partial(_document, "compas_assembly"),
             write=assembly_with_plan,
             takes=("source",),
-            lost=("densities", *_NEVER),
         ),
         *(Format(n, read=partial(_document, n)) for n in [*DOCUMENTS][1:]),
         Format("boxes", ("csv",), partial(_of_text, read_boxes)),

@@ -114,27 +114,3 @@ def test_a_plan_goes_back_into_the_assembly(tmp_path):
     assert len(graph.attributes["plan"]) == len(steps)
     again = import_scene(path, given=Given(unit="m", density=2000.0, supports=["0", "1"]))
     assert [brick.mass for brick in again.bricks] == [brick.mass for brick in scene.bricks]
-
-
-def test_a_scene_goes_out_as_an_assembly_and_comes_back(tmp_path):
-    """Without a source: blocks, and the faces between them, are written anew."""
-    scene = imported("shelf-stable")
-    steps = METHODS["sequential"](build_network(scene), ())
-    path = tmp_path / "out.json"
-    path.write_text(export_plan(scene, steps, "compas_assembly"), encoding="utf-8")
-    theirs = compas.json_load(path)
-    assert theirs.graph.number_of_nodes() == len(scene.bricks) + 1  # and the ground
-    blocks = [theirs.graph.node_attribute(brick.name, "block") for brick in scene.bricks]
-    volume = sum(block.volume() for block in blocks)
-    assert volume == pytest.approx(sum(b.mass for b in scene.bricks) / 2000.0)
-    back = import_scene(path, given=Given(unit="m", density=2000.0))
-    assert back.build_order == scene.build_order
-    for one, other in zip(scene.bricks, back.bricks, strict=True):
-        assert other.mass == pytest.approx(one.mass)
-        assert other.position == pytest.approx(one.position)
-    for kind in ("joints", "grounds"):
-        one, other = (
-            sorted(spring.translational_stiffness[0] for spring in getattr(held, kind))
-            for held in (scene, back)
-        )
-        assert other == pytest.approx(one)

@@ -10,15 +10,11 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments.harness.scenes import running_bond
 from seqopt._cli.main import main
-from seqopt.exchange._content import Given
 from seqopt.exchange._tasks import FRAMES, plan_tasks
 from seqopt.exchange.exports import export_plan
-from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
 from seqopt.sequence.methods import METHODS
-from tests.blocks import with_shapes
 from tests.builders import ROOT, six_bricks
 
 compas = pytest.importorskip("compas")
@@ -89,23 +85,6 @@ def test_compas_fab_takes_blocks_and_targets_of_tasks():
     for block, brick in zip(found["blocks"], SCENE.placed, strict=True):
         body = robots.RigidBody.from_mesh(block["shape"]).collision_meshes[0]
         assert np.allclose(body.centroid(), brick.position, atol=1e-9)
-
-
-def test_compas_opens_an_assembly_and_writes_it_again(tmp_path):
-    """Its own datastructures keep blocks, faces, supports and the order of the build."""
-    wall, path = with_shapes(running_bond(2, 3)), tmp_path / "again.json"
-    steps = METHODS["sequential"](build_network(wall), ())
-    theirs = compas.json_loads(export_plan(wall, steps, "compas_assembly"))
-    compas.json_dump(theirs, path)
-    again = import_scene(path, given=Given(unit="m", density=2000.0))
-    assert again.build_order == wall.build_order
-    assert {joint.bricks for joint in again.joints} == {joint.bricks for joint in wall.joints}
-    for mine, other in zip(wall.bricks, again.bricks, strict=True):
-        assert np.allclose(mine.position, other.position)
-    theirs.graph.delete_node(wall.build_order[-1])
-    compas.json_dump(theirs, path)
-    shorter = import_scene(path, given=Given(unit="m", density=2000.0))
-    assert shorter.build_order == wall.build_order[:-1]
 
 
 @pytest.mark.slow

@@ -12,15 +12,11 @@ from compas_model.models import Model
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.harness.scenes import running_bond
 from seqopt.errors import SeqoptError
 from seqopt.exchange._building import build_scene
 from seqopt.exchange._content import Given
 from seqopt.exchange._formats import DOCUMENTS as READERS
 from seqopt.exchange._formats import sniffed
-from seqopt.exchange.exports import export_plan
-from seqopt.network.build import build_network
-from seqopt.sequence.methods import METHODS
 from tests.documents import DOCUMENTS as OTHERS
 
 JUNK = (None, True, -1, 0, 3, 1e308, -1e-300, 10**400, "", "x", [], {}, [[1]], {"data": 1}, [0] * 3)
@@ -35,10 +31,6 @@ def places(held, before=()):
         yield from places(value, (*before, key))
 
 
-WALL = running_bond(2, 1)
-STEPS = METHODS["sequential"](build_network(WALL), ())
-
-
 def by_compas():
     """Documents that COMPAS writes: a dictionary of shapes, a model of elements."""
     model = Model()
@@ -48,8 +40,7 @@ def by_compas():
     return {f"{name} of compas": json.loads(compas.json_dumps(it)) for name, it in written.items()}
 
 
-OURS = {"ours": json.loads(export_plan(WALL, STEPS, "compas_assembly"))}
-DOCUMENTS = OTHERS | by_compas() | OURS
+DOCUMENTS = OTHERS | by_compas()
 PLACES = {name: sorted(places(held), key=repr) for name, held in DOCUMENTS.items()}
 REMOVED = "removed"
 

@@ -31,7 +31,7 @@ from seqopt.sequence.rules import with_robots
 from seqopt.sequence.schedule_file import read_site
 from tests.arms.scenes import two_arms
 from tests.builders import small_arch
-from tests.documents import BOXES
+from tests.documents import BOXES, DOCUMENTS
 from tests.quality.fuzz_cases import CHANGES, _changed_plan, _noise, pick, plan_text
 
 Read = Callable[[Path], object]
@@ -125,9 +125,8 @@ def _of_imports() -> Iterator[tuple[str, File]]:
 
     scene = seqopt.load_scene(RIGHT)
     steps = seqopt.sequential(seqopt.build_network(scene))
-    for form, end in (("compas_assembly", "json"), ("obj", "obj")):
-        text = export_plan(scene, steps, form)
-        yield form, (f"i.{end}", text.encode() if isinstance(text, str) else text, brought)
+    yield "obj", ("i.obj", export_plan(scene, steps, "obj").encode(), brought)
+    yield "compas_assembly", ("i.json", _json(DOCUMENTS["assembly"]), brought)
     yield "boxes", ("i.csv", BOXES.encode(), brought)
     made = trimesh.Scene([trimesh.creation.box((0.2, 0.1, 0.1))])
     for end in ("glb", "ply", "stl"):
