@@ -12,7 +12,9 @@ import furo
 import pytest
 import yaml
 
+from seqopt._registry import COMMANDS
 from tests.builders import ROOT
+from tests.commands import command
 
 WORKFLOW = ROOT / ".github" / "workflows" / "tests.yml"
 
@@ -192,3 +194,22 @@ def test_the_architecture_names_what_exists():
         "registry.NO_ENGINES",
         "engines/gone.",
     ]
+
+
+OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
+ELSEWHERE = r"pip|uv |sphinx|pytest|experiments|pre-commit|npx|ruff|mutation|LMGC90|weigh"
+
+
+def unknown(text, known):
+    """Return the options of seqopt in a text that no command has."""
+    lines = [line for line in text.splitlines() if not re.search(ELSEWHERE, line)]
+    return {option for line in lines for option in OPTION.findall(line)} - known
+
+
+def test_pages_name_options_that_commands_have(capsys):
+    helps = [command(capsys, name, "--help-all")[1] for name in COMMANDS]
+    known = {*OPTION.findall(" ".join(helps))}
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    texts = {str(page): page.read_text(encoding="utf-8") for page in pages}
+    assert {name: lost for name, text in texts.items() if (lost := unknown(text, known))} == {}
+    assert unknown("`seqopt optimize --placing --out plan`", known) == {"--placing"}  # the control
