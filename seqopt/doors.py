@@ -40,6 +40,7 @@ from seqopt.instances.answers import judge_instance as judge
 from seqopt.plan.front import Front
 from seqopt.plan.plan import Plan
 from seqopt.report.comparison import Comparison
+from seqopt.sweep import sweep
 from seqopt.workflow import optimize
 
 __all__ = [
@@ -56,6 +57,7 @@ __all__ = [
     "reach",
     "replan",
     "report",
+    "sweep",
     "times",
 ]
 

@@ -41,6 +41,7 @@ GONE = {
     "--load-factor": "in Python seqopt.stability.load_factors has it",
     "--staged": "in Python seqopt.responses.analyze_staged has it",
     "--stiffens": "give a scene whose joints are softer, as seqopt scene --export writes it",
+    "--tables": "in Python plan.alternatives() has every choice",
     "--unseen": "in Python seqopt.plan.out_of_sample.judge_unseen has it",
 }  # options that there were, and what to do in their place
 MISSING = "the following arguments are required"

@@ -66,15 +66,13 @@ def bare_files(
     }
 
 
-def plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
-    """Return tables and tasks of a plan by file name; ``choices``: also of every choice."""
+def plan_files(plan: Plan) -> dict[str, bytes | str]:
+    """Return tables and tasks of a plan by file name."""
     tables = {"plan": plan.responses()}
     if plan.graph.candidates:
         tables["selection"] = plan.table()
     elif plan.graph.standing is not None:
         tables["stability"] = plan.stability()
-    if choices and plan.graph.candidates and not plan.graph.scenarios:
-        tables["responses"] = plan.alternatives()
     if plan.engine.network.scene.props:
         tables["props"] = plan.props()
     if plan.makespan is not None:

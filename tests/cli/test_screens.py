@@ -195,7 +195,7 @@ def test_numbers_are_read_where_they_are_given():
     [
         ("--schedule free --criteria equations-2-3", "it ranks the choices of a move"),
         ("--aim steps --ranked pairs", "leave it out"),
-        ("--stands dry --ranked pairs", "leave it out"),
+        ("--criteria weighted --ranked pairs", "weighted has no ranks; leave it out"),
         ("--rule least_grips=1", "give --schedule free"),
         ("--direction take-down", "--schedule free"),
         ("--friction 0.5", "--stands"),

@@ -65,15 +65,11 @@ class Optimize(options.Written, options.Strict, options.Limited, options.Cured, 
     What is written and printed?
     out : DIR
         folder to write plan, tables, summary and page to
-    tables : plan|all
-        which tables are written: those of the plan, or all, with every choice of every open step
-        beside: megabytes (default: plan)
     """
 
     option: options.Words = options.word((), shell=True)
     proof: bool = options.word(default=True, shell=True)
     lazy: bool = options.word(default=False, shell=True)
-    tables: str = options.word("plan", choices=("plan", "all"), shell=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -185,7 +181,7 @@ def answered(asked: Optimize, found: Found) -> Answer:
     proving = found.prover.begun(found.plan.steps) if found.clock.left else nullcontext()
     with proving:  # in another process, as commands may, unlike scripts
         if asked.path is not None and found.analyzed and found.summary:  # what says most is first
-            tables = partial(outputs.plan_files, found.plan, choices=asked.tables == "all")
+            tables = partial(outputs.plan_files, found.plan)
             made = found.clock.spare("its tables", tables, made)
         _ = found.verdicts
         return _answer(asked, found, outputs.write_outputs(asked, lambda: _files(found, made)))
