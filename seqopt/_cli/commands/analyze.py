@@ -99,10 +99,7 @@ def run(asked: Analyze) -> Answer:
     table = response_table(engine.network, answers)
     reached = len(table) + len(faults)
     late, ended = _late(asked, reached, len(steps), engine, clock)
-    failures, status = (*_faults_said(faults, reached), *late), ended
-    if faults and status is Status.DONE:
-        failed = any(isinstance(error, SolverError) for error in faults.values())
-        status = Status.FAILED if failed else Status.NO_ANSWER
+    failures, status = (*_faults_said(faults, reached), *late), _status_of(faults, ended)
     computed, off = [s for s in steps[:reached] if s.number not in faults], tuple[str, ...]()
     if computed and asked.tolerance is not None:
         tolerances = partial(_with_tolerances, asked.tolerance, engine, computed, table)
@@ -233,6 +230,14 @@ def _faults_said(faults: Mapping[int, SeqoptError], steps: int) -> tuple[str, ..
             first = str(own[min(own)])
             out.append(f"seqopt: {what}: {where} ({_steps_in_words([*own])}); {first}")
     return tuple(out)
+
+
+def _status_of(faults: Mapping[int, SeqoptError], ended: Status) -> Status:
+    """Return the exit status, given the errors of steps."""
+    if ended is not Status.DONE or not faults:
+        return ended
+    failed = any(isinstance(error, SolverError) for error in faults.values())
+    return Status.FAILED if failed else Status.NO_ANSWER
 
 
 def _with_tolerances(
