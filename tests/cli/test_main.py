@@ -71,10 +71,6 @@ def test_compare_says_what_is_not_possible(capsys, tmp_path):
     assert "Loop of robots: not possible here; " in out
     assert "<td>cantilever</td>" in (folder / "report.html").read_text("utf-8")
     assert "cantilever" in (folder / "comparison.csv").read_text("utf-8")
-    path = scene_file(capsys, tmp_path, lambda d: d.update(robots=d["robots"][:1]))
-    status, out, _ = run(capsys, "compare", str(path))
-    assert status == 0
-    assert "needs two" in out
 
 
 def scene_file(capsys, tmp_path, change):
