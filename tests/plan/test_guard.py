@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 
@@ -13,7 +12,7 @@ import seqopt
 from formulations.states.order_search import FORMULATION as ORDER
 from formulations.states.pareto_zones import FORMULATION as FRONT
 from formulations.states.schedule_search import FORMULATION as PLAN
-from seqopt.errors import InfeasibleError, SolverError, StepError
+from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph._orders import among_orders
 from seqopt.graph.formulation import Solution
 from seqopt.graph.states.states import build_states
@@ -237,35 +236,6 @@ def test_scenarios_have_the_same_guard():
         cheat = replace(real, solve=fake)
         with pytest.raises(SolverError, match=said):
             seqopt.solve(robust, cheat)
-
-
-ODD = (-50, -1, 0, 1, 5, 50, 10**6, 2**31, 10**20)
-
-
-def wrong_path(rng, right):
-    """A path with a number that stands for nothing, a row too short or too long, or none."""
-    rows = [[*state] for state in right.states]
-    row, what = rows[rng.integers(len(rows))], rng.integers(5)
-    if what == 0:
-        row[rng.integers(len(row))] = ODD[rng.integers(len(ODD))]
-    elif what == 1:
-        del row[rng.integers(len(row))]
-    elif what == 2:
-        rows.remove(row)
-    visited = [np.array(each) for each in right.visited]
-    k, odd = rng.integers(len(visited)), ODD[rng.integers(len(ODD))]
-    if what == 3:
-        visited[k] = np.full(visited[k].shape, odd, dtype=float)
-    elif what == 4:
-        visited[k] = (visited[k][:, :-1], visited[k].ravel(), visited[k] + 0.5)[rng.integers(3)]
-    return replace(right, states=tuple(map(tuple, rows)), visited=tuple(visited))
-
-
-@pytest.mark.parametrize("number", range(15))
-def test_a_path_of_numbers_that_stand_for_nothing_is_told(number):
-    bad = wrong_path(np.random.default_rng(number), answer_of("plan"))
-    with suppress(SolverError, StepError):
-        asked("plan", lambda _: bad)
 
 
 def test_such_a_path_is_a_failure_of_its_formulation():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +17,6 @@ from seqopt.errors import (
     ProblemError,
     SolverError,
 )
-from seqopt.graph import formulation as registry
 from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import FormulationKind, Solution, find_formulation, formulations
@@ -124,16 +122,6 @@ def test_whole_numbers_of_any_kind_are_a_choice(problem):
     assert plan.selection == solve(problem, exact).selection
 
 
-@pytest.mark.parametrize("error", [ZeroDivisionError("by\nzero"), KeyError("x"), OSError("gone")])
-def test_a_formulation_that_raises_has_failed(problem, error):
-    def fails(_):
-        raise error
-
-    made = replace(find_formulation("overlap_dp"), name="odd", solve=fails)
-    with pytest.raises(SolverError, match=f"formulation odd failed: {type(error).__name__}"):
-        solve(problem, made)
-
-
 def says_so(_):
     raise InfeasibleError("no choice is within all budgets")
 
@@ -190,33 +178,6 @@ def test_a_heuristic_only_says_that_it_found_none(monkeypatch, kind, error, said
     assert type(caught.value) is error
 
 
-def test_an_exit_does_not_leave_through_solve(problem):
-    with pytest.raises(SolverError, match="overlap_dp failed: SystemExit: 3"):
-        solve(problem, replace(find_formulation("overlap_dp"), solve=lambda _: sys.exit(3)))
-
-
-class Entry:
-    name, value = "odd", "package:THING"
-
-    def __init__(self, thing):
-        self.thing = thing
-
-    def load(self):
-        if isinstance(self.thing, Exception):
-            raise self.thing
-        return self.thing
-
-
-@pytest.mark.parametrize(
-    ("thing", "said"),
-    [(ImportError("no package"), "cannot be loaded: ImportError: no package"), (3, "is a int")],
-)
-def test_a_registered_formulation_that_is_none_is_named(monkeypatch, thing, said):
-    monkeypatch.setattr(registry, "plugins", lambda _: {"odd": Entry(thing)})
-    with pytest.raises(ProblemError, match=f"'odd': package:THING {said}"):
-        find_formulation("odd")
-
-
 def test_what_does_not_fit_into_memory_is_refused_before(problem, monkeypatch):
     needed = batches._bytes_of_costs(problem.schedule) / batches._SHARE
     whole = batches._bytes_of_choices(problem.schedule, problem.evaluation.wanted) / batches._SHARE
@@ -252,4 +213,6 @@ def test_one_that_cannot_be_used_is_left_out_of_all_others(monkeypatch, tmp_path
     assert ["math:pi is a float" in x for x in lines] == [True, False, False, False]
     assert lines[2].endswith("has str as kind; correct it; it is left out")
     assert "answers walls; give some of costs, goals, " in lines[3]
+    with pytest.raises(ProblemError, match="'odder': no_such_package:X cannot be loaded: Module"):
+        find_formulation("odder")
     assert main(["optimize", *words, "--formulation", "odd"]) == 2
