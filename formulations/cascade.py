@@ -49,7 +49,7 @@ def choose(graph: Graph, watch: Watch, *, charge: str = "later") -> Choice:
 
 
 def _charged(graph: Graph, charge: str) -> Floats:
-    """Return what moves are charged, (m,), by which of two moves answers for a shared step."""
+    """Return costs of moves (m,), by which of two moves pays for a shared step."""
     if graph.alone is None or graph.peaks[0]:
         return graph.amounts[:, 0]
     if charge == "later":

@@ -157,7 +157,7 @@ def _split(graph: Graph, level: Ints) -> tuple[Floats, Floats, float]:
 
 
 def _epigraph(graph: Graph, *, of_layers: bool) -> WholeProgram:
-    """Return the flow whose peak is above what it costs in every layer, or on every arc."""
+    """Return the flow with a peak variable above its cost in every layer, or on every arc."""
     flow = unit_flow(graph)
     arcs, peak = cp.Variable(len(flow.cost), boolean=True), cp.Variable(nonneg=True)
     rows = np.arange(len(flow.cost))

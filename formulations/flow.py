@@ -67,7 +67,7 @@ MOST_ARCS = 1_000_000  # of a program: more take gigabytes and minutes before a 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """The unit flow through a graph, and what it costs and takes, all of order one.
+    """The unit flow through a graph, its cost and amounts, all of order one.
 
     ``graph``: without moves that go on from an end; ``balance`` ((n, m) sparse): what leaves states
     that are no ends, less what arrives; ``source`` (n,): what must be left over: 1 at the start;
@@ -99,7 +99,7 @@ class Flow:
 
 
 def unit_flow(graph: Graph, goal: int = 0) -> Flow:
-    """Return the unit flow through a graph whose moves cost what a goal takes.
+    """Return the unit flow through a graph whose costs are the amounts of a goal.
 
     Raises a `ProblemError` if there are more than `MOST_ARCS`.
     """
@@ -132,7 +132,7 @@ def _unit(amounts: Floats) -> float:
 
 
 def conserved(flow: Flow, arcs: cp.Variable) -> cp.Constraint:
-    """Let what leaves a state be what arrives there, and one unit more at the start."""
+    """Flow balance: outflow of a state is its inflow, and one unit more at the start."""
     return cp.Zero(flow.balance @ arcs - flow.source)
 
 
@@ -241,7 +241,7 @@ def _least_peak(graph: Graph, goal: int, watch: Watch) -> _Least:
 
 
 class WholeProgram(NamedTuple):
-    """A program with whole variables, and what its solution means.
+    """An integer program, and the meaning of its solution.
 
     ``program``: costs are scaled; ``whole``: those that a path is read from; ``path``: returns the
     one that their values stand for; ``bound``: returns a lower bound in the unit of the costs for

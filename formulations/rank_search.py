@@ -36,7 +36,7 @@ MOST = 20_000_000  # combinations in one enumeration
 
 
 class _Ways(NamedTuple):
-    """Combinations of moves: what they cost (n,), where they lead, and their states (n, h)."""
+    """Combinations of moves: costs (n,), last states, and all states (n, h)."""
 
     cost: Floats
     states: Ints

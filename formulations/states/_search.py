@@ -371,7 +371,7 @@ class ThresholdSearch:
         return middle if middle * NARROW < self._ceiling else self._ceiling
 
     def _dives(self, threshold: float, below: float) -> bool:
-        """Return whether a dive finds a better incumbent; what it visits in vain stays visited."""
+        """Return whether a dive finds a better incumbent; states that it visits stay visited."""
         if self.wide.passes == 0 or (np.isinf(below) and self.incumbent):
             return False  # what lies below a first threshold is seldom all that a path needs
         trial = self.wide.copy()

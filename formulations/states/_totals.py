@@ -106,10 +106,10 @@ class _Totals(SummedLabels):
         self._left = np.column_stack(left)
 
     def bounds(self, state: Ints, taken: Floats) -> Floats:
-        """Return what the aim makes at least of totals of paths."""
+        """Return a lower bound of the aim by totals of paths."""
         weighed = taken @ self._weights.T + self._left[state]
         return np.asarray(weighed.max(axis=1, keepdims=True))
 
     def values(self, taken: Floats, _: int) -> Floats:
-        """Return what the aim makes of totals."""
+        """Return the aim of totals."""
         return self._aim.each(taken)

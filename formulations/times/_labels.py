@@ -199,7 +199,7 @@ class InTime(Carried):
 
 @dataclass(frozen=True, eq=False)
 class Carrying:
-    """Moves of a build, and what depends on the path through them.
+    """Moves of a build, and the labels that depend on the path.
 
     ``levels`` (n,): of states; ``timed``: readiness of robots, if that counts; else moves are
     counted in its place; ``asked``: further resources, ``steps``: what these see of moves.
@@ -249,7 +249,7 @@ class Carrying:
         goal: int | None = None,
         most: int = 0,
     ) -> Swept:
-        """Return the best label within the caps, in the time or in a sum, and what was kept.
+        """Return the best label within the caps, in the time or in a sum, and the kept labels.
 
         ``width``: how many labels of a level are continued; by default all; ``goal``: the place of
         the sum that is minimized; by default the time is; ``most``: labels that may be kept, 0 for

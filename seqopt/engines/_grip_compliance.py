@@ -104,8 +104,8 @@ def _in_place(network: Network, grips: Ints) -> GripCompliance:
         at = tuple(np.argwhere(kind < 0)[0])
         name = scene.robots[[*scene.grip_kinds.of_robot].index(of_robot[at])].name
         raise GripError(
-            f"robot {name} has no posture at node {node[at]}, so nobody knows how its grip gives "
-            "way; move its base, or leave out joint_stiffness"
+            f"robot {name} has no posture at node {node[at]}, so the compliance of its grip is "
+            "not known; move its base, or leave out joint_stiffness"
         )
     matrix = _by_kind(network)
     one = len(matrix) == 1

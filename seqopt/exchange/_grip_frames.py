@@ -21,7 +21,7 @@ from seqopt.scene.shape import fans
 
 _SQUARE = 0.9  # cosine from which on a joint lies on a face
 _NEVER, _LATER = 4.0, 2.0  # what a face costs that a joint lies on, now or once more bricks stand
-_UP = 0.1  # what looking up is worth beside looking to the robot
+_UP = 0.1  # weight of looking up beside looking to the robot
 _EDGE = 1e-6  # how far beside a face its edge is, over the size of the brick
 _PARALLEL = 0.95  # cosine from which on an axis of the brick is along the tool
 

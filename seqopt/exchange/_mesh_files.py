@@ -28,7 +28,7 @@ from seqopt.scene._checks import short
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.scene import Scene
 
-_UNASKED = logging.NullHandler()  # else Python prints what no one listens to
+_UNASKED = logging.NullHandler()  # else Python prints unhandled errors
 _NEEDS = {  # packages and the extra that brings them
     "ply": ("trimesh", "blocks"),
     "stl": ("trimesh", "blocks"),

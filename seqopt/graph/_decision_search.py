@@ -74,14 +74,14 @@ class Windows(Terse):
         return self.rows[move]
 
     def costs(self, move: int, aim: Aim = Aim.SUM) -> Floats:
-        """Return what the candidates of a move cost after the choices before it, (C_k,)."""
+        """Return costs (C_k,) of the candidates of a move after the choices before it."""
         costs = self.problem.possible_after(move, self.choice[move - 1] if move else 0)
         for choices in self.row(move):
             costs = aim.join(costs, self.problem.step_costs(choices))
         return costs
 
     def so_far(self) -> str:
-        """Return what is chosen, in a few words."""
+        """Return the kind of choice, in a few words."""
         if not self.choice:
             return "no move was chosen yet"
         moves = self.problem.schedule.moves
@@ -90,7 +90,7 @@ class Windows(Terse):
 
 
 def walk_windows(problem: Decisions, watch: Watch) -> Windows:
-    """Choose what costs least, one move after the other (equation 1 of Bruun et al.).
+    """Choose the candidate of least cost, one move after the other (equation 1 of Bruun et al.).
 
     Raises `NothingFoundError` if a move has no candidate left after the choices before it, while
     others may have led on; `TimeUpError` if time is over before the last move is chosen;
@@ -197,14 +197,14 @@ class PairBounds:
     rows: dict[tuple[int, int], Floats] = field(default_factory=dict)
 
     def pairs(self, move: int, unknown: float) -> tuple[Ints, Floats]:
-        """Return the solved candidates of the move before, (R,), and what pairs cost, (R, C_k)."""
+        """Return the solved candidates of the move before, (R,), and costs of pairs, (R, C_k)."""
         before = sorted(i for k, i in self.rows if k == move)
         none = np.zeros((0, len(self.single[move])))
         rows = np.vstack([none, *(self.rows[move, i] for i in before)])
         return np.array(before, dtype=np.int64), np.where(np.isnan(rows), unknown, rows)
 
     def best(self, unknown: float) -> tuple[float, tuple[int, ...]]:
-        """Return the least cost, and a choice; ``unknown``: what pairs cost that are not solved."""
+        """Return the least cost, and a choice; ``unknown``: cost of pairs that are not solved."""
         return self._path(self.aim.join, self.single, [self._level(k, unknown) for k in self._ks])
 
     def fewest_open(self, most: float) -> tuple[int, ...]:
@@ -301,7 +301,7 @@ def prove_lazily(problem: Decisions, formulation: Formulation, watch: Watch) -> 
 
 
 def _floor(problem: Decisions, formulation: Formulation) -> float:
-    """Return what any pair costs at least; raise an error where that is not known."""
+    """Return a lower bound of any pair's cost; raise an error where none is known."""
     if formulation.kind is not FormulationKind.EXACT:
         raise ProblemError(f"{formulation.name}: the lazy search proves; give an exact formulation")
     if problem.budgets:
@@ -337,7 +337,7 @@ class _Search:
         self.open: list[tuple[int, int]] = []
 
     def dive(self, watch: Watch) -> None:
-        """Solve the pairs of what costs least, move after move; a dead end leaves the rest open."""
+        """Solve the pairs of least cost, move after move; a dead end leaves the rest open."""
         at = int(self.bounds.single[0].argmin())
         for k in range(1, len(self.bounds.single)):
             if (k, at) not in self.bounds.rows:

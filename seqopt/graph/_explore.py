@@ -221,7 +221,7 @@ class Explorer:
         self.passes += 1
 
     def copy(self) -> Explorer:
-        """Return an explorer that goes on by itself from what is visited."""
+        """Return an independent explorer that starts from the visited states."""
         out = copy(self)
         out._parts = [{key: part.copy() for key, part in level.items()} for level in self._parts]
         out._moves = defaultdict(list, {key: [*moves] for key, moves in self._moves.items()})

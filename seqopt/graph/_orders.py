@@ -300,7 +300,7 @@ class OrderSpace(Space):
         return len(self.parts) - 1, sum(space.problem.models for space in self.parts.values())
 
     def rows(self, part: Part, states: Ints) -> Ints:
-        """Return what states stand for: the level, the newest brick, and the place of each grip."""
+        """Return labels of states: the level, the newest brick, and the place of each grip."""
         held = states[:, : self._up.space.robots].astype(np.int64)
         own = np.array([[len(part[0]), part[1]]])
         return np.column_stack([np.repeat(own, len(held), axis=0), held])

@@ -76,12 +76,12 @@ class LayeredCosts(FrozenValue):
         return tuple(len(single) for single in self.single)
 
     def arcs(self, aim: Aim = Aim.SUM) -> list[Floats]:
-        """Return what a pair and its later choice cost together, (C_{k-1}, C_k) for every move."""
+        """Return the cost of a pair and its later choice, (C_{k-1}, C_k) for every move."""
         pairs = zip(self.shared, self.single, strict=True)
         return [aim.join(shared, single) for shared, single in pairs]
 
     def parts(self, choice: Sequence[int]) -> list[float]:
-        """Return what a choice meets, by move: its cost, and that shared with the move before."""
+        """Return the costs of a choice by move: its own, and that shared with the move before."""
         out, before = [], 0
         for single, shared, now in zip(self.single, self.shared, choice, strict=True):
             out += [float(single[now]), float(shared[before, now])]
@@ -312,7 +312,7 @@ def best_in_order(goals: Sequence[tuple[LayeredCosts, Aim]]) -> tuple[int, ...]:
 
 
 def _raised(columns: Sequence[Blocks], kind: str) -> tuple[list[list[Floats]], float]:
-    """Return columns with no amount below zero, and what is thereby missing in all of them.
+    """Return columns with no amount below zero, and the total to add to values of paths.
 
     Sums are raised level by level, since every path has an arc on each; largest amounts all alike.
     """

@@ -290,7 +290,7 @@ class Decisions(Shown):
             )
 
     def costs_in(self, engines: Sequence[Engine]) -> tuple[ScenarioCosts, ...]:
-        """Return what candidates cost by every engine of a scenario, which an error names."""
+        """Return costs of candidates by the engine of every scenario, which an error names."""
         out = []
         for number, own in enumerate(map(self.of, engines), start=1):
             try:

@@ -1,4 +1,4 @@
-"""Formulations: ways to solve a placement problem, and what they return."""
+"""Formulations: ways to solve a placement problem, and their solutions."""
 
 from __future__ import annotations
 
@@ -407,7 +407,7 @@ def as_formulation(given: object, *questions: str) -> Formulation:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(FrozenValue):
-    """A free schedule, and what its formulation claims of it.
+    """A free schedule, and the values and bounds that its formulation claims.
 
     ``states``: after every step: how many bricks stand, then the node that each robot holds, as a
     place in build order from 1; robots of one kind stand together, 0 for one that is free;

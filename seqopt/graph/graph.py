@@ -1,4 +1,4 @@
-"""A build as a graph: states, moves between them, and what every move takes, as arrays.
+"""A build as a graph: states, moves between them, and amounts of every move, as arrays.
 
 In time, a path through states says which kind of robot takes a grip or lets go. Which of its robots
 that are free acts is open, and so is when. A *label* of a state says when the last step ended, and
@@ -121,7 +121,7 @@ class Graph(FrozenValue):
         return slice(int(first), int(last))
 
     def _with(self, **changed: object) -> Graph:
-        """Return the graph with parts of what was checked: it is not checked again."""
+        """Return a subgraph of checked arrays: it is not checked again."""
         part = object.__new__(Graph)
         own = {field.name: getattr(self, field.name) for field in fields(Graph)}
         part.__setstate__(own | changed)

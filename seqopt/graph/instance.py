@@ -157,7 +157,7 @@ class Instance(FrozenValue, Shown):
         return found
 
     def names_of(self, aim: Aim | None) -> tuple[str, ...]:
-        """Return what every goal is called."""
+        """Return the names of the goals."""
         return tuple(goal.name for goal in self.goals)
 
     def in_display_units(self, aim: Aim | None, values: Sequence[float]) -> dict[str, float]:
@@ -240,7 +240,7 @@ class Instance(FrozenValue, Shown):
         return steps and alone and bool((self.ends == (levels == last)).all())
 
     def facts_of(self) -> dict[str, object]:
-        """Return what it is, for a summary, ready for JSON."""
+        """Return its properties for a summary, ready for JSON."""
         return {
             "instance": self.name,
             "nodes": self.nodes,
@@ -252,7 +252,7 @@ class Instance(FrozenValue, Shown):
 
 
 def _target_sums(goal: _Target, totals: Floats) -> float:
-    """Return what a ``tail`` makes of totals (S,): the mean of the largest, by their weights."""
+    """Return the tail mean of totals (S,): the mean of the largest, by their weights."""
     weights = np.clip(1.0 - goal.most * np.arange(len(totals)), 0.0, goal.most)
     return float(np.sort(totals)[::-1] @ weights / weights.sum())
 

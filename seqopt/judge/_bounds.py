@@ -99,7 +99,7 @@ def least_within(
     prices: Sequence[float] = (),
     laid_down: bool = False,
 ) -> tuple[float, Floats]:
-    """Return a bound on what any path within caps costs, at most a value; its multipliers (B,).
+    """Return a lower bound of paths within caps, at most a value, and its multipliers (B,).
 
     ``limited``: columns and what may be taken of them; ``value``: of a path within the caps;
     ``prices``: multipliers that are tried first, by default none; ``laid_down``: whether what
@@ -151,7 +151,7 @@ def _best_multipliers(case: _Case, prices: Floats) -> _Ascent:
 
 
 def _mixed(case: _Case, paths: Sequence[tuple[float, Floats]]) -> tuple[Floats, float]:
-    """Return the multipliers of the cheapest mixture of paths, and what that costs."""
+    """Return the multipliers of the best mixture of paths, and its cost."""
     from scipy.optimize import linprog  # noqa: PLC0415  # slow to import, for budgets only
 
     costs, over = np.array([cost for cost, _ in paths]), np.array([own for _, own in paths])
@@ -249,7 +249,7 @@ class Book:
         return np.zeros(len(state), dtype=bool)
 
     def counted(self, state: Ints, values: Floats) -> Floats:
-        """Return what counts of values (N, k) where they are compared."""
+        """Return values (N, k) as they are compared for dominance."""
         return values
 
     def dominated(self, first: Floats, other: Floats) -> Bools:
@@ -354,7 +354,7 @@ class Closed:
         return True
 
     def _open(self, state: Ints, values: Floats) -> Bools:
-        """Return which labels may still lead to what is within the limits."""
+        """Return which labels may still reach an end within the limits."""
         out = np.ones(len(state), dtype=bool)
         for book, own in self._books:
             out &= ~book.beyond(state, values[:, own])

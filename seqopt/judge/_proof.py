@@ -72,7 +72,7 @@ class OneSchedule:
         return self.evaluator.least()
 
     def at(self, part: Any) -> tuple[int, StateEvaluator]:
-        """Return the level of a part, and what evaluates its states."""
+        """Return the level of a part, and the evaluator of its states."""
         return part, self.evaluator
 
     def evaluators(self) -> tuple[StateEvaluator, ...]:
@@ -454,7 +454,7 @@ def as_rows(problem: States, evaluator: StateEvaluator, hint: Hint) -> dict[int,
 def label_bounds(
     evaluator: StateEvaluator, rebuilt: Any, values: Sequence[float], found: Solution
 ) -> Callable[[Graph], tuple[float, ...]]:
-    """Return what bounds the goals after those about margins, by labels, on rebuilt subgraphs.
+    """Return lower bounds of the goals after those about margins, by labels, on rebuilt subgraphs.
 
     ``rebuilt``: states, as of `seqopt.judge._proof.Rebuilt`; ``values``: of all goals; ``found``:
     what is claimed, with labels. The function raises `SolverError` if labels are given that do not
@@ -488,7 +488,7 @@ class _LabeledRows:
         assert self.timed is not None
         wide = proof.prices.ndim == 2 and proof.prices.shape[1] == 1 + len(self._columns)
         if not wide:
-            raise SolverError("there is no price for every robot")
+            raise SolverError("there is no multiplier for every robot")
         prices = proof.prices[:, [0, *(1 + c for c in self._columns)]]
         return self.timed.clock(graph, prices, most, strict=strict)
 

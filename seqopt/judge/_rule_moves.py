@@ -42,7 +42,7 @@ class Transitions(NamedTuple):
 
 
 class _Tables:
-    """Places of nodes, and what rows of them have in common for rules and schedules.
+    """Places of nodes, and the checks of rows of them that rules and schedules share.
 
     ``nodes`` (p,): by place; -1 of none; ``team``: robots of the columns, by index; ``robots``: how
     many; ``parks``: whether it counts where a free robot was last.

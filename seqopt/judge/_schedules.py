@@ -188,7 +188,7 @@ def _multipliers(problem: States, selection: Solution) -> Sequence[Sequence[floa
     """Return the claimed multipliers of budgets, goal by goal."""
     found, budgets = selection.prices, len(problem.budgets)
     if len(found) < len(problem.aims) or any(len(each) < budgets for each in found):
-        raise SolverError("there is no price for every budget and goal")
+        raise SolverError("there is no multiplier for every budget and goal")
     return found
 
 

@@ -25,7 +25,7 @@ from seqopt.responses._grip_sets import solve_sets
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.schedule import Schedule
 
-FEW = 500  # grip sets of which all digits take no longer than to ask some of them twice
+FEW = 500  # grip sets below which full precision is as fast as screening
 BAND = 1e-3  # share of a value within which six digits do not decide, far more than they err
 
 Tables: TypeAlias = RuleTables | ScheduleTables
@@ -49,7 +49,7 @@ class Answers(NamedTuple):
 def ask(
     problem: States, bricks: int, grips: Ints, most: float = np.inf, *, low_precision: bool = False
 ) -> Answers:
-    """Return what the engine answers of grip sets (S, r), nodes held.
+    """Return the engine's responses to grip sets (S, r), nodes held.
 
     ``most``: over scenarios, what the first goal takes more of in one is not asked of the next;
     ``low_precision``: whether six digits are enough.
@@ -293,7 +293,7 @@ class StateEvaluator:
     def _answers(
         self, bricks: int, held: Ints, asked: Filter, below: float
     ) -> tuple[Floats, Floats, Bools]:
-        """Return values (n, g), forces (n, r) and what is within limits (n,) of places held.
+        """Return values (n, g), forces (n, r) and feasibility (n,) of places held.
 
         Over scenarios they are those of the first that exceeds a value of the first goal.
         """
@@ -312,7 +312,7 @@ class StateEvaluator:
         return out[:, :goals], out[:, goals:-1], out[:, -1] > 0
 
     def _computed(self, bricks: int, grips: Ints, asked: Filter, below: float) -> Floats:
-        """Return values, forces and what is within limits of grip sets, side by side.
+        """Return values, forces and feasibility of grip sets, side by side.
 
         Six digits are enough where no value or payload that decides is close.
         """
@@ -353,7 +353,7 @@ def largest_load(problem: States, robot: int, *, stand: bool) -> float:
 
 
 def _tables(problem: States, most: Sequence[float]) -> Tables:
-    """Return what rules or a schedule allow; ``most``: that robots may carry, N."""
+    """Return the rule book of rules or a schedule; ``most``: payloads, N."""
     if isinstance(problem.rules, Schedule):
         own = problem.rules, problem.network
         return ScheduleTables(*own, parks=problem.parks, worlds=problem.worlds)

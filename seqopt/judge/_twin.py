@@ -56,7 +56,7 @@ class PathTwin(NamedTuple):
 
 
 def _criterion(states: StateArrays) -> Floats:
-    """Return what the criterion makes of responses; infinite where states are not possible."""
+    """Return the criterion of responses; infinite where states are infeasible."""
     criterion, able = states.criterion, states.possible
     costs = criterion.costs(states.responses, states.bricks, len(able))
     if (least := costs[able].min(initial=0.0)) < 0:

@@ -31,7 +31,7 @@ ABOVE = 1e-6  # over a value: how far a claim may be above what is proven
 
 
 class Answer(NamedTuple):
-    """A path as numbers of ``nodes``, ``arcs`` or ``acts``, and what is claimed of it."""
+    """A path as numbers of ``nodes``, ``arcs`` or ``acts``, and its claimed values."""
 
     what: str
     numbers: Ints
@@ -44,7 +44,7 @@ class OverCapError(SolverError):
 
 
 def judge_path(instance: Instance, answer: Answer) -> Certificate:
-    """Check a path through an instance, and bounds with what is to prove them.
+    """Check a path through an instance, and bounds with their proofs.
 
     Result: values, and lower bounds: by the proofs given; without any by potentials, a cut or
     multipliers that the judge finds itself. A bound without proof counts as claimed.

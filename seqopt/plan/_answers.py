@@ -1,4 +1,4 @@
-"""Answers of formulations: called, read as numbers, and judged for what they claim.
+"""Answers of formulations: called, read as numbers, and judged by their claims.
 
 A formulation gets a copy of what it is judged by: nothing that it changes counts. What it raises or
 returns that cannot be read is its failure, never a verdict.

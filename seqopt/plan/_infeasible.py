@@ -1,4 +1,4 @@
-"""Why a free schedule is impossible: the brick at which it stops, and what would help."""
+"""Why a free schedule is infeasible: the brick at which it stops, and what would help."""
 
 from __future__ import annotations
 
@@ -338,7 +338,7 @@ class Remedies:
         if not ways and finished:  # no robot can do anything about it
             return "; no robot helps: it needs more bond or friction, less load, or other limits"
         if not ways:
-            return ", whatever two rules or limits are loosened; extend a reach or add a robot"
+            return ", even if two rules or limits are loosened; extend a reach or add a robot"
         enough = dict.fromkeys(text for way in ways if (text := way.enough()))
         if enough:
             return f"; it becomes possible with {' or '.join(enough)}"
@@ -502,7 +502,7 @@ def _heaviest(problem: States) -> float:
 
 
 def _where(problem: States, reached: int) -> str:
-    """Name the step or the brick at which builds stop, and what is too heavy there."""
+    """Name the step or the brick at which builds stop, and the load there."""
     if problem.rules.method == FREE:
         return _where_rules_stop(problem, problem.free_rules, reached)
     heavy = "".join(f": in step {n} {why}" for n, why in [*_unbearable(problem).items()][:1])

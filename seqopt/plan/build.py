@@ -51,7 +51,7 @@ class ShownBuild(Shown):
 
         @property
         def result(self) -> str:
-            """The value of the plan, and what is proven about it, in words."""
+            """The objective of the plan, and what is proven about it, in words."""
 
         @property
         def seconds(self) -> Mapping[str, float]:

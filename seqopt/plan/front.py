@@ -79,7 +79,7 @@ class FrontProblem:
         return f"<FrontProblem of {self._problem}>"
 
     def anew(self) -> FrontProblem:
-        """Return a copy with an empty cache, for a formulation: what it changes is its own."""
+        """Return a copy with an empty cache for a formulation, which may change it."""
         return FrontProblem(replace(self._problem), self._rounding)
 
     @property

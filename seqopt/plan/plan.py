@@ -261,7 +261,7 @@ class Plan(ShownBuild):
 
     @property
     def result(self) -> str:
-        """The value of the plan, and what is proven about it, in words.
+        """The objective of the plan, and what is proven about it, in words.
 
         It begins with a warning if steps exceed the linear range.
         """

@@ -107,7 +107,7 @@ def graph_of(problem: Problem, *, moves: bool | None = None) -> States:
 
 
 def decisions_of(problem: Problem) -> Decisions:
-    """Return what candidates of all moves cost, budgets included."""
+    """Return costs of the candidates of all moves, budgets included."""
     found = graph_of(problem, moves=True).decisions
     assert found is not None  # as is required of these
     return found

@@ -1,4 +1,4 @@
-"""What is asked: what a step costs, what is to be small, and what must hold.
+"""The problem: criteria, aims and requirements.
 
 A criterion turns the responses of a step into its cost. An amount is what states or moves take, of
 which the largest or the sum over a build is to be small, or within a budget. A filter says which

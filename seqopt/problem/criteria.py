@@ -263,7 +263,7 @@ class WorstRatio(Terse):
 
 
 OVER_METHODS = WeightedSum("weighted", tuple((name, 1.0, None) for name in SCALED))
-"""The sum of responses over what the scene's fixed methods reach."""
+"""The sum of responses over the best values of the scene's fixed methods."""
 WORST_OVER_METHODS = WorstRatio("worst-ratio", tuple((name, None) for name in SCALED))
 """The largest of these ratios."""
 
@@ -334,7 +334,7 @@ class StepCost:
 
     @property
     def settings(self) -> Mapping[str, object]:
-        """The responses it takes, and what its function is called."""
+        """The responses it takes, and the name of its function."""
         called = getattr(self.function, "__qualname__", type(self.function).__name__)
         return {"responses": list(self.responses), "function": called}
 
@@ -348,7 +348,7 @@ class StepCost:
         return replace(self, responses=tuple(name for (name,) in terms))
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
-        """Return what the function makes of the responses, NaN where a choice is impossible."""
+        """Return the function of the responses, NaN where a choice is impossible."""
         given = {name: _present(responses[name]) for name in self.responses}
         impossible = np.isnan([*given.values()]).any(axis=0)
         what = f"criterion {self.name}: its function"

@@ -144,7 +144,7 @@ LARGE = 1e6  # N; more than robots have to carry
 
 
 def _rules_filter() -> Filter:
-    """Return the filter of the rules of a free schedule: moves lead only to what passes."""
+    """Return the filter of the rules of a free schedule: moves lead only to states that pass."""
 
     def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
         for words, rules in problem.rules.loosened(problem.network.scene):
@@ -172,7 +172,7 @@ def _standing_filter(problem: Any) -> Filter:
 
 
 def _payloads_filter() -> Filter:
-    """Return the filter of what robots may carry, by each of their grips."""
+    """Return the filter of payloads, by each grip."""
 
     def passes(states: StateArrays) -> Bools:
         over = states.forces > states.most + LIMIT_TOLERANCE * states.most
@@ -186,7 +186,7 @@ def _payloads_filter() -> Filter:
 
 
 def _arms_filter() -> Filter:
-    """Return the filter of postures that go together: moves lead only to what passes."""
+    """Return the filter of compatible postures: moves lead only to states that pass."""
 
     def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
         scene = problem.network.scene  # robots without arms hold as those whose joints are rigid

@@ -320,7 +320,7 @@ class Problem(Shown):
     paths: tuple[Resource, ...] = ()
 
     def __post_init__(self) -> None:
-        """Let a tolerance keep to other limits, and props to what they may bear."""
+        """Let a tolerance keep to other limits, and props to their capacities."""
         network, limits = getattr(self.engine, "network", None), self.limits
         if isinstance(network, Network):  # another engine is refused later
             kept = (each for each in limits if each.response != PROP_EXCESS)

@@ -348,7 +348,7 @@ _LITTLE = 1e-4  # of the mean weight of a brick: by how much props may bear more
 
 
 def _prop_limits(scene: Scene) -> tuple[Limit, ...]:
-    """Return the limit that keeps props within what they may bear; none where all bear anything."""
+    """Return the limit of the props' capacities; none where all bear anything."""
     if all(prop.capacity is None and prop.direction is None for prop in scene.props):
         return ()
     weight = sum(b.mass for b in scene.bricks) * math.hypot(*scene.gravity) * scene.weight_factor
@@ -372,7 +372,7 @@ class ResponsesAsked(Terse):
 def state_costs(
     criterion: Criterion, found: Mapping[str, Floats], bricks: int, possible: Bools
 ) -> Floats:
-    """Return what states cost (n,), infinite where they are not possible (n,).
+    """Return costs of states (n,), infinite where they are infeasible (n,).
 
     Steps can be added to a plan, so none that counts may cost less than nothing. ``found`` has
     responses (n,), SI units.
@@ -387,7 +387,7 @@ def state_costs(
 
 
 def robots_of(engine: Engine, schedule: Schedule, criterion: Criterion) -> list[str]:
-    """Return the names of a schedule's robots if all is what it should be, and grips are open."""
+    """Return the names of a schedule's robots; an error says if none of its grips is open."""
     wanted = (
         (engine, isinstance(getattr(engine, "network", None), Network), "engine", "make_engine"),
         (schedule, isinstance(schedule, Schedule), "schedule", "three_robot_loop"),

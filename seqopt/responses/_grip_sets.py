@@ -184,7 +184,7 @@ def _columns(part: Block, found: Answers) -> Floats:
     return np.column_stack([*(found.values[name] for name in part.names), found.forces])
 
 
-_SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
+_SEVERAL = 4  # chunks of work that states of one brick count may be before they are parted
 _CHUNKS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
 
 

@@ -111,7 +111,7 @@ class TimedRows:
     ) -> tuple[Clock, Ints]:
         """Return the book of a graph of these states, and which moves its arcs are."""
         if multipliers.ndim != 2 or multipliers.shape[1] != 1 + self._team_columns:
-            raise SolverError("there is no price for every robot")
+            raise SolverError("there is no multiplier for every robot")
         acts = self.acts(graph)
         return Clock(acts, multipliers, most, strict=strict), acts.move
 

@@ -169,7 +169,7 @@ def test_a_posture_that_there_is_not_is_a_line(arch25):
     scene = with_joints(arch25, np.full((2, 6), 1e6), jacobians, without=[(1, 4)])
     node = sorted(arch25.brick_of_node)[4]
     engine = make_engine("compliance", scene)
-    said = f"robot r1 has no posture at node {node}, so nobody knows how its grip gives way"
+    said = f"robot r1 has no posture at node {node}, so the compliance of its grip is not known"
     with pytest.raises(GripError, match=said):
         engine.solve(20, [scene.grip_numbers((3, node))])
     assert engine.solve(20, [scene.grip_numbers((node, 3))]).grip_force.all()

@@ -179,7 +179,7 @@ def test_the_judge_of_budgets_has_prices_of_its_own_to_check():
     plan = seqopt.solve(problem, SEARCH)
     judge_schedule(problem, plan.selection, plan.steps)
     for wrong, said in (
-        (replace(plan.selection, prices=()), "no price for every budget"),
+        (replace(plan.selection, prices=()), "no multiplier for every budget"),
         (replace(plan.selection, prices=((1e3,),)), "no plan within budgets is promised below"),
         (replace(plan.selection, bound=(2 * plan.selection.bound[0], 0.0)), "is promised below"),
     ):

@@ -137,7 +137,7 @@ def test_a_margin_within_a_budget_is_proven_to_its_width():
     width = slack("friction", friction)
     assert travel <= 1.0
     assert alone.certificate.bounds[0] - width <= plan.certificate.bounds[0] <= friction
-    with pytest.raises(SolverError, match="no price for every budget and goal"):
+    with pytest.raises(SolverError, match="no multiplier for every budget and goal"):
         judge_schedule(plan.states, replace(plan.selection, prices=()), plan.steps)
     objective = (0.5 * friction, *plan.selection.objective[1:])
     with pytest.raises(SolverError):

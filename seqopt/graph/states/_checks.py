@@ -16,7 +16,7 @@ from seqopt.responses.quantities import PROP_EXCESS, robot_response
 
 
 def checked_limits(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
-    """Return limits that are all on what a state has."""
+    """Return the limits, checked to be on responses of a state."""
     limits = _step_limits(limits, network.scene)
     robots = {robot_response(robot.name) for robot in network.scene.robots}
     for limit in limits:

@@ -51,7 +51,7 @@ def steps_in_hands(
 
 @dataclass(frozen=True)
 class StateSpace(Space):
-    """The states of one schedule, a part for every level: its open grips, or what rules allow.
+    """The states of one schedule, a part for every level: by its open grips, or by rules.
 
     Moves take a column each: whether they are regrips, and how far robots go, m. Where totals over
     scenarios count, a column for every scenario stands in the place of the goal.
@@ -159,7 +159,7 @@ class StateSpace(Space):
         return (1, self.problem.models) if self.order else (0, 0)
 
     def rows(self, part: int, states: Ints) -> Ints:
-        """Return what states stand for: the level, and the node that each robot holds, 0: none."""
+        """Return labels of states: the level, and the node that each robot holds, 0: none."""
         numbers = np.array([0, *node_numbers(self.problem.network)])
         held = states[:, : self.problem.space.robots].astype(np.int64)
         named = np.where(held > 0, numbers[held.clip(min=0)], 0)

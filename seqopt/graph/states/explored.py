@@ -1,4 +1,4 @@
-"""The space of a problem, what is known of all its plans, and the best margin of stability.
+"""The space of a problem, facts about all its plans, and the best margin of stability.
 
 The best margin with which a plan exists is found by bisection.
 """
@@ -114,7 +114,7 @@ STEPS = (COUNT,)
 def best_margin(
     problem: States, tell: Callable[[Explorer], object] = lambda _: None
 ) -> tuple[float, float, States, Ordered]:
-    """Return objective and lower bound of the first goal, a margin, and what is left at it.
+    """Return objective and lower bound of the first goal, a margin, and the space left at it.
 
     ``tell``: called with the states that are reached; may raise to end the search. Third, the
     problem of the goals after it, all states standing with that margin; fourth, the order and
@@ -129,7 +129,7 @@ def best_margin(
 
 
 class StandingLook:
-    """The states of a problem that are within limits, and what is known of how they stand."""
+    """The states of a problem within limits, and their stability as far as known."""
 
     def __init__(self, problem: States, tell: Callable[[Explorer], object]) -> None:
         self._problem = problem
@@ -154,7 +154,7 @@ class StandingLook:
         return self.proving(replace(with_margin(self._problem, name, value), goals=goals))
 
     def proving(self, asked: States) -> States:
-        """Return a problem with other demands that shares what was proven with those before."""
+        """Return a problem with other demands that shares the proofs of those before."""
         first = self._first = self._first or asked
         asked.share_proofs(first)
         return asked

@@ -130,7 +130,7 @@ class States(Shown):
         return self
 
     def names_of(self, aim: Aim | None) -> tuple[str, ...]:
-        """Return what every goal is called, then what has a budget; ``aim``: of decisions."""
+        """Return the names of goals, then of budgets; ``aim``: of decisions."""
         if self.decisions is None:
             return self.names
         return (self.title or ("minmax" if aim is Aim.PEAK else "sum"),)
@@ -214,7 +214,7 @@ class States(Shown):
         return as_formulation(named or self.default_formulation, *self.questions)
 
     def in_display_units(self, aim: Aim | None, values: Sequence[float]) -> dict[str, float]:
-        """Return values of the first goals by their names; of a tilt, what is survived, degrees."""
+        """Return values of the first goals by their names; of a tilt the critical one, degrees."""
         if self.decisions is not None:
             return dict(zip(self.names_of(aim), values, strict=False))
         found = zip(self.names, self.goals, values, strict=False)
@@ -498,7 +498,7 @@ class States(Shown):
     def _worst(
         self, valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]], states: Ints, most: float
     ) -> tuple[Floats, Bools]:
-        """Return values (n, g) over scenarios; what one excludes is not evaluated in the next."""
+        """Return values (n, g) over scenarios, evaluated where none before excludes the state."""
         out = np.zeros((len(states), len(self.goals)))
         within = np.ones(len(states), dtype=bool)
         for number, values in enumerate(valued):
@@ -584,7 +584,7 @@ class States(Shown):
 
 
 def _ascending(held: Ints, most: Floats) -> tuple[Ints, Floats]:
-    """Return places held (n, r) in ascending order, and what those who hold may carry."""
+    """Return places held (n, r) in ascending order, and the payloads of their robots."""
     order = np.argsort(held, axis=1, kind="stable")
     return np.take_along_axis(held, order, axis=1), np.asarray(most[order])
 
