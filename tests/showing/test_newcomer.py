@@ -7,47 +7,15 @@ import pytest
 
 import seqopt
 
-BUILDS = {
-    "own arch": ("arch:span=2,rise=0.8", {}),
-    "own arch, free": ("arch:span=2,rise=0.8", {"schedule": "free"}),
-    "own wall": ("wall:columns=3,courses=2", {}),
-    "two robots": (
-        "arch:span=2,rise=0.8",
-        {"schedule": "free", "robots": 2, "rules": "least_grips=1"},
-    ),
-    "from both sides": ("arch:span=2,rise=0.8", {"schedule": "free", "order": "ends"}),
-}
 
-
-QUICK = ("own arch", "own wall")
-
-
-@pytest.mark.parametrize(
-    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BUILDS]
-)
-def test_one_line_makes_a_plan_that_shows_itself(name):
-    scene, given = BUILDS[name]
-    plan = seqopt.optimize(scene, **given)
+def test_one_line_makes_a_plan_that_shows_itself():
+    plan = seqopt.optimize("arch:span=2,rise=0.8", "free", robots=2, rules="least_grips=1")
     assert "<table" in plan._repr_html_()
     assert len(plan.table()) > 0
     assert plan.gantt().axes
-    used = set(plan.grips()["robot"])
-    assert len(used) == given.get("robots", 3)
-    if "order" in given:
-        first = plan.engine.network.scene.build_order[:2]
-        assert {*first} == {ground.brick for ground in plan.engine.network.scene.grounds}
-
-
-def test_own_robots_build_the_same_scene():
-    scene = seqopt.load_scene("wall:columns=2,courses=2")
-    near = seqopt.Sphere(center=(0.0, 0.0, 0.0), radius=5.0)
-    pair = [seqopt.Robot(name=name, payload=300.0, reach=near) for name in ("left", "right")]
-    own = scene.with_robots(*pair)
-    assert (own.robots, own.bricks) == (tuple(pair), scene.bricks)
-    plan = seqopt.optimize(own, "free", rules="least_grips=1")
-    assert set(plan.grips()["robot"]) == {"left", "right"}
+    assert len(set(plan.grips()["robot"])) == 2
     with pytest.raises(seqopt.SeqoptError, match="robots"):
-        scene.with_robots("left")
+        plan.engine.network.scene.with_robots("left")
 
 
 def test_a_report_shows_plans_side_by_side():
