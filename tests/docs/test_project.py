@@ -114,8 +114,10 @@ def test_templates_are_forms_with_questions():
 
 def test_one_version_is_said_everywhere():
     project = re.search(r'^version = "(.*)"', (ROOT / "pyproject.toml").read_text(), re.M)[1]
-    assert str(loaded(ROOT / "CITATION.cff")["version"]) == project
-    assert f"\n## [{project}] - " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    cited = loaded(ROOT / "CITATION.cff")
+    assert str(cited["version"]) == project
+    headings = re.findall(r"^## .*", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)
+    assert headings[:2] == ["## [Unreleased]", f"## [{project}] - {cited['date-released']}"]
 
 
 FURO = (Path(furo.__file__).parent / "theme/furo/static/styles/furo.css").read_text("utf-8")
