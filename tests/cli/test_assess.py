@@ -61,28 +61,6 @@ def test_margins_of_some_steps(capsys, tmp_path, words, known):
     assert table["friction_needed"].isna().all()
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--steps", "5:3"], "--steps 5:3: the first is after the last; exchange them"),
-        (["--steps", "0:3"], "--steps 0:3: give numbers from 1 to 17, as 3:7"),
-        (["--steps", "a"], "--steps a: give numbers from 1 to 17, as 3:7"),
-        (["--margins", "tillt"], "margin 'tillt' (did you mean tilt?): give all, or some of"),
-        (["--workers", "0"], "--workers 0: give a whole number from 1"),
-        (["--map", "wind"], "--map wind: give friction or tilt, with values as"),
-        (["--map", "tilt=60"], "--map tilt=60: 60 is too much; give tilt from 0 to 45"),
-        (["--map", "friction=x"], "--map friction=x: 'x' is not a positive number or zero"),
-        (["--map", "friction", "--holds", "glue"], "--holds glue: give epoxy, dry, or bond="),
-        (["--mortar", "bond=-1"], "--mortar bond=-1: give epoxy, dry, or bond=STRENGTH (Pa)"),
-    ],
-)
-def test_what_cannot_be_meant_is_a_line(capsys, words, said):
-    assert main([*WORDS, *words]) == 2
-    err = capsys.readouterr().err
-    assert said in err
-    assert err.count("\n") == 1
-
-
 def test_a_map_of_one_method(capsys, tmp_path):
     words = ["--map", "friction=0.2,0.6", "--holds", "dry,bond=1e5"]
     assert main([*WORDS, *words, "--json", "--out", str(tmp_path / "map")]) == 1

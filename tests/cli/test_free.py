@@ -76,51 +76,6 @@ def test_the_margin_search_plan_is_in_degrees(capsys, tmp_path, arch):
     assert tilt <= pd.read_csv(out / "stability.csv")["tilt_survived_deg"].min() + 0.1
 
 
-@pytest.mark.parametrize(
-    ("words", "status", "said"),
-    [
-        (["--rule", "newest=never"], 2, "rule newest: 'never'; give one of either"),
-        (["--rule", "speed=2"], 2, "--rule speed=2 does not exist; give one of newest"),
-        (["--rule", "regrips=few"], 2, "rule regrips: 'few'"),
-        (["--aim", "speed"], 2, "aim 'speed' does not exist"),
-        (["--robots", "7"], 2, "7 robots: the free schedule takes one to 5"),
-        (["--robots", "rob9,rob1"], 2, "robot 'rob9' does not exist"),
-        (["--option", "width=0"], 2, "options width=0, growth=1.1: give a whole number"),
-        (["--option", "speed=1"], 2, "--option speed=1: schedule_search has width"),
-        (["--formulation", "minimax", "--aim", "steps"], 2, "minimax: a sum comes first"),
-        (["--formulation", "pareto_zones"], 2, "pareto_zones is for Pareto sets"),
-        (["--criteria", "equations-2-3"], 2, "it ranks the choices of a move"),
-        (["--tilt", "3"], 2, "--tilt: it goes with --stands"),
-        (["--stands", "jelly"], 2, "--stands jelly: give epoxy, dry, or bond="),
-        (["--stands", "dry", "--tilt", "90"], 2, "give an angle from 0 to below pi/2"),
-        (["--stands", "dry", "--rule", "payload=ignored"], 2, "holds up anything"),
-        (["--aim", "minmax,tilt"], 2, "name bond, friction and tilt before all others"),
-        (["--stands", "bond=1e-9", "--friction", "0.01"], 3, "a bond of "),
-        (["--limit", "F_largest=1"], 3, "it becomes possible with F_largest="),
-        (["--payload", "30"], 3, "more than the payload of rob1 (30 N), rob2 (30 N), rob3 (30 N)"),
-    ],
-)
-def test_what_is_wrong_gets_one_line(capsys, tmp_path, arch, words, status, said):
-    arguments = ["optimize", arch, "--schedule", "free", *words, "--out", str(tmp_path / "out")]
-    found, _, error = run(capsys, *arguments)
-    assert found == status
-    assert said in error
-    assert error.count("\n") == 1
-    assert not (tmp_path / "out").exists()
-
-
-def test_what_only_the_free_schedule_has(capsys, tmp_path, arch):
-    out = ["--out", str(tmp_path / "out")]
-    for words in (
-        ["--rule", "regrips=0"],
-        ["--tilt", "3"],
-        ["--aim", "sum", "--rule", "regrips=0"],
-    ):
-        status, _, error = run(capsys, "optimize", arch, *words, *out)
-        assert status == 2
-        assert re.search("only the free schedule has them|it goes with --stands", error)
-
-
 def test_a_free_schedule_within_a_budget(capsys, tmp_path, arch):
     out = tmp_path / "out"
     words = ("--schedule", "free", "--budget", "regrips=0", "--budget", "travel=9m")
@@ -131,15 +86,6 @@ def test_a_free_schedule_within_a_budget(capsys, tmp_path, arch):
     assert summary["budgets"]["regrips"] == {"bound": 0, "spent": 0, "price": None}
     assert summary["budgets"]["travel"]["spent"] <= 9
     assert summary["objective"]["travel"] <= 9
-    for word, status, said in (
-        ("travel=0.8", 2, "give travel=3.5m, makespan=600s, regrips=2"),
-        ("tilt=3", 2, "it is no total of moves or of a response"),
-        ("sum(T_max)=0", 3, "no plan is within all budgets; sum(T_max) is at least"),
-    ):
-        words = ("--schedule", "free", "--budget", word, "--out", str(tmp_path / "no"))
-        found, _, error = run(capsys, "optimize", arch, *words)
-        assert (found, error.count("\n")) == (status, 1)
-        assert said in error
 
 
 def test_a_free_schedule_over_scenarios(capsys, tmp_path, arch):
@@ -150,10 +96,6 @@ def test_a_free_schedule_over_scenarios(capsys, tmp_path, arch):
     assert text.splitlines()[0].endswith(", optimal")
     summary = json.loads((out / "summary.json").read_text())
     assert summary["scenarios"]["count"] == 3
-    words = ("--schedule", "free", "--robust", "worst-peak", "--aim", "sum")
-    status, _, error = run(capsys, "optimize", arch, *words, "--out", str(tmp_path / "no"))
-    assert status == 2
-    assert "no total of worst states" in error
 
 
 def test_a_loop_by_its_states(capsys, tmp_path, arch):
@@ -239,23 +181,6 @@ def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     assert [*scene.build_order] == summary["order"] != [*load_scene(arch).build_order]
     assert summary["order_bound"] == pytest.approx(summary["objective"]["F_largest"])
     assert len(read_plan(scene, out / "plan.csv")) == summary["steps"]
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--schedule", "loop"], "orders, and steps or regrips in a Pareto set, go with the free"),
-        (["--schedule", "free", "--formulation", "pareto_zones"], "or order_search"),
-        (["--schedule", "free", "--max-memory", "1B"], "option max_memory: it is too little"),
-        (["--schedule", "free", "--option", "depth=3"], "depth"),
-    ],
-)
-def test_what_does_not_go_with_the_search_of_orders(capsys, tmp_path, arch, words, said):
-    out = str(tmp_path / "out")
-    status, _, err = run(capsys, "optimize", arch, "--order", "search", *words, "--out", out)
-    assert status == 2
-    assert said in err
-    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize("scene", ["wall:columns=2,courses=2", "chain:bricks=8"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 
 import pandas as pd
 import pytest
@@ -51,28 +50,3 @@ def test_analyses_follow(capsys, tmp_path):
     name = "D_max_1e-3mm"
     assert pd.read_csv(path)[name].to_numpy() == pytest.approx(wanted[name].to_numpy(), rel=1e-5)
     assert "compliance of robots" not in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        ("soft", "'soft' is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5"),
-        ("0", r"stiffness is \(0.0, 0.0, 0.0\); give one number or three"),
-        ("1e6,2e4", "give a stiffness, and after a comma turning=STIFFNESS"),
-        ("1e6x2e6", "'1e6x2e6' is no stiffness"),
-        ("1e6,turning=-1", "rotational_stiffness is"),
-        ("1e5..1e9", "'1e5..1e9' is no stiffness"),
-    ],
-)
-def test_wrong_words_are_a_line(words, named, capsys):
-    assert main(["scene", "arch25", f"--grips={words}"]) == 2
-    line = capsys.readouterr().err
-    assert line.startswith(f"seqopt: error: --grips {words}: ")
-    assert line.count("\n") == 1
-    assert re.search(named, line)
-
-
-def test_scenarios_of_rigid_grips_do_not_vary(capsys):
-    words = ["optimize", ARCH, "--robust", "worst-peak", "--scenarios", "2", "--vary", "grips=2"]
-    assert main(words) == 2
-    assert "they are rigid; say how stiff with --grips" in capsys.readouterr().err

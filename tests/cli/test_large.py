@@ -68,23 +68,6 @@ def test_results_do_not_depend_on_workers_and_memory(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--workers", "0"], "--workers 0: give a whole number from 1"),
-        (["--workers", "two"], "--workers two: give"),
-        (["--max-memory", "much"], "--max-memory much: give a size, as 500MB or 2GB"),
-        (["--max-memory", "0GB"], "--max-memory 0GB: give a size"),
-    ],
-)
-def test_what_cannot_be_meant_is_refused_in_a_line(capsys, tmp_path, words, said):
-    assert main([*WORDS, "cascade", "--out", str(tmp_path / "out"), *words]) == 2
-    err = capsys.readouterr().err
-    assert said in err
-    assert err.count("\n") == 1
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
     ("text", "size"),
     [("2GB", 2e9), ("500 MB", 5e8), ("1.5GiB", 1.5 * 2**30), ("2e9", 2e9), ("7", 7), ("1k", 1000)],
 )

@@ -277,56 +277,6 @@ def test_the_loop_of_two_is_compared_where_there_is_no_third(capsys, tmp_path):
     assert "overlap_dp" in out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (("--formulation", "overlap_dp", "--schedule", "ring"), "schedule 'ring' does not exist"),
-        (("--formulation", "overlap_dp", "--schedule", "no.csv"), "cannot read no.csv"),
-        (("--schedule", "three-robot", "--robots", "rob1,rob2"), "three-robot takes three"),
-        (("--formulation", "overlap_dp", "--robots", "rob1,,rob2"), "robot '' does not exist"),
-        (("--formulation", "simplex"), "formulation 'simplex'"),
-        (("--formulation", "beam", "--option", "depth=3"), "--option depth=3: beam has seconds"),
-        (("--formulation", "beam", "--option", "width=wide"), "width is 'wide'; give an int"),
-        (("--formulation", "beam", "--option", "width=0"), "width is 0"),
-        (("--formulation", "overlap_dp", "--criteria", "beauty"), "--criteria beauty"),
-        (("--formulation", "overlap_dp", "--criteria", "T_max=heavy"), "'heavy' is not a positive"),
-        (("--formulation", "overlap_dp", "--limit", "T_max"), "--limit T_max"),
-        (("--formulation", "overlap_dp", "--limit", "payload=9"), "values with --payload"),
-        (("--formulation", "minimax", "--no-proof"), "minimax looks beyond"),
-    ],
-)
-def test_optimize_refuses_in_one_line(capsys, tmp_path, arguments, named):
-    status, _, err = run(capsys, "optimize", *arguments, "--out", str(tmp_path / "out"))
-    assert status == 2
-    assert err.count("\n") == 1
-    assert named in err
-    assert not list(tmp_path.rglob("*.*"))  # no half-written folder of results
-
-
-@pytest.mark.parametrize(
-    ("arguments", "status", "named"),
-    [
-        (("overlap_dp", "--limit", "F_largest=9"), 3, "no grip is left to choose"),
-        (
-            ("overlap_dp", "--limit", "T_max=20"),
-            3,
-            "(--aim F_largest",
-        ),  # proven: no choice is allowed
-        (
-            ("cascade", "--no-proof", "--limit", "T_max=64"),
-            4,
-            "no allowed grip",
-        ),  # a dead end proves nothing
-    ],
-)
-def test_no_answer_is_no_bad_input(capsys, tmp_path, arguments, status, named):
-    words = ("--formulation", *arguments, "--out", str(tmp_path / "out"))
-    found, _, err = run(capsys, "optimize", *words)
-    assert (found, err.count("\n")) == (status, 1)
-    assert named in err
-    assert not list(tmp_path.iterdir())
-
-
 def test_optimize_with_words_of_ones_own(capsys):
     arguments = ("--criteria", "T_max,M_sup=2,F_move", "--limit", "payload")
     chosen = ("--formulation", "beam", "--option", "width=10", "--schedule", "modified-sequential")
@@ -444,40 +394,6 @@ def test_scene(capsys, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (("--engine",), "COMMAND"),
-        (("analyze", "--method", "seq"), "'seq' (choose from 'sequential', 'cantilever'"),
-        (("analyze", "arch52", "--method", "sequential"), "scene arch52"),
-        (("analyze", "no/such.json", "--method", "sequential"), "no/such.json"),
-        (("analyze", "--plan", "no.csv"), "no.csv"),
-        (("analyze", "--method", "sequential", "--plan", "no.csv"), "not allowed with"),
-        (("analyze", "--method", "sequential", "--out", "no/dir/x.csv"), "no/dir/x.csv"),
-        (("scene", "--export", "no/dir/x.json"), "no/dir/x.json"),
-        (("analyze", "--method", "sequential", "--robots", "rob1,rob9"), "robot 'rob9'"),
-        (
-            ("analyze", "--method", "published", "--robots", "rob1,rob2"),
-            "--robots rob1,rob2: a plan",
-        ),
-        (("assess", "--plan", "no.csv", "--robots", "rob1,rob2"), "--robots rob1,rob2: a plan"),
-        (("assess", "--method", "sequential", "--plan", "x.csv"), "not allowed with"),
-        (
-            ("assess", "--method", "sequential", "--mortar", "glue"),
-            "--mortar glue: give epoxy, dry",
-        ),
-        (("assess", "--method", "sequential", "--friction", "-1"), "--friction: '-1' is not"),
-        (("assess", "--plan", "no.csv"), "no.csv"),
-    ],
-)
-def test_bad_arguments_get_one_line(capsys, arguments, named):
-    status, out, err = run(capsys, *arguments)
-    assert status == 2
-    assert err.count("\n") == 1
-    assert named in err
-    assert "Traceback" not in out + err
-
-
-@pytest.mark.parametrize(
     ("change", "named"),
     [
         (lambda d: d["bricks"][4].update(density="heavy"), "bricks[4].density"),
@@ -558,31 +474,6 @@ def test_budgets_are_kept_as_asked(capsys):
     assert steps["spent"] <= steps["bound"] == 3
     assert found["status"] == "optimal"
     assert found["ended"] == "done"
-
-
-@pytest.mark.parametrize(
-    ("budget", "status", "said"),
-    [
-        ("travel=2m", 3, "every choice uses at least 11.3476 of 'robot travel [m]', more than 2"),
-        ("travel=few", 2, "'few' is not a number from 0"),
-        ("travel=-1m", 2, "'-1' is not a number from 0"),
-        ("travel=250:3", 2, "does not exist; give travel=0.8"),
-        ("steps_over:T_max=3", 2, "does not exist; give travel=0.8"),
-        ("steps_over:T_max=80:3m", 2, "steps have no meters"),
-        ("robot_use:rob9=80:3", 2, "response F_rob9 does not exist"),
-    ],
-)
-def test_budgets_that_cannot_be_get_one_line(tmp_path, capsys, budget, status, said):
-    words = ("--formulation", "labels", "--budget", budget, "--out", str(tmp_path / "a"))
-    assert main(["optimize", "arch25", *words]) == status
-    assert said in capsys.readouterr().err
-    assert not (tmp_path / "a").exists()
-
-
-def test_a_budget_is_given_once(tmp_path, capsys):
-    words = ("--formulation", "labels", "--budget", "travel=2m", "--budget", "travel=0.5")
-    assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
-    assert "budget travel=0.5: it stands there twice" in capsys.readouterr().err
 
 
 def test_a_time_limit_ends_with_a_choice_and_a_trace(tmp_path, capsys, monkeypatch):

@@ -98,24 +98,6 @@ def test_a_state_is_read_from_a_file(capsys, folder, tmp_path):
         assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--from", "PLAN:99"), "the plan has 0 to"),
-        (("--from", "nowhere"), "give PLAN:STEP"),
-        (("--from", "9"), "site: 9 bricks"),
-        (("--from", "3", "--to", "2"), "cannot end with 2"),
-        (("--to", "PLAN:x"), "give PLAN:STEP"),
-    ],
-)
-def test_a_wrong_place_is_one_line(capsys, folder, words, said):
-    words = [word.replace("PLAN", str(folder)) for word in words]
-    status, _, err = run(capsys, "optimize", str(folder / "scene.json"), *FREE, *words)
-    assert status == 2
-    assert said in err
-    assert err.count("\n") == 1
-
-
 def test_the_rest_is_planned_anew(capsys, folder, tmp_path):
     quiet = ("--no-stability",)
     status, said, _ = run(capsys, "replan", str(folder), "--at", "3", *quiet)

@@ -55,18 +55,3 @@ def test_props_are_said_in_words(cli, arch, tmp_path):
     assert {prop.stiffness for prop in props} == {(1e5,) * 3}
     bare = cli("scene", str(tmp_path / "own.json"), "--props", "none", "--json")
     assert json.loads(bare.out)["scene"]["props"] == []
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--props", "evry"), "'evry' is no node (did you mean every?); give nodes, as 13,27"),
-        (("--props", "99"), "prop at node 99: there is no such node"),
-        (("--props", "3:soft"), "'soft' is not a positive number"),
-        (("--props", "3,3"), "prop at node 3: another one holds it"),
-    ],
-)
-def test_what_does_not_fit_is_said_in_a_line(cli, arch, words, said):
-    found = cli("optimize", arch, *FREE, *words)
-    assert found.status == 2
-    assert said in found.err

@@ -57,39 +57,6 @@ def test_a_plan_over_scenarios_is_written(capsys, tmp_path, scene, aim):
     assert len(pd.read_csv(folder / "selection.csv")) > 0
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--robust", "cvar=2"], "--robust: cvar=2.0: give a level"),
-        (["--robust", "best"], "--robust: robust aim best does not exist"),
-        (["--robust", "worst-total", "--formulation", "minimax"], "use scenario_search"),
-        (["--robust", "worst-peak", "--budget", "travel=0.8"], "where candidates are chosen"),
-        (["--robust", "worst-peak", "--no-proof"], "ask for the proof"),
-        (["--robust", "worst-total", "--schedule", "free", "--aim", "steps"], "of one sum alone"),
-        (["--scenarios", "3", "--formulation", "minimax"], "--scenarios: plans over scenarios"),
-        (["--seed", "3", "--schedule", "free"], "--seed: plans over scenarios alone"),
-        (["--robust", "worst-peak", "--scenarios", "x"], "--scenarios x: give a whole number"),
-        (["--robust", "worst-peak", "--scenarios", "0"], "--scenarios 0: give a whole number"),
-        (["--robust", "worst-peak", "--unseen", "3"], "seqopt.plan.out_of_sample.judge_unseen"),
-        (["--robust", "worst-peak", "--vary", "foo=1"], "--vary foo=1 does not exist"),
-        (["--robust", "worst-peak", "--vary", "density=-1"], "not a positive number"),
-        (["--robust", "worst-peak", "--vary", "stiffness=0.5"], "give a factor from 1"),
-        (["--robust", "worst-peak", "--vary", "density=1"], "density is 1.0"),
-    ],
-)
-def test_bad_input_gets_one_line(capsys, tmp_path, scene, words, said):
-    status, out, err = optimize(capsys, tmp_path, scene, *words)
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert said in err
-    assert not (tmp_path / "out").exists()
-
-
-def test_what_no_choice_keeps_in_all_scenarios_has_no_answer(capsys, tmp_path, scene):
-    words = ("--robust", "worst-total", "--scenarios", "2", "--limit", "F_largest=1")
-    status, _, err = optimize(capsys, tmp_path, scene, *words)
-    assert (status, err.count("\n")) == (3, 1)
-
-
 def test_numbers_that_are_not_finite_are_null():
     report = {"a": {"b": math.inf, "c": 1.5}, "d": [1], "e": math.nan}
     assert _plain(report) == {"a": {"b": None, "c": 1.5}, "d": [1], "e": None}

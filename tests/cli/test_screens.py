@@ -190,29 +190,6 @@ def test_numbers_are_read_where_they_are_given():
             [options[name].parse(value) for name, value in wrong.items()]
 
 
-@pytest.mark.parametrize(
-    ("words", "why"),
-    [
-        ("--schedule free --criteria equations-2-3", "it ranks the choices of a move"),
-        ("--aim steps --ranked pairs", "leave it out"),
-        ("--criteria weighted --ranked pairs", "weighted has no ranks; leave it out"),
-        ("--rule least_grips=1", "give --schedule free"),
-        ("--direction take-down", "--schedule free"),
-        ("--friction 0.5", "--stands"),
-        ("--schedule free --tilt 1", "--stands"),
-        ("--curing 15min", "--stands"),
-        ("--budget steps=40", "with an aim"),
-        ("--aim minmax --budget steps_over:F_largest=250:10", "does not exist"),
-        ("--seed 3", "--robust"),
-        ("--lazy --formulation beam", "exact"),
-        ("--no-proof", "cascade or rank_search"),
-    ],
-)
-def test_what_help_says_does_not_go_together_does_not(capsys, words, why):
-    assert main(["optimize", "chain:bricks=7", *words.split()]) == 2
-    assert why in capsys.readouterr().err
-
-
 def test_the_payload_that_is_said_to_be_enough_is(capsys):
     words = ["optimize", "arch25", "--robots", "2", "--no-stability"]
     assert main(words) == 0

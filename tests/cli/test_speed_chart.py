@@ -12,27 +12,6 @@ from seqopt._cli.main import main
 WALL = "wall:columns=2,courses=2"
 
 
-@pytest.mark.parametrize("words", ["x", "0", "-1", "nan", WALL])
-def test_what_is_no_time_is_refused_in_a_line(words, capsys):
-    assert main(["compare", "arch25", f"--speed={words}"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"seqopt: error: --speed: '{words}' is not a positive number")
-    assert "give seconds, and the scene before it" in line
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--reference", "frame"], "--reference: it values the plans of --speed; give --speed 60"),
-        (["--speed", "9", "--reference", "rigid"], "reference 'rigid' does not exist; give one of"),
-    ],
-)
-def test_a_reference_that_values_nothing_is_refused_in_a_line(words, said, capsys):
-    assert main(["compare", WALL, *words]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert said in line
-
-
 @pytest.mark.slow
 def test_a_comparison_with_speed(tmp_path, capsys):
     out = tmp_path / "speed"

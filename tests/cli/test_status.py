@@ -203,20 +203,3 @@ def test_a_mechanism_has_no_answer(capsys, tmp_path):
     save_scene(replace(arch, grounds=grounds, robots=arch.robots[:1]), tmp_path / "s.json")
     assert main(["analyze", str(tmp_path / "s.json"), "--plan", str(plan)]) == Status.NO_ANSWER
     assert "nothing resists" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--schedule", "free"), "no plan was found yet; give more"),
-        (("--schedule", "free", "--stands", "dry", "--aim", "bond"), "no plan was found yet"),
-        (("--schedule", "free", "--order", "search"), "no plan was found yet; give more"),
-        (("--formulation", "cascade", "--no-proof"), "no move was chosen yet; give more"),
-    ],
-)
-def test_time_that_is_over_is_no_failure_of_a_solver(capsys, words, said):
-    assert main(["optimize", "arch25", *words, "--time-limit", "0"]) == 4
-    error = capsys.readouterr().err
-    assert error.startswith("seqopt: time is over: ")
-    assert said in error
-    assert error.count("\n") == 1

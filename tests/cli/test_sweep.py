@@ -74,20 +74,6 @@ def test_a_problem_without_a_plan_is_a_row_that_says_why(capsys):
     assert told("chain:bricks=7..9/2", "--over", "payload=1") == 3
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("chain:bricks=5", "--over", "paylod=3"), "no option paylod (did you mean payload?)"),
-        (("chain:bricks=5", "--over", "payload"), "give NAME=VALUES"),
-        (("chain:bricks=5..7/0",), "range 5..7/0: give from 1 to 100000 values"),
-        (("chain:bricks=5..7/900", "--over", "payload=1..9/900"), "more than 100000 problems"),
-    ],
-)
-def test_what_is_wrong_gets_one_line(words, said, capsys):
-    assert told(*words) == 2
-    assert said in capsys.readouterr().err
-
-
 def test_ranges_are_even_or_in_proportion():
     assert _spread_values("0..1/3") == ("0", "0.5", "1")
     assert _spread_values("1e3..1e9/3log") == ("1000", "1000000", "1000000000")

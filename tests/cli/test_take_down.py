@@ -62,20 +62,3 @@ def test_what_limits_follow_from_the_scene_goes_with_it(capsys, tmp_path, arch, 
     status, said, _ = run(capsys, "replan", str(out), "--at", "2", "--no-stability")
     assert (status, "optimal" in said) == (0, True)
     assert run(capsys, "analyze", str(out))[0] == 0
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--direction", "take-down"), "it goes with --schedule free"),
-        ((*DOWN, "--keep", "1..2"), "--keep is no more; --to 12 leaves the first 12 bricks"),
-        (("--schedule", "free", "--direction", "takedown"), "did you mean take-down?"),
-        ((*DOWN, "--to", "5"), "cannot end with 5; give fewer"),
-        ((*DOWN, "--order", "search", "--aim", "steps"), "put minmax first"),
-    ],
-)
-def test_wrong_words_get_a_line(capsys, tmp_path, arch, words, said):
-    status, _, error = run(capsys, "optimize", arch, *words, "--out", str(tmp_path / "x"))
-    assert status == 2
-    assert said in error
-    assert error.count("\n") == 1

@@ -1,0 +1,206 @@
+"""What cannot be answered is one line that says why, with its status; nothing is written.
+
+``ARCH`` stands for a scene of five bricks, ``SIX`` for one of six, ``PLAN`` for the folder of a plan
+of the first.
+"""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from seqopt.scene.scene_file import save_scene
+from tests.builders import six_bricks, small_arch
+from tests.commands import command
+
+VLR = "assess arch:span=1,rise=0.4,pattern=VLR --method sequential --mortar dry"
+FREE = "optimize ARCH --schedule free"
+ROBUST = "optimize SIX --robust"
+WALL = "wall:columns=2,courses=2"
+BAD = {
+    # commands, scenes, files
+    "--engine": "COMMAND",
+    "analyze --method seq": "'seq' (choose from 'sequential', 'cantilever'",
+    "analyze arch52 --method sequential": "scene arch52",
+    "analyze no/such.json --method sequential": "no/such.json",
+    "analyze --plan no.csv": "no.csv",
+    "analyze --method sequential --plan no.csv": "not allowed with",
+    "analyze --method sequential --out no/dir/x.csv": "no/dir/x.csv",
+    "analyze --method sequential --robots rob1,rob9": "robot 'rob9'",
+    "analyze --method published --robots rob1,rob2": "--robots rob1,rob2: a plan",
+    "scene --export no/dir/x.json": "no/dir/x.json",
+    "assess --plan no.csv": "no.csv",
+    "assess --plan no.csv --robots rob1,rob2": "--robots rob1,rob2: a plan",
+    "assess --method sequential --plan x.csv": "not allowed with",
+    "assess --method sequential --mortar glue": "--mortar glue: give epoxy, dry",
+    "assess --method sequential --friction -1": "--friction: '-1' is not",
+    # schedules, formulations, criteria, limits
+    "optimize ARCH --formulation overlap_dp --schedule ring": "schedule 'ring' does not exist",
+    "optimize ARCH --formulation overlap_dp --schedule no.csv": "cannot read no.csv",
+    "optimize ARCH --schedule three-robot --robots rob1,rob2": "three-robot takes three",
+    "optimize ARCH --formulation overlap_dp --robots rob1,,rob2": "robot '' does not exist",
+    "optimize ARCH --formulation simplex": "formulation 'simplex'",
+    "optimize ARCH --formulation beam --option depth=3": "--option depth=3: beam has seconds",
+    "optimize ARCH --formulation beam --option width=wide": "width is 'wide'; give an int",
+    "optimize ARCH --formulation beam --option width=0": "width is 0",
+    "optimize ARCH --criteria beauty": "--criteria beauty",
+    "optimize ARCH --criteria T_max=heavy": "'heavy' is not a positive",
+    "optimize ARCH --limit T_max": "--limit T_max",
+    "optimize ARCH --limit payload=9": "values with --payload",
+    "optimize ARCH --formulation minimax --no-proof": "minimax looks beyond",
+    # budgets
+    "optimize ARCH --formulation labels --budget travel=few": "'few' is not a number from 0",
+    "optimize ARCH --formulation labels --budget travel=-1m": "'-1' is not a number from 0",
+    "optimize ARCH --formulation labels --budget travel=250:3": "does not exist; give travel=0.8",
+    "optimize ARCH --formulation labels --budget steps_over:T_max=3": "give travel=0.8",
+    "optimize ARCH --formulation labels --budget steps_over:T_max=80:3m": "steps have no meters",
+    "optimize ARCH --formulation labels --budget robot_use:rob9=80:3": "response F_rob9 does not",
+    "optimize ARCH --budget travel=2m --budget travel=0.5": "budget travel=0.5: it stands there",
+    # scenarios
+    f"{ROBUST} cvar=2": "--robust: cvar=2.0: give a level",
+    f"{ROBUST} best": "--robust: robust aim best does not exist",
+    f"{ROBUST} worst-total --formulation minimax": "use scenario_search",
+    f"{ROBUST} worst-peak --budget travel=0.8": "where candidates are chosen",
+    f"{ROBUST} worst-peak --no-proof": "ask for the proof",
+    f"{ROBUST} worst-total --schedule free --aim steps": "of one sum alone",
+    f"{ROBUST} worst-peak --scenarios x": "--scenarios x: give a whole number",
+    f"{ROBUST} worst-peak --scenarios 0": "--scenarios 0: give a whole number",
+    f"{ROBUST} worst-peak --vary foo=1": "--vary foo=1 does not exist",
+    f"{ROBUST} worst-peak --vary density=-1": "not a positive number",
+    f"{ROBUST} worst-peak --vary stiffness=0.5": "give a factor from 1",
+    f"{ROBUST} worst-peak --vary density=1": "density is 1.0",
+    f"{ROBUST} worst-peak --vary grips=2": "they are rigid; say how stiff with --grips",
+    f"{FREE} --robust worst-peak --aim sum": "no total of worst states",
+    "optimize SIX --scenarios 3 --formulation minimax": "--scenarios: plans over scenarios",
+    "optimize SIX --seed 3 --schedule free": "--seed: plans over scenarios alone",
+    # the free schedule
+    f"{FREE} --rule newest=never": "rule newest: 'never'; give one of either",
+    f"{FREE} --rule speed=2": "--rule speed=2 does not exist; give one of newest",
+    f"{FREE} --rule regrips=few": "rule regrips: 'few'",
+    f"{FREE} --aim speed": "aim 'speed' does not exist",
+    f"{FREE} --robots 7": "7 robots: the free schedule takes one to 5",
+    f"{FREE} --robots rob9,rob1": "robot 'rob9' does not exist",
+    f"{FREE} --option width=0": "options width=0, growth=1.1: give a whole number",
+    f"{FREE} --option speed=1": "--option speed=1: schedule_search has width",
+    f"{FREE} --formulation minimax --aim steps": "minimax: a sum comes first",
+    f"{FREE} --formulation pareto_zones": "pareto_zones is for Pareto sets",
+    f"{FREE} --criteria equations-2-3": "it ranks the choices of a move",
+    f"{FREE} --tilt 3": "--tilt: it goes with --stands",
+    f"{FREE} --stands jelly": "--stands jelly: give epoxy, dry, or bond=",
+    f"{FREE} --stands dry --tilt 90": "give an angle from 0 to below pi/2",
+    f"{FREE} --stands dry --rule payload=ignored": "holds up anything",
+    f"{FREE} --aim minmax,tilt": "name bond, friction and tilt before all others",
+    f"{FREE} --budget travel=0.8": "give travel=3.5m, makespan=600s, regrips=2",
+    f"{FREE} --budget tilt=3": "it is no total of moves or of a response",
+    f"{FREE} --direction takedown": "did you mean take-down?",
+    f"{FREE} --direction take-down --keep 1..2": "--keep is no more; --to 12 leaves the first",
+    f"{FREE} --direction take-down --to 5": "cannot end with 5; give fewer",
+    f"{FREE} --direction take-down --order search --aim steps": "put minmax first",
+    f"{FREE} --props evry": "'evry' is no node (did you mean every?); give nodes, as 13,27",
+    f"{FREE} --props 99": "prop at node 99: there is no such node",
+    f"{FREE} --props 3:soft": "'soft' is not a positive number",
+    f"{FREE} --props 3,3": "prop at node 3: another one holds it",
+    f"{FREE} --from PLAN:99": "the plan has 0 to",
+    f"{FREE} --from nowhere": "give PLAN:STEP",
+    f"{FREE} --from 9": "site: 9 bricks",
+    f"{FREE} --from 3 --to 2": "cannot end with 2",
+    f"{FREE} --to PLAN:x": "give PLAN:STEP",
+    f"{FREE} --order search --formulation pareto_zones": "or order_search",
+    f"{FREE} --order search --max-memory 1B": "option max_memory: it is too little",
+    f"{FREE} --order search --option depth=3": "depth",
+    "optimize ARCH --order search --schedule loop": "orders, and steps or regrips in a Pareto set",
+    # what does not go together, as help says
+    "optimize ARCH --aim steps --ranked pairs": "leave it out",
+    "optimize ARCH --criteria weighted --ranked pairs": "weighted has no ranks; leave it out",
+    "optimize ARCH --rule least_grips=1": "only the free schedule has them; give --schedule free",
+    "optimize ARCH --aim sum --rule regrips=0": "only the free schedule has them; give --schedule",
+    "optimize ARCH --direction take-down": "it goes with --schedule free",
+    "optimize ARCH --friction 0.5": "it goes with --stands",
+    "optimize ARCH --curing 15min": "it goes with --stands",
+    "optimize ARCH --budget steps=40": "with an aim",
+    "optimize ARCH --aim minmax --budget steps_over:F_largest=250:10": "does not exist",
+    "optimize ARCH --lazy --formulation beam": "exact",
+    "optimize ARCH --no-proof": "cascade or rank_search",
+    # numbers and sizes
+    "optimize ARCH --workers 0": "--workers 0: give a whole number from 1",
+    "optimize ARCH --workers two": "--workers two: give",
+    "optimize ARCH --max-memory much": "--max-memory much: give a size, as 500MB or 2GB",
+    "optimize ARCH --max-memory 0GB": "--max-memory 0GB: give a size",
+    "optimize ARCH --time-limit soon": "--time-limit: 'soon' is not a positive number or zero",
+    "scene arch25 --grips=soft": "--grips soft: 'soft' is no stiffness; give rigid, 1e6 or",
+    "scene arch25 --grips=0": "stiffness is (0.0, 0.0, 0.0); give one number or three",
+    "scene arch25 --grips=1e6,2e4": "give a stiffness, and after a comma turning=STIFFNESS",
+    "scene arch25 --grips=1e6x2e6": "'1e6x2e6' is no stiffness",
+    "scene arch25 --grips=1e6,turning=-1": "rotational_stiffness is",
+    "scene arch25 --grips=1e5..1e9": "'1e5..1e9' is no stiffness",
+    **{
+        f"compare arch25 --speed={word}": f"--speed: '{word}' is not a positive number"
+        for word in ("x", "0", "-1", "nan", WALL)
+    },
+    "compare arch25 --speed=y": "give seconds, and the scene before it",
+    f"compare {WALL} --reference frame": "--reference: it values the plans of --speed",
+    f"compare {WALL} --speed 9 --reference rigid": "reference 'rigid' does not exist; give one of",
+    f"{VLR} --steps 5:3": "--steps 5:3: the first is after the last; exchange them",
+    f"{VLR} --steps 0:3": "--steps 0:3: give numbers from 1 to 17, as 3:7",
+    f"{VLR} --steps a": "--steps a: give numbers from 1 to 17, as 3:7",
+    f"{VLR} --margins tillt": "margin 'tillt' (did you mean tilt?): give all, or some of",
+    f"{VLR} --workers 0": "--workers 0: give a whole number from 1",
+    f"{VLR} --map wind": "--map wind: give friction or tilt, with values as",
+    f"{VLR} --map tilt=60": "--map tilt=60: 60 is too much; give tilt from 0 to 45",
+    f"{VLR} --map friction=x": "--map friction=x: 'x' is not a positive number or zero",
+    f"{VLR} --map friction --holds glue": "--holds glue: give epoxy, dry, or bond=",
+    f"{VLR} --mortar bond=-1": "--mortar bond=-1: give epoxy, dry, or bond=STRENGTH (Pa)",
+    "sweep chain:bricks=5 --over paylod=3": "no option paylod (did you mean payload?)",
+    "sweep chain:bricks=5 --over payload": "give NAME=VALUES",
+    "sweep chain:bricks=5..7/0": "range 5..7/0: give from 1 to 100000 values",
+    "sweep chain:bricks=5..7/900 --over payload=1..9/900": "more than 100000 problems",
+}
+NO_ANSWER = {
+    f"{ROBUST} worst-total --scenarios 2 --limit F_largest=1": "F_largest",
+    f"{FREE} --stands bond=1e-9 --friction 0.01": "a bond of ",
+    f"{FREE} --limit F_largest=1": "it becomes possible with F_largest=",
+    f"{FREE} --payload 30": "more than the payload of rob1 (30 N), rob2 (30 N), rob3 (30 N)",
+    f"{FREE} --budget sum(T_max)=0": "no plan is within all budgets; sum(T_max) is at least",
+    "optimize arch25 --limit F_largest=9": "no grip is left to choose",
+    "optimize arch25 --limit T_max=20": "(--aim F_largest",  # proven: no choice is allowed
+    "optimize arch25 --budget travel=2m": "every choice uses at least 11.3476 of 'robot travel [m]",
+}
+NOT_FOUND = {  # by a search that left something out, or had no time
+    "optimize arch25 --formulation cascade --no-proof --limit T_max=64": "no allowed grip",
+    "optimize arch25 --schedule free --time-limit 0": "time is over: .*no plan was found yet; give",
+    "optimize arch25 --schedule free --stands dry --aim bond --time-limit 0": "no plan was found",
+    "optimize arch25 --schedule free --order search --time-limit 0": "no plan was found yet; give",
+    "optimize arch25 --formulation cascade --no-proof --time-limit 0": "no move was chosen yet",
+}
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory):
+    """Paths of scenes, and of a plan, by the words that stand for them."""
+    home = tmp_path_factory.mktemp("scenes")
+    for name, scene in (("ARCH", small_arch(5)), ("SIX", six_bricks())):
+        save_scene(scene, home / f"{name}.json")
+    (home / "PLAN").mkdir()
+    rows = "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n"
+    (home / "PLAN" / "plan.csv").write_text(rows, encoding="utf-8")
+    return {"ARCH": home / "ARCH.json", "SIX": home / "SIX.json", "PLAN": home / "PLAN"}
+
+
+CASES = [(BAD, 2), (NO_ANSWER, 3), (NOT_FOUND, 4)]
+
+
+@pytest.mark.parametrize(
+    ("words", "said", "status"),
+    [(words, said, status) for each, status in CASES for words, said in each.items()],
+)
+def test_it_is_one_line_and_writes_nothing(
+    capsys, monkeypatch, scenes, tmp_path, words, said, status
+):
+    monkeypatch.chdir(tmp_path)
+    words = re.sub("ARCH|SIX|PLAN", lambda found: str(scenes[found[0]]), words).split()
+    more = ["--out", "out"] if words[0] == "optimize" else []
+    found, out, err = command(capsys, *words, *more)
+    assert (found, out, err.count("\n")) == (status, "", 1), err
+    assert re.search(said if status == 4 else re.escape(said), err), err
+    assert not [*tmp_path.iterdir()]
