@@ -1,7 +1,7 @@
 """What cannot be answered is one line that says why, with its status; nothing is written.
 
-``ARCH`` stands for a scene of five bricks, ``SIX`` for one of six, ``PLAN`` for the folder of a plan
-of the first.
+``ARCH`` stands for a scene of five bricks, ``SIX`` for one of six, ``PLAN`` for the folder of a
+plan of the first.
 """
 
 from __future__ import annotations
