@@ -37,6 +37,7 @@ from formulations.cascade import _charged
 from formulations.choice import Choice, greedy, onward, shortest
 from formulations.on_graph import on_graph
 from formulations.states._search import (
+    StopError,
     Watching,
     after_margins,
     best_standing,
@@ -44,7 +45,6 @@ from formulations.states._search import (
     narrow,
     plan_by_then,
 )
-from formulations.states._totals import StopError
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.formulation import FormulationKind, Solution, Watch

@@ -20,8 +20,14 @@ from typing import Any
 import numpy as np
 
 from formulations.choice import Choice, Choose, onward
-from formulations.states._search import after_margins, best_total, chosen, watched
-from formulations.states._totals import cheapest_by, least_total
+from formulations.states._search import (
+    after_margins,
+    best_total,
+    cheapest_by,
+    chosen,
+    least_total,
+    watched,
+)
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch

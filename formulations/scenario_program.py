@@ -9,7 +9,7 @@ r"""Totals over scenarios as one mixed-integer program (cvxpy, HiGHS): a referen
 with the costs :math:`c_s` of moves in every scenario and the largest weight :math:`\bar w` of one:
 1 for the worst total, :math:`1 / ((1 - \alpha) S)` for the mean total of the worst
 :math:`1 - \alpha` of :math:`S` scenarios (Rockafellar and Uryasev). Without the integers its value
-is that which weights of scenarios prove (`formulations.states._totals`), tens to hundreds of times
+is that which weights of scenarios prove (`formulations.states._search`), tens to hundreds of times
 faster by dynamic programs.
 """
 

@@ -28,6 +28,7 @@ import numpy as np
 
 from formulations.states._search import (
     Options,
+    StopError,
     Watching,
     first_threshold,
     plan_by_then,
@@ -36,7 +37,6 @@ from formulations.states._search import (
     unproven,
     watched,
 )
-from formulations.states._totals import StopError
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph._orders import TooManySetsError, order_rules
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch, find_formulation

@@ -6,7 +6,7 @@ sums took by then, and what further resources came to (`seqopt.graph._labels`).
 Every build takes at least the time of all that its steps take one after the
 other, and no less than the time of any robot: preparing, acting, and holding while others act. With
 multipliers from 0 that add up to one over these, the weighted time of moves is a sum along a path,
-and the shortest path bounds every build (`seqopt.graph._multipliers`).
+and the shortest path bounds every build (`seqopt.graph._budgets`).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph._budgets import Plane, Polyhedron, highest_bound
 from seqopt.graph._labels import Asked, Carried, Joint, Sums, Sweep, Swept
-from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import HELD, NOW, Graph, TimedGraph
 from seqopt.graph.paths import distances, fewest_moves, moves_along

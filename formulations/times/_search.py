@@ -15,6 +15,7 @@ import numpy as np
 
 from formulations.states._search import (
     WIDTH,
+    StopError,
     Watching,
     after_margins,
     close_fallen,
@@ -22,7 +23,6 @@ from formulations.states._search import (
     plan_by_then,
     watched,
 )
-from formulations.states._totals import StopError
 from formulations.times._labels import Carrying
 from formulations.times._stages import ALMOST, Choose, Goals, StageFound, Stages
 from seqopt.arrays import Terse

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from formulations.states._totals import StopError
+from formulations.states._search import StopError
 from formulations.times._labels import STEPS, Caps, Carrying, Prices
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError, NothingFoundError

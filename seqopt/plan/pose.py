@@ -10,11 +10,18 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
 from seqopt.errors import ProblemError
 from seqopt.graph.decisions import Decisions, pose_decisions
-from seqopt.graph.states._checks import check_parts
 from seqopt.graph.states.states import States, build_states, of_decisions, over_scenarios, within
 from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.problem.filters import Filter
-from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, parse_budgets
+from seqopt.problem.problem import (
+    WORST_PEAK,
+    Aim,
+    Orders,
+    Problem,
+    RobustAim,
+    check_parts,
+    parse_budgets,
+)
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources

@@ -21,13 +21,16 @@ from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
-from seqopt.problem.amounts import BUILT_IN, Amount, parse_goals, worst
+from seqopt.problem.amounts import BUILT_IN, STATE_RESPONSES, Amount, parse_goals, worst
+from seqopt.problem.criteria import RankSum
 from seqopt.problem.filters import Filter, parse_limits
 from seqopt.problem.requirements import (
     LINEAR_RANGE,
     Criterion,
     Limit,
+    SceneFacts,
     _prop_limits,
+    _step_limits,
     _tolerance_beside,
     as_limits,
 )
@@ -449,3 +452,37 @@ def _require_for_curing(problem: Any) -> None:
     wrong += ["scenarios"] if problem.scenarios else []
     if wrong:
         raise ProblemError(f"curing: {wrong[0]} beside it is not modeled; leave one of them out")
+
+
+def checked_limits(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
+    """Return the limits, checked to be on responses of a state."""
+    limits = _step_limits(limits, network.scene)
+    robots = {robot_response(robot.name) for robot in network.scene.robots}
+    for limit in limits:
+        _require(limit.response, {*STATE_RESPONSES, PROP_EXCESS, *robots}, "limit")
+    return limits
+
+
+def check_parts(parts: Sequence[Amount | Filter]) -> None:
+    """Raise a `ProblemError` if an amount or a filter asks for a response that no state has."""
+    for part in parts:
+        for name in part.responses:
+            _require(name, {*STATE_RESPONSES}, f"{type(part).__name__.lower()} {part}")
+
+
+def of_states(engine: Engine, criterion: Criterion) -> Criterion:
+    """Return a criterion posed for a scene, if it is about states alone."""
+    if isinstance(criterion, RankSum):
+        raise ProblemError(
+            f"criterion {criterion.name}: it ranks the choices of a move, and a free schedule "
+            "has none; take worst-ratio or weighted, or a schedule with open grips, as loop"
+        )
+    for name in criterion.wanted(1):
+        _require(name, {*STATE_RESPONSES}, f"criterion {criterion.name}")
+    return criterion.for_scene(SceneFacts(engine))
+
+
+def _require(name: str, known: set[str], where: str) -> None:
+    if name not in known and not is_tolerance(name):
+        listed = ", ".join(sorted(known))
+        raise ProblemError(f"{where}: a state of a free schedule has no {name}; give {listed}")

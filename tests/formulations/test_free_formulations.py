@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from formulations.choice import Choice
 from formulations.on_graph import on_graph
-from formulations.states._search import path_values
-from formulations.states._totals import least_total
+from formulations.states._search import least_total, path_values
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.formulation import FormulationKind, Watch, formulations

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from formulations.states._totals import _Totals
+from formulations.states._search import _Totals
 from seqopt.graph._labels import CappedSums, LabelSearch, LateError, Sweep, widening
 from seqopt.graph.formulation import Watch
 from seqopt.problem.problem import WORST_TOTAL, cvar

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from seqopt.graph._multipliers import Plane, Polyhedron, highest_bound
+from seqopt.graph._budgets import Plane, Polyhedron, highest_bound
 
 BUDGETS, WEIGHTS, SHARES = range(3)
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import seqopt
 from formulations.path_dp import SCENARIO_SEARCH
 from formulations.scenario_program import solve_program
-from formulations.states._totals import by_weights, cheapest_by, least_total
+from formulations.states._search import by_weights, cheapest_by, least_total
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.decision_costs import LayeredCosts, compile_costs, compile_totals, largest_of
@@ -137,7 +137,7 @@ def test_a_search_of_few_labels_still_has_a_valid_bound(aim, layers, most):
     found = values(layers, aim)
     if found:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("formulations.states._totals.LABELS", most)
+            patch.setattr("formulations.states._search.LABELS", most)
             plan = solved(layers, aim, "scenario_search")
         assert plan.selection.bound[0] <= min(found.values()) + 1e-9
         assert plan.certificate.objective >= min(found.values()) - 1e-9

@@ -18,7 +18,6 @@ from seqopt.errors import ProblemError
 from seqopt.graph.decision_costs import ScenarioCosts
 from seqopt.graph.decisions import Decisions
 from seqopt.graph.formulation import Formulation, as_formulation
-from seqopt.graph.states._checks import check_parts, checked_limits, of_states
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.problem.amounts import (
@@ -31,7 +30,17 @@ from seqopt.problem.amounts import (
     judged_by,
 )
 from seqopt.problem.filters import Filter, filters_of
-from seqopt.problem.problem import WORST_PEAK, Aim, Orders, RobustAim, _goals, _require_for_curing
+from seqopt.problem.problem import (
+    WORST_PEAK,
+    Aim,
+    Orders,
+    RobustAim,
+    _goals,
+    _require_for_curing,
+    check_parts,
+    checked_limits,
+    of_states,
+)
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.resources import Resource
 from seqopt.problem.standing import Standing, StandingSets
