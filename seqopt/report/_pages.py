@@ -13,16 +13,15 @@ import pandas as pd
 from seqopt._showing import Page, display
 from seqopt.arms._kept import arm_faults
 from seqopt.engines.interface import Engine
-from seqopt.errors import ExtraError, FileError, ProblemError, SeqoptError
+from seqopt.errors import ExtraError, FileError, ProblemError
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
-from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import overloads
 from seqopt.report._regret._table import RegretTable
 from seqopt.report._robots import _known_arms
 from seqopt.report.comparison import CLOSED, Comparison, largest, method_tables, shown_table
 from seqopt.report.page import Build, Scatter, _Drawn, report_page
-from seqopt.report.text import IN_UNITS, _worst_along, in_words
+from seqopt.report.text import IN_UNITS, in_words
 from seqopt.responses.table import (
     OUTSIDE,
     REMEDY,
@@ -149,12 +148,7 @@ def plan_page(
     verdicts = prover.of_builds({key: _steps_in_table(scene, t) for key, t in tables.items()})
     left = plan._within.of_builds(tables)  # knows the plan's own steps
     first, *rest = _builds(scene, tables, left, verdicts)
-    along = None
-    if isinstance(plan, Plan):  # its objective, where it is the largest step that counts
-        criterion = plan._of_scene.criterion
-        with suppress(SeqoptError):  # what no table has
-            along = _worst_along(scene, first.table, plan.goals[0], criterion)
-    builds = [replace(first, along=along, tasks=tasks or {}), *rest]
+    builds = [replace(first, tasks=tasks or {}), *rest]
     found = f"Found by: {in_words(name)} ({plan.result})."
     shown = [_worst_table(scene, builds)]
     return report_page(engine, builds, builds[0].sentence(scene), shown, found=found)

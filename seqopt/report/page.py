@@ -78,7 +78,7 @@ class Build:
     order; ``falls`` (steps, B, 6): how steps fall, with the first mortar; ``arms``: the joints of
     robots whose postures are known, points (k, 3), m, from the base to the tip of the tool, an
     entry a step, by the names of robots (of others a simple arm is drawn); ``faults``: in which
-    steps arms cannot be, in words; ``along``: values of the steps of which the largest decides;
+    steps arms cannot be, in words;
     ``tasks``: what robots do, as CSV and JSON, where that is known.
     """
 
@@ -92,7 +92,6 @@ class Build:
     falls: Floats | None = None
     arms: Arms = field(default_factory=dict)
     faults: Sequence[str] = ()
-    along: Floats | None = None
     tasks: Mapping[str, str] = field(default_factory=dict)
 
     def sentence(self, scene: Scene) -> str:
@@ -235,7 +234,7 @@ def _build_data(
             {"how": each.how, "of": [WORDS[verdict] for verdict in each.verdicts]}
             for each in build.verdicts
         ],
-        "decides": _deciding_step(scene, build.table, build.verdicts, build.along),
+        "decides": _deciding_step(scene, build.table, build.verdicts),
         "sentence": build.sentence(scene),
         "words": in_words(build.name),
         "arms": arm_data(scene, build.steps, build.arms, sketched),

@@ -10,9 +10,8 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.problem.criteria import RankSum
-from seqopt.problem.requirements import Criterion, _prop_faults, _response_along, overloads
-from seqopt.responses.quantities import RESPONSES, _plain, length_text, robot_response
+from seqopt.problem.requirements import _prop_faults, _response_along, overloads
+from seqopt.responses.quantities import _plain, length_text, robot_response
 from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
 from seqopt.scene.scene import Scene
 from seqopt.stability._builds import BuildVerdicts, _settlement_said
@@ -52,45 +51,18 @@ def _headline(scene: Scene, table: _Columns) -> str:
     return f"{said}, displacement {length_text(float(f'{moved:.3g}'))}"
 
 
-def _worst_along(
-    scene: Scene, table: pd.DataFrame, aim: str, criterion: Criterion
-) -> Floats | None:
-    """Return the values (n,) of which an aim counts the largest; None where it is none of these."""
-    if aim in RESPONSES or aim == "F_largest":
-        return np.asarray(_response_along(scene, table, aim))
-    if aim != "minmax" or isinstance(criterion, RankSum):
-        return None
-    out = np.zeros(len(table))
-    for at, bricks in enumerate(table["bricks"].astype(int)):
-        names = criterion.wanted(bricks)
-        row = table.iloc[[at]]
-        if bricks and "F_move" not in names:
-            found = {name: _response_along(scene, row, name) for name in names}
-            out[at] = float(criterion.costs(found, bricks, 1)[0])
-    return out
-
-
-def _deciding_step(
-    scene: Scene,
-    table: pd.DataFrame,
-    verdicts: Sequence[BuildVerdicts],
-    along: Floats | None = None,
-) -> int:
+def _deciding_step(scene: Scene, table: pd.DataFrame, verdicts: Sequence[BuildVerdicts]) -> int:
     """Return the place of the step that decides.
 
     It is the first that exceeds a payload, or what props bear, or falls with the last mortar; where
-    none does, that of the largest value ``along`` the build, or of the largest share of a payload,
-    among those in which a robot holds, if there are any.
+    none does, that of the largest share of a payload.
     """
     over = (*overloads(scene, table), *_prop_faults(scene, table))
     wrong = [number for excess in over for number in excess.steps]
     wrong += [each.first for each in verdicts[-1:] if each.first]
     if wrong:
         return min(wrong) - int(table["step"].iloc[0])
-    shares = _payload_shares(scene, table).max(axis=1)
-    values = shares if along is None else along
-    asked = np.isfinite(values) & ((shares > 0) | (not shares.any()))
-    return int(np.where(asked, values, -np.inf).argmax())
+    return int(_payload_shares(scene, table).max(axis=1).argmax())
 
 
 def _in_a_sentence(

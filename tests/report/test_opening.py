@@ -6,13 +6,10 @@ import json
 import re
 import subprocess
 
-import numpy as np
 import pytest
 
-from seqopt.problem.criteria import WORST_OVER_METHODS
-from seqopt.problem.requirements import SceneFacts
 from seqopt.report.page import Build, report_page
-from seqopt.report.text import _deciding_step, _in_a_sentence, _worst_along
+from seqopt.report.text import _deciding_step, _in_a_sentence
 from seqopt.responses.table import Departure, analyze
 from seqopt.sequence.methods import sequential
 from seqopt.stability._builds import BuildVerdicts
@@ -80,27 +77,11 @@ def test_the_step_that_decides_is_never_one_that_nobody_holds(engine25, table):
     shares = [table[f"F_rob{k}_N"].abs().max() for k in (1, 2)]
     assert _deciding_step(scene, table, ()) == 25
     assert table.loc[25, "F_rob1_N"] == max(shares)
-    last = np.arange(49.0)
-    assert _deciding_step(scene, table, (), last) == 47  # in the last one all let go
-    assert _deciding_step(scene, table, [dry(9)], last) == 8
-    assert (
-        _deciding_step(scene, table, [dry(9), dry()], last) == 47
-    )  # it stands with the last mortar
+    assert _deciding_step(scene, table, [dry(9)]) == 8
+    assert _deciding_step(scene, table, [dry(9), dry()]) == 25  # it stands with the last mortar
     over = table.copy()
     over.loc[[3, 30], "F_rob1_N"] = 500.0
-    assert _deciding_step(scene, over, [dry(9)], last) == 3
-
-
-def test_the_worst_along_a_build_is_that_of_its_aim(engine25, table):
-    scene, criterion = engine25.network.scene, WORST_OVER_METHODS.for_scene(SceneFacts(engine25))
-    ratios = _worst_along(scene, table, "minmax", criterion)
-    terms = dict(criterion.limits)
-    at = int(ratios.argmax())
-    assert ratios[at] == pytest.approx(1e-6 * table["D_max_1e-3mm"][at] / terms["D_max"])
-    assert at == 46
-    tensions = _worst_along(scene, table, "T_max", criterion)
-    np.testing.assert_allclose(tensions, table["F_max_N"])
-    assert _worst_along(scene, table, "steps", criterion) is None
+    assert _deciding_step(scene, over, [dry(9)]) == 3
 
 
 @pytest.fixture
