@@ -28,7 +28,7 @@ VIEWS = {
     "FailureMap.plot": "seqopt.report.charts:failure_figure",
     "RegretTable.plot": "seqopt.report._regret._chart:regret_chart",
 }
-"""By a class of values and a way, what shows them so; values of its subclasses, too."""
+"""Renderers by class of values, with its subclasses, and by name."""
 OFFERS = {
     "PostureRules": "seqopt.arms._judge",
     "check_postures": "seqopt.arms._judge",
@@ -51,7 +51,7 @@ ADDED: dict[tuple[type, str], Any] = {}
 
 
 class Part:
-    """Base of what is taken from packages and users by name: formats, commands."""
+    """Base of parts that packages and users register by name: formats, commands."""
 
     name: str
 
@@ -151,7 +151,7 @@ def offered(name: str) -> Any:
 
 
 def view(kind: type, way: str) -> Any:
-    """Return what shows values of a class in a way, loaded on first use."""
+    """Return the renderer of a class of values, loaded on first use."""
     keys = (f"{each.__name__}.{way}" for each in kind.__mro__)
     home, name = next(VIEWS[key] for key in keys if key in VIEWS).split(":")
     return getattr(import_module(home), name)

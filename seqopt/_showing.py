@@ -22,7 +22,7 @@ PAGE = "report.html"  # the page in a folder that a command writes
 
 
 def display(kind: type, way: str) -> Callable[..., Any]:
-    """Return what shows values of a class in a way, as ``plot``, loaded on first use.
+    """Return the renderer of a class of values, as ``plot``, loaded on first use.
 
     Raises `ExtraError` if it needs matplotlib and that is not installed.
     """

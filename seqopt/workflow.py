@@ -89,7 +89,7 @@ class Search:
 
 @dataclass(frozen=True, kw_only=True)
 class Robust:
-    """Scenarios over which a plan is to be good, and what counts of them.
+    """Scenarios for a robust plan, and its aim over them.
 
     Parameters
     ----------

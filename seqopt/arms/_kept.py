@@ -29,7 +29,7 @@ _SAME = 1e-9  # over the size of a value
 
 @dataclass(frozen=True, repr=False)
 class KeptPostures(Terse):
-    """The postures of a plan, and what is known of plans with others.
+    """The postures of a plan, and lower bounds with other postures.
 
     ``asked``, ``most``: how many postures at each node were looked at, and with how many the plan
     was made. ``bounds``: lower bounds with any posture looked at, by goal, in display units; empty
@@ -48,7 +48,7 @@ class KeptPostures(Terse):
         return faults_in_words(self.postures)
 
     def described(self) -> dict[str, object]:
-        """Return what the summary of a plan says of arms, ready for JSON."""
+        """Return the entries of a plan's summary about arms, ready for JSON."""
         found = {
             "said": str(self),
             "cannot": [*self.faults],

@@ -28,7 +28,7 @@ _DRAWN = 2_000  # postures from which the reach of an arm is known
 
 
 def needs_extra() -> None:
-    """Raise an `ExtraError` if what computes postures is not installed."""
+    """Raise an `ExtraError` if the packages for postures are not installed."""
     for name in ("pinocchio", "coal"):
         if find_spec(name) is None:
             raise ExtraError("arms need pinocchio and coal: pip install 'seqopt[arms]'")
@@ -373,5 +373,5 @@ class PosedArm:
 
 
 def idle_arm(arm: Arm) -> PosedArm:
-    """Return what there is of an arm that holds nothing."""
+    """Return the shapes of an arm that holds nothing."""
     return PosedArm(arm, np.zeros(_model(arm).joints), holds=False)

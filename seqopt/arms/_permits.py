@@ -91,7 +91,7 @@ class Permits(FrozenValue):
 
 @lru_cache(maxsize=_SCENES)
 def permits(scene: Scene) -> Permits:
-    """Return what arms allow in the build order of a scene in which a robot has one."""
+    """Return the permits of arms in the build order of a scene in which a robot has one."""
     table = find_table(scene)
     nodes = scene.placed_nodes
     place = {node: i for i, node in enumerate(nodes, start=1)}

@@ -1,4 +1,4 @@
-"""The postures of one arm at all nodes, free of what stands still, and the bricks that they hit."""
+"""The postures of one arm at all nodes, free of fixed obstacles, and the bricks that they hit."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ _SEED = 4600  # with the number of the node, of what is drawn for it
 
 @dataclass(frozen=True)
 class Site:
-    """What postures depend on: bricks and nodes, arms and what is up; not the build order.
+    """Everything postures depend on: bricks, nodes, arms and the vertical; not the build order.
 
     Nor on how stiff anything is.
 

@@ -65,7 +65,7 @@ class GripCompliance(FrozenValue):
 
     @property
     def transmitted(self) -> Floats:
-        """The compliance to what grips transmit, (S, r, w, w); they must not all be rigid."""
+        """The compliance (S, r, w, w) to grip wrenches; grips must not all be rigid."""
         assert self.matrix is not None
         return np.where(np.isinf(self.matrix), 0.0, self.matrix)
 
@@ -169,7 +169,7 @@ def grip_springs(compliance: GripCompliance, grips: int) -> list[GripSpring]:
 
 
 def _lengths(columns: Ints, moved: ArrayLike) -> Floats:
-    """Return offsets (S, r, 3) of grips, if that is what they are."""
+    """Return offsets (S, r, 3) of grips, checked."""
     try:
         far = np.array(moved, dtype=float)
     except (TypeError, ValueError):
@@ -187,7 +187,7 @@ def _lengths(columns: Ints, moved: ArrayLike) -> Floats:
 def _follow_bricks(
     network: Network, columns: Ints, offsets: Floats, compliance: GripCompliance
 ) -> None:
-    """Restrict the offsets of two rigid grips on one brick to what it can follow, in place.
+    """Restrict the offsets of two rigid grips on one brick to rigid motions, in place.
 
     It cannot become longer: along it, both nodes go halfway between.
     """

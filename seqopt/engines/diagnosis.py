@@ -179,7 +179,7 @@ def _off_grips(moved: Floats, borne: Floats, compliance: GripCompliance) -> Floa
 
 
 def _beside_weight(network: Network, bricks: int, stiffness: Floats) -> tuple[Floats, float]:
-    """Return the weight of a brick, its moment over a brick's length, and what it moves, m."""
+    """Return scales: weight of a brick, its moment over a brick's length, its displacement, m."""
     tiny = np.finfo(float).tiny
     heavy = float(np.linalg.norm(network.weight[:bricks], axis=1).max())
     ends = network.node_position[network.inner[:bricks]]
@@ -203,7 +203,7 @@ def _ground_motion(network: Network) -> Floats:
 
 
 def _loads(network: Network, bricks: int) -> list[_Pull]:
-    """Return what pulls at bricks beside their weight, where it does."""
+    """Return the loads on bricks beside their weight, if any."""
     scene, out = network.scene, []
     pulls = [
         (load.brick, load.position, load.force)
@@ -222,7 +222,7 @@ def _loads(network: Network, bricks: int) -> list[_Pull]:
 
 
 def _moved(twist: Floats, arm: Floats) -> Floats:
-    """Return what two bricks' translation and rotation add to the motion at an arm, (2, n, 6)."""
+    """Return motions (2, n, 6) at an arm by translation and rotation of two bricks."""
     zero = np.zeros_like(arm)
     turning = np.hstack([np.cross(twist[:, 3:], arm), twist[:, 3:]])
     return np.stack([np.hstack([twist[:, :3], zero]), turning])

@@ -1,4 +1,4 @@
-"""The interface of engines: what they are asked and what they return."""
+"""The interface of engines: requests and fields."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ FLAGS = {
     "brick_twist": Want.BRICKS,
 }
 SHAPES = dict.fromkeys(FLAGS, (6,)) | {"edge_force": (), "displacement": (3,)}
-"""Of what each has for an edge, node, end, spring or brick."""
+"""Trailing shape of every field, for an edge, node, end, spring or brick."""
 
 
 @cache
@@ -180,7 +180,7 @@ def names_wanted(want: Want) -> frozenset[str]:
 
 
 def keep_wanted(answer: Fields, want: Want) -> Fields:
-    """Return fields without what is not asked for."""
+    """Return the requested fields alone."""
     dropped = FLAGS.keys() - names_wanted(want)
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 
@@ -310,7 +310,7 @@ def _merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
 
 
 class NamedEngine:
-    """Base of engines: they say what they are and which structure they compute."""
+    """Base of engines, with a representation that names engine and structure."""
 
     def __init__(self, network: Network | Scene) -> None:
         self._network = network_of(network)

@@ -1,4 +1,4 @@
-"""The engines by name, how one was made, and what a result came from.
+"""The engines by name, their recipes, and the provenance of results.
 
 A recipe is enough to make an engine again elsewhere.
 """
@@ -128,7 +128,7 @@ class Recipe:
 
     @cached_property
     def name(self) -> str:
-        """The name of what answers grip sets."""
+        """The name of the engine that answers grip sets."""
         return USUAL if self.simplest else self.engine
 
     @cached_property
@@ -145,7 +145,7 @@ def _version(package: str, missing: str) -> str:
 
 
 def recipe_of(engine: object) -> Recipe | None:
-    """Return how an engine was made, if by name, or what one of one's own has as ``recipe``."""
+    """Return the recipe of an engine made by name, or the ``recipe`` of one of your own."""
     found = getattr(engine, "recipe", None)
     return found if isinstance(found, Recipe) else None
 
@@ -240,7 +240,7 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
 
 
 def simplest(engine: Engine) -> Engine:
-    """Return what alone answers all grip sets of a problem: of `auto` the level of its scene.
+    """Return the engine that answers all grip sets of a problem: of `auto` the level of its scene.
 
     Exactly rigid bricks; whether that was enough is to be asked of the steps that are chosen. Any
     other engine is returned as it is.
@@ -262,7 +262,7 @@ def _chooser_of(engine: Engine) -> AutoEngine | None:
 
 
 def provenance(engine: Engine) -> dict[str, object]:
-    """Return what a summary says of the engine, after it computed, and of packages.
+    """Return the entries of a summary about the engine, after it computed, and packages.
 
     ``engine``: its ``name``, the ``reason`` for it, the ``mortar`` if one was given, and of an
     automatic one the ``level`` that it took for all grip sets, or the ``levels`` for how many

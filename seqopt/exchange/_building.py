@@ -1,4 +1,4 @@
-"""Make a scene of what a file says and what the user adds; say what was assumed."""
+"""Make a scene from a file's content and the user's additions; report assumptions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _STUB = 0.1  # of a ground end, over the smallest dimension of its block
 
 
 def build_scene(content: Content, given: Given, source: str) -> Scene:
-    """Return the scene of what a file and its user say, for which shapely is needed.
+    """Return the scene of a file's content and the user's additions; it needs shapely.
 
     ``source``: what the file is called. What was read, mended and assumed stands in the provenance.
     """
@@ -206,7 +206,7 @@ def _order(
     sunk: Collection[int],
     said: list[str],
 ) -> list[int]:
-    """Return blocks in an order in which each touches the ground or what stands before it.
+    """Return blocks in an order in which each touches the ground or an earlier one.
 
     ``sunk``: those that interpenetrate.
     """

@@ -109,7 +109,7 @@ def _tree(source: str, held: Entry) -> Iterator[tuple[str, str | None]]:
 
 
 def read_assembly(document: Any, source: str) -> Content:
-    """Return what an assembly says."""
+    """Return the content of an assembly."""
     graph, meshes = assembly_graph(document, source)
     nodes = mapping(f"{source}: node", entry(source, graph, "node", "vertex"))
     common = held_by(source, graph.get("node_attributes") or graph.get("dva") or {})
@@ -156,7 +156,7 @@ def _node_block(where: str, key: str, node: Entry, meshes: dict[str, Any] | None
 
 
 def _edges(source: str, found: Entry) -> Iterator[tuple[str, str, str, Any]]:
-    """Yield the ends of a graph's edges, what messages call them, and what they hold."""
+    """Yield the ends of a graph's edges, their names for messages, and their data."""
     for a, ends in found.items():
         for b, held in mapping(f"{source}: edge {a}", ends).items():
             yield a, b, f"{source}: edge {a}-{b}", held
@@ -174,7 +174,7 @@ def _interfaces(where: str, held: Entry) -> Iterator[Floats]:
 
 
 def read_model(document: Any, source: str) -> Content:
-    """Return what a block model, or a problem about one, says."""
+    """Return the content of a block model, or of a problem about one."""
     held = held_by(source, document)
     law, said = None, list[str]()
     if kind(document) == "problem":

@@ -1,4 +1,4 @@
-"""What a file says about an assembly, what the user has to add, and JSON that is read strictly."""
+"""The content of a file with an assembly, the user's additions, and strict JSON."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def mapping(where: str, value: object) -> Entry:
 
 
 def entry(where: str, holder: object, *keys: str) -> Any:
-    """Return what stands in an object under the first of some keys that there is."""
+    """Return the value in an object under the first of some keys that exists."""
     found = mapping(where, holder)
     for key in keys:
         if key in found:

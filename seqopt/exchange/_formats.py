@@ -195,7 +195,7 @@ def of_ending(path: Path) -> Format | None:
 
 
 def read_file(path: Path, form: str | None = None) -> Content:
-    """Return what a file says, in the format of a name; by default in that of its ending."""
+    """Return the content of a file, in the format of a name; by default in that of its ending."""
     found = of_ending(path) if form is None else formats().get(form)
     if found is None or found.read is None:
         suffix = path.suffix.lower().removeprefix(".")

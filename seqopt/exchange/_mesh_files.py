@@ -47,7 +47,7 @@ def known_unit(name: str, source: str) -> str:
 
 
 def require_reader(form: str, source: str) -> None:
-    """Raise if what reads a format is not installed."""
+    """Raise if the package that reads a format is not installed."""
     package, extra = _NEEDS[form]
     if find_spec(package) is None:
         raise FileError(f"{source}: reading {form} needs {package}; pip install 'seqopt[{extra}]'")
@@ -119,7 +119,7 @@ def _nodes(scene: Any, source: str) -> Iterator[FileBlock]:
 
 
 def counted(name: str) -> list[tuple[int, str]]:
-    """Return what sorts names by the numbers in them: stone_2 before stone_10."""
+    """Return the natural sort key of a name: stone_2 before stone_10."""
     return [(int(part or 0), text) for text, part in re.findall(r"(\D*)(\d*)", name)]
 
 

@@ -106,7 +106,7 @@ def spread(row: Ints, column: Ints, block: Floats, shape: tuple[int, int]) -> sp
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Statics(FrozenValue):
-    """Linear maps from forces to what the edges and the supports carry, for the whole scene.
+    """Linear maps from forces to edge and support forces, for the whole scene.
 
     Attributes
     ----------

@@ -110,7 +110,7 @@ def _verdicts(found: FailureMap, build: str, value: float) -> tuple[BuildVerdict
 
 
 def cure_words(case: Mapping[Any, Any]) -> str:
-    """Return what would let a case of a map stand, in words."""
+    """Return the remedy for a case of a map that falls, in words."""
     bond, friction, node = case["bond_needed_Pa"], case["friction_needed"], case["grip_node"]
     enough = [f"a bond of {bond / 1e3:.3g} kPa"] if np.isfinite(bond) else []
     enough += [f"friction {friction:.3g}"] if np.isfinite(friction) else []

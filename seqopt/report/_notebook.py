@@ -42,7 +42,7 @@ STEPS = 34  # of a build whose grips are drawn
 
 
 class _Card(NamedTuple):
-    """What there is to show of a value: a title, rows of a table by name, and what draws it."""
+    """A value in a notebook: a title, rows of a table by name, and its pictures."""
 
     title: str
     rows: Rows
@@ -82,7 +82,7 @@ def card(value: object) -> str:
 
 @singledispatch
 def facts(value: object) -> _Card:
-    """Return what there is to show of a value."""
+    """Return the title, table and pictures of a value."""
     return _Card(type(value).__name__, {"": repr(value)})
 
 

@@ -75,7 +75,7 @@ def _page(
     tables: Sequence[tuple[str, pd.DataFrame | _Drawn]],
     scatter: Scatter | None = None,
 ) -> str:
-    """Return a page of several builds, whose sentence also says what is wrong with some."""
+    """Return a page of several builds, whose sentence also names their faults."""
     said = builds_in_words({build.name: build.departures for build in builds})
     if said and len(builds) == 1:
         said = (*map(str, builds[0].departures),)
@@ -86,7 +86,7 @@ def _page(
 
 
 def _captioned(caption: str, table: pd.DataFrame) -> tuple[str, pd.DataFrame]:
-    """Return a table of builds under its caption, with a legend where it marks what is wrong."""
+    """Return a table of builds under its caption, with a legend where it marks faults."""
     said = "".join(f". {name.capitalize()}: {why}" for name, why in LEGEND.items() if name in table)
     return f"{caption}{said}. Such steps are marked in red" if said else caption, table
 
@@ -229,7 +229,7 @@ def front_page(
     departures: Mapping[str, Sequence[Departure]],
     verdicts: Mapping[str, Sequence[BuildVerdicts]],
 ) -> str:
-    """Return the page of a Pareto set: its points, and what is known of each plan, by its name."""
+    """Return the page of a Pareto set: its points, and the facts of each plan by its name."""
     scene, builds = engine.network.scene, []
     for (name, plan), own in zip(plans.items(), front.engines, strict=True):
         placed = own.network.scene

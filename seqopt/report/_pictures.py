@@ -56,7 +56,7 @@ def _panels(box: Box, count: int, width: float, room: float) -> tuple[Figure, li
 
 
 def _seen_box(scene: Scene) -> Box:
-    """Return what is seen of a structure, with some room around it."""
+    """Return the view of a structure, with a margin."""
     seen = boxes(scene.placed).corners().reshape(-1, 3) @ VIEW.axes()[:2].T
     room = 0.06 * np.ptp(seen, axis=0).max()
     return np.asarray(seen.min(axis=0) - room), np.asarray(seen.max(axis=0) + room)
@@ -182,7 +182,7 @@ def _draw_built(
 
 
 def _said(scene: Scene, step: Step, last: int) -> str:
-    """Return what a step does, as the title of its picture."""
+    """Return the title of the picture of a step."""
     newest = scene.placed[step.bricks - (step.kind is not StepKind.REMOVE)].name
     what = {
         StepKind.REMOVE: f"brick {newest} is removed",

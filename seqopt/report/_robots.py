@@ -76,7 +76,7 @@ class Cell:
         return np.vstack([np.zeros((0, 3)), *lines, *bodies])
 
     def arms(self, step: Step, at: int) -> list[Floats | PosedArm | None]:
-        """Return what there is of every robot in a step, the ``at``-th of those of known arms."""
+        """Return the shapes of every robot in a step, the ``at``-th of those of known arms."""
         pairs = zip(self.scene.robots, step.grips, strict=True)
         return [
             self._arms[robot.name][at] if robot.name in self._arms else self.arm(robot, node)

@@ -120,7 +120,7 @@ def _marks(scene: Scene, reaching: Reaching) -> dict[str, object]:
 
 
 def _robots(scene: Scene, reaching: Reaching, trouble: str) -> pd.DataFrame:
-    """Return a row for every robot: what it may carry, and what it reaches."""
+    """Return a row for every robot: its payload and reach."""
     rows = []
     for k, robot in enumerate(scene.robots):
         reached = f"{sum(k in who for who in reaching.values())} of {len(reaching)}"
@@ -139,7 +139,7 @@ def _robots(scene: Scene, reaching: Reaching, trouble: str) -> pd.DataFrame:
 
 
 def _bricks(scene: Scene, reaching: Reaching) -> pd.DataFrame:
-    """Return a row for every brick: what it is joined to, its nodes, and who reaches these."""
+    """Return a row for every brick: its joints, its nodes, and who reaches these."""
     joined: dict[int, list[str]] = {brick.name: [] for brick in scene.bricks}
     for ground in scene.grounds:
         joined[ground.brick] = ["ground"]

@@ -1,4 +1,4 @@
-"""The chart of a sweep: the first goal over one or two of what differs (extra ``plot``)."""
+"""The chart of a sweep: the first goal over one or two parameters (extra ``plot``)."""
 
 from __future__ import annotations
 

@@ -214,7 +214,7 @@ def failure_figure(found: FailureMap) -> Figure:
 
 
 def _draw_shares(axes: Axes, cases: pd.DataFrame, rows: list[tuple[str, str]]) -> None:
-    """Draw how many steps of how many fall, a row for every build and what holds it."""
+    """Draw how many steps of how many fall, a row for every build and mortar."""
     values = sorted(cases["value"].unique())
     share = np.full((len(rows), len(values)), np.nan)  # where a build is not possible
     for case in cases.to_dict(orient="records"):

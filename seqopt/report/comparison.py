@@ -1,4 +1,4 @@
-"""Every method and formulation on one scene, side by side, beside what was published; as text."""
+"""Every method and formulation on one scene, beside the published plan; as text."""
 
 from __future__ import annotations
 
@@ -551,7 +551,7 @@ def _stands(comparison: Comparison) -> Iterator[str]:
 
 
 def _plainness(name: str) -> tuple[bool, bool, str]:
-    """Return what sorts names: rows with the same figures go by the first of them."""
+    """Return the sort key of names: rows with the same figures go by the first of them."""
     found = formulations().get(name)
     if found is None:
         return False, False, name
@@ -587,7 +587,7 @@ def _about(comparison: Comparison) -> str:
 
 
 def _choices(comparison: Comparison) -> Iterator[str]:
-    """Yield the table of objectives and of what choosing took."""
+    """Yield the table of objectives and times of formulations."""
     kinds = {name: found.kind.value for name, found in formulations().items()}
     kinds |= {MODIFIED: kinds.get("cascade", ""), FREE: "exact"}
     yield f"{'':{NAME}}{'objective':>10}{'gap':>9}{'steps':>7}{'models':>9}{'seconds':>9}  kind"
@@ -607,7 +607,7 @@ def _choices(comparison: Comparison) -> Iterator[str]:
 
 
 def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
-    """Return what columns of the table of choices are."""
+    """Return the captions of the columns of the table of choices."""
     known = "the fixed sequences" + (" and the published plan" * (PUBLISHED in comparison.tables))
     worst = (
         "of minimax its largest step, of the free schedule, which has no ranks, its worst response "

@@ -95,7 +95,7 @@ class Build:
     tasks: Mapping[str, str] = field(default_factory=dict)
 
     def sentence(self, scene: Scene) -> str:
-        """Return what it is, as one sentence."""
+        """Describe it in one sentence."""
         return _in_a_sentence(scene, self.table, self.verdicts, self.departures, self.faults)
 
     def overloads(self, scene: Scene) -> tuple[Excess, ...]:
@@ -117,7 +117,7 @@ class Scatter:
     logarithmic: Sequence[str] = ()
 
     def data(self) -> dict[str, object]:
-        """Return it as lists, ready for JSON; what is not known is None."""
+        """Return it as lists, ready for JSON; None where unknown."""
         known = self.points.astype(float)
         known = known.astype(object).where(np.isfinite(known), None)
         return {
@@ -275,7 +275,7 @@ def _marks(scene: Scene, build: Build) -> list[str]:
 def _fields(
     engine: Engine, build: Build, known: Mapping[tuple[int, Grips], Fields]
 ) -> dict[str, object]:
-    """Return twists (steps, B, 6), edge forces (steps, E), and what ground ends exert, packed."""
+    """Return twists (steps, B, 6), edge forces (steps, E) and reactions, packed."""
     network = engine.network
     count = len(build.steps)
     twist = np.zeros((count, len(network.inner), 6))
@@ -361,7 +361,7 @@ def _filled(data: Mapping[str, object], **parts: str) -> str:
 
 
 def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
-    """Return what the viewer reads of builds, fields of as many as there is room for."""
+    """Return the viewer's data of builds, with fields of as many as there is room for."""
     if not builds:
         raise ProblemError("a report of nothing; give at least one build")
     network = engine.network
@@ -386,13 +386,13 @@ def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
 
 
 def _tasks(engine: Engine, build: Build) -> dict[str, str]:
-    """Return what robots do in a build as CSV and JSON, compressed: to copy and to keep."""
+    """Return the tasks of a build as CSV and JSON, compressed: to copy and to keep."""
     texts = build.tasks or task_texts(engine.network.scene, build.steps)
     return {kind: _compressed(text.encode()) for kind, text in texts.items()}
 
 
 def task_texts(scene: Scene, steps: Sequence[Step]) -> dict[str, str]:
-    """Return what robots do in a build as CSV and JSON.
+    """Return the tasks of a build as CSV and JSON.
 
     Arms are in their postures; where nothing computes these, grips are proposals.
     """

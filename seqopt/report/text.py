@@ -21,7 +21,7 @@ _NUMBERED = re.compile(r"rob(?:ot)?[ _-]?(\d+)")
 
 
 def _robot_words(name: str) -> str:
-    """Return what a robot is called on a page.
+    """Return the name of a robot on a page.
 
     >>> _robot_words("rob2"), _robot_words("left_arm")
     ('robot 2', 'left arm')
@@ -72,7 +72,7 @@ def _in_a_sentence(
     departures: Sequence[Departure] = (),
     faults: Sequence[str] = (),
 ) -> str:
-    """Return what a build is, as one sentence; first, if so, that it leaves the linear range.
+    """Describe a build in one sentence; first, if so, that it leaves the linear range.
 
     ``faults``: why arms cannot be in steps.
     """
@@ -173,7 +173,7 @@ WORDS = {
 
 
 def in_words(name: str) -> str:
-    """Return what a method or formulation is called, or its name where nobody gave it words.
+    """Return the title of a method or formulation, or its name if it has none.
 
     >>> in_words("overlap_dp"), in_words("my_own")
     ('dynamic programming', 'my_own')
@@ -182,7 +182,7 @@ def in_words(name: str) -> str:
 
 
 def typed(name: str) -> str:
-    """Return words for a method or formulation, with what is typed behind where it differs.
+    """Return the title of a method or formulation, with its option behind where it differs.
 
     >>> typed("overlap_dp"), typed("cantilever")
     ('dynamic programming (overlap_dp)', 'cantilever')

@@ -23,7 +23,7 @@ from seqopt.work.progress import Tell
 
 @dataclass(frozen=True)
 class Unreached:
-    """A step that arms cannot be in: its number, which robots hold what, and why in words."""
+    """A step without compatible postures: its number, the grips, and the reason in words."""
 
     step: int
     why: str

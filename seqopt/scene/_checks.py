@@ -70,7 +70,7 @@ def settle(value: object, **content: object) -> None:
 
 
 def check(value: object, where: str, **checks: Callable[[str, Any], object]) -> None:
-    """Set fields of a frozen value to what checks return, which get the name of the field."""
+    """Set fields of a frozen value to results of checks, which get the name of the field."""
     for name, checked in checks.items():
         settle(value, **{name: checked(f"{where}: {name}", getattr(value, name))})
 
@@ -102,7 +102,7 @@ def kind_of(where: str, value: object, kind: type[_Part]) -> _Part:
 
 
 def printable(where: str, value: str) -> str:
-    """Return a name that can be printed and written, without what steers a terminal."""
+    """Return a name that can be printed and written, without control characters."""
     if not isinstance(value, str) or any(map(steers, value)):
         raise SceneError(f"{where}: its name is {short(value)}; give text of printable characters")
     return value
@@ -148,7 +148,7 @@ def whole_between(where: str, value: int, least: int, most: int = MOST_BRICKS) -
 
 
 def rows(where: str, values: Iterable[_Part], what: str = "a list") -> tuple[_Part, ...]:
-    """Return what there is to go through; text is nothing to go through."""
+    """Return the items of an iterable; text is refused."""
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise SceneError(f"{where} is {short(values)}; give {what}")
     return tuple(values)
@@ -192,7 +192,7 @@ def sizes(where: str, values: Iterable[float]) -> Vector:
 
 
 def as_float(value: object) -> float:
-    """Return a number as a float: NaN for what is none, infinity for one that is too large."""
+    """Return a number as a float: NaN if it is none, infinity if it is too large."""
     try:
         return float(value) if isinstance(value, Real) else math.nan
     except OverflowError:
@@ -202,7 +202,7 @@ def as_float(value: object) -> float:
 def finite(
     where: str, value: float, least: float = -math.inf, wanted: str = "a finite number"
 ) -> float:
-    """Return a finite float, at least ``least``. ``wanted``: what messages ask for."""
+    """Return a finite float, at least ``least``. ``wanted``: accepted values, for messages."""
     number = as_float(value)
     if not math.isfinite(number) or number < least:
         raise SceneError(f"{where} is {short(value)}; give {wanted}")

@@ -245,7 +245,7 @@ def _bricks(shape: ArchShape, axes: tuple[Floats, Floats, Floats]) -> tuple[Bric
 
 
 def _spring(shape: ArchShape, position: Floats, direction: Floats, along: Floats) -> dict[str, Any]:
-    """Return what the joints and ground ends of an arch have in common."""
+    """Return the properties that joints and ground ends of an arch share."""
     stiffness = (shape.translational_stiffness, shape.rotational_stiffness)
     rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
     fields = _spring_fields(position, along, np.asarray(rest / np.linalg.norm(rest)), stiffness)

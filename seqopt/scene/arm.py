@@ -172,7 +172,7 @@ class HeldPostures(FrozenValue):
 
 
 def from_arms(name: str) -> Any:
-    """Return what the room of arms offers under a name. Raises `ExtraError` if there is none."""
+    """Return a function of the room of arms by name. Raises `ExtraError` without the extra."""
     found = offered(name)
     if found is None:
         raise ExtraError(

@@ -209,7 +209,7 @@ def _bounds_of(points: Floats) -> Floats:
 def _find_overlaps(
     solids: Sequence[Polyhedron], tolerated: Sequence[float], progress: Tell | None = None
 ) -> Iterator[Overlap]:
-    """Yield pairs of solids that interpenetrate by more than what either tolerates, m.
+    """Yield pairs of solids that interpenetrate by more than either's tolerance, m.
 
     ``progress``: called with how far it is.
 

@@ -27,7 +27,7 @@ _Part = TypeVar("_Part", Brick, Joint, Ground, Load)
 
 
 def _scaled(values: Any, factor: float) -> Any:
-    """Return a stiffness in three directions times a factor; None of what is rigid."""
+    """Return a stiffness in three directions times a factor; None if rigid."""
     return None if values is None else as_vector(factor * np.array(values))
 
 

@@ -38,7 +38,7 @@ _PULL = 100.0  # m/s²; ten times that of the earth
 
 
 def _find_warnings(scene: Scene) -> tuple[str, ...]:
-    """Return what looks wrong in a scene, one line each; most scenes have none."""
+    """Return warnings about a scene, one line each; most scenes have none."""
     return (*_of_units(scene), *_find_overlapping(scene), *_of_places(scene))
 
 
@@ -49,7 +49,7 @@ def warn_of(scene: Scene, name: str) -> None:
 
 
 def _of_units(scene: Scene) -> Iterator[str]:
-    """Yield what may be meant in other units, of the first brick that is so."""
+    """Yield warnings of probable other units, of the first such brick."""
     pull = math.hypot(*scene.gravity)
     if pull > _PULL:
         yield f"gravity is {pull:g} m/s²: give it in meters, if it is meant in millimeters"
@@ -313,7 +313,7 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
 
 
 def _entry(part: Any) -> dict[str, Any]:
-    """Return the fields of a part of a scene by name, without what is as it is by default."""
+    """Return the fields of a part of a scene by name, without defaults."""
     kinds = {cls: {"kind": kind} for kind, cls in _REACHES.items()}
     out: dict[str, Any] = {**kinds.get(type(part), {})}
     for each in fields(part):

@@ -1,4 +1,4 @@
-"""A second implementation of the rules: what robots may hold, place and carry, for the judge.
+"""A second implementation of the rules of holding, placing and carrying, for the judge.
 
 It is independent of `seqopt.sequence._rule_space`, whose results it checks: the moves of
 `seqopt.judge._rule_moves` follow from it.

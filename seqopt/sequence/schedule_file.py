@@ -121,7 +121,7 @@ def _read_steps(scene: Scene, text: str, what: str) -> Iterator[tuple[int, Row, 
 def _read_grip(
     scene: Scene, robot: Robot, row: Row, where: str, held: object, opened: int
 ) -> int | OpenGrip | None:
-    """Return what a robot holds; a mark continues the open grip that it held, or is a new move.
+    """Return a robot's grip; a mark continues the open grip that it held, or is a new move.
 
     ``opened``: moves so far. A brick named with a node must be the node's.
     """

@@ -15,7 +15,7 @@ Groups = tuple[tuple[int, ...], ...]
 
 @dataclass(frozen=True, eq=False)
 class Acts:
-    """Who may act in moves between states, for how long, and what readiness is passed on.
+    """Who may act in moves between states, for how long, and how readiness is extended.
 
     Of states: ``entries`` (n, c): above 0 where the robot of a column holds, equal where robots of
     one of the ``groups`` of columns are alike. Of acts (a,), by move: ``move``; ``column`` whose
@@ -77,7 +77,7 @@ class Acts:
         return out
 
     def counted(self, state: Ints, values: Floats) -> Floats:
-        """Return labels with what counts of readiness, and of ages of mortar after it."""
+        """Return labels with the readiness and then the ages of mortar that count."""
         last = 1 + self.count
         out, columns = values.copy(), slice(1, last)
         later = np.maximum(values[:, columns], values[:, [0]] - self.longest)

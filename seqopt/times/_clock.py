@@ -55,7 +55,7 @@ class Clock(Book):
         return is_beyond_limits(ends[:, None], *self._limit)
 
     def counted(self, state: Ints, values: Floats) -> Floats:
-        """Return labels with what counts of readiness and ages.
+        """Return labels with the readiness and ages that count.
 
         Who is free for longer than any preparation takes could as well be so for as long: who acts
         again acts no sooner, and who does not is done.

@@ -1,4 +1,4 @@
-"""Builds whose mortar cures: what bonds joints have when, and from when on a state stands.
+"""Builds whose mortar cures: bond of joints over time, and from when on a state stands.
 
 A joint's age counts from the end of the step that places the brick which closes it. Bonds only
 grow, so a state that stands with what its joints have when it begins stands while it lasts.

@@ -1,4 +1,4 @@
-"""The states of a build as a graph in time: their acts, and what mortar asks of them."""
+"""The states of a build as a graph in time: their acts, and the bond that they need."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def timed_graph(problem: States, visited: Visited, cuts: FallCuts | None = None)
 
 
 def _curing(problem: States, visited: Visited, cuts: FallCuts) -> CuringStates:
-    """Return what visited states ask of mortar."""
+    """Return the bond that visited states need."""
     every = [(level, *problem.held_to_stand(rows)) for level, _, rows in visited.states]
     bricks = [np.full(len(held), problem.space.bricks_at(level)) for level, held, _ in every]
     held, payload = (np.concatenate([each[k] for each in every]) for k in (1, 2))
@@ -62,7 +62,7 @@ def _curing(problem: States, visited: Visited, cuts: FallCuts) -> CuringStates:
 
 
 def _moves(problem: States, graph: Graph, rows: Ints, levels: Ints) -> _Moves:
-    """Return what moves do, kind by kind."""
+    """Return the acts of moves, kind by kind."""
     before, after = rows[graph.source], rows[graph.target]
     taken, dropped, able = (np.zeros(after.shape, dtype=bool) for _ in range(3))
     for first, end in problem.space.slots:

@@ -78,7 +78,7 @@ class Floors:
 def cured_rows(
     evaluator: StateEvaluator, rebuilt: Rebuilt, motions: Sequence[Floats]
 ) -> CuringStates | None:
-    """Return what rebuilt states ask of mortar; None where none cures.
+    """Return the bond that rebuilt states need; None where no mortar cures.
 
     ``motions``: that are claimed, (b, 6) in m and rad.
     """

@@ -1,4 +1,4 @@
-"""Builds in time: who does what when, and the same grips by other robots."""
+"""Timetables of builds, and the same grips by other robots."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from seqopt.times._steps import reassigned_steps, step_times
 def times_table(
     scene: Scene, steps: Sequence[Step], waits: Waits | None = None, begin: Site | None = None
 ) -> pd.DataFrame:
-    """Return who does what when, at the earliest: a row per step, as of `Plan.times`.
+    """Return the earliest timetable: a row per step, as of `Plan.times`.
 
     ``waits``: as of `step_times`, where mortar cures; ``begin``: where a part of a build begins.
 
@@ -144,7 +144,7 @@ def _who_carries(scene: Scene, steps: Sequence[Step]) -> Callable[[int, Hold], b
 
 
 def spent_lines(busy: pd.DataFrame) -> Iterator[str]:
-    """Yield how long each robot does what."""
+    """Yield the durations of each robot's actions."""
     for row in busy.to_dict("records"):
         spent = (
             f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")

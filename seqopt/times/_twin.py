@@ -1,4 +1,4 @@
-"""The makespan as an amount of whole builds, with what the judge needs to know of it."""
+"""The makespan as an amount of whole builds, with its twin for the judge."""
 
 from typing import Any
 

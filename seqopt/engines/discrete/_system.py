@@ -81,7 +81,7 @@ _BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever wa
 
 @dataclass(frozen=True, eq=False, repr=False)
 class System(FrozenValue):
-    """Bodies, what holds them together, and what pulls at them; the bricks are the first bodies.
+    """Bodies, their connections and loads; the bricks are the first bodies.
 
     Twists are in m and rad over ``unit``, wrenches in N and N m times it.
     """
@@ -207,7 +207,7 @@ _LENT_STIFFNESS = 1e-12  # lent to every motion, over its own: a loose body can 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Held(FrozenValue):
-    """A system and what its grips do."""
+    """A system and the forces of its grips."""
 
     system: System
     free: sparse.csr_array  # (6n, m); motions that the grips leave
@@ -220,7 +220,7 @@ class Held(FrozenValue):
         return np.asarray(self.free @ motion + share * self.far)
 
     def reaction(self, motion: Floats, force: Floats, share: float = 1.0) -> Floats:
-        """Return what is not balanced on the bodies (6n,): what the grips must take.
+        """Return the unbalanced wrenches on bodies (6n,), which the grips must take.
 
         ``motion`` (m,): in the free motions; ``force`` (P, 3): of the points, N; ``share``: of the
         load, and of the ways of grips.
@@ -239,7 +239,7 @@ class Held(FrozenValue):
         return frozen(np.asarray(self.system.gap @ self.far))
 
     def rounding(self, motion: Floats, force: Floats) -> float:
-        """Return what rounding leaves of a balance between large forces, N."""
+        """Return the rounding error of a balance between large forces, N."""
         moved = np.abs(self.moved(motion))
         return _ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
 

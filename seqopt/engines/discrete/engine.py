@@ -99,7 +99,7 @@ class _Spring(NamedTuple):
         return np.asarray(self.motion.T @ self.stiffness @ self.motion)
 
     def force(self, twist: Floats) -> Floats:
-        """Return what it exerts, (w,), on a body that is moved by a scaled twist (6,)."""
+        """Return its wrench (w,) on a body that is moved by a scaled twist (6,)."""
         return np.asarray(self.stiffness @ (self.far - self.motion @ twist))
 
 

@@ -25,7 +25,7 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 def _compiled(*freedom: str) -> Callable[[_Function], _Function]:
-    """Return what compiles a function when it is first called, and keeps it if there is a place.
+    """Return a decorator that compiles a function at its first call, cached if there is a folder.
 
     ``freedom``: what may differ from arithmetic by the book, in numba's words.
     """
@@ -140,7 +140,7 @@ def _substitute(low: Floats, share: Floats) -> None:
 
 @_compiled()
 def _weigh(share: Floats, s: int, grown: Grown, at: Ints, i: int) -> None:
-    """Write what undoes how far the weight moves a grip's node."""
+    """Write the grip's share that undoes its node's motion by the weight."""
     brick, first = at[i] // 2, 3 * (at[i] % 2)
     for a in range(3):
         total = 0.0
@@ -237,7 +237,7 @@ def _pull_bricks(
 
 @_compiled()
 def _share_pairs(tension: Floats, part: Part, at: Ints, force: Floats) -> None:
-    """Let each of two grips on one brick take what reaches its own node, in place."""
+    """Let each of two grips on one brick take the force at its own node, in place."""
     for second in range(1, len(at)):
         for first in range(second):
             brick = at[first] // 2

@@ -133,7 +133,7 @@ class Ends(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A partial structure: counts, and what `inner_edges` says of its bricks."""
+    """A partial structure: counts, and the `inner_edges` of its bricks."""
 
     bricks: int
     wrenches: int  # numbers: six for every spring that acts
@@ -144,7 +144,7 @@ class Part(NamedTuple):
 
 
 def maps_by_entry(scene: SceneMaps) -> tuple[Edges, Motion, Ends]:
-    """Return what wrenches and twists of a whole scene mean, in space."""
+    """Return the response maps of wrenches and twists of a whole scene, in space."""
     spring = scene.network.edge_spring
     through, outer = scene.edge[spring < 0], scene.edge[spring >= 0].tocoo()
     along = np.zeros((3, outer.shape[0]))
@@ -221,7 +221,7 @@ class GrownExtremes:
         return found
 
     def _kept(self, columns: Ints) -> Kept:
-        """Return what forces mean at the nodes that all sets (S, r) hold."""
+        """Return the response maps of forces at the nodes that sets (S, r) hold."""
         (twist, wrench, nodes), part = self._grown, self._part
         held = [n for n in columns[0].tolist() if (columns == n).any(axis=1).all()]
         found, count = [], -(-len(held) // 2) * 6

@@ -282,7 +282,7 @@ def share_pairs(
     carried: Floats,
     pairs: Pairs | None = None,
 ) -> None:
-    """Let each of two grips on one brick take what reaches its own node.
+    """Let each of two grips on one brick take the force at its own node.
 
     Then the inner edge between them carries nothing: the limit of a stiff bar with both ends held.
     Nothing else in the structure changes.

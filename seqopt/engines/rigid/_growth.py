@@ -81,7 +81,7 @@ _MOST = 0.95  # share of all pairs of motions whose asymmetry counts as rounding
 
 
 class _Before(NamedTuple):
-    """The last brick count but one: its weight's answers, its loss, and what has changed since.
+    """The last brick count but one: answers to its weight, lost digits, and later changes.
 
     ``closing`` (1 + kb, n), ``changes`` of n rows: what loops added to twists and wrenches.
     """
@@ -161,7 +161,7 @@ class Growth:
         return self.bricks - last <= bricks <= self.bricks
 
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats, Floats]:
-        """Return what so many bricks do under the weight, and unit wrenches on some bricks (h,).
+        """Return motions of bricks under the weight, and under unit wrenches on some bricks (h,).
 
         Results: twists and wrenches, 1 + kh rows; the loss (h,).
         """
@@ -191,7 +191,7 @@ class Growth:
         return 6 * self.bricks
 
     def _answers(self, rows: slice | Ints | int) -> tuple[Floats, Floats]:
-        """Return the twists of bricks that stand, and what springs that act transmit."""
+        """Return the twists of bricks that stand, and the wrenches of springs that act."""
         acting = 6 * self._acting[self.bricks]
         return self.twist[:, : self._moves][rows], self.wrench[:, :acting][rows]
 
@@ -236,7 +236,7 @@ class Growth:
         self._tie(np.array([spring]), self._ties)
 
     def _load(self, brick: int) -> None:
-        """Add to what the weight does that of a brick, and of loads that begin with it."""
+        """Add the weight of a brick, and loads that begin with it."""
         k, pulls = 6, [(brick, self._network.weight[brick])]
         begun = self._network.applied(brick + 1, before=brick)
         for other in np.flatnonzero(begun.any(axis=1)).tolist():
@@ -247,11 +247,11 @@ class Growth:
                 weighed[:] += pull @ answer
 
     def _of(self, spring: int) -> slice:
-        """Return the columns of what a spring transmits."""
+        """Return the columns of a spring's wrenches."""
         return slice(6 * spring, 6 * spring + 6)
 
     def _close(self, springs: Ints) -> tuple[Floats, list[Floats]]:
-        """Let springs act that close loops; return what is added, as of `_Before`."""
+        """Let springs act that close loops; return the changes, as `_Before` has them."""
         k, rows = 6, slice(0, 1 + self._moves)
         gaps = np.concatenate([self._gap(s) for s in springs], axis=1)
         answers = self._answers(rows)
@@ -277,7 +277,7 @@ class Growth:
         return self.twist[1 : 1 + self._moves, : self._moves].diagonal()
 
     def _sum_again(self) -> None:
-        """Sum all twists anew, from what springs give on the shortest way from the ground."""
+        """Sum all twists anew, by spring deformations on the shortest path from the ground."""
         k, springs, center = 6, self._network.springs, self._network.centroid
         ways, shift = [], np.zeros((self.bricks, k))  # the ground's, where bricks hang on it
         for parent, brick, spring, sign in self._ways(GROUND):
@@ -346,7 +346,7 @@ class Growth:
                     yield body, other, spring, 1.0 if second == other else -1.0
 
     def _pulled(self, answers: Floats, spring: int) -> Floats:
-        """Return what a spring's unit wrenches on both its bodies do, of the answers' rows."""
+        """Return rows of the answers to a spring's unit wrenches on both its bodies."""
         k, springs = 6, self._network.springs
         out = np.zeros((k, answers.shape[1]))
         for body, sign in zip(springs.bodies[spring].tolist(), (-1.0, 1.0), strict=True):

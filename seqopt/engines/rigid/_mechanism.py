@@ -85,7 +85,7 @@ class Ungripped(FrozenValue):
 
 
 def share(network: Network) -> Shared:
-    """Return what the systems of all brick counts are cut from."""
+    """Return the system of the whole scene, of which those of all brick counts are parts."""
     springs, size = network.springs, network.inner.size
     brick = np.repeat(np.arange(len(network.inner)), 2)
     moved = point_motion(network.node_position[network.inner.ravel()] - network.centroid[brick])
@@ -96,7 +96,7 @@ def share(network: Network) -> Shared:
 
 
 def ungripped_system(network: Network, bricks: int, shared: Shared | None = None) -> Ungripped:
-    """Return what all systems of a partial structure have in common."""
+    """Return the part that all systems of a partial structure share."""
     shared = share(network) if shared is None else shared
     springs = network.springs
     acting = springs.acting(bricks)
@@ -233,7 +233,7 @@ class Hanging:
 
     @cached_property
     def factors(self) -> SuperLU:
-        """Of what springs part by for unit twists, in the scene's axes."""
+        """Spring deformations by unit twists, in the scene's axes."""
         springs, first = self._network.springs, slice(self.bricks)
         center = self._network.centroid[first]
         gap = deformation(springs.bodies[first], springs.position[first], center).tocsc()
@@ -263,7 +263,7 @@ class HangingSystem:
         return np.hstack([wrench, twist]), np.zeros((len(loads), 0))
 
     def _sums(self, right: Floats, which: str) -> Floats:
-        """Return what leads to right sides (S, 6b), of the matrix or its transpose."""
+        """Return the solutions for right sides (S, 6b), of the matrix or its transpose."""
         whole = np.zeros((6 * self.hanging.bricks, len(right)), order="F")
         whole[: right.shape[1]] = right.T
         found: Floats = self.hanging.factors.solve(whole, which)  # type: ignore[call-overload]

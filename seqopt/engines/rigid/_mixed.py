@@ -80,7 +80,7 @@ def respond(
 
 
 def edge_forces(network: Network, statics: Statics, wrench: Floats, load: Floats) -> Floats:
-    """Return what the edges carry (S, E), tension positive.
+    """Return the edge forces (S, E), tension positive.
 
     ``wrench`` (S, J, 6): as of `Solution`; ``load`` (S, 2b, 3): forces at the inner nodes, those of
     grips among them.
@@ -102,7 +102,7 @@ def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
 def split_pairs(
     network: Network, columns: Ints, force: Floats, carried: Floats, soft: Bools | None = None
 ) -> None:
-    """Let each of two rigid grips on one brick take what reaches its own node, in place.
+    """Let each of two rigid grips on one brick take the force at its own node, in place.
 
     ``force`` (S, r, 3): of the grips; ``carried`` (S, E): by the edges; ``soft`` (S, r): which
     grips are.

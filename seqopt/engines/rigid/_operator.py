@@ -32,7 +32,7 @@ _FEW = 200  # loads whose responses take little, and are always made once for al
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Doubts(FrozenValue):
-    """How far rounding may reach: of every load what it moves itself, the weight, and lost digits.
+    """Error bounds of rounding: by load its own motion, the weight, and lost digits.
 
     Arrays are the flexibility's diagonal, ``dead_displacement`` and ``loss`` (l,) of
     `ComplianceOperator`.
@@ -44,7 +44,7 @@ class Doubts(FrozenValue):
 
     @cached_property
     def shares(self) -> Floats:
-        """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
+        """Roots of flexibilities, share of the weight, and factors to forces; (3, l)."""
         own = np.maximum(np.abs(self.flexibility), np.finfo(float).tiny)
         root = np.sqrt(own * self.loss)
         return frozen(np.stack([root, np.abs(self.dead) * self.loss / root, root / own]))
@@ -196,11 +196,11 @@ class ComplianceOperator(FrozenValue):
         return out
 
     def few_loads(self, sets: int) -> bool:
-        """Return whether what all loads mean is made before that of so many grip sets."""
+        """Return whether response maps of all loads pay for so many grip sets."""
         return are_few(self.axis.size, sets)
 
     def _add_grips(self, index: Ints, force: Floats, out: Floats) -> None:
-        """Add to edge forces (S, E) what forces (S, k) at second nodes send into inner edges."""
+        """Add to edge forces (S, E) those of inner edges by forces (S, k) at second nodes."""
         own = self.by_grip(force)
         place, at = np.divmod(self.by_grip(index)[..., 0], 6 + self.moments)
         brick = self.held[place]
@@ -231,7 +231,7 @@ class ComplianceOperator(FrozenValue):
         return {}
 
     def _states(self, name: str) -> Floats:
-        """Return what a field follows from under every load: twists or wrenches."""
+        """Return the unknowns from which a field follows: twists or wrenches."""
         return self.twist if name in _OF_TWISTS else self.wrench
 
 
@@ -257,7 +257,7 @@ def load_rows(nodes: Ints, moments: int) -> Ints:
 
 
 class OperatorBuilder:
-    """Makes the operator of any brick count of a tree from what grows with it."""
+    """Makes the operator of any brick count of a tree from data that grow with it."""
 
     def __init__(self, network: Network, tree: SpanningTree) -> None:
         self.network, self.growth = network, Growth(network, tree)
@@ -302,7 +302,7 @@ class OperatorBuilder:
 
 
 def _at_nodes(nodes: Floats, answers: Floats) -> Floats:
-    """Return what unit loads at nodes of bricks (h, w, k) mean, and the weight last.
+    """Return the response maps of unit loads at nodes of bricks (h, w, k), and of the weight last.
 
     ``answers`` (1 + kh, n): of the weight and unit wrenches on these bricks.
     """

@@ -300,7 +300,7 @@ class Refinements:
 
 
 def _loaded(parts: Ungripped) -> sparse.csr_array:
-    """Return what loads do to scaled twists, (l, 6b), as `load_rows` numbers them in space."""
+    """Return the loads on scaled twists, (l, 6b), in the numbering of `load_rows`."""
     network, size = parts.network, 6 * parts.bricks
     if not network.scene.grip_kinds.turns.any():
         return parts.inner
@@ -327,7 +327,7 @@ class _Asked(NamedTuple):
 
 @dataclass(frozen=True)
 class _Corrector:
-    """Corrects what an operator answers; as of `Refinement.solve`."""
+    """Corrects answers of an operator, as `Refinement.solve`."""
 
     system: Refinement
     operator: ComplianceOperator
@@ -381,7 +381,7 @@ class _Corrector:
         return done
 
     def _correction(self, asked: _Asked, states: Floats, force: Floats) -> tuple[Floats, Floats]:
-        """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
+        """Return the corrections of scaled answers (S, n) and grip forces (S, 3r)."""
         operator, system, columns = self.operator, self.system, asked.columns
         parts, inner = system.parts, system.inner
         joints = len(parts.wrench_unit)

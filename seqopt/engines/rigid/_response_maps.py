@@ -83,7 +83,7 @@ class ResponseMaps(FrozenValue):
         return _counts_of_fields(self.scene.network, self.bricks)
 
     def apply(self, name: str, states: Floats, out: Floats | None = None) -> Floats:
-        """Return a field of states, edge forces without what loads add to the inner edges.
+        """Return a field of states, edge forces without those of loads on the inner edges.
 
         ``states`` (S, n): wrenches; of displacements and brick twists, twists. ``out`` (S, Q):
         where to put it.
@@ -130,7 +130,7 @@ class Loads:
     count: int  # how many rows there are, the weight's among them
 
     def sum(self, rows: Floats) -> Floats:
-        """Return the sums (S, Q) of what the loads mean by rows (count, Q)."""
+        """Return the sums (S, Q) of loads times rows of a response map (count, Q)."""
         if self.index.size * rows.shape[1] <= _GATHERED:  # in the order of the sparse product
             return np.asarray(np.einsum("sk,skq->sq", self.share, rows.take(self.index, axis=0)))
         return np.asarray(self.matrix @ rows)
@@ -153,7 +153,7 @@ def loads_of(index: Ints, force: Floats, count: int, weight: float = 1.0) -> Loa
 
 
 def inner_edges(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
-    """Return the inner edges of bricks, and what weighs on their second nodes.
+    """Return the inner edges of bricks, and the weight on their second nodes.
 
     Results: ``edge`` (b,); ``axis`` (b, 3): unit vectors to the second nodes; ``weight`` (b,):
     there, with that of loads, along the edge, N.

@@ -105,7 +105,7 @@ def _solve_fast(
     even: bool,
     accuracy: float,
 ) -> _FastSolution:
-    """Return what an operator alone says about grip sets, and which of them it answers well enough.
+    """Return the operator's answers to grip sets, and which of them are accurate enough.
 
     ``even``: whether the joints are about equally stiff: where not, pivots do not bound the error;
     ``accuracy``: largest error of fields,
@@ -195,7 +195,7 @@ class ComplianceEngine(NamedEngine):
         return require_finite(found, bricks, grips)
 
     def _found(self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want) -> Fields:
-        """Return what is wanted of grip sets, corrected where the operator is not enough."""
+        """Return the fields of grip sets, corrected where the operator is not accurate enough."""
         fast: _FastSolution | None = None
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._uniform
@@ -244,7 +244,7 @@ class ComplianceEngine(NamedEngine):
         return Extremes(found[0], found[1], found[2], found[3], size)
 
     def _recalls(self, bricks: int) -> bool:
-        """Return whether fields of a brick count are had from what grew for extremes."""
+        """Return whether fields of a brick count come from the data grown for extremes."""
         return self._grown is not None and self._builder.growth.recalls(bricks)
 
     def _accepted(self, want: Want) -> float:
@@ -287,7 +287,7 @@ class ComplianceEngine(NamedEngine):
     def _refined(
         self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want
     ) -> Fields:
-        """Return what is wanted of grip sets that the operator alone answers not well enough."""
+        """Return the fields of grip sets for which the operator is not accurate enough."""
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             tied = operator is not None  # the tree that it grew on reaches them all

@@ -1,4 +1,4 @@
-"""The chart of speed against regret, and of what regret is made of (extra ``plot``)."""
+"""The chart of speed against regret, and of the parts of regret (extra ``plot``)."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ PARTS = (
 
 @styled
 def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
-    """Return the chart of one scene, with what regret is made of, or of several side by side."""
+    """Return the chart of one scene, with the parts of regret, or of several side by side."""
     if len(tables) == 1:
         return _alone(tables[0], width)
     across = 1 if width < WIDTH else 2
@@ -225,7 +225,7 @@ def _regrets(axes: Axes, table: RegretTable) -> tuple[list[Label], list[tuple[Ax
 
 
 def _curves(axes: Axes, table: RegretTable) -> None:
-    """Draw incumbents of ways with the reference over time, and what their bounds leave open."""
+    """Draw incumbents of ways with the reference over time, and their gaps."""
     for at, findings in table.curves.items():
         row = table.table.iloc[at]
         known = len(findings) > 1 and np.isfinite(row["regret"])
@@ -284,7 +284,7 @@ def _parts(axes: Axes, rows: pd.DataFrame, decades: int) -> None:
 
 
 def _legend(figure: Figure, tables: Sequence[RegretTable], across: int) -> None:
-    """Name engines and schedules, and say what marks mean."""
+    """Draw the legend: engines, schedules and marks."""
     present = dict.fromkeys(str(name) for each in tables for name in each.table["engine"])
     marks = [Line2D([], [], label=name, **_look(name, FREE) | {"marker": "o"}) for name in present]
     mark: dict[str, Any] = {"ls": "none", "color": INK}

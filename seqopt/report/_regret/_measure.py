@@ -80,14 +80,14 @@ Valued: TypeAlias = tuple[float, float, str, str]
 
 @dataclass(frozen=True)
 class Timer:
-    """What tells the time, s, what ends a block by a `TimeoutError`, and how often it repeats."""
+    """A clock, s, a guard that ends a block by a `TimeoutError`, and the number of repeats."""
 
     now: Callable[[], float] = time.perf_counter
     within: Callable[[float], AbstractContextManager[None]] = ending
     times: int = TIMES
 
     def least(self, seconds: float, call: Callable[[], Found]) -> tuple[float, Found]:
-        """Return the least time that a call takes, and what it returns; `TimeoutError` if late."""
+        """Return the least time that a call takes, and its result; `TimeoutError` if late."""
         start = self.now()
         with self.within(seconds):
             found = call()
@@ -246,7 +246,7 @@ def measure_regret(
     progress: Tell = lambda _: None,
     timer: Timer = WALL,
 ) -> RegretTable:
-    """Return what the plan of every way costs in the most detailed model of a scene.
+    """Return the cost of every way's plan in the most detailed model of a scene.
 
     Parameters
     ----------
@@ -366,7 +366,7 @@ def _ways(course: _Course, reference: str) -> tuple[list[Way], dict[str, str]]:
 
 
 def _variants(course: _Course) -> Iterator[tuple[str, str, str]]:
-    """Yield schedule, formulation and what is left out, or added, of ways with the usual engine."""
+    """Yield schedule, formulation and the options of ways with the default engine."""
     if course.loop:
         yield LOOP, USUAL[LOOP], NEAR
         if isinstance(course.criterion, RankSum):

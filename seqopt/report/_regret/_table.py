@@ -142,7 +142,7 @@ class RegretTable:
         return f"{said}; sooner is {way_named(one)} {late}."
 
     def facts(self) -> dict[str, object]:
-        """Return what a summary says, for scripts."""
+        """Return the summary, for scripts."""
         took = {name: self.take[name] for name in ("engine", "schedule", "formulation", "without")}
         about: dict[str, object] = {
             "sentence": self.sentence,

@@ -124,7 +124,7 @@ def _touching_order(
     pairs: Iterable[tuple[int, int]],
     starts: Iterable[int],
 ) -> list[int]:
-    """Return an order in which everything touches what stands before it, or the ground.
+    """Return an order in which every brick touches an earlier one, or the ground.
 
     Of what can be placed, the lowest ``rank`` is next; what cannot be reached is left out.
     """
