@@ -51,7 +51,7 @@ from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_check import RuleBook, unbearable
 from seqopt.sequence.methods import _enough_reach
-from seqopt.sequence.rules import FREE, FreeRules, Payload
+from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import OpenStep, loads
 from seqopt.sequence.steps import Step
 
@@ -466,7 +466,7 @@ class Remedies:
     @cached_property
     def _idle(self) -> tuple[str, ...]:
         """Payloads where no state is held within them, and every robot bears its brick."""
-        kept = self._is_free and self.problem.free_rules.payload is Payload.KEPT
+        kept = self.problem.rules.keeps_payloads(stands=False)
         asked = (kept and self.problem.demands) or _unbearable(self.problem)
         return () if asked else ("payload",)
 
