@@ -39,12 +39,12 @@ GONE = {
     "--crown": "in Python dataclasses.replace(seqopt.CRITERIA[...], crown=...) has it",
     "--keep": "--to 12 leaves the first 12 bricks of --order",
     "--load-factor": "in Python seqopt.stability.load_factors has it",
+    "--seconds": "it is --time-limit, as of any command",
     "--staged": "in Python seqopt.responses.analyze_staged has it",
     "--stiffens": "give a scene whose joints are softer, as seqopt scene --export writes it",
     "--tables": "in Python plan.alternatives() has every choice",
     "--unseen": "in Python seqopt.plan.out_of_sample.judge_unseen has it",
 }  # options that there were, and what to do in their place
-MISSING = "the following arguments are required"
 
 
 def _nearest(message: str, options: Iterable[str]) -> str:
@@ -68,22 +68,6 @@ def _nearest(message: str, options: Iterable[str]) -> str:
     return did_you_mean(found[1].lstrip("-"), known).replace("mean ", "mean --")
 
 
-def _first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> str:
-    """Return the parser's message, or one about the mistyped option that causes it.
-
-    >>> given = ["arch25", "--ot", "best"]
-    >>> _first_wrong("the following arguments are required: --out", given, ["--out"])
-    'unrecognized arguments: --ot'
-    """
-    if not message.startswith(MISSING) or message.endswith("COMMAND"):
-        return message
-    for word in given:
-        name = word.partition("=")[0]
-        if name.startswith("--") and not any(option.startswith(name) for option in options):
-            return f"unrecognized arguments: {word}"
-    return message
-
-
 def _layout(prog: str) -> argparse.HelpFormatter:
     return argparse.RawDescriptionHelpFormatter(prog, width=columns())
 
@@ -92,13 +76,8 @@ class _Parser(argparse.ArgumentParser):
     """A parser with one-line errors that prints help as a result on standard output."""
 
     color: bool  # of Python 3.14
-    given: Sequence[str] = ()  # what it was asked to parse: a missing word may be a mistyped one
     asked = ""  # the command that is asked for, and its options
     spoken: tuple[str, ...] = ()
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        self.given = args or ()
-        return super().parse_known_args(args, namespace)
 
     def format_help(self) -> str:
         return super().format_help().replace("?:\n", "?\n")  # titles that are questions
@@ -107,9 +86,7 @@ class _Parser(argparse.ArgumentParser):
         show(first_screen(self))
 
     def error(self, message: str) -> NoReturn:
-        own = tuple(self._option_string_actions)
-        message = _first_wrong(message, self.given, own)
-        hint = _nearest(message, self.spoken or own)
+        hint = _nearest(message, self.spoken or tuple(self._option_string_actions))
         where = f"{self.prog} {self.asked}".rstrip()
         complain(f"{self.prog}: error: {message}{hint} (see {where} --help)")
         self.exit(Status.BAD_INPUT)

@@ -115,7 +115,7 @@ def test_an_interrupt_of_the_proof_leaves_a_plan_in_python_too(monkeypatch):
     [
         FREE,
         LOOP,
-        ("pareto", WALL, "--seconds", "0"),
+        ("pareto", WALL),
         ("instance", WALL, "--schedule", "free"),
         ("analyze", WALL, "--method", "sequential"),
     ],
@@ -123,9 +123,8 @@ def test_an_interrupt_of_the_proof_leaves_a_plan_in_python_too(monkeypatch):
 def test_a_limit_that_is_over_at_once_is_a_line(capsys, monkeypatch, tmp_path, words):
     """Whatever comes first, and where nothing is late the same words have an answer."""
     monkeypatch.chdir(tmp_path)
-    limit = () if words[0] == "pareto" else ("--time-limit", "0")
     monkeypatch.setattr("seqopt.work.progress.GRACE", 0.0)
-    assert main([*words, *limit]) == 4
+    assert main([*words, "--time-limit", "0"]) == 4
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert err.startswith("seqopt: time is over: ")

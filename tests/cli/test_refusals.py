@@ -25,6 +25,8 @@ BAD = {
     "analyze arch52 --method sequential": "scene arch52",
     "analyze no/such.json --method sequential": "no/such.json",
     "analyze --plan no.csv": "no.csv",
+    "pareto ARCH --seconds 9": "--seconds is no more; it is --time-limit",
+    "import a.obj": "arguments are required: --out",
     "analyze --method sequential --plan no.csv": "not allowed with",
     "analyze --method sequential --out no/dir/x.csv": "no/dir/x.csv",
     "analyze --method sequential --robots rob1,rob9": "robot 'rob9'",

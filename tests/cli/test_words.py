@@ -44,7 +44,7 @@ def test_it_says_its_version(capsys):
         ("scene arch26", "arch25"),
         ("scene arch:spn=2", "span"),
         ("scene wal:columns=3", "wall"),
-        ("optimize --formlation beam", "--formulation"),  # though --out is missing too
+        ("optimize --formlation beam", "--formulation"),
         ("optimize --schedule fre --out x", "free"),
         ("optimize --formulation beam --schedule three-robt --out x", "three-robot"),
         ("optimize --schedule free --formulation schedule_serch --out x", "schedule_search"),

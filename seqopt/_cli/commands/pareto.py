@@ -7,7 +7,6 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from math import inf
 from pathlib import Path
 
 import pandas as pd
@@ -44,7 +43,7 @@ MOST_ROWS = 30  # of a table on the terminal
 FOUR = "F_largest,M_sup,T_max,D_max"
 
 
-class Pareto(options.Written, options.Moves):
+class Pareto(options.Written, options.Limited, options.Moves):
     """Which steps may a build have?
 
     schedule : NAME|FILE
@@ -66,7 +65,7 @@ class Pareto(options.Written, options.Moves):
         round a number up to multiples of a step (SI units)
 
     Who chooses and proves, and how long?
-    seconds : S
+    time_limit : SECONDS
         limit of the whole command, with its proof, verdicts and page: what it has no time for is
         left out and named; the points that were found by then are there
 
@@ -77,7 +76,6 @@ class Pareto(options.Written, options.Moves):
     schedule: str | Path | None = FREE
     aim: options.Words | None = FOUR
     rounding: options.Numbers = options.word((), flag="--round")
-    seconds: float = options.word(inf, zero=True)
     pick: str | None = options.word(None, shell=True)
     under: options.Words = options.word((), shell=True)
 
@@ -102,7 +100,7 @@ def run(asked: Pareto) -> Result:
     --------
     seqopt pareto arch25 --out front
     seqopt pareto arch25 --pick D_max --under F_largest=250 --out front
-    seqopt pareto arch25 --aim D_max,steps --seconds 60 --out front
+    seqopt pareto arch25 --aim D_max,steps --time-limit 60 --out front
     seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front
     """
     found = _find(asked)
@@ -153,7 +151,7 @@ class Found:
 def _find(asked: Pareto) -> Found:
     """Find all non-dominated plans."""
     outputs.require_out(asked)
-    clock = Clock(asked.seconds)
+    clock = Clock(asked.time_limit)
     with clock.needed("posing the problem"):
         problem = pose_problem(asked).problem
         free = states_of(problem)
