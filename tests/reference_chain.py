@@ -36,8 +36,12 @@ class Reference(NamedTuple):
     brick_twist: Floats
 
 
-def solve_exactly(network: Network, bricks: int, columns: Ints) -> Reference:
+def solve_exactly(
+    network: Network, bricks: int, columns: Ints, stiffness: float | None = None
+) -> Reference:
     """Return the answer for one grip set, given as places in ``network.inner.ravel()``.
+
+    ``stiffness``: of every grip in all directions, N/m; rigid by default.
 
     Raises
     ------
@@ -47,12 +51,15 @@ def solve_exactly(network: Network, bricks: int, columns: Ints) -> Reference:
     with localcontext(Context(prec=DIGITS)):
         nodes = EXACT(network.node_position[network.inner[:bricks]])
         center = nodes.sum(axis=1) / 2
-        bases = [_motions(nodes[b], center[b], columns, b) for b in range(bricks)]
+        rigid = columns if stiffness is None else columns[:0]
+        bases = [_motions(nodes[b], center[b], rigid, b) for b in range(bricks)]
         springs = [
             (s, *_spring(network, s, center))
             for s in np.flatnonzero(network.springs.since <= bricks)
         ]
-        blocks, loads = _assemble(network, bases, springs)
+        soft = [] if stiffness is None else columns.tolist()
+        grips = [_soft_grip(nodes[c // 2], center[c // 2], c, stiffness) for c in soft]
+        blocks, loads = _assemble(network, bases, springs + grips)
         local = _solve(blocks, loads)
         twist = np.array([base @ x for base, x in zip(bases, local, strict=True)])
         wrench = np.full((len(network.springs.since), 6), Decimal(0))
@@ -65,6 +72,17 @@ def solve_exactly(network: Network, bricks: int, columns: Ints) -> Reference:
             for node in pair
         ]
     return Reference(*(np.array(a).astype(float) for a in (motion, wrench, twist)))
+
+
+def _soft_grip(
+    nodes: Numbers, center: Numbers, column: int, stiffness: float | None
+) -> tuple[int, Numbers, list[tuple[int, Numbers]]]:
+    """Return a spring that holds a node, without a number of its own."""
+    matrix = np.full((6, 6), Decimal(0))
+    matrix[:3, :3] = EXACT(np.eye(3)) * Decimal(stiffness or 0.0)
+    part = EXACT(np.eye(6))
+    part[:3, 3:] = -_skew(nodes[column % 2] - center)
+    return -1, matrix, [(column // 2, part)]
 
 
 def _skew(v: Numbers) -> Numbers:

@@ -30,7 +30,18 @@ def stated() -> dict[str, str]:
         | {"classical_table": _classical(stored("classical"))}
         | {"makespan_table": _makespans(stored("makespan"), stored("makespan_large"))}
         | instance_tables(*map(stored, INSTANCES))
+        | _failing(stored("where_numbers_fail"), stored("where_steps_fall"))
     )
+
+
+def _failing(numbers: pd.DataFrame, steps: pd.DataFrame) -> dict[str, str]:
+    """Return how many answers and verdicts were held against others, and how many decided."""
+    ends = numbers[["answered", "refused", "infeasible", "failed", "mechanism"]].sum()
+    told = ", ".join(f"{count:,} {name}" for name, count in ends.items())
+    left, every = steps["own_open"].sum(), steps["steps"].sum()
+    checked = f"Of {every:,} verdicts they decide {every - left:,} and contradict none."
+    kernels = f"under {numbers['kernels'].max()} kernels {told}, {numbers['wrong'].sum()} off"
+    return {"failing_counts": kernels, "failing_checked": checked}
 
 
 def _questions(rows: pd.DataFrame) -> str:

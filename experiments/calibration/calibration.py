@@ -14,20 +14,11 @@ in closed form (a weighted median for absolute errors, a quotient for squares), 
 the ratio finds the global optimum, which is computed again with the compliance operator of the
 scene. Every test is also predicted from a fit to the other seven. The confidence region holds all
 pairs whose sum of squares is at most ``1 + p F(p, 8 - 2) / (8 - 2)`` times the smallest, ``p = 2``;
-a profile has ``p = 1``. `rotational` says by how many routes the tests bound ``k_r``.
-
-`readings` are interpretations of the printed tests that might give the paper's own column: what
-span and rise measure, where the load acts and over which width, how many bricks there are, how
-stiff joints are across, and what multiplies the rotational stiffness. Each is tried with the
-printed joint stiffnesses, full or half, and with free ones: then the smallest possible largest
-deviation from the column is sought, over all tests and over some of them.
+a profile has ``p = 1``.
 
 Inputs: ``arch_tests.csv``, ``arch_stiffness.csv`` in ``seqopt/data/paper``. Command: ``python -m
 experiments calibration [--quick]``.
 """
-
-from collections.abc import Callable
-from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -41,7 +32,6 @@ from experiments.calibration.parts.barrel_vaults import (
     LAWS,
     MEASURES,
     Law,
-    Parts,
     Vault,
     chain,
     errors,
@@ -56,88 +46,9 @@ from experiments.harness.results import stored
 from seqopt.arrays import Floats
 from seqopt.report._style import BLUE, GREEN, ORANGE, VERMILION, dress, name_panels, plain, styled
 
-PRINTED = (1e11, 0.9e9)  # N/m³ and what is printed in kN/(rad m²), in N
-POWERS = {"b": (0, 1.0), "b t": (1, 1.0), "b t2": (2, 1.0), "b t3/12": (3, 1 / 12)}
-SHEAR = {"rigid": 0.0, "as along": 1.0, "a tenth": 10.0}  # compliance across over along
-HALVES = ((1.0, 1.0), (0.5, 0.5), (1.0, 0.5), (0.5, 1.0))  # of k_t and of k_r
-GROUPS = {"all": range(8), "2-8": range(1, 8), "3-8": range(2, 8)}
-GROUPS |= {"2,3,4,6,7,8": (1, 2, 3, 5, 6, 7)}
-RATIOS = np.geomspace(1e-5, 1e4, 181)
-
-
-def section(vault: Vault, law: str) -> float:
-    """Return what multiplies the rotational stiffness."""
-    power, factor = POWERS[law]
-    return vault.width * vault.thickness**power * factor
-
-
-def against_study(tests: tuple[Vault, ...], parts: list[Parts], law: str, k: Floats) -> Floats:
-    """Return stiffnesses over the paper's (T, R) for rows (R, 2) of k_t and k_r."""
-    rows = []
-    for vault, part in zip(tests, parts, strict=True):
-        slide, turn = k[:, 0] * vault.area, k[:, 1] * section(vault, law)
-        rows.append(barrel.planar_stiffness(part, slide, turn) / vault.study)
-    return np.array(rows)
-
-
-def closest(logs: Floats) -> tuple[int, float, float]:
-    """Return the column of logarithms with the least half-range, its middle, that half-range.
-
-    Of some that are equal but for rounding it is the first.
-    """
-    top, bottom = logs.max(axis=0), logs.min(axis=0)
-    half = (top - bottom) / 2
-    best = int(np.argmax(half <= half.min() * (1 + 1e-9)))
-    return best, float(top[best] + bottom[best]) / 2, float(half[best])
-
-
-def _row(tests: tuple[Vault, ...], parts: list[Parts], law: str) -> dict[str, object]:
-    """Return how one reading does with printed and with free joint stiffnesses."""
-    printed = np.array([[PRINTED[0] * a, PRINTED[1] * b] for a, b in HALVES])
-    ratio = against_study(tests, parts, law, printed)
-    out: dict[str, object] = {}
-    for percent in (5, 10):
-        within = (np.abs(ratio - 1) <= percent / 100).sum(axis=0)
-        out[f"within_{percent}"] = int(within.max())
-        out[f"halves_{percent}"] = "{:g} {:g}".format(*HALVES[within.argmax()])
-    for name, group in GROUPS.items():
-        worst = np.abs(np.log(ratio[list(group)])).max(axis=0)
-        out[f"printed_{name}"] = 100 * (np.exp(worst.min()) - 1)
-        out[f"halves_{name}"] = "{:g} {:g}".format(*HALVES[worst.argmin()])
-    for i, vault in enumerate(tests):
-        out[f"printed_test_{vault.test}"] = ratio[i, 0]
-    free = np.log(
-        against_study(tests, parts, law, np.stack([np.ones_like(RATIOS), RATIOS], axis=1))
-    )
-    for name, group in GROUPS.items():
-        best, middle, half = closest(free[list(group)])
-        out[f"free_{name}"] = 100 * (np.exp(half) - 1)
-        out[f"k_t_{name}"] = np.exp(-middle)
-        out[f"k_r_{name}"] = np.exp(-middle) * RATIOS[best]
-    return out
-
-
-def readings() -> pd.DataFrame:
-    """Return a row per reading; ``free_*`` are the least largest deviations in percent."""
-    tests, rows = vaults(), []
-    lines, places = barrel.LINES, barrel.PLACES
-    for line, place, fewer, spread, shear in product(lines, places, (0, 1), (0, 1), SHEAR):
-        parts = [
-            planar_parts(chain(v, line, place, fewer=fewer, strip=spread * v.fill), SHEAR[shear])
-            for v in tests
-        ]
-        reading = {"line": line, "place": place, "fewer": fewer, "shear": shear}
-        reading["load"] = "strip as wide as the fill is high" if spread else "line"
-        rows += [{**reading, "law": law, **_row(tests, parts, law)} for law in POWERS]
-    return pd.DataFrame(rows)
-
-
 LEVEL = 0.95
 ACROSS = {"rigid": 0.0, "as stiff as along": 1.0, "a tenth as stiff": 10.0}  # compliance ratio
 DECISIVE = 5  # the test whose error the paper's column owes most of its mean to
-DRAWS = 2000
-RATIO = np.geomspace(1e-5, 1e4, 4001)  # searched k_r / k_t
-TURN = np.geomspace(2e10, 2e13, 1501)  # k_r, N/m³
 IN_SAMPLE, ANEW = "mean absolute error, all tests fitted", "law chosen anew for each test left out"
 GAIN = "mean gain over the paper, paired"
 GAIN_LOW, GAIN_HIGH = "95 % interval of that, from", "95 % interval of that, to"
@@ -215,26 +126,10 @@ def _paired(gains: Floats) -> list[tuple[str, float, float]]:
     return [(name, value, np.nan) for name, value in named.items()]
 
 
-Route = tuple[Callable[[Floats], Floats], float]
-"""What is summed over the tests, of model over measured (T, R), and up to which multiple of its
-least value k_r is kept."""
-
-
 def threshold(numbers: int, fitted: int, count: int = 8) -> float:
     """Return the border of a region of ``numbers`` of the fitted ones, over the least sum."""
     rest = count - fitted
     return float(1 + numbers * stats.f.ppf(LEVEL, numbers, rest) / rest)
-
-
-def routes(count: int = 8) -> dict[str, Route]:
-    """Return profiles that differ in which error is taken for random, and how it is spread."""
-    squares, sizes = threshold(1, 2, count), float(np.exp(stats.chi2.ppf(LEVEL, 1) / 2 / count))
-    return {
-        "squares of relative errors": (lambda x: ((x - 1) ** 2).sum(axis=0), squares),
-        "sizes of relative errors": (lambda x: np.abs(x - 1).sum(axis=0), sizes),
-        "squares of logarithms": (lambda x: (np.log(x) ** 2).sum(axis=0), squares),
-        "sizes of logarithms": (lambda x: np.abs(np.log(x)).sum(axis=0), sizes),
-    }
 
 
 def interval(values: Floats, sums: Floats, limit: float) -> tuple[float, float]:
@@ -253,32 +148,6 @@ def _crossing(values: Floats, sums: Floats, between: tuple[int, int], border: fl
     a, b = between
     share = (border - sums[a]) / (sums[b] - sums[a])
     return float(values[a] ** (1 - share) * values[b] ** share)
-
-
-def rotational(tests: tuple[Vault, ...]) -> pd.DataFrame:
-    """Return what bounds k_r by several routes: a row each, N/m³."""
-    rows = []
-    for across in ACROSS:
-        share = bed(tests, across).relative(RATIO)
-        for name, (summed, limit) in routes(len(tests)).items():
-            sums = np.array([summed(k / RATIO * share).min() for k in TURN])
-            low, high = interval(TURN, sums, limit)
-            rows.append((f"profile, {name}", across, low, float(TURN[sums.argmin()]), high))
-        for measure in MEASURES:
-            drawn = np.percentile(resampled(share, measure), [2.5, 50, 97.5], method="higher")
-            rows.append((f"tests drawn anew, {measure}", across, *map(float, drawn)))
-    return pd.DataFrame(rows, columns=["route", "across", "k_r_from", "k_r", "k_r_to"])
-
-
-def resampled(share: Floats, measure: str) -> Floats:
-    """Return k_r fitted to tests drawn with replacement, infinite where joints do not turn."""
-    random, coarse, ratio = np.random.default_rng(1), share[:, ::5], RATIO[::5]
-    out = []
-    for _ in range(DRAWS):
-        drawn = random.integers(0, len(coarse), len(coarse))
-        best, scale = barrel.best_of(coarse[drawn], measure)
-        out.append(np.inf if best == len(ratio) - 1 else scale * ratio[best])
-    return np.array(out)
 
 
 LOOKS = {"b t": (ORANGE, "--"), "b t2": (GREEN, ":"), "b t3/12": (BLUE, "-")}
@@ -462,8 +331,7 @@ def experiment(options: Options) -> Finding:
     if options.quick:
         return Finding(good)
     kept = fits.drop(columns="engine_gap")  # rounding, another on every machine
-    tables = {"": table, "_fits": kept, "_comparison": beside, "_readings": readings()}
-    tables |= {"_routes": rotational(models[BED].tests)}
+    tables = {"": table, "_fits": kept, "_comparison": beside}
     return Finding(good, tables={f"calibration{end}": rows for end, rows in tables.items()})
 
 
@@ -492,4 +360,4 @@ def picture() -> Figure:
     return chart(bed_rows, fits, region=region, levels=levels, outs=outs, profiles=curves)
 
 
-CLAIM = Claim(experiment, digits=4, quick="no readings", pictures={"calibration.png": picture})
+CLAIM = Claim(experiment, digits=4, quick="no intervals", pictures={"calibration.png": picture})

@@ -13,17 +13,13 @@ inner nodes that no robot holds (section 3.2.3, table 3). Here
 
 Tension and shear stay within the printed limits (3 MPa, 25 degrees, 2 MPa), hence nothing breaks or
 slips. A scan over pads of 4, 5, ... 50 mm finds the readings whose worst arch is least off. The
-claim fails if any reading is within 10 points on all four arches, or if a limit is exceeded. LMGC90
-is an outside witness for pads of 20 mm (`experiments.discrete.parts.arches_lmgc90`); where it is
-not installed, its stored rows are shown.
+claim fails if any reading is within 10 points on all four arches, or if a limit is exceeded.
 
-Inputs: the shipped scene; LMGC90 (compas_lmgc90) in this or another Python. Command: ``python -m
-experiments discrete_arches [--quick] [--lmgc90 PYTHON]``.
+Inputs: the shipped scene. Command: ``python -m experiments discrete_arches [--quick]``.
 """
 
 from __future__ import annotations
 
-import sys
 from itertools import product
 
 import numpy as np
@@ -33,10 +29,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from experiments.discrete.parts.arch_pads import JOINTS, Across, Pinch, Reading, readings
-from experiments.discrete.parts.arches_lmgc90 import PAD, READINGS, witness
 from experiments.harness.charts import subplots
-from experiments.harness.claim import Claim, Finding, Option, Options
-from experiments.harness.lmgc90 import python_with_lmgc90
+from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import stored
 from experiments.harness.scenes import arch25
 from experiments.harness.yardstick import STEPS, error, moved
@@ -46,10 +40,10 @@ from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.report._style import BLUE, GREEN, ORANGE, SMALL, VERMILION, dress, name_panels, styled
+from seqopt.report._style import BLUE, ORANGE, SMALL, VERMILION, dress, name_panels, styled
 from seqopt.study.published import STUDY_PADS, printed
 
-PANELS = {"as printed": "even", "springs at corners": "corners"}  # joints, and as LMGC90 has them
+PANELS = ("as printed", "springs at corners")  # joints
 COLORS = {"node": (BLUE, "o"), "pads, width": (VERMILION, "^"), "pads, thickness": (ORANGE, "v")}
 DASHES = (":", "-", "--")  # of the sizes of pads, in ascending order
 NAMES = {
@@ -57,25 +51,18 @@ NAMES = {
     "pads, width": "pads across the width",
     "pads, thickness": "pads across the thickness",
 }
-LMGC90 = GREEN
+NEAR = 10.0  # points of percent within which an error counts as reproduced
 TICKS = (-90, -80, -50, 0, 100, 200, 500)  # %
 
 
 @styled
-def chart(
-    errors: pd.DataFrame,
-    best: pd.DataFrame,
-    study: pd.Series[float],
-    seen: pd.DataFrame,
-    near: float,
-) -> Figure:
+def chart(errors: pd.DataFrame, best: pd.DataFrame, study: pd.Series[float]) -> Figure:
     figure, panels = subplots(5.6, 1, 3)
     first, second, third = panels
     for axes, joint in zip((first, second), PANELS, strict=True):
         draw_readings(
             axes, errors[errors.index.get_level_values("joint") == joint].droplevel("joint")
         )
-        draw_witness(axes, seen[seen["spread"] == PANELS[joint]], list(study.index))
         axes.plot(study.to_numpy(), "ks", ms=6, label="printed (3DEC)", zorder=5)
         axes.set_title(f"joints {joint}" if joint == "as printed" else f"joints as {joint}")
         # the ratio of displacements is drawn evenly
@@ -84,7 +71,7 @@ def chart(
         axes.set(ylim=(-95, 650), yticks=TICKS)
     with_best_pads(third, best)
     look = {"fmt": "ks", "ms": 6, "capsize": 4, "zorder": 5}
-    third.errorbar(range(len(study)), study, near, label=f"printed, ± {near:g} points", **look)
+    third.errorbar(range(len(study)), study, NEAR, label=f"printed, ± {NEAR:g} points", **look)
     third.set(ylim=(-30, 40))
     for axes in panels:
         tidy(axes, list(study.index))
@@ -95,7 +82,7 @@ def chart(
     figure.legend(*first.get_legend_handles_labels(), alignment="left", **look)
     look = {"loc": "outside lower right", "title": "(c)", "alignment": "left"}
     figure.legend(*third.get_legend_handles_labels(), **look)
-    figure.suptitle(words(best, study, seen), fontsize=SMALL, x=0.01, ha="left")
+    figure.suptitle(words(best, study), fontsize=SMALL, x=0.01, ha="left")
     return figure
 
 
@@ -107,14 +94,6 @@ def draw_readings(axes: Axes, errors: pd.DataFrame) -> None:
         color, marker = COLORS[grip]
         row = errors.loc[(grip, side)].to_numpy()
         axes.plot(row, color=color, marker=marker, mfc="white", ls=dashes, lw=1.3, label=name)
-
-
-def draw_witness(axes: Axes, seen: pd.DataFrame, bricks: list[int]) -> None:
-    if seen.empty:
-        return
-    at = [bricks.index(count) for count in seen["bricks"]]
-    label = f"LMGC90, pads of {seen['side_mm'].iloc[0]:g} mm"
-    axes.plot(at, seen["lmgc90_error_pct"], "x", color=LMGC90, ms=8, mew=2, label=label, zorder=6)
 
 
 def with_best_pads(axes: Axes, best: pd.DataFrame) -> None:
@@ -140,23 +119,15 @@ def tidy(axes: Axes, bricks: list[int]) -> None:
     axes.axhline(0, color="0.5", lw=0.8, zorder=0)
 
 
-def words(best: pd.DataFrame, study: pd.Series[float], seen: pd.DataFrame) -> str:
-    off = (best - study).abs().max(axis=1).min()
-    text = (
+def words(best: pd.DataFrame, study: pd.Series[float]) -> str:
+    off = farthest(best, study).min()
+    return (
         "Disagrees with print: no reading of the discrete elements gives the printed errors on all "
-        f"four arches;\nthe best is {off:.1f} points off on one. "
-    )
-    if seen.empty:
-        return text + "There is no answer from LMGC90 yet."
-    same, engine = (seen[f"{name}_off_pct"].abs().max() for name in ("same_pads", "engine"))
-    return text + (
-        f"LMGC90 agrees: its displacements are within {same:.2g} % of the same\nsprings', and "
-        f"within {engine:.1f} % of our engine's, as its pads across the width must lean."
+        f"four arches;\nthe best is {off:.1f} points off on one."
     )
 
 
 SIDES = 1e-3 * np.arange(4.0, 51.0)  # m, of the scan
-NEAR = 10.0  # points of percent within which an error counts as reproduced
 KEYS = ["grip", "side_mm", "joint"]
 
 
@@ -225,26 +196,6 @@ def arches(engine: ComplianceEngine, *, quick: bool) -> list[Step]:
     return steps[::2] if quick else steps
 
 
-def witness_rows(
-    engine: ComplianceEngine, steps: list[Step], python: str | None
-) -> tuple[pd.DataFrame, str]:
-    """Return what LMGC90 says, now or when it was last asked, and which of the two it is."""
-    tables = [witness(engine, step, python) for step in steps] if python else []
-    if rows := [table for table in tables if table is not None]:
-        return pd.concat(rows, ignore_index=True), "asked now"
-    return stored("arches_lmgc90"), "stored rows: LMGC90 was not asked or is not installed"
-
-
-def missing(table: pd.DataFrame, steps: list[Step]) -> list[str]:
-    """Name the cases on which there is no word from LMGC90."""
-    there = set(table[["bricks", "pads", "spread"]].itertuples(index=False, name=None))
-    return [
-        f"{step.bricks} bricks, pads {across.name.lower()}, {spread}"
-        for step, (across, spread) in product(steps, READINGS)
-        if (step.bricks, across.name.lower(), spread) not in there
-    ]
-
-
 def report(errors: pd.DataFrame, study: pd.Series[float]) -> None:
     shown = errors.assign(farthest=farthest(errors, study))
     print("mean error of the double-cross model [%], and points off at worst:")
@@ -259,17 +210,6 @@ def within_limits(table: pd.DataFrame) -> bool:
     elastic = bool(tension < EPOXY.tensile_strength / 1e6 and shear.between(0, 1).all())
     print(f"all within the elastic limits: {'yes' if elastic else 'NO'}")
     return elastic
-
-
-def report_witness(table: pd.DataFrame, source: str, steps: list[Step]) -> None:
-    columns = [name for name in table if str(name).endswith("_pct")]
-    print(f"LMGC90, pads of {1e3 * PAD:g} mm ({source}):")
-    print(table[["bricks", "pads", "spread", *columns]].to_string(index=False))
-    for case in missing(table, steps):
-        print(f"left out, as LMGC90 has no answer: {case}")
-    for name in ("same_pads_off_pct", "same_pads_farthest_pct", "engine_off_pct"):
-        if name in table:
-            print(f"largest {name}: {table[name].abs().max():.2g}")
 
 
 def holds(table: pd.DataFrame, study: pd.Series[float]) -> bool:
@@ -300,12 +240,7 @@ def experiment(options: Options) -> Finding:
     print("the best pads of 4 to 50 mm, for every grip and joint:")
     report(best, study)
     print(largest_fall(scanned, study))
-    tables = {"discrete_arches": table}
-    if not options.quick:
-        seen, source = witness_rows(engine, steps, python_with_lmgc90(options.lmgc90))
-        report_witness(seen, source, steps)
-        tables["arches_lmgc90"] = seen
-    return Finding(holds(table, study), tables=tables)
+    return Finding(holds(table, study), tables={"discrete_arches": table})
 
 
 def picture() -> Figure:
@@ -315,13 +250,7 @@ def picture() -> Figure:
         for _, rows in stored("discrete_arches").groupby("pads", sort=False)
     )
     nearest = farthest(best, study).sort_values().index
-    return chart(errors, best.loc[nearest], study, stored("arches_lmgc90"), NEAR)
+    return chart(errors, best.loc[nearest], study)
 
 
-CLAIM = Claim(
-    experiment,
-    digits={"discrete_arches": 4, "arches_lmgc90": 6},
-    quick="two arches",
-    options=(Option("--lmgc90", "a Python with compas_lmgc90", sys.executable),),
-    pictures={"discrete_arches.png": picture},
-)
+CLAIM = Claim(experiment, digits=4, quick="two arches", pictures={"discrete_arches.png": picture})

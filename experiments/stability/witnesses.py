@@ -43,11 +43,10 @@ import numpy as np
 import pandas as pd
 
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
-from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.stability.parts import witness_cra
 from experiments.stability.parts.blocks import ring, stack
 from experiments.stability.parts.witness_cra import SAMPLES, force_only, sample_scene
-from experiments.stability.parts.witness_lmgc90 import moved_by
+from experiments.stability.parts.witness_lmgc90 import moved_by, python_with_lmgc90
 from experiments.stability.parts.witness_scenes import Scene, arch, incline, scene_of
 from seqopt.contact.mortar import Mortar
 from seqopt.stability._prover import Prover

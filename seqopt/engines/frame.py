@@ -29,6 +29,7 @@ CONTRAST = 1e7  # bar over joint stiffness: softer bars bend, stiffer ones lose 
 _FEWEST, _MOST = 3, 12  # corrections; how fast they shrink, each processor decides in its own way
 _LAST_FRAME_CORRECTION = 1e-6  # the largest of an accepted solution, relative to it
 _SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
+_KEPT = 0.5  # share of its stiffness that the softest motion keeps in the assembled matrix
 _LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
 
 
@@ -224,8 +225,11 @@ def _solve(
     vector = np.random.default_rng(0).standard_normal(len(load))
     for _ in range(4):  # inverse iteration, for the smallest eigenvalue
         vector = factor.solve(vector / np.linalg.norm(vector))
-    if 1 / np.linalg.norm(vector) < _SUSPICIOUS / contrast:
+    lowest = 1 / np.linalg.norm(vector)
+    if lowest < _SUSPICIOUS / contrast:
         examine()
+    if stiffness @ (maps @ (scale * vector * lowest)) ** 2 < _KEPT * lowest:
+        raise failure  # rounding has stiffened this motion: corrections would stop far too early
     answer = scale * factor.solve(scale * load)
     for count in range(1, _MOST + 1):
         residual = pull - maps.T @ (stiffness * (maps @ answer + strain))

@@ -228,7 +228,9 @@ class Screen:
         known, key = self._proofs.upright, (part, self.mortar)
         if key not in known:
             answers = self._proofs.answers[part] if self._proofs.keeps else None
-            known[key] = _lacking(self._assembly(part), self.mortar, self._compile, answers)
+            assembly = self._assembly(part)
+            case = bonded(assembly, self.mortar)  # of the least bond that is lacking
+            known[key] = HeldStates(assembly, case, self._compile, case.fixed(), answers)
         return known[key]
 
     def _tilted(self, part: Part) -> TiltedStates:
@@ -243,17 +245,6 @@ class Screen:
             bricks, propped = part
             self._assemblies[part] = node_assembly(self.network, bricks, held=propped)
         return self._assemblies[part]
-
-
-def _lacking(
-    assembly: Assembly,
-    mortar: Mortar,
-    compiled: CompileHeld,
-    earlier: list[tuple[Answer, Floats]] | None = None,
-) -> HeldStates:
-    """Return the brackets of the least bond that a structure lacks; it stands at zero."""
-    case = bonded(assembly, mortar)
-    return HeldStates(assembly, case, compiled, case.fixed(), earlier)
 
 
 def _decided(bracket: Floats) -> Bools:

@@ -12,7 +12,6 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import PartialAssemblies, _contact_at
 from seqopt.contact.mortar import Curing, Mortar
 from seqopt.errors import SceneError, StepError
@@ -99,12 +98,11 @@ class CuringBuilds:
         self.network, self.joints = network, JointsInTime(network, curing)
         self._parts = PartialAssemblies(network, len(network.inner))
         self._bond = np.zeros(0)
-        self._chain = VerdictChain(self._bonded, mortar)
+        self._chain = VerdictChain(
+            lambda bricks, grips: self._parts(bricks, grips).with_bond(self._bond), mortar
+        )
         self._found: dict[tuple[int, Grips, bytes], tuple[Verdict, Floats | None]] = {}
         self.asked = 0
-
-    def _bonded(self, bricks: int, grips: Grips) -> Assembly:
-        return self._parts(bricks, grips).with_bond(self._bond)
 
     def verdict(self, bricks: int, grips: Grips, bond: Floats) -> tuple[Verdict, Floats | None]:
         """Return whether a state stands with shares of bond (j,), and in which motion it falls.

@@ -12,17 +12,12 @@ from scipy import stats
 from experiments.calibration.calibration import (
     ANEW,
     GAIN,
-    GROUPS,
     IN_SAMPLE,
-    RATIOS,
-    against_study,
     chosen_anew,
-    closest,
     comparison,
     interval,
     intervals,
     left_out,
-    rotational,
     squares,
     turning_share,
 )
@@ -174,20 +169,6 @@ def test_what_is_left_of_the_lead():
     assert test.pvalue > 0.5
 
 
-@pytest.mark.slow
-def test_only_the_lower_bound_of_the_rotational_stiffness_is_firm():
-    bounds = rotational(VAULTS)
-    low, high = bounds["k_r_from"] / 1e9, bounds["k_r_to"] / 1e9
-    assert (low.between(50, 65)).all()
-    assert high.min() < 140
-    assert high.max() == np.inf
-    logs = bounds[bounds["route"].str.contains("squares of log")].set_index("across")
-    ends = logs.loc["as stiff as along", ["k_r_from", "k_r_to"]].to_numpy(float) / 1e9
-    assert ends == pytest.approx((61, 3740), rel=0.01)
-    kept = stored("routes")["k_r_from"].to_numpy()
-    assert bounds["k_r_from"].to_numpy() == pytest.approx(kept, rel=1e-3)
-
-
 def test_an_interval_ends_where_its_border_is_crossed():
     """Also between the values at which it is known; the one number lies within 67 and 100."""
     values = np.geomspace(0.1, 10, 41)
@@ -229,14 +210,3 @@ def test_interpolated_sums_of_squares_are_those_of_the_model():
     pair = fit(MODELS[BED], "squares", ALL)
     sums = squares(MODELS[BED], np.array([pair[0]]), np.array([pair[1]]))[0]
     assert sums == pytest.approx((errors(MODELS[BED], pair) ** 2).sum(), rel=1e-4)
-
-
-def test_the_studys_column_in_proportion_to_the_area():
-    """Tests 3 to 8 reach the floor of any model linear in width; test 1 is far from them."""
-    floor = np.sqrt((434 / 2.88) / (140 / 1.01)) - 1
-    parts = [planar_parts(chain(vault)) for vault in VAULTS]
-    k = np.stack([np.ones_like(RATIOS), RATIOS], axis=1)
-    free = np.log(against_study(VAULTS, parts, "b t", k))
-    best, middle, half = closest(free[list(GROUPS["3-8"])])
-    assert np.exp(half) - 1 == pytest.approx(floor, rel=1e-6)
-    assert np.exp(free[0, best] - middle) > 4

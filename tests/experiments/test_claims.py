@@ -19,7 +19,7 @@ from tests.builders import ROOT
 from tests.commands import run_experiment
 
 ALWAYS = "criteria_variants"  # one that takes a second runs among the quick tests too
-LONG = ("identify_arch25", "dry_map", "dry_grips", "dry_methods")
+LONG = ("identify_arch25", "dry_map", "dry_methods")
 
 
 def marks(name):

@@ -21,6 +21,7 @@ from experiments.engines import (
     soft_grips,
 )
 from experiments.exchange import four_arms, outside_assemblies
+from experiments.failing import where_methods_fail
 from experiments.harness.claim import claims
 from experiments.harness.results import stored
 from experiments.instances import instance_contest
@@ -35,7 +36,7 @@ from experiments.placement import (
     speed_accuracy,
     staged_construction,
 )
-from experiments.stability import classical, dry_grips, dry_map, dry_methods, witnesses
+from experiments.stability import classical, dry_map, dry_methods, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.counterpart_items import ITEMS
 from experiments.times import makespan
@@ -97,9 +98,6 @@ CHECKS = {
         dry_map.holds,
         ("dry_map",),
         *("least_payload", 2.0, {"bricks": 13, "thickness_m": 0.053, "robots": 3}),
-    ),
-    "dry_grips": Check(
-        dry_grips.holds, ("dry_grips", "dry_grips_build"), *("placed", 25, {"robots": 2}, 1)
     ),
     "dry_methods": Check(
         lambda *tables: all(dry_methods.holds(*tables).values()),
@@ -212,6 +210,21 @@ CHECKS = {
         ("vault_loads",),
         *("bare_thrust", 38.0318, {"test": 3}),
     ),
+    **{
+        f"where_methods_fail {part}": Check(
+            lambda *tables: all(where_methods_fail.holds(*tables).values()),
+            ("where_numbers_fail", "where_steps_fall"),
+            *(column, value, where, spoiled),
+        )
+        for part, column, value, where, spoiled in (
+            ("errors", "off", 1.1, {"method": "frame", "axis": "bricks", "value": "25"}, 0),
+            ("mechanisms", "wrong", 1, {"method": "compliance", "axis": "bricks"}, 0),
+            ("refusals", "unexplained", 1, {"method": "frame", "axis": "bricks"}, 0),
+            ("failures", "failed", 0, {"half": "formulations"}, 0),
+            ("verdicts", "contradicted", 1, {"mortar": "dry", "value": 0.3}, 1),
+            ("open steps", "own_open", 40, {"mortar": "dry"}, 1),
+        )
+    },
     "witnesses": Check(
         lambda table: not witnesses.faults(table, ["rbe", "lmgc90"], sooner(table)),
         (stored("witnesses").fillna(dict.fromkeys(("no_tension", "cra", "lmgc90"), "")),),

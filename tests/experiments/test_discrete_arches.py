@@ -6,15 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.discrete import discrete_arches
 from experiments.discrete.discrete_arches import (
     best_sides,
     largest_fall,
-    missing,
     row_of,
     stresses,
     within_limits,
-    witness_rows,
 )
 from experiments.discrete.parts.arch_pads import (
     CORNERS,
@@ -27,7 +24,6 @@ from experiments.discrete.parts.arch_pads import (
     pads_at_corners,
     readings,
 )
-from experiments.harness.results import RESULTS
 from experiments.harness.yardstick import STEPS, error, moved
 from seqopt.engines.interface import Want
 from seqopt.sequence.methods import sequential
@@ -112,34 +108,6 @@ def test_the_largest_fall_is_between_the_arches_where_print_falls():
     text = largest_fall(table.set_index(["grip", "side_mm", "joint"]), pd.Series({17: 20, 23: -10}))
     assert text.startswith("from 17 to 23 bricks print falls by 30.0 points, of 2 readings none by")
     assert text.endswith("more than 7.0: pads, width, 10 mm, a")
-
-
-def test_stored_rows_are_called_stored_and_missing_ones_are_named(monkeypatch, engine25, step):
-    row = pd.DataFrame([{"bricks": 17, "pads": "width", "spread": "even"}])
-    monkeypatch.setattr(discrete_arches, "stored", lambda _: row)
-    monkeypatch.setattr(discrete_arches, "witness", lambda *_: row)
-    assert witness_rows(engine25, [step], "some python")[1] == "asked now"
-    table, source = witness_rows(engine25, [step], None)
-    assert source.startswith("stored rows")
-    assert missing(table, [step]) == [
-        "17 bricks, pads width, corners",
-        "17 bricks, pads thickness, corners",
-        "17 bricks, pads thickness, even",
-    ]
-    assert len(missing(row[:0], [step])) == 4
-
-
-def test_the_stored_witness_rows_stand_beside_the_engine_as_it_is(engine25, step):
-    """Rows of LMGC90 that were stored with another engine would show here."""
-    rows = pd.read_csv(RESULTS / "arches_lmgc90.csv")
-    for row in rows[rows["bricks"] == 17].itertuples():
-        joint = CORNERS if row.spread == "corners" else "as printed"
-        reading = Reading(
-            joint, Pinch(Across[row.pads.upper()], STUDY_PADS, side=1e-3 * row.side_mm)
-        )
-        assert row_of(engine25, step, reading)["error_pct"] == pytest.approx(
-            row.engine_error_pct, rel=1e-3
-        )
 
 
 def test_the_study_compares_as_many_nodes(engine25):

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from experiments.peers import peers
-from experiments.peers.parts.models import LOOPS, OpenSees, chain_of, kept, loop, open_sees
+from experiments.peers.parts.models import LOOP, Loop, OpenSees, chain_of, kept, open_sees
 from experiments.peers.peers import Case, difference
 from seqopt.engines.interface import Want, grip_columns
 
@@ -27,16 +27,13 @@ def gap(engine, solve):
     return difference(engine, answers)
 
 
-@pytest.mark.parametrize("name", LOOPS)
-def test_loops_agree_with_the_engine(engine25, name):
-    limit = peers.LIKE_RIGID if "bricks" in name else peers.LIKE_BARS
-    assert gap(engine25, lambda bricks: loop(engine25.network, bricks, name)) <= limit
-
-
-@pytest.mark.parametrize("name", LOOPS)
-def test_a_loop_with_a_wrong_stiffness_does_not(engine25, name):
+def test_the_loop_agrees_with_the_engine_and_with_a_wrong_stiffness_does_not(engine25):
     """The joints a hundredth stiffer; forces hardly notice, displacements must."""
-    wrong = gap(engine25, lambda bricks: loop(engine25.network, bricks, name, factor=1.01))
+    right, wrong = (
+        gap(engine25, lambda bricks, f=factor: Loop(kept(engine25.network, bricks, f)))
+        for factor in (1.0, 1.01)
+    )
+    assert right <= peers.ALIKE
     assert wrong == pytest.approx(0.01, rel=0.05)
 
 
@@ -46,20 +43,18 @@ def test_opensees_agrees_with_the_engine(engine25):
     except (ImportError, OSError, RuntimeError):
         pytest.skip("openseespy is not installed")
     made = gap(engine25, lambda bricks: OpenSees(chain_of(engine25.network, bricks)))
-    assert made <= peers.LIKE_BARS
+    assert made <= peers.ALIKE
 
 
 def test_what_is_not_asked_is_empty(engine25):
     columns = grip_columns(engine25.network, 9, np.array([[1, 17]]))[0]
-    answer = loop(engine25.network, 9, "SciPy bricks, banded").solve(columns, Want.SUPPORT)
+    answer = Loop(kept(engine25.network, 9)).solve(columns, Want.SUPPORT)
     assert not answer.edge_force.size
     assert not answer.displacement.size
     assert answer.grip_force.shape == (2, 3)
 
 
 def test_joints_that_differ_are_refused(engine25):
-    parts = kept(engine25.network, 3, rigid=True)
-    assert len(parts.matrix) == 18
     springs = engine25.network.springs
     stiffness = springs.translational_stiffness.copy()
     stiffness[1] *= 2
@@ -90,7 +85,7 @@ def test_without_the_package_its_stored_rows_stay(monkeypatch, capsys):
     monkeypatch.setattr(peers, "open_sees", lacking)
     monkeypatch.setattr(peers, "compete", lambda *_: rows)
     names = ["round", "setting", "tool", "setup_s", "models_s", "difference"]
-    times = {peers.OURS: 1.0, **dict.fromkeys(LOOPS, 30.0)}
+    times = {peers.OURS: 1.0, LOOP: 30.0}
     rows = pd.DataFrame(
         [(0, s, tool, 0.0, t, 0.0) for s in peers.TITLES for tool, t in times.items()],
         columns=names,

@@ -14,10 +14,8 @@ from experiments.harness.claim import claims
 from experiments.harness.results import FIGURES
 from seqopt.report._style import DPI, WIDTH, dress, looks, new_figure, styled
 from tests.pictures import flaws, texts
-from tests.quality.engine_limits import picture as limits_picture
 
 DRAWN = {name: draw for claim in claims().values() for name, draw in claim.pictures.items()}
-DRAWN["engine_limits.png"] = limits_picture
 LONG = {"calibration.png", "outside_assemblies.png", "dry_map.png", "decision_sensitivity.png"}
 DAILY = ("soft_grips.png", "four_arms.png")
 ELSEWHERE = {"report.png", "half_built.png"}  # of a browser

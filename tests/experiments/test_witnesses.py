@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.stability import witnesses
 from experiments.stability.parts.blocks import ring
 from experiments.stability.parts.witness_cra import (
@@ -18,7 +17,13 @@ from experiments.stability.parts.witness_cra import (
     sample_scene,
     without_tension,
 )
-from experiments.stability.parts.witness_lmgc90 import GRAVITY, STEP, STEPS, verdict
+from experiments.stability.parts.witness_lmgc90 import (
+    GRAVITY,
+    STEP,
+    STEPS,
+    python_with_lmgc90,
+    verdict,
+)
 from experiments.stability.parts.witness_scenes import incline, scene_of
 from experiments.stability.witnesses import (
     Trial,

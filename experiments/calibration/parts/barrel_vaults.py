@@ -70,55 +70,17 @@ class Chain(NamedTuple):
     loads: Floats
 
 
-def _arc(vault: Vault, outward: float, bricks: int) -> tuple[Floats, Floats]:
-    """Return joints on an arc through springings and crown, shifted outward from it."""
-    half = 2 * np.arctan(2 * vault.rise / vault.span)
-    radius = vault.span / 2 / np.sin(half) + outward
-    turn = np.linspace(-half, half, bricks + 1)
-    return radius * np.stack([np.sin(turn), np.cos(turn)], axis=1), -turn
+def chain(vault: Vault) -> Chain:
+    """Return the joints, at half the thickness, and the load of a vault.
 
-
-def _parabola(vault: Vault, bricks: int) -> tuple[Floats, Floats]:
-    """Return joints at equal distances along a parabola through springings and crown."""
-    x = np.linspace(-vault.span / 2, vault.span / 2, 4001)
-    y = vault.rise * (1 - (2 * x / vault.span) ** 2)
-    way = np.append(0.0, np.cumsum(np.hypot(np.diff(x), np.diff(y))))
-    at = np.interp(np.linspace(0, way[-1], bricks + 1), way, x)
-    points = np.stack([at, vault.rise * (1 - (2 * at / vault.span) ** 2)], axis=1)
-    return points, np.arctan(-8 * vault.rise * at / vault.span**2)
-
-
-LINES: dict[str, Callable[[Vault, int], tuple[Floats, Floats]]] = {
-    "intrados": lambda vault, bricks: _arc(vault, vault.thickness / 2, bricks),
-    "center line": lambda vault, bricks: _arc(vault, 0.0, bricks),
-    "extrados": lambda vault, bricks: _arc(vault, -vault.thickness / 2, bricks),
-    "parabola": _parabola,
-}  # what the printed span and rise measure; joints lie at half the thickness
-PLACES: dict[str, Callable[[Vault, Floats], float]] = {
-    "x from springing": lambda vault, _points: vault.load_at - vault.span / 2,
-    "x from first joint": lambda vault, points: float(points[0, 0]) + vault.load_at,
-    "x from crown": lambda vault, points: min(vault.load_at, 0.999 * float(points[-1, 0])),
-    "quarter of span": lambda vault, _points: -vault.span / 4,
-    "crown": lambda _vault, _points: 0.0,
-}
-
-
-def chain(
-    vault: Vault,
-    line: str = "intrados",
-    place: str = "x from springing",
-    *,
-    fewer: int = 0,
-    strip: float = 0.0,
-) -> Chain:
-    """Return the joints and the load of a vault in one reading of its printed numbers.
-
-    ``line`` is of `LINES`, ``place`` of `PLACES`; the chain is shorter than printed by ``fewer``
-    bricks; the load is spread over a ``strip``, m, zero is a line.
+    The printed span and rise are of the intrados, an arc; the load stands off the springing.
     """
-    points, slope = LINES[line](vault, vault.bricks - fewer)
-    at = PLACES[place](vault, points) + strip * np.linspace(-0.5, 0.5, 9 if strip else 1)
-    return Chain(points - points[0], slope, at - points[0, 0])
+    half = 2 * np.arctan(2 * vault.rise / vault.span)
+    radius = vault.span / 2 / np.sin(half) + vault.thickness / 2
+    turn = np.linspace(-half, half, vault.bricks + 1)
+    points = radius * np.stack([np.sin(turn), np.cos(turn)], axis=1)
+    at = np.array([vault.load_at - vault.span / 2])
+    return Chain(points - points[0], -turn, at - points[0, 0])
 
 
 def scene(vault: Vault, translational: float, rotational: float) -> Scene:

@@ -2,11 +2,7 @@
 
 A face is springs at its corners, each with an equal share of its area. It is three times too stiff
 against bending, as the corners of a rectangle are √3 times as far out as points that stand for an
-even bed. With the spread "even" the faces are therefore drawn in by √3 and _stiffened threefold.
-
-`AtCorners` is the discrete-element engine with such faces. For LMGC90, `padded` makes the pads of a
-`Pinch` contacts with the ground; `bed_at_corners` then says where exactly these springs let the
-blocks rest.
+even bed. `AtCorners` is the discrete-element engine with such faces.
 """
 
 from __future__ import annotations
@@ -17,20 +13,19 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import linalg, sparse
+from scipy import sparse
 
-from seqopt import Step
 from seqopt.arrays import Floats, Ints
 from seqopt.contact._elastic_limits import opening_maps
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import bare_assembly, step_assembly
+from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import EPOXY, BedStiffness, Mortar
 from seqopt.engines._grip_compliance import GripCompliance
 from seqopt.engines.discrete._system import Held, System, build_system
 from seqopt.engines.discrete.engine import DiscreteEngine, _Spring
 from seqopt.engines.interface import Fields, Want
 from seqopt.network._mechanics import point_motion
-from seqopt.network.network import GROUND, Network
+from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.study.published import STUDY_BED, STUDY_PADS
 
@@ -101,11 +96,6 @@ def pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> F
     return total
 
 
-STIFFER = 10  # contacts per pad: its joint over those between bricks, as in section 3.2.3
-CLEAR = 1e-3  # m, between a pad's plane and the joints' corners: on one plane, facets would merge
-SPREADS = ("corners", "even")
-
-
 class AtCorners(PaddedEngine):
     """Discrete elements on the paper's bed, all of it at the corners of the faces."""
 
@@ -139,85 +129,6 @@ def pads_at_corners(pinch: Pinch) -> Pinch:
 def shares(assembly: Assembly) -> Floats:
     """Return every corner's share of its face, (K,), m²."""
     return np.asarray((assembly.area / np.bincount(assembly.contact))[assembly.contact])
-
-
-def padded(
-    network: Network, step: Step, pinch: Pinch, spread: str = "even", *, flush: bool = False
-) -> Assembly:
-    """Return a step held by two pads; a pad is `STIFFER` contacts with the ground in one place.
-
-    LMGC90's blocks are convex hulls of their contacts, and the joint's corners reach beyond the
-    plane of a pad by half the mortar. A pad therefore leans, by a few degrees about its middle,
-    until it is a facet with the joint spread as asked; ``flush`` leaves it on the brick's surface.
-    """
-    assembly = step_assembly(network, step.bricks, step.grips)
-    brick = network.scene.brick_of_node[step.held[0]]
-    block, node = int(assembly.grip_block[0]), assembly.grip_position[0]
-    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-    axes = np.stack([length, width, np.cross(length, width)])
-    touching = (assembly.bodies == block).any(axis=1)[assembly.contact]
-    corner = posed(assembly, spread)[0].corner[touching]
-    faces, inward = [], []
-    for sign in np.repeat([-1.0, 1.0], STIFFER):
-        out = sign * axes[pinch.across]
-        middle = node + 0.5 * brick.dimensions[pinch.across] * out
-        away = corner - middle
-        lean = 0.0 if flush else np.arctan2(away @ out + CLEAR, -away @ length).max()
-        along = np.cos(lean) * length - np.sin(lean) * out if lean > 0 else length
-        other = axes[3 - pinch.across]
-        square = [a * along + b * other for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        faces.append(middle + 0.5 * pinch.side * np.array(square))
-        normal = np.cross(along, other)
-        inward.append(normal if normal @ out < 0 else -normal)
-    count = len(faces)
-    return replace(  # the block is on further faces of the ground and no longer gripped
-        assembly,
-        contact_name=assembly.contact_name + ("pad",) * count,
-        bodies=np.vstack([assembly.bodies, np.tile([GROUND, block], (count, 1))]),
-        normal=np.vstack([assembly.normal, *inward]),
-        corner=np.vstack([assembly.corner, *faces]),
-        contact=np.append(assembly.contact, len(assembly.bodies) + np.repeat(np.arange(count), 4)),
-        grip_block=np.empty(0, dtype=np.int64),
-        grip_position=np.empty((0, 3)),
-        payload=np.empty(0),
-    )
-
-
-def drawn_in(assembly: Assembly) -> Assembly:
-    """Return the assembly with every face drawn in about its middle by √3."""
-    count = np.bincount(assembly.contact)
-    middle = np.stack(
-        [np.bincount(assembly.contact, weights=x) / count for x in assembly.corner.T], axis=1
-    )[assembly.contact]
-    return replace(assembly, corner=middle + (assembly.corner - middle) / np.sqrt(3))
-
-
-def posed(assembly: Assembly, spread: str) -> tuple[Assembly, BedStiffness]:
-    """Return an assembly with its faces spread as asked, and the stiffness they need."""
-    if spread == "corners":
-        return assembly, STUDY_BED
-    return drawn_in(assembly), BedStiffness(3 * STUDY_BED.normal, 3 * STUDY_BED.tangential)
-
-
-def bed_at_corners(assembly: Assembly, bed: BedStiffness) -> tuple[Floats, Floats]:
-    """Return twists (B, 6) of the blocks and forces (K, 3) on second bodies at the corners.
-
-    Forces are normal and tangential, N.
-    """
-    moduli = np.array([bed.normal, bed.tangential, bed.tangential])
-    stiffness = (shares(assembly)[:, None] * moduli).ravel()
-    own = assembly.contact_map
-    load = assembly.load() * assembly.scales[0]
-    motion = linalg.solve((own.multiply(stiffness) @ own.T).toarray(), load, assume_a="pos")
-    twist = motion.reshape(-1, 6) / np.repeat([1.0, assembly.scales[1]], 3)
-    return twist, -(stiffness * (own.T @ motion)).reshape(-1, 3)
-
-
-def ground_forces(assembly: Assembly, corner_force: Floats) -> Floats:
-    """Return the forces (F, 3) of the ground on the blocks, a row per contact with it, N."""
-    force = np.einsum("ki,kij->kj", corner_force, assembly.axes[assembly.contact])
-    total = np.stack([np.bincount(assembly.contact, weights=x) for x in force.T], axis=1)
-    return np.asarray(total[assembly.bodies[:, 0] == GROUND])
 
 
 PADS = (0.012, 0.02, 0.03)  # m

@@ -13,7 +13,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
+import subprocess
 import sys
+import tempfile
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -28,14 +31,34 @@ FAR, VISIBLE, NEAR = 0.1, 1e-3, 0.02  # of the smallest block's diagonal
 SLOW = 0.05  # of the speed of a fall through that diagonal
 
 
+def python_with_lmgc90(python: str) -> str | None:
+    """Return the full path of a Python if it has LMGC90."""
+    found = shutil.which(python)
+    look = "import sys, importlib.util as u; sys.exit(u.find_spec('compas_lmgc90') is None)"
+    if found is None or subprocess.run([found, "-c", look], check=False).returncode:
+        return None
+    return str(Path(found).absolute())
+
+
+def asked(python: str, program: str, scene: dict[str, Any], limit: float) -> dict[str, Any] | None:
+    """Return what a program says of a scene, in another Python; None if it breaks off."""
+    with tempfile.TemporaryDirectory() as folder:
+        shown, said = Path(folder) / "scene.json", Path(folder) / "result.json"
+        shown.write_text(json.dumps(scene), encoding="utf-8")
+        command = [python, program, str(shown), str(said)]
+        try:
+            subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=limit)
+        except subprocess.TimeoutExpired:
+            return None
+        return dict(json.loads(said.read_text("utf-8"))) if said.exists() else None
+
+
 def moved_by(python: str, scene: Any, friction: float) -> str:
     """Return the verdict of LMGC90, in another Python; undecided if it breaks off."""
     blocks = [
         {"vertices": x.vertex.tolist(), "faces": x.faces, "support": i in scene.supports}
         for i, x in enumerate(scene.solids)
     ]
-    from experiments.harness.lmgc90 import asked  # noqa: PLC0415  # not in that Python
-
     result = asked(python, __file__, {"blocks": blocks, "friction": friction}, LIMIT)
     return "undecided" if result is None else str(result["verdict"])
 

@@ -1,21 +1,41 @@
-"""Degenerate placement problems: ties, limits and budgets that bind, bad scales, bad input."""
+"""Formulations against enumeration, where costs tie, are badly scaled, infeasible or malformed.
+
+Every registered formulation solves small problems of random whole costs, whose exact answer
+enumeration finds. What comes back is
+
+- answered: certified, and off the optimum by no more than the gap that its certificate states;
+- infeasible: no choice is allowed, or none keeps the budgets;
+- refused: the input is malformed, or the formulation does not take budgets;
+- failed: the solver ended without an answer, or the certificate found its answer wrong. The linear
+  program ends so where its flow mixes choices under a budget; its bound stands;
+- wrong: anything else, as "infeasible" or a refusal without ground, a bound above the optimum or no
+  optimum where one is promised.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from dataclasses import fields as dataclass_fields
+from functools import partial
 from itertools import pairwise, product
+from typing import NamedTuple
+from unittest.mock import patch
 
+import cvxpy as cp
 import numpy as np
 from numpy.typing import ArrayLike
 
 from experiments.harness.scenes import half_circle
+from formulations import solvers
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.decisions import pose_decisions
+from seqopt.graph.formulation import Formulation, FormulationKind, formulations
 from seqopt.network.network import Network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
@@ -23,6 +43,7 @@ from seqopt.problem.requirements import Criterion, Limit
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import EQUATIONS, RESOLUTION
 from tests.layered import Costs, of_layers
+from tests.layered import answer as claimed_answer
 
 COARSE = replace(
     EQUATIONS, name="coarse", resolution=tuple((name, 100 * size) for name, size in RESOLUTION)
@@ -208,17 +229,142 @@ CASES: dict[str, Case] = {
     "one cost infinite": lambda size, rng: altered(size, rng, np.inf),
     "one cost NaN": lambda size, rng: altered(size, rng, np.nan),
     "one cost -inf": lambda size, rng: altered(size, rng, -np.inf),
-    "costs 1e-9": lambda size, rng: whole(size.sizes, rng, 1e-9),
-    "costs 1e9": lambda size, rng: whole(size.sizes, rng, 1e9),
     "costs 1e-9 and 1e9": mixed,
     "costs 1e308": lambda size, rng: whole(size.sizes, rng, 1e307, 9),
     "budget binds exactly": lambda size, rng: capped(size, rng, 0.1, 1.0),
     "budget binds": lambda size, rng: capped(size, rng, 1.0, 0.6),
-    "budget binds, amounts 1e-9": lambda size, rng: capped(size, rng, 1e-9, 0.6),
-    "budget binds, amounts 1e9": lambda size, rng: capped(size, rng, 1e9, 0.6),
     "budget leaves one choice": lambda size, rng: capped(size, rng, 1.0, 0.0),
     "budget cannot be met": lambda size, rng: capped(size, rng, 1.0, -1.0),
     "budgets met by mixtures only": lambda size, rng: opposed(size, rng, 1.0),
     "budgets not met by mixtures": lambda size, rng: opposed(size, rng, 0.9),
     "budget amount NaN": lambda size, rng: capped(size, rng, np.nan, 1.0),
 }
+MALFORMED = {"one cost NaN", "one cost -inf", "costs 1e308", "budget amount NaN"}
+FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)
+CLOSE = 1e-6  # relative: values this close are equal
+SCALES = tuple(10.0**power for power in range(-12, 13, 3))
+MOVES = (2, 3, 4, 5, 6)
+RAISED = "raised"
+ENDS = {
+    "infeasible": cp.INFEASIBLE,
+    "nearly optimal": cp.OPTIMAL_INACCURATE,
+    "nearly infeasible": cp.INFEASIBLE_INACCURATE,
+    "limit reached": cp.USER_LIMIT,
+    "nothing": "None",
+    "out of memory": RAISED,
+}  # as a solver may end on a problem that has an optimum
+UNANSWERED = ("infeasible", "refused", "failed")
+
+
+class Cell(NamedTuple):
+    """A value of an axis, and the problem that it stands for."""
+
+    axis: str
+    value: str
+    case: Case
+    size: Size
+    said: str | None = None  # what solvers end with, whatever they are asked
+
+
+def cells(*, quick: bool) -> Iterator[Cell]:
+    """Yield all cells, or few and small ones."""
+    size = SMALL if quick else FULL
+    for scale in SCALES[:: 4 if quick else 1]:
+        scaled, used = partial(_scaled, scale=scale), partial(capped, amount=scale, share=0.6)
+        yield Cell("scale of costs", f"{scale:g}", scaled, size)
+        yield Cell("scale of a budget's amounts", f"{scale:g}", used, size)
+    for moves in MOVES[: 2 if quick else None]:
+        yield Cell("moves", f"{moves}", _scaled, Size(moves, size.candidates, 0))
+    for name, case in CASES.items():
+        yield Cell("costs and budgets", name, case, size)
+    for said, status in ENDS.items():
+        yield Cell("a solver says", said, _scaled, size, status)
+
+
+def _scaled(size: Size, rng: Rng, scale: float = 1.0) -> Costs:
+    return whole(size.sizes, rng, scale)
+
+
+def answer(problem: Costs, formulation: Formulation) -> dict[str, object]:
+    """Return what a formulation makes of a problem: value, claimed bound, the gap it states."""
+    row: dict[str, object] = {"bound": np.nan, "message": ""}
+    try:
+        claimed = claimed_answer(problem, formulation, proof=False)
+    except (InfeasibleError, ProblemError, SolverError) as error:
+        names: dict[type, str] = {InfeasibleError: "infeasible", ProblemError: "refused"}
+        return row | {"status": names.get(type(error), "failed"), "message": str(error)}
+    except Exception as error:  # a traceback is what this looks for
+        return row | {"status": "wrong", "message": repr(error)}
+    row |= {"bound": claimed.bound, "choice": claimed.choice}
+    try:
+        certificate = claimed_answer(problem, formulation).certificate
+    except SolverError as error:
+        return row | {"status": "failed", "message": str(error)}
+    value, stated = certificate.objective, certificate.gap  # type: ignore[attr-defined]
+    return row | {"status": "answered", "objective": value, "stated": stated}
+
+
+def judge(problem: Costs, formulation: Formulation) -> dict[str, object]:
+    """Return the answer with its status and its true error, as enumeration has them."""
+    best, winners = enumerated(problem, formulation.aim or Aim.SUM)
+    row = answer(problem, formulation)
+    room = CLOSE * abs(best)
+    if row["status"] == "infeasible" and winners:
+        return row | {"status": "wrong"}
+    if row["status"] == "refused" and not (problem.budgets and not formulation.takes_budgets):
+        return row | {"status": "wrong"}
+    if float(str(row["bound"])) > best + room:
+        return row | {"status": "wrong", "message": "bound above the optimum"}
+    if row["status"] != "answered":
+        return row
+    value, stated = float(str(row["objective"])), float(str(row["stated"]))
+    error = (value - best) / abs(value) if value != best else 0.0  # as a gap is measured
+    relaxed = formulation.kind is FormulationKind.BOUND and problem.budgets
+    exact = formulation.kind is not FormulationKind.HEURISTIC and not relaxed
+    most = CLOSE if exact else stated + CLOSE
+    right = bool(winners) and -CLOSE <= error <= most
+    return row | {
+        "error": max(error, 0.0),
+        "stated": most,
+        "status": "answered" if right else "wrong",
+    }
+
+
+@contextmanager
+def solvers_saying(status: str | None) -> Iterator[None]:
+    """Let every solver end with a status, whatever it is asked."""
+    if status is None:
+        yield
+        return
+
+    def solve(*_: object, **__: object) -> None:
+        if status == RAISED:
+            raise cp.SolverError("out of memory")
+
+    def end(*_: object) -> str:
+        solve()
+        return "kInfeasible" if status == cp.INFEASIBLE else str(status)
+
+    with (
+        patch.object(cp.Problem, "solve", solve),
+        patch.object(cp.Problem, "status", status),
+        patch.object(solvers, "_end", end),
+    ):
+        yield
+
+
+def rows(cell: Cell, seeds: Iterable[int]) -> Iterator[dict[str, object]]:
+    """Yield what every formulation makes of the draws of a cell."""
+    for seed in seeds:
+        found: dict[str, dict[str, object]]
+        try:
+            problem = cell.case(cell.size, np.random.default_rng(seed))
+            with solvers_saying(cell.said):
+                found = {n: judge(problem, f) for n, f in formulations("costs").items()}
+        except ProblemError as error:  # before any formulation
+            status = "refused" if cell.value in MALFORMED else "wrong"
+            found = {n: {"status": status, "message": str(error)} for n in formulations("costs")}
+        for name, row in found.items():
+            own = {"axis": cell.axis, "value": cell.value, "method": name, "case": str(seed)}
+            silent = row["status"] in UNANSWERED and not str(row["message"]).strip()
+            yield own | row | ({"status": "wrong"} if silent else {})

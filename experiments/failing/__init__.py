@@ -1,0 +1,1 @@
+"""Where methods fail: numbers of engines and formulations, and steps of builds."""

@@ -1,0 +1,1 @@
+"""What the heat maps of failures are made of, cell by cell."""

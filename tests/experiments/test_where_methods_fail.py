@@ -1,0 +1,158 @@
+"""Cells of the maps of failures against closed forms, and answers and verdicts gone wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import seqopt
+from experiments.failing import where_methods_fail
+from experiments.failing.parts import engine_cells, heat_maps, step_cells
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import Mortar
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import SolverError
+from tests.builders import six_bricks
+from tests.quality.kernels import NAMES, every, other, running
+
+
+def cell(bend, bricks=25):
+    """Grips beyond a missing joint, off one line by a bend."""
+    pitch = np.full(bricks, 0.3)
+    pitch[17:] += bend
+    shape = seqopt.ArchShape(pitch=pitch, pattern="VLR", closed=False)
+    net = engine_cells.without_joint(seqopt.arch_scene(shape))
+    return engine_cells.Cell("bend", bend, net, [(30, 40, 49)])
+
+
+def statuses(one):
+    return {row["method"]: row for row in engine_cells.rows(one, engine_cells.exact(one))}
+
+
+def test_a_frame_refuses_what_rounding_has_stiffened():
+    """Its corrections end early there, with an error of 100 %."""
+    with pytest.raises(SolverError, match="too ill-conditioned"):
+        FrameEngine(cell(1e-7).network).solve(25, [[30, 40, 49]])
+    found = statuses(cell(1e-1))
+    assert {row["status"] for row in found.values()} == {"answered"}
+    assert found["frame"]["error"] < 1e-6
+
+
+def test_what_only_last_digits_decide_is_refused_or_called_a_mechanism():
+    assert {row["status"] for row in statuses(cell(1e-9)).values()} == {"refused"}
+    assert engine_cells.exact(cell(1e-13))[0].digits > engine_cells.UNDECIDED
+    assert engine_cells.exact(cell(1e-1))[0].digits < 1e-12
+
+
+@pytest.mark.parametrize(("share", "status"), [(1e-12, "answered"), (1e-8, "wrong")])
+def test_an_answer_that_is_off_by_more_than_promised_is_wrong(monkeypatch, share, status):
+    one = next(engine_cells.sizes("VLR", [5]))
+    solve = ComplianceEngine.solve
+
+    def spoiled(self, *words):
+        fields = solve(self, *words)
+        return replace(fields, displacement=(1 + share) * fields.displacement)
+
+    monkeypatch.setattr(ComplianceEngine, "solve", spoiled)
+    assert statuses(one)["compliance"]["status"] == status
+
+
+def test_a_missed_and_a_false_mechanism_are_wrong():
+    one = next(engine_cells.sizes("VLR", [5]))
+    exact = engine_cells.exact(one)
+    missed = [each._replace(answer=None) for each in exact]
+    assert {row["status"] for row in engine_cells.rows(one, missed)} == {"wrong"}
+    apart = cell(1e-1)._replace(grips=[()])
+    (nothing,) = engine_cells.exact(apart)
+    assert nothing.answer is None
+    made = engine_cells.engines(apart.network)["compliance"]
+    assert engine_cells.ending("compliance", made, (), nothing)["status"] == "mechanism"
+    assert engine_cells.ending("compliance", made, (), exact[0])["status"] == "wrong"
+
+
+def test_units_change_nothing_but_units():
+    scene, rescaled = engine_cells.chain(5), engine_cells.in_units(engine_cells.chain(5), 1e3)
+    one, other = (
+        ComplianceEngine(seqopt.build_network(each)).solve(5, [[9]]) for each in (scene, rescaled)
+    )
+    np.testing.assert_allclose(other.displacement, 1e3 * one.displacement, rtol=1e-9, atol=1e-12)
+
+
+def test_a_refusal_without_a_way_out_is_seen():
+    """Another method answers, or a message says that none can."""
+    row = {"half": "engines", "kernel": "one", "axis": "a", "value": "1", "error": np.nan}
+    row |= {"stated": np.nan, "case": "0"}
+    refused = row | {"method": "frame", "status": "refused", "message": "take another engine"}
+    silent = row | {"method": "compliance", "status": "refused", "message": "no"}
+    said = silent | {"message": "too close to a mechanism for double precision"}
+    answered = silent | {"status": "answered", "error": 1e-10, "stated": 1e-9}
+    for beside, count in ((silent, 2), (said, 0), (answered, 0)):
+        table = where_methods_fail.cells(pd.DataFrame([refused, beside]))
+        assert table["unexplained"].sum() == count
+
+
+def block(net, degrees, mortar, **changes):
+    blocks = replace(step_assembly(net, 1, [None, None]), **changes)
+    up = np.array(net.scene.up)
+    return step_cells.own_verdict(blocks, mortar, step_cells.tilted(blocks.weight, up, degrees))
+
+
+def test_own_programs_know_when_a_block_slides_tips_and_is_held():
+    """A block on a slope: friction, then width over height, decide."""
+    scene = seqopt.load_scene("wall:columns=1,courses=1")
+    net = seqopt.build_network(scene.with_robots(*scene.robots[:2]))
+    width, _, height = scene.bricks[0].dimensions
+    rough, steep = Mortar(friction=5.0), np.degrees(np.arctan(min(width, 0.116) / height))
+    assert block(net, 16.0, Mortar(friction=np.tan(np.radians(15.0)))) == "falls"
+    assert block(net, 14.0, Mortar(friction=np.tan(np.radians(15.0)))) == "stands"
+    assert block(net, 1.05 * steep, rough) == "falls"
+    assert block(net, 0.9 * steep, rough) == "stands"
+    weight = np.linalg.norm(net.weight[0])
+    held = {"grip_block": np.zeros(1, int), "grip_position": net.centroid[:1]}
+    none = {"normal": np.array([[0.0, 0.0, -1.0]])}  # the ground can only pull
+    for payload, verdict in ((0.9, "falls"), (1.3, "stands"), (1.05, "open")):
+        grip = held | none | {"payload": np.array([payload * weight])}
+        assert block(net, 0.0, Mortar(friction=0.5), **grip) == verdict
+
+
+def test_own_programs_agree_with_the_verdicts_and_contradict_false_ones(monkeypatch):
+    scene = six_bricks()
+    net = seqopt.build_network(scene)
+    asked = scene, {"cantilever": seqopt.cantilever(net)}, ["dry"], {"friction": [0.4]}
+    (row,) = step_cells.rows(*asked)
+    assert row["steps"] == 11
+    assert 0 < row["fall"] == row["own_fall"]
+    assert row["contradicted"] == row["undecided"] == 0
+    monkeypatch.setattr(step_cells, "find_mortar", lambda _: Mortar(friction=1, cohesion=1e6,
+                        tensile_strength=1e6))  # fmt: skip
+    assert next(step_cells.rows(*asked))["contradicted"] == row["fall"]
+
+
+@pytest.mark.parametrize(
+    ("ends", "place", "sign"),
+    [
+        ({"answered": 3, "error": 1e-13}, 0, ""),
+        ({"answered": 2, "refused": 1, "error": 1e-7}, 2, "r"),
+        ({"refused": 1}, 4, "r"),
+        ({"mechanism": 1}, 5, "m"),
+        ({"answered": 3, "off": 1.1}, 6, ""),
+        ({"answered": 3, "wrong": 1}, 6, ""),
+    ],
+)
+def test_a_cell_shows_the_worst_of_it(ends, place, sign):
+    row = dict.fromkeys(("answered", "refused", "mechanism", "infeasible", "failed", "wrong"), 0)
+    row |= {"error": 0.0, "off": 0.0} | ends
+    assert (heat_maps.color(row), heat_maps.letter(row)) == (place, sign)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not other(), reason="no OpenBLAS, or no other kernel by name")
+def test_every_kernel_of_the_machine_is_known_by_what_runs():
+    found = every()
+    assert {*running().values()} <= {*found}
+    assert other() in found
+    assert {*found.values()} <= {*NAMES}
