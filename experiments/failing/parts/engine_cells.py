@@ -7,7 +7,6 @@ with several grip sets. The worst of them counts.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -19,7 +18,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.engines import frame
 from seqopt.engines.interface import Engine, Want, grip_columns
 from seqopt.engines.rigid import _mixed, _refinement, compliance
-from seqopt.errors import MechanismError, SceneError, SolverError
+from seqopt.errors import MechanismError, SolverError
 from seqopt.network.network import Network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Joint
@@ -32,7 +31,7 @@ SETS = 4  # random ones, where one joint is loose
 LARGEST_FRAME = 100  # bricks; beyond, the frame is not asked
 POWERS = (1, 3, 5, 7, 9, 11, 13, 15)
 SHAPES = ("VLR", "V")  # patterns of bricks; the second one lies in a plane
-ENGINES = ("compliance", "compliance, to compare", "planar", "frame")
+ENGINES = ("compliance", "compliance, to compare", "frame")
 STATED = {"frame": frame._LAST_FRAME_CORRECTION, "compliance, to compare": compliance._SCREEN}
 UNDECIDED = 1e-3  # share of an answer from which on last digits decide whether it is a mechanism
 FIELDS = Want.DISPLACEMENTS | Want.JOINTS | Want.BRICKS
@@ -232,14 +231,13 @@ def stated(name: str, net: Network) -> float:
 
 
 def engines(net: Network) -> dict[str, Engine]:
-    """Return the engines that can model a network, by name; a plane needs one that lies in it."""
+    """Return the engines that are asked of a network, by name."""
     out: dict[str, Engine] = {}
     for name in ENGINES:
         if name == "frame" and len(net.inner) > LARGEST_FRAME:
             continue
         own = name.partition(",")[0]
-        with suppress(SceneError):
-            out[name] = out[own] if own in out else make_engine(own, net)
+        out[name] = out[own] if own in out else make_engine(own, net)
     return out
 
 
@@ -267,8 +265,6 @@ def rows(cell: Cell, wanted: Sequence[Exact]) -> Iterator[dict[str, object]]:
     made = engines(cell.network)
     for case, (grips, one) in enumerate(zip(cell.grips, wanted, strict=True)):
         for name, engine in made.items():
-            if name == "planar" and one.answer is None:
-                continue  # it does not say whether anything holds out of its plane
             row = {"axis": cell.axis, "value": f"{cell.value:g}", "method": name}
             case_name = f"{cell.network.scene.name}, {case}"
             yield row | {"case": case_name} | ending(name, engine, grips, one)
