@@ -63,9 +63,9 @@ def solve_exactly(
         local = _solve(blocks, loads)
         twist = np.array([base @ x for base, x in zip(bases, local, strict=True)])
         wrench = np.full((len(network.springs.since), 6), Decimal(0))
-        for s, stiffness, maps in springs:
+        for s, matrix, maps in springs:
             gap = sum(part @ twist[body] for body, part in maps)
-            wrench[s] = -(stiffness @ gap)
+            wrench[s] = -(matrix @ gap)
         motion = [
             (_point_motion(node - center[b]) @ twist[b])
             for b, pair in enumerate(nodes)

@@ -280,10 +280,7 @@ def reached_alone(site: Site, most: int) -> Reached:
     bricks = obstacles(
         [(convex(c - c.mean(axis=0)), turned(np.eye(3), c.mean(axis=0))) for c in corners], corners
     )
-    inside = np.asarray(overlap(fixed_bodies(model), bricks).any(axis=0))
-    if inside.any():
-        name = site.bricks[int(inside.argmax())].name
-        raise SceneError(f"robot {robot.name}: the base of its arm hits brick {name}; move it")
+    _require_free(site, robot, np.asarray(overlap(fixed_bodies(model), bricks).any(axis=0)))
     places, joints, flanges, why = _solved(site, model)
     tools = np.array([flange.tool for flange in flanges])
     placed, able = _with_ways(model, joints, flanges, tools)
@@ -355,6 +352,13 @@ def _with_ways(
     )
     ways = tuple(model.placed(points[:, k], tools) for k in range(WAY))
     return replace(placed, ways=ways), able
+
+
+def _require_free(site: Site, robot: Robot, inside: Bools) -> None:
+    """Raise a `SceneError` if a base stands in a brick. ``inside`` (B,): in which it does."""
+    if inside.any():
+        name = site.bricks[int(inside.argmax())].name
+        raise SceneError(f"robot {robot.name}: the base of its arm hits brick {name}; move it")
 
 
 def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:

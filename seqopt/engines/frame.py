@@ -29,7 +29,7 @@ CONTRAST = 1e7  # bar over joint stiffness: softer bars bend, stiffer ones lose 
 _FEWEST, _MOST = 3, 12  # corrections; how fast they shrink, each processor decides in its own way
 _LAST_FRAME_CORRECTION = 1e-6  # the largest of an accepted solution, relative to it
 _SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
-_KEPT = 0.5  # share of its stiffness that the softest motion keeps in the assembled matrix
+_KEPT = 0.9  # share of its stiffness that the softest motion keeps in the assembled matrix
 _LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
 
 

@@ -23,7 +23,6 @@ from itertools import pairwise, product
 from typing import NamedTuple
 from unittest.mock import patch
 
-import cvxpy as cp
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -244,14 +243,12 @@ FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)
 CLOSE = 1e-6  # relative: values this close are equal
 SCALES = tuple(10.0**power for power in range(-12, 13, 3))
 MOVES = (2, 3, 4, 5, 6)
-RAISED = "raised"
 ENDS = {
-    "infeasible": cp.INFEASIBLE,
-    "nearly optimal": cp.OPTIMAL_INACCURATE,
-    "nearly infeasible": cp.INFEASIBLE_INACCURATE,
-    "limit reached": cp.USER_LIMIT,
+    "infeasible": "infeasible",
+    "nearly optimal": "optimal_inaccurate",
+    "nearly infeasible": "infeasible_inaccurate",
+    "limit reached": "user_limit",
     "nothing": "None",
-    "out of memory": RAISED,
 }  # as a solver may end on a problem that has an optimum
 UNANSWERED = ("infeasible", "refused", "failed")
 
@@ -337,18 +334,11 @@ def solvers_saying(status: str | None) -> Iterator[None]:
         yield
         return
 
-    def solve(*_: object, **__: object) -> None:
-        if status == RAISED:
-            raise cp.SolverError("out of memory")
-
-    def end(*_: object) -> str:
-        solve()
-        return "kInfeasible" if status == cp.INFEASIBLE else str(status)
-
+    end = "kInfeasible" if status == ENDS["infeasible"] else status
     with (
-        patch.object(cp.Problem, "solve", solve),
-        patch.object(cp.Problem, "status", status),
-        patch.object(solvers, "_end", end),
+        patch("cvxpy.Problem.solve", lambda *_, **__: None),
+        patch("cvxpy.Problem.status", status),
+        patch.object(solvers, "_end", lambda *_: end),
     ):
         yield
 

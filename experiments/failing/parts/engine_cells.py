@@ -31,8 +31,8 @@ SETS = 4  # random ones, where one joint is loose
 LARGEST_FRAME = 100  # bricks; beyond, the frame is not asked
 POWERS = (1, 3, 5, 7, 9, 11, 13, 15)
 SHAPES = ("VLR", "V")  # patterns of bricks; the second one lies in a plane
-ENGINES = ("compliance", "compliance, to compare", "frame")
-STATED = {"frame": frame._LAST_FRAME_CORRECTION, "compliance, to compare": compliance._SCREEN}
+COMPARED = "compliance, to compare"  # six digits, to choose by
+ENGINES = ("compliance", COMPARED, "frame")
 UNDECIDED = 1e-3  # share of an answer from which on last digits decide whether it is a mechanism
 FIELDS = Want.DISPLACEMENTS | Want.JOINTS | Want.BRICKS
 
@@ -221,12 +221,14 @@ def worst(moved: Floats, wrench: Floats, wanted: Reference) -> float:
 def stated(name: str, net: Network) -> float:
     """Return the largest error that an engine says its answers have.
 
-    Where a joint has next to no stiffness beside the others, the last digits decide more.
+    Where a joint has next to no stiffness beside the others, last digits decide more.
     """
-    if name in STATED:
-        return STATED[name]
+    if name == "frame":
+        return frame._LAST_FRAME_CORRECTION
     kinds = net.springs.translational_stiffness, net.springs.rotational_stiffness
     loose = any(each.min() < _refinement._SOFT * each.max() for each in kinds)
+    if name == COMPARED:
+        return compliance._SCREEN * (10 if loose else 1)
     return 0.1 * _mixed._SENSITIVE if loose else compliance.ACCURACY
 
 
@@ -243,7 +245,7 @@ def engines(net: Network) -> dict[str, Engine]:
 
 def ending(name: str, engine: Engine, grips: Grips, wanted: Exact) -> dict[str, object]:
     """Return how an engine ends on a grip set, the true error of an answer, and what it says."""
-    want = FIELDS | Want.SCREEN if name.endswith("to compare") else FIELDS
+    want = FIELDS | Want.SCREEN if name == COMPARED else FIELDS
     net, true = engine.network, wanted.answer
     bricks = len(net.inner)
     try:
