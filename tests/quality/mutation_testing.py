@@ -56,7 +56,7 @@ PROOFS = {
     "seqopt.plan._answers": ("judge/test_certificate", "formulations/test_conformance"),
     "seqopt.judge._bounds": ("judge/test_proofs", "judge/test_budget_proof"),
     "seqopt.judge.certificate": (
-        *("judge/test_certificate", "plan/test_values", "judge/test_proofs"),
+        *("judge/test_certificate", "plan/test_plan", "judge/test_proofs"),
         "agreement/test_pair_search",
     ),
     "seqopt.plan._infeasible": ("judge/test_budget_proof", "plan/test_no_choice"),
@@ -79,7 +79,7 @@ MODULES = {
     "seqopt.engines.rigid._growth": ("engines/test_operator", "engines/test_growth"),
     "seqopt.graph.decision_costs": (
         "graph/test_costs",
-        "plan/test_values",
+        "plan/test_plan",
         "judge/test_certificate",
         "formulations/test_programs",
     ),

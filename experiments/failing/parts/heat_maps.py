@@ -18,9 +18,9 @@ ERRORS = ("error up to 1e-12", "up to 1e-9", "up to 1e-6", "more, and stated")
 SHADES = ("#e8f3fa", "#b5d9ee", "#7dbbe0", "#3f93c9")
 NONE, MECHANISM, OFF = "#d9d9d9", "#f2ddc4", VERMILION  # no answer; called a mechanism; wrong
 ENDS = {
-    NONE: "no answer: refused, infeasible or failed",
+    NONE: "no answer, or not asked",
     MECHANISM: "called a mechanism",
-    OFF: "off",
+    OFF: "off by more than it says",
 }
 LETTERS = {"refused": "r", "failed": "f", "infeasible": "i", "mechanism": "m"}  # the first counts
 NAMES = {
