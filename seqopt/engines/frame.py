@@ -29,7 +29,7 @@ CONTRAST = 1e7  # bar over joint stiffness: softer bars bend, stiffer ones lose 
 _FEWEST, _MOST = 3, 12  # corrections; how fast they shrink, each processor decides in its own way
 _LAST_FRAME_CORRECTION = 1e-6  # the largest of an accepted solution, relative to it
 _SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
-_KEPT = 0.9  # share of its stiffness that the softest motion keeps in the assembled matrix
+_KEPT = 0.5  # share of its stiffness that the softest motion keeps in the assembled matrix
 _LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
 
 
@@ -228,14 +228,15 @@ def _solve(
     lowest = 1 / np.linalg.norm(vector)
     if lowest < _SUSPICIOUS / contrast:
         examine()
-    if stiffness @ (maps @ (scale * vector * lowest)) ** 2 < _KEPT * lowest:
-        raise failure  # rounding has stiffened this motion: corrections would stop far too early
+    kept = stiffness @ (maps @ (scale * vector * lowest)) ** 2 / lowest
+    if kept < _KEPT:
+        raise failure  # rounding has stiffened this motion: corrections would end far too early
     answer = scale * factor.solve(scale * load)
     for count in range(1, _MOST + 1):
         residual = pull - maps.T @ (stiffness * (maps @ answer + strain))
         correction = scale * factor.solve(scale * residual)
         answer += correction
         last, most = (np.abs(part / scale).max() for part in (correction, answer))
-        if count >= _FEWEST and last <= _LAST_FRAME_CORRECTION * most:
+        if count >= _FEWEST and last <= min(kept, 1.0) * _LAST_FRAME_CORRECTION * most:
             return np.asarray(answer)
     raise failure
