@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.rigid._extremes import Edges, Ends, Grown, Kept, Motion, Part
+from seqopt.engines.rigid._extremes import Edges, Ends, Grown, Motion, Part
 
 _SIDE_BY_SIDE = 16  # sets: a number that is known when loops are compiled
 _ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave
@@ -178,21 +178,12 @@ def _add_six(out: Floats, rows: Floats, first: int, much: Floats) -> None:
 
 
 @_compiled()
-def _sum_up(
-    moved: Floats, carried: Floats, grown: Grown, kept: Kept, at: Ints, force: Floats
-) -> None:
+def _sum_rows(moved: Floats, carried: Floats, grown: Grown, at: Ints, force: Floats) -> None:
     """Find the twists and wrenches under the weight and forces at nodes."""
-    pull, shares = np.empty(6), np.zeros(len(kept.twist))
+    pull = np.empty(6)
     moved[:] = grown.twist[0, : len(moved)]
     carried[:] = grown.wrench[0, : len(carried)]
     for i in range(len(at)):
-        known = False
-        for k in range(len(kept.node)):
-            if at[i] == kept.node[k]:
-                shares[3 * k : 3 * k + 3] = force[3 * i : 3 * i + 3]
-                known = True
-        if known:
-            continue
         brick, first = at[i] // 2, 3 * (at[i] % 2)
         for p in range(6):
             pull[p] = 0.0
@@ -200,9 +191,6 @@ def _sum_up(
                 pull[p] += grown.nodes[brick, first + a, p] * force[3 * i + a]
         _add_six(moved, grown.twist, 1 + 6 * brick, pull)
         _add_six(carried, grown.wrench, 1 + 6 * brick, pull)
-    for row in range(0, len(shares), 6):
-        _add_six(moved, kept.twist, row, shares[row : row + 6])
-        _add_six(carried, kept.wrench, row, shares[row : row + 6])
 
 
 @_compiled("nnan", "nsz")
@@ -304,13 +292,8 @@ def _most_moment(carried: Floats, ends: Ends) -> float:
 
 
 @_compiled("nnan", "nsz")
-def reduce_grown(
-    grown: Grown,
-    kept: Kept,
-    maps: tuple[Edges, Motion, Ends],
-    part: Part,
-    columns: Ints,
-    force: Floats,
+def reduce_sets(
+    grown: Grown, maps: tuple[Edges, Motion, Ends], part: Part, columns: Ints, force: Floats
 ) -> Floats:
     """Return squares of extremes of sets, (4, S), and let grips on one brick share, in place.
 
@@ -320,7 +303,7 @@ def reduce_grown(
     found, tension = np.zeros((4, len(columns))), np.empty(part.bricks)
     carried, moved, far = np.empty(part.wrenches), np.empty(6 * part.bricks), 0
     for s in range(len(columns)):
-        _sum_up(moved, carried, grown, kept, columns[s], force[s])
+        _sum_rows(moved, carried, grown, columns[s], force[s])
         if part.nodes:
             found[2, s], far = _farthest(moved, motion, part.nodes, far)
         found[3, s] = _most_moment(carried, ends)

@@ -84,17 +84,6 @@ class Grown(NamedTuple):
     nodes: Floats
 
 
-class Kept(NamedTuple):
-    """What forces at nodes (q,) mean that all grip sets hold: three rows each, and rows of zeros.
-
-    So many that they are a multiple of six: as many as of a brick.
-    """
-
-    node: Ints
-    twist: Floats
-    wrench: Floats
-
-
 class Edges(NamedTuple):
     """What edges carry of the forces of springs.
 
@@ -208,10 +197,10 @@ class GrownExtremes:
     def extremes(self, columns: Ints, force: Floats, want: Want) -> Floats:
         """Return extremes (4, S) as of `Extremes`; two grips on one brick share, in place."""
         part = self._part if want & Want.DISPLACEMENTS else self._part._replace(nodes=0)
-        grown, maps, loops, kept = self._grown, self._maps, _loops(), self._kept(columns)
+        grown, maps, loops = self._grown, self._maps, _loops()
 
         def reduce(own: slice) -> Floats:
-            squares: Floats = loops.reduce_grown(grown, kept, maps, part, columns[own], force[own])
+            squares: Floats = loops.reduce_sets(grown, maps, part, columns[own], force[own])
             return squares
 
         step = max(_SETS, -(-len(columns) // cores()))
@@ -219,16 +208,3 @@ class GrownExtremes:
         found = np.concatenate(in_threads(reduce, parts), axis=1)
         np.sqrt(found[2:], out=found[2:])
         return found
-
-    def _kept(self, columns: Ints) -> Kept:
-        """Return the response maps of forces at the nodes that sets (S, r) hold."""
-        (twist, wrench, nodes), part = self._grown, self._part
-        held = [n for n in columns[0].tolist() if (columns == n).any(axis=1).all()]
-        found, count = [], -(-len(held) // 2) * 6
-        for answers, width in ((twist, 6 * part.bricks), (wrench, part.wrenches)):
-            rows = np.zeros((count, width))
-            for i, node in enumerate(held):
-                turned = nodes[node // 2, 3 * (node % 2) : 3 * (node % 2) + 3]
-                rows[3 * i : 3 * i + 3] = turned @ answers[1 + 6 * (node // 2) :][:6, :width]
-            found.append(rows)
-        return Kept(np.array(held, dtype=np.int64), *found)

@@ -9,8 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.engines.rigid._growth import Growth, SpanningTree
@@ -25,6 +27,7 @@ from seqopt.engines.rigid._response_maps import (
 from seqopt.network._mechanics import point_motion
 from seqopt.network.network import Network
 
+_Number = TypeVar("_Number", np.float64, np.int64)
 _OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
 _TOGETHER = 1000  # sets up to which one product takes less than one for every field
 _FEW = 200  # loads whose responses take little, and are always made once for all
@@ -106,8 +109,8 @@ class ComplianceOperator(FrozenValue):
         """How many unknowns each grip has: forces, and then moments."""
         return 3 + self.moments
 
-    def by_grip(self, force: Floats) -> Floats:
-        """Return a view (S, r, w) of unknowns (S, k) without loose motions."""
+    def by_grip(self, force: NDArray[_Number]) -> NDArray[_Number]:
+        """Return a view (S, r, w) of unknowns (S, k), or their loads, without loose motions."""
         own = force[:, : force.shape[1] - self.loose]
         return own.reshape(len(force), own.shape[1] // self.width, self.width)
 
