@@ -14,7 +14,7 @@ from seqopt.engines.rigid import _extremes, _growth
 from seqopt.engines.rigid._extremes import extremes_in
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.responses._blocks import COMPILED, Block, answer
+from seqopt.responses._blocks import Block, answer
 from seqopt.responses.quantities import CHOSEN_BY, EXTREMES, lengths
 from seqopt.scene.scene_file import load_scene
 from tests.builders import from_both_sides, six_bricks, small_arch
@@ -47,7 +47,7 @@ def of_fields(engine, bricks, sets, want):
 @needs_numba
 @once
 @pytest.mark.parametrize("want", SOME)
-@pytest.mark.parametrize("grips", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("grips", [2, 5])
 def test_they_are_those_of_the_fields(grips, want):
     engine = ComplianceEngine(build_network(from_both_sides(6)))
     sets = sets_of(engine.network, 6, grips)
@@ -72,12 +72,11 @@ def test_what_rows_do_not_answer_is_that_of_the_fields(alter):
 
 @needs_numba
 @once
-@pytest.mark.parametrize("want", SOME)
-@pytest.mark.parametrize("grips", [1, 3, 4])
+@pytest.mark.parametrize(("grips", "want"), [(1, Want.RESPONSES), (3, Want.EDGES), (4, Want(0))])
 def test_few_sets_of_a_large_structure_are_read_from_what_grows(grips, want):
     network = build_network(load_scene("dome163"))
     engine = ComplianceEngine(network)
-    for bricks in (40, 41, 70):  # joints of which one brick is there alone move with it
+    for bricks in (40, 41):  # joints of which one brick is there alone move with it
         sets = sets_of(network, bricks, grips, 100)
         known, index = network.index_of_grip
         pair = known[np.isin(index, [bricks, bricks + 1])]  # on one brick
@@ -176,7 +175,3 @@ def test_without_numba_fields_answer(monkeypatch):
     asked = engine._extremes(6, sets, Want.RESPONSES, compiled=True)
     plain = engine._extremes(6, sets, Want.RESPONSES)
     assert all(map(np.array_equal, asked, plain))
-
-
-def test_much_work_is_compiled_and_little_is_not():
-    assert COMPILED > 25 * 22724 * 2  # the loop of arch25 loads nothing

@@ -79,7 +79,7 @@ def agree_with_dense(arch, i):
     return max([*out, far(found.grip_moment[0], borne[:, 3:])] if turn else out)
 
 
-@pytest.mark.parametrize("i", range(0, STATES, 10))
+@pytest.mark.parametrize("i", range(0, STATES, 20))
 def test_a_dense_solver_agrees(arch25, i):
     assert agree_with_dense(arch25, i) <= 1e-9
 

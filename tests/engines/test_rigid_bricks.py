@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,7 @@ from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
-from tests.builders import hinged, six_bricks, solve_batch
+from tests.builders import hinged, solve_batch
 from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened
 from tests.reference_chain import solve_exactly
 
@@ -96,30 +94,6 @@ def test_a_batch_of_many_passes(monkeypatch):
     for name in ("edge_force", "displacement", "grip_force", "support"):
         gap = np.abs(getattr(parts, name) - getattr(whole, name)).max()
         assert gap <= 1e-12 * np.abs(getattr(whole, name)).max()
-
-
-def test_loads_in_two_directions():
-    """Held and loaded in its plane, a plane arch knows no third direction."""
-    net = build_network(six_bricks("V"))
-    assert not np.ptp(net.node_position[:, 1])
-    space = OperatorBuilder(net, grow_tree(net)).operator(6)
-    kept = np.flatnonzero(np.arange(36) % 3 != 1)
-    plane = replace(
-        space,
-        flexibility=space.flexibility[np.ix_(kept, kept)],
-        dead_displacement=space.dead_displacement[kept],
-        axis=space.axis[:, [0, 2]],
-        loss=space.loss[kept],
-        twist=space.twist[[*kept, 36]],
-        wrench=space.wrench[[*kept, 36]],
-    )
-    columns = np.array([(0, 7, 11), (6, 7, 2), (3, 9, 8), (4, 1, 10)])
-    (more, sound), (less, trusted) = (solve_batch(o, columns, Want.ALL) for o in (space, plane))
-    assert sound.all()
-    assert trusted.all()
-    for name in ("edge_force", "displacement", "support"):
-        gap = np.abs(getattr(less, name) - getattr(more, name)).max()
-        assert gap <= 1e-12 * np.abs(getattr(more, name)).max()
 
 
 def test_what_is_solved_again_fits_what_was_asked():

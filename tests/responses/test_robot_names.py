@@ -27,21 +27,7 @@ from seqopt.sequence.methods import sequential, three_robot_loop
 from seqopt.study.published import EQUATIONS, WORST_RATIO, find_criterion
 from tests.builders import six_bricks
 
-NAMES = [
-    "sup",
-    "sup_6",
-    "max",
-    "min",
-    "avg",
-    "move",
-    "largest",
-    "each",
-    "rob",
-    "[sup]",
-    "a,b",
-    "a=b",
-    "]",
-]
+NAMES = ["sup_6", "max", "each", "[sup]", "a,b", "a=b"]
 PAYLOAD = 40.0  # N
 ALSO = ("F_move", "F_largest", "T_max", "M_sup")
 EVERY = replace(EQUATIONS, before=(("F_each", 1.0),), after=(("F_each", 1.0),))
@@ -85,7 +71,7 @@ def test_a_name_changes_no_number(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("criterion", [EVERY, EQUATIONS, WORST_RATIO], ids=lambda c: c.name)
+@pytest.mark.parametrize("criterion", [EVERY, WORST_RATIO], ids=lambda c: c.name)
 def test_a_name_changes_no_choice(name, criterion):
     plain, chosen = plainly(criterion)
     odd = posed(called("one", name, "three"), criterion, also=ALSO)
@@ -99,8 +85,8 @@ def test_a_name_changes_no_choice(name, criterion):
     assert len(chosen.alternatives().columns) == len(other.alternatives().columns)
 
 
-@pytest.mark.parametrize("name", ["sup_6", "a,b"])
-def test_a_name_hides_no_overload(name):
+def test_a_name_hides_no_overload():
+    name = "a,b"
     scene = called("one", name, "three")
     notes = compare(ComplianceEngine(build_network(scene)), EQUATIONS).notes
     assert any(f"sequential: {name} holds up to" in note for note in notes)
