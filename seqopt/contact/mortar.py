@@ -178,11 +178,11 @@ class Curing(Terse):
         )
 
     def __str__(self) -> str:
-        own = [f"{name}:{_said(points)}" for name, points in self.joints]
-        return " ".join([_said(self.points), *own])
+        own = [f"{name}:{_describe(points)}" for name, points in self.joints]
+        return " ".join([_describe(self.points), *own])
 
 
-def _said(points: Points) -> str:
+def _describe(points: Points) -> str:
     """Return points in the words of `_find_curing`."""
     if points and points == _linear(points[-1][0]):
         return f"{points[-1][0]:g}s"

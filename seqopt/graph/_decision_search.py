@@ -300,7 +300,7 @@ def prove_lazily(problem: Decisions, formulation: Formulation, watch: Watch) -> 
     return LazyProof(search.bounds, stopped, search.models)
 
 
-def _floor(problem: Decisions, formulation: Formulation) -> float:
+def _lower_bound(problem: Decisions, formulation: Formulation) -> float:
     """Return a lower bound of any pair's cost; raise an error where none is known."""
     if formulation.kind is not FormulationKind.EXACT:
         raise ProblemError(f"{formulation.name}: the lazy search proves; give an exact formulation")
@@ -319,7 +319,7 @@ class _Search:
     """A search on its way: the bounds, and pairs on their best path that are not solved."""
 
     def __init__(self, problem: Decisions, formulation: Formulation) -> None:
-        aim, floor = formulation.aim or Aim.SUM, _floor(problem, formulation)
+        aim, floor = formulation.aim or Aim.SUM, _lower_bound(problem, formulation)
         self._problem, self._aim, schedule = problem, aim, problem.schedule
         self._each = isinstance(problem.criterion, WeightedSum | WorstRatio)  # pair by pair
         first = alone_steps(problem)

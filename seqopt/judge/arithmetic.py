@@ -241,7 +241,7 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value:
 
     Raises `SolverError` where a potential, a weight or a share is dual infeasible.
     """
-    limited = _priced(stage, claim)
+    limited = _caps_with_multipliers(stage, claim)
     if instance.resources and claim.labels is not None and goal.kind in (SUM, PEAK):
         return _by_labels(instance, stage, goal, claim)
     if goal.kind == PEAK:
@@ -289,7 +289,7 @@ def _by_labels(instance: Instance, stage: Stage, goal: _Target, claim: Claim) ->
     raise SolverError(f"{goal.name}: labels do not prove that no path is below {claim.value:.9g}")
 
 
-def _priced(stage: Stage, claim: Claim) -> list[tuple[float, int, float]]:
+def _caps_with_multipliers(stage: Stage, claim: Claim) -> list[tuple[float, int, float]]:
     """Return multipliers with their columns and caps."""
     known = {name: (column, most) for name, column, most in stage.limited}
     for name, price in claim.prices.items():

@@ -211,13 +211,13 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
         if state is None:
             where = _where(problem, look(steps).reached)
         else:
-            where = _barred_said(problem, *state)
+            where = _describe_barred(problem, *state)
         return f"{problem.title}: {where}{Remedies(problem, look).said(finished=finished)}"
     except LateError:
         return f"{problem.title}: {where}; time was over before it was known what helps, give more"
 
 
-def _barred_said(problem: States, level: int, state: Ints) -> str:
+def _describe_barred(problem: States, level: int, state: Ints) -> str:
     """Describe the infeasible state that every plan passes, and the violated constraint."""
     each, falls = problem.each or (problem,), False
     what = f"step {level} of {problem.space.levels}, in which no grip is open,"
@@ -225,7 +225,7 @@ def _barred_said(problem: States, level: int, state: Ints) -> str:
         what = "the finished structure, which nobody holds,"
     for one in each:
         if not one.values(level, state)[1].all():
-            return f"{what} {_excess_said(one, level, state)}"
+            return f"{what} {_describe_excess(one, level, state)}"
         states, demanded = one.responses(level, state)[0], one.every_filter if one.demands else ()
         falls |= any(f.refuted(states).any() for f in demanded if f.expensive)
     how = "does not stand" if falls else "is not proven to stand"
@@ -239,7 +239,7 @@ def _is_bare_end(problem: States, level: int, state: Ints) -> bool:
     return whole and not problem.space.grips(state).any()
 
 
-def _excess_said(problem: States, level: int, state: Ints) -> str:
+def _describe_excess(problem: States, level: int, state: Ints) -> str:
     """Describe the limits that a state exceeds."""
     states, _ = problem.responses(level, state)
     found = states.responses
@@ -396,7 +396,7 @@ class Remedies:
         held = worst_least(problem, LARGEST, self.look)
         if held > whole_load(problem.network):
             return self._softer()
-        return _payload_said(max(held, _heaviest(self.problem)))
+        return _describe_payload(max(held, _heaviest(self.problem)))
 
     def _softer(self) -> str:
         """Describe the stiffest sufficient grips; empty if none suffice."""
@@ -440,7 +440,7 @@ class Remedies:
             whole_load(self.problem.network), _heaviest(self.problem)
         ):
             return ""
-        return _payload_said(most * step)
+        return _describe_payload(most * step)
 
     def _enough_limit(self, limit: Limit) -> str:
         """Return the least feasible bound of all limits with a label, in words."""
@@ -478,7 +478,7 @@ class Remedies:
         return self.look.exists(self.problem.in_scene(scene))
 
 
-def _payload_said(newton: float) -> str:
+def _describe_payload(newton: float) -> str:
     said = _payload_text(newton)
     return f"a payload of {said} N (--payload {said})"
 

@@ -146,7 +146,7 @@ def steps_picture(
         else:
             _draw_robots(axes, cell, cell.arms(step, at), VIEW)
             _draw_built(axes, engine.network, step, found, magnify)
-        axes.set_title(_said(scene, step, steps[-1].number), loc="center")
+        axes.set_title(_describe(scene, step, steps[-1].number), loc="center")
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         if len(picked) == 1:
             draw_grips(axes, engine.network, step.grips, VIEW)
@@ -181,7 +181,7 @@ def _draw_built(
     draw_bricks(axes, network, step.bricks, VIEW, twist=found.brick_twist[0], magnify=magnify)
 
 
-def _said(scene: Scene, step: Step, last: int) -> str:
+def _describe(scene: Scene, step: Step, last: int) -> str:
     """Return the title of the picture of a step."""
     newest = scene.placed[step.bricks - (step.kind is not StepKind.REMOVE)].name
     what = {

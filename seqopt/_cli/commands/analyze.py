@@ -99,7 +99,7 @@ def run(asked: Analyze) -> Answer:
     table = response_table(engine.network, answers)
     reached = len(table) + len(faults)
     late, ended = _late(asked, reached, len(steps), engine, clock)
-    failures, status = (*_faults_said(faults, reached), *late), _status_of(faults, ended)
+    failures, status = (*_describe_faults(faults, reached), *late), _status_of(faults, ended)
     computed, off = [s for s in steps[:reached] if s.number not in faults], tuple[str, ...]()
     if computed and asked.tolerance is not None:
         tolerances = partial(_with_tolerances, asked.tolerance, engine, computed, table)
@@ -220,7 +220,7 @@ def _counted(table: pd.DataFrame, faults: Mapping[int, SeqoptError]) -> str:
     return f"{len(table)} steps{of_them}"
 
 
-def _faults_said(faults: Mapping[int, SeqoptError], steps: int) -> tuple[str, ...]:
+def _describe_faults(faults: Mapping[int, SeqoptError], steps: int) -> tuple[str, ...]:
     """Return lines naming the steps that are mechanisms, and those where the solver failed."""
     out = []
     for what, kind in (("mechanism", MechanismError), ("solver failed", SolverError)):

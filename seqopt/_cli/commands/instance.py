@@ -64,7 +64,7 @@ def run(asked: Instance) -> Result:
     named = None if asked.formulation is None else find_formulation(asked.formulation)
     asked.tell("computing all that arcs take")
     aim = None if named is None else named.aim
-    facts = {"made_by": _made_by(asked.made_by)} if asked.made_by else {}
+    facts = {"made_by": _command_line(asked.made_by)} if asked.made_by else {}
     usual = inputs.file_name(problem.scene.name, ".npz")
     name = asked.name or (
         path.stem if path else usual.stem if asked.made_by else problem.scene.name
@@ -88,7 +88,7 @@ def _answer(asked: Instance, found: Graph, path: Path) -> Answer:
     return Answer(facts=found.facts_of(), text="\n".join(lines), written=(path,), notes=notes)
 
 
-def _made_by(words: Sequence[str]) -> str:
+def _command_line(words: Sequence[str]) -> str:
     """Return the command line without options of output."""
     kept = list[str]()
     left = iter(words)
