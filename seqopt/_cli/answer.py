@@ -162,7 +162,7 @@ def plain(value: object) -> Any:
 
 def _unpacked(value: object) -> Any:
     """Return the contents of a table, an array, an enumeration's member or another value."""
-    if hasattr(value, "to_csv"):
+    if hasattr(value, "to_dict"):
         return value.to_dict(orient="records")
     if isinstance(value, Mapping):
         return dict(value)
