@@ -1,8 +1,8 @@
 """The compliance of grips, and how far they are from where they should be.
 
-A soft grip is held at its far end: it lets its node shift and turn by a compliance for every force
-and moment that it transmits. Its far end may be moved. Moments and rotations are measured by a
-lever, so that they are forces and lengths.
+A compliant grip is held at its far end: it lets its node shift and turn by a compliance for every
+force and moment that it transmits. Its far end may be moved. Moments and rotations are measured by
+a lever, so that they are forces and lengths.
 """
 
 from __future__ import annotations

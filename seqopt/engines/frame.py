@@ -108,7 +108,7 @@ class _Holds(NamedTuple):
 
     fixed: Ints  # (f,); motions (6n,) that rigid grips prescribe
     moved: Floats  # (f,); by how much, m
-    spring: sparse.csr_array  # (p, 6n); deformations of soft grips
+    spring: sparse.csr_array  # (p, 6n); deformations of compliant grips
     stiffness: Floats  # (p,)
     stretched: Floats  # (p,); of these, where the nodes are in place
     turns: Bools  # (r,); which bear moments

@@ -195,7 +195,7 @@ def _loaded(
     force = solution.force.copy()
     load[columns] += force[0]
     carried = edge_forces(network, parts.statics, solution.wrench, load[None])
-    split_pairs(network, columns[None], force, carried, solution.soft)
+    split_pairs(network, columns[None], force, carried, solution.compliant)
     twist, wrench = state.twist + solution.twist[0], state.wrench + solution.wrench[0]
     borne = np.concatenate([force, solution.moment], axis=2)[0]
     pairs = zip(state.grips.items(), borne, strict=True)

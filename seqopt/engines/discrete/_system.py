@@ -211,9 +211,9 @@ class Held(FrozenValue):
 
     system: System
     free: sparse.csr_array  # (6n, m); motions that the grips leave
-    pads: sparse.csr_array  # (6n, 6n); stiffness of soft grips
+    pads: sparse.csr_array  # (6n, 6n); stiffness of compliant grips
     far: Floats  # (6n,); how grips move the bodies that they hold, all the way
-    pull: Floats  # (6n,); how soft grips pull at bodies that stay, all the way
+    pull: Floats  # (6n,); how compliant grips pull at bodies that stay, all the way
 
     def moved(self, motion: Floats, share: float = 1.0) -> Floats:
         """Return how bodies move (6n,). ``motion`` (m,): in the free motions; ``share``: of it."""
@@ -265,7 +265,7 @@ class Held(FrozenValue):
 
     @cached_property
     def _unbroken(self) -> sparse.csr_array:
-        """Stiffness of layers and soft grips in the free motions, (m, m)."""
+        """Stiffness of layers and compliant grips in the free motions, (m, m)."""
         return frozen(sparse.csr_array(self.free.T @ (self.system.layers + self.pads) @ self.free))
 
     def stiffness(self, slope: Floats) -> sparse.csr_array:

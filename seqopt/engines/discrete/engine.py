@@ -84,7 +84,7 @@ def _not_at_rest(network: Network, held: Held, found: Settled, columns: Ints) ->
 
 
 class _Spring(NamedTuple):
-    """A soft grip."""
+    """A compliant grip."""
 
     grip: int
     body: int
@@ -106,7 +106,7 @@ class _Spring(NamedTuple):
 def _springs(
     network: Network, system: System, columns: Ints, compliance: GripCompliance
 ) -> list[_Spring]:
-    """Return the soft grips of one set as springs."""
+    """Return the compliant grips of one set as springs."""
     nodes, out = network.node_position[network.inner.ravel()[columns]], []
     for grip, ways, flexibility, offset in grip_springs(compliance, len(columns)):
         body = int(columns[grip] // 2)
@@ -124,7 +124,7 @@ def _held_nodes(
     compliance: GripCompliance,
     springs: list[_Spring],
 ) -> Held:
-    """Return a system whose nodes are held: rigidly, or by springs of soft grips."""
+    """Return a system whose nodes are held: rigidly, or by springs of compliant grips."""
     count = len(system.load) // 6
     blocks, taken = [np.eye(6)] * count, np.zeros_like(system.load)
     pads, pull = [sparse.csr_array((6, 6))] * count, np.zeros_like(system.load)
@@ -157,17 +157,17 @@ def _fields(
     wrench = np.zeros((len(network.springs.since), 6))
     wrench[system.acting] = system.bed_wrenches(found.force)
     exerted = -held.reaction(found.motion, found.force)
-    (force, moment), soft = np.zeros((2, len(columns), 3)), np.zeros(len(columns), dtype=bool)
+    (force, moment), compliant = np.zeros((2, len(columns), 3)), np.zeros(len(columns), dtype=bool)
     for spring in springs:
         both = np.zeros(6)
         both[spring.ways] = spring.force(moved[6 * spring.body : 6 * spring.body + 6])
         force[spring.grip], moment[spring.grip] = both[:3], both[3:]
-        soft[spring.grip] = 0 in spring.ways
+        compliant[spring.grip] = 0 in spring.ways
     if not springs:
         exerted += held.pull - held.pads @ moved
     nodes = network.node_position[network.inner.ravel()[columns]]
-    for body in np.unique(columns[~soft] // 2):
-        mine = np.flatnonzero(~soft & (columns // 2 == body))
+    for body in np.unique(columns[~compliant] // 2):
+        mine = np.flatnonzero(~compliant & (columns // 2 == body))
         rows = slice(6 * body, 6 * body + 6)
         if len(mine) == 1:
             force[mine[0]] = exerted[rows][:3]
@@ -176,6 +176,6 @@ def _fields(
             pulls = np.linalg.lstsq(maps, exerted[rows] / system.unit[rows], rcond=None)[0]
             force[mine] = pulls.reshape(-1, 3)
     twist = (system.unit * moved)[None, : 6 * system.bricks]
-    solution = Solution(twist, wrench[None], force[None], moment[None], soft[None])
+    solution = Solution(twist, wrench[None], force[None], moment[None], compliant[None])
     motion, statics = node_motion(network, system.bricks), build_statics(network)
     return respond(network, statics, motion, columns[None], solution)

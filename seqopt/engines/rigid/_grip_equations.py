@@ -1,7 +1,7 @@
 """The equations of many grip sets at once: which forces hold the grips still.
 
 Two grips may share a brick: between them along it, rigid ones leave a force undetermined, which
-`share_pairs` gives to the node that it reaches. The compliance of soft grips is added to the
+`share_pairs` gives to the node that it reaches. The compliance of compliant grips is added to the
 equations; where two that are nearly rigid share a brick, digits are lost (`nearly_rigid`).
 """
 
@@ -191,7 +191,9 @@ def well_conditioned(
     """
     lowest, least = found.lowest, np.inf
     if compliance.moved is None:  # else forces may undo what the weight does
-        own = 0.0 if compliance.rigid else 2.0  # of what soft grips yield, that forces undo as well
+        own = (
+            0.0 if compliance.rigid else 2.0
+        )  # of what compliant grips yield, that forces undo as well
         least = len(found.pivot) * operator.doubts.worst + own
     out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
@@ -235,7 +237,7 @@ def _with_compliance(
     flexibility: Floats,
     compliance: GripCompliance,
 ) -> Floats:
-    """Return errors of forces (k, S), as of `_doubts`, with soft and moved grips.
+    """Return errors of forces (k, S), as of `_doubts`, with compliant and moved grips.
 
     ``size`` (k, S): of the forces, N; ``flexibility`` (k, S): the diagonal, m/N.
     """
@@ -345,7 +347,7 @@ _CLOSE = 1e-4  # flexibility of two grips on one brick, over its own, below whic
 def nearly_rigid(
     operator: ComplianceOperator, index: Ints, pairs: Pairs, compliance: GripCompliance
 ) -> Bools:
-    """Return which sets (S,) hold a brick by two soft grips so stiff that digits are lost.
+    """Return which sets (S,) hold a brick by two compliant grips so stiff that digits are lost.
 
     They share what acts along the brick by their stiffness. ``index`` (S, k): loads at the grips.
     """

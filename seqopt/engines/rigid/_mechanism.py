@@ -192,7 +192,7 @@ def require_resistance(
 ) -> None:
     """Raise `MechanismError` if one grip set leaves a motion that nothing resists.
 
-    A soft grip resists as a rigid one does. ``compliance``: of this set.
+    A compliant grip resists as a rigid one does. ``compliance``: of this set.
     """
     motion = free_motion(network, bricks, columns, compliance)
     if motion is not None:

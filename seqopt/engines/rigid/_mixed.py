@@ -38,14 +38,14 @@ class Solution(FrozenValue):
     ``twist`` (S, 6b): of the bricks, m and rad. ``wrench`` (S, J, 6): of every spring of the
     network on its second body, N and N m; zero where it does not act. ``force`` (S, r, 3): of the
     grips, N; two rigid ones on one brick may share theirs in any way. ``moment`` (S, r, 3): of the
-    grips, N m. ``soft`` (S, r): which grips are.
+    grips, N m. ``compliant`` (S, r): which grips are.
     """
 
     twist: Floats
     wrench: Floats
     force: Floats
     moment: Floats = None  # type: ignore[assignment]  # none where none is given
-    soft: Bools | None = None
+    compliant: Bools | None = None
 
     def __post_init__(self) -> None:
         if self.moment is None:
@@ -66,7 +66,7 @@ def respond(
     load = np.tile(network.inner_load(bricks), (sets, 1, 1))
     load[np.arange(sets)[:, None], columns] += force
     carried = edge_forces(network, statics, wrench, load)
-    split_pairs(network, columns, force, carried, solution.soft)
+    split_pairs(network, columns, force, carried, solution.compliant)
     moved = (motion @ twist.T).T.reshape(sets, motion.shape[0] // 3, 3)
     return Fields(
         edge_force=carried,
@@ -100,20 +100,20 @@ def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
 
 
 def split_pairs(
-    network: Network, columns: Ints, force: Floats, carried: Floats, soft: Bools | None = None
+    network: Network, columns: Ints, force: Floats, carried: Floats, compliant: Bools | None = None
 ) -> None:
     """Let each of two rigid grips on one brick take the force at its own node, in place.
 
-    ``force`` (S, r, 3): of the grips; ``carried`` (S, E): by the edges; ``soft`` (S, r): which
+    ``force`` (S, r, 3): of the grips; ``carried`` (S, E): by the edges; ``compliant`` (S, r): which
     grips are.
     """
-    soft = np.zeros(columns.shape, dtype=bool) if soft is None else soft
+    compliant = np.zeros(columns.shape, dtype=bool) if compliant is None else compliant
     inner = np.flatnonzero(network.edge_spring < 0)
     edge_of = np.empty(len(network.inner), dtype=np.int64)
     edge_of[network.edge_brick[inner]] = inner
     for i, j in permutations(range(columns.shape[1]), 2):
         pair = (columns[:, i] % 2 == 0) & (columns[:, j] == columns[:, i] + 1)
-        sets = np.flatnonzero(pair & ~soft[:, i] & ~soft[:, j])
+        sets = np.flatnonzero(pair & ~compliant[:, i] & ~compliant[:, j])
         edge = edge_of[columns[sets, i] // 2]
         shift = carried[sets, edge][:, None] * network.edge_axis[edge]
         force[sets, i] += shift
@@ -165,12 +165,12 @@ def mixed_system(
 def _with_flexibility(
     parts: Ungripped, grips: Ints, rows: sparse.csr_array, force: Floats, compliance: GripCompliance
 ) -> tuple[sparse.csr_array, Floats, Floats]:
-    """Return rows of motions, forces and flexibilities of a set with soft grips.
+    """Return rows of motions, forces and flexibilities of a set with compliant grips.
 
     After the multipliers of rigid grips, ``rows`` (c, 6b) and ``force`` (3r, c), there is one for
-    the force between two grips on one brick of which one is soft, which moves no brick, and those
-    of moments. Results: ``rows`` (n, 6b); ``force`` (rw, n): of each grip, then its moments over
-    the lever; ``flexibility`` (n, n): m/N.
+    the force between two grips on one brick of which one is compliant, which moves no brick, and
+    those of moments. Results: ``rows`` (n, 6b); ``force`` (rw, n): of each grip, then its moments
+    over the lever; ``flexibility`` (n, n): m/N.
     """
     network, count = parts.network, len(grips)
     yields, turns = compliance.compliant(1, count)[0], compliance.transmits(1, count)[0]
