@@ -66,7 +66,7 @@ class Replan(
         where the build ends, as of optimize
 
     What counts as best?
-    As before, where nothing is said.
+    As before, by default.
 
     What is written and printed?
     out : DIR
@@ -91,7 +91,7 @@ def run(asked: Replan) -> Result:
     """Plan the rest of a build from one of its steps, after something has changed.
 
     A robot is lost, carries less or is new, a brick is missing. Any robot may release, hold or
-    place next; aims, criterion and rules are those of the plan, if nothing else is said.
+    place next; aims, criterion and rules are by default those of the plan.
 
     Usage
     PLAN_DIR [--at STEP] [changes] [--out DIR] [other options]

@@ -83,7 +83,7 @@ def run(asked: Sweep) -> Answer:
 
 
 def _cases(asked: Sweep) -> list[dict[str, Any]]:
-    """Return every case: words of options by name, and of the scene that is told apart by these."""
+    """Return every case: words of options by name, and of the scene that they distinguish."""
     known = signature_of(optimize.run).options
     flags = {option.flag.removeprefix("--"): name for name, option in known.items()}
     differs = dict[str, list[str]]()

@@ -160,7 +160,7 @@ class StandingLook:
         return asked
 
     def exists(self, asked: States) -> bool:
-        """Return whether there is a plan all of whose states stand as is demanded; keep one."""
+        """Return whether some plan meets the stability requirement in all states; keep one."""
         known = np.zeros(len(self._parts), dtype=np.int64)
         known[0] = PASSES
 
