@@ -160,7 +160,7 @@ def plain(value: object) -> Any:
     return json.loads(json.dumps(value, default=_unpacked), parse_constant=NOT_IN_JSON.get)
 
 
-def _unpacked(value: object) -> Any:
+def _unpacked(value: Any) -> Any:
     """Return the contents of a table, an array, an enumeration's member or another value."""
     if hasattr(value, "to_dict"):
         return value.to_dict(orient="records")
