@@ -118,7 +118,7 @@ def experiment(options: Options) -> Finding:
     )
     print(shown.to_string(float_format="%.2g"))
     print(step.to_string(index=False))
-    note = f": {number['answered'].sum():,} answers, {step['steps'].sum():,} steps"
+    note = f": {number['answered'].sum():,} answers"
     tables = {"where_numbers_fail": number, "where_steps_fall": step}
     return Finding(holds(number, step), note, tables)
 
