@@ -152,8 +152,8 @@ class Side(_Limited):
 
     def lack(self, point: Vector) -> float:
         """Return how far a point is out of reach, m; negative within."""
-        bound: float = sum(map(mul, self.toward, self.point))
-        return bound - sum(map(mul, self.toward, point))
+        lacking: float = sum(map(mul, self.toward, self.point)) - sum(map(mul, self.toward, point))
+        return lacking
 
     def longer(self, more: float) -> Side:
         """Return a reach that is longer, m."""

@@ -126,7 +126,7 @@ class FreeRules:
             settle(self, **{name: tuple(names)})
         for name in _COUNTS:
             count = getattr(self, name)
-            whole = isinstance(count, Integral) and not isinstance(count, bool) and count >= 0
+            whole = isinstance(count, Integral) and not isinstance(count, bool) and int(count) >= 0
             if not (count is None or whole):
                 raise StepError(f"rule {name}: {short(count)}; give a whole number from 0 on")
             settle(self, **{name: None if count is None else int(count)})
