@@ -1,4 +1,8 @@
-"""Parsers of the command line: commands, their arguments, and their help."""
+"""Parsers of the command line: commands, their arguments, and their help.
+
+They are those of argparse: cyclopts, which reads docstrings too, starts 0.2 s later, as long as all
+of ``seqopt --version`` takes, and brings seven packages.
+"""
 
 from __future__ import annotations
 
