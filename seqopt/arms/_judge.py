@@ -121,7 +121,7 @@ def _check_grips(scene: Scene) -> None:
             apart = np.abs(compliance - given[place]).max() / np.abs(compliance).max()
             if not (apart <= _SAME and off <= _REACHED * arm.tool_length):
                 raise StepError(
-                    f"the grip of {name} at node {node} gives way in another way than its joints"
+                    f"the grip of {name} at node {node} has another compliance than its joints"
                 )
 
 
