@@ -362,7 +362,9 @@ class Problem(Shown):
     @property
     def schedule(self) -> Schedule:
         """The schedule whose grips are open; a `ProblemError` where rules say what can be done."""
-        return self.moves.given()
+        if isinstance(self.moves, FreeRules):
+            raise ProblemError("the free schedule has no open grips; it has states")
+        return self.moves
 
     @classmethod
     def asked(

@@ -6,12 +6,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from numbers import Integral
-from typing import NoReturn
 
 import numpy as np
 
 from seqopt.arrays import Bools, Ints
-from seqopt.errors import ProblemError, StepError, did_you_mean
+from seqopt.errors import StepError, did_you_mean
 from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene
@@ -166,10 +165,6 @@ class FreeRules:
     def free(self) -> FreeRules:
         """Return these rules: who asks for the moves of a schedule gets an error from that."""
         return self
-
-    def given(self) -> NoReturn:
-        """Raise a `ProblemError`: no step is given."""
-        raise ProblemError("the free schedule has no open grips; it has states")
 
     def keeps_payloads(self, *, stands: bool) -> bool:
         """Return whether robots hold no more than their payloads, also where nothing limits it.

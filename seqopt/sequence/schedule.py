@@ -211,10 +211,6 @@ class Schedule(Shown):
             "Pareto set, go with the free schedule"
         )
 
-    def given(self) -> Schedule:
-        """Return the schedule: free rules raise an error here."""
-        return self
-
     def begun(self, scene: Scene) -> Schedule:
         """Return the schedule, which says itself where it begins."""
         return self
