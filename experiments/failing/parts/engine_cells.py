@@ -218,15 +218,16 @@ def worst(moved: Floats, wrench: Floats, wanted: Reference) -> float:
     )
 
 
-def stated(name: str, net: Network) -> float:
+def stated(name: str, net: Network, digits: float) -> float:
     """Return the largest error that an engine says its answers have.
 
-    Where a joint has next to no stiffness beside the others, last digits decide more.
+    It is more where the scene's last digits decide more, or a joint has next to no stiffness.
     """
     if name == "frame":
         return frame._LAST_FRAME_CORRECTION
     kinds = net.springs.translational_stiffness, net.springs.rotational_stiffness
     loose = any(each.min() < _refinement._SOFT * each.max() for each in kinds)
+    loose = loose or digits > compliance.ACCURACY
     if name == COMPARED:
         return compliance._SCREEN * (10 if loose else 1)
     return 0.1 * _mixed._SENSITIVE if loose else compliance.ACCURACY
@@ -258,7 +259,7 @@ def ending(name: str, engine: Engine, grips: Grips, wanted: Exact) -> dict[str, 
     if true is None:
         return {"status": "wrong", "message": "no mechanism seen"}
     moved = fields.displacement[0, net.inner[:bricks].ravel()]
-    off, most = worst(moved, fields.joint_wrench[0], true), stated(name, net)
+    off, most = worst(moved, fields.joint_wrench[0], true), stated(name, net, wanted.digits)
     return {"status": "answered" if off <= most else "wrong", "error": off, "stated": most}
 
 
