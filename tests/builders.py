@@ -15,6 +15,8 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, _check_part
+from seqopt.stability._held_states import HeldStates
+from seqopt.stability.assessment import bonded
 
 ROOT = Path(__file__).parents[1]
 HERE = np.zeros((1, 0), dtype=int)  # one set of no grips
@@ -314,3 +316,9 @@ def turned_round(scene, steps):
             grips[robot] = then.grips[robot]
             out.append(Step(len(out) + 1, kind, then.bricks, tuple(grips)))
     return _check_part(scene, out)
+
+
+def lacking(assembly, mortar, compiled):
+    """The brackets of the least bond that a structure lacks; it stands at zero."""
+    case = bonded(assembly, mortar)
+    return HeldStates(assembly, case, compiled, case.fixed())

@@ -15,18 +15,9 @@ from seqopt.errors import GripError, SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Robot
 from seqopt.stability._held_states import _Known
-from seqopt.stability._screens import (
-    FALLS,
-    OPEN,
-    STANDS,
-    Margins,
-    Screen,
-    _decided,
-    _lacking,
-    held_places,
-)
+from seqopt.stability._screens import FALLS, OPEN, STANDS, Margins, Screen, _decided, held_places
 from seqopt.stability.limit_analysis import CAP, EXACT, Claim, bound, violation
-from tests.builders import held, small_arch
+from tests.builders import held, lacking, small_arch
 
 
 def pairs_and_triples(bricks):
@@ -152,7 +143,7 @@ def test_a_motion_rules_out_every_set_that_it_leaves_at_rest(arch25):
 def test_motions_and_forces_prove_what_the_certificates_checks_say(arch25):
     """The batch formulas against `bound` and `violation`, which look at one assembly."""
     network = build_network(arch25)
-    states = _lacking(Screen(network, DRY)._upright((5, True)).assembly, DRY, compile_held)
+    states = lacking(Screen(network, DRY)._upright((5, True)).assembly, DRY, compile_held)
     assembly, case = states.assembly, states._case
     for grips in ([1, 9], [5, 9], [2, 8]):
         payload = np.zeros(10)
@@ -204,6 +195,6 @@ def test_wrong_questions_get_a_line(arch25):
 def test_an_assembly_of_no_scene_can_be_asked():
     """The question itself needs blocks, contacts and grips, and nothing else."""
     leaning = held(stack([0.6]).assembly(2000.0), 1e5, (1.6, 0.5, 1.5))
-    states = _lacking(leaning, DRY, compile_held)
+    states = lacking(leaning, DRY, compile_held)
     bracket = states.bracket(np.array([[0], [1]]), np.array([[1e5], [0.0]]), _decided)
     assert bracket[0, 1] < 1e-6 < bracket[1, 0]

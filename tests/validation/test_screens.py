@@ -14,10 +14,10 @@ from seqopt.contact.mortar import DRY, Mortar
 from seqopt.scene.parts import Robot
 from seqopt.stability._held_states import HeldStates
 from seqopt.stability._prover import sideways
-from seqopt.stability._screens import STANDS, Margins, Screen, _decided, _lacking, _narrow
+from seqopt.stability._screens import STANDS, Margins, Screen, _decided, _narrow
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import EXACT
-from tests.builders import block, held
+from tests.builders import block, held, lacking
 
 NOBODY = np.zeros((1, 0), dtype=int), np.zeros((1, 0))
 WEIGHT = 2000.0 * 9.81
@@ -25,7 +25,7 @@ WEIGHT = 2000.0 * 9.81
 
 def stands(assembly, mortar, places=NOBODY[0], payload=NOBODY[1]):
     """Whether it is proven to stand; an open answer is a failure here."""
-    low, high = _lacking(assembly, mortar, compile_held).bracket(places, payload, _decided)[0]
+    low, high = lacking(assembly, mortar, compile_held).bracket(places, payload, _decided)[0]
     assert high <= EXACT or low > EXACT
     return high <= EXACT
 
