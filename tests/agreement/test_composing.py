@@ -233,8 +233,7 @@ def costs_in_each(name, _grips_of):
 @pytest.mark.parametrize(
     ("name", "over"),
     [
-        ("modified-sequential", "cvar=0.5"),
-        pytest.param("own", "cvar=0.5", marks=pytest.mark.slow),
+        pytest.param("modified-sequential", "cvar=0.5", marks=pytest.mark.slow),
         pytest.param("free", "worst-total", marks=pytest.mark.slow),
     ],
 )

@@ -79,6 +79,7 @@ def package(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_a_package_adds_a_command(package):
     assert "    weigh     Say what the bricks of a scene weigh." in package("--help").stdout
     page = package("weigh", "--help")

@@ -134,6 +134,7 @@ SELDOM = (
     *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
     *("seqopt.engines.rigid._refinement", "seqopt.graph._orders"),
     *("seqopt.plan._states", "seqopt.judge._proof", "seqopt.scene.library"),
+    "seqopt.sequence._rule_space",
 )
 
 

@@ -64,6 +64,7 @@ def test_listing_takes_no_import_of_an_experiment():
     assert "seqopt" not in loaded.split()
 
 
+@pytest.mark.slow
 def test_every_claim_is_found_by_its_plain_name_and_starts_its_module():
     for name, (module, text) in modules().items():
         assert find_claim(name).name == name == module.rpartition(".")[2]

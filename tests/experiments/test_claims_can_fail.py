@@ -256,5 +256,6 @@ def test_pictures_of_another_scene_are_seen():
     assert figures.unlike(image[:32], image) == np.inf
 
 
+@pytest.mark.slow
 def test_every_claim_is_checked_here():
     assert {name.split()[0] for name in CHECKS} | {"figures"} == set(claims())

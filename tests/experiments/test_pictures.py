@@ -79,6 +79,7 @@ def test_stored_figures_are_of_this_style():
         assert int.from_bytes(header[16:20]) == round(WIDTH * DPI), name
 
 
+@pytest.mark.slow
 def test_redraw_writes_figures_and_runs_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("experiments.harness.results.FIGURES", tmp_path)
     claim = claims()["soft_grips"]
