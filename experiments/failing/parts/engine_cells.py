@@ -183,20 +183,6 @@ def nudged(net: Network) -> Network:
     return replace(net, node_position=place, springs=replace(springs, **own))
 
 
-def _solved(net: Network, cell: Cell, columns: Ints) -> Reference | None:
-    try:
-        return solve_exactly(net, len(net.inner), columns, cell.stiffness)
-    except MechanismError:
-        return None
-
-
-def _apart(one: Reference | None, other: Reference | None) -> float:
-    """Return the largest difference of two answers; that of a mechanism is no number."""
-    if one is None or other is None:
-        return 0.0
-    return worst(one.displacement, one.joint_wrench, other)
-
-
 def places(cell: Cell) -> list[Ints]:
     bricks = len(cell.network.inner)
     sets = [np.array(grips, dtype=int).reshape(1, -1) for grips in cell.grips]
