@@ -173,7 +173,7 @@ replan = _function(
 analyze = _function(
     Analyze,
     pd.DataFrame,
-    "A row per step, units in the names of columns. ``attrs['notes']`` says what is to be\n"
+    "A row per step, units in the names of columns. ``attrs['notes']`` says what is worth\n"
     "    knowing, ``attrs['failures']`` which steps are mechanisms, or were not solved.",
 )
 times = _function(
