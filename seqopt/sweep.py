@@ -99,7 +99,7 @@ def sweep(
     mortars : sequence of str, optional
         With which it is proven how many steps fall: ``"dry"``, ``"epoxy"``.
     out : pathlib.Path or str, optional
-        A CSV file that grows row by row; rows of the same scenes that it has already are kept.
+        A CSV file that grows row by row; rows that it has are kept, and not computed again.
     workers, executor : optional
         How many processes solve problems, or who does, as ``client.get_executor()`` of dask.
     progress : callable, optional
@@ -166,23 +166,29 @@ def _solve_cases(  # what a sweep takes
     if not 0 < len(cases) <= MOST:
         raise ProblemError(f"sweep: it has {len(cases)} problems; give from 1 to {MOST}")
     path = None if out is None else Path(out)
-    keys = [_key(case) for case in cases]
-    rows = {} if path is None or not path.exists() else _read_rows(path, [*keys[0]])
-    todo = [case for case, key in zip(cases, keys, strict=True) if tuple(key.values()) not in rows]
-    table = partial(_table, [*keys[0]], [tuple(key.values()) for key in keys], rows)
+    names, keys = [*_key(cases[0])], [tuple(_key(case).values()) for case in cases]
+    if len({*keys}) < len(keys):
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise ProblemError(
+            f"sweep: two problems are called {', '.join(twice)}; give scenes names of their own, "
+            "as dataclasses.replace(scene, name='stiff')"
+        )
+    rows = {} if path is None or not path.exists() else _read_rows(path, names)
+    todo = [case for case, key in zip(cases, keys, strict=True) if key not in rows]
 
     def done(case: Case, row: dict[str, Any]) -> None:
         rows[tuple(_key(case).values())] = row
-        if path is not None:
-            write_text(path, csv_text(table(), DIGITS))
+        if path is not None:  # rows of other problems stay in the file
+            every = [*dict.fromkeys([*keys, *rows])]
+            write_text(path, csv_text(_table(names, every, rows), DIGITS))
         if progress is not None:
-            progress(Stage("problems", len(rows) / len(cases)))
+            progress(Stage("problems", sum(key in rows for key in keys) / len(keys)))
 
     with hire(executor, workers) as crew:
         found = map_ordered(partial(_row, solve), todo, crew, done)
         with closing(found):
             deque(found, maxlen=0)
-    return table()
+    return _table(names, keys, rows)
 
 
 def _key(case: Case) -> dict[str, str]:

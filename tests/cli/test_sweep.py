@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import partial
 
 import pandas as pd
@@ -93,6 +94,11 @@ def test_scenes_of_ones_own_and_any_function(tmp_path):
     assert list(again["F_largest"]) == pytest.approx(list(found["F_largest"]), rel=1e-8)
     with pytest.raises(ProblemError, match="it has columns scene, not bricks"):
         sweep("chain:bricks=7..9/2", free, out=path)
+    other = sweep([replace(scenes[0], name="other")], free, mortars=["dry"], out=path)
+    assert len(other) == 1
+    assert len(pd.read_csv(path)) == 3  # rows of other problems stay
+    with pytest.raises(ProblemError, match="two problems are called chain 7; give scenes names"):
+        sweep([scenes[0], scenes[0].with_grips(1e6)], free)
 
 
 @pytest.mark.parametrize("count", [2, 8])

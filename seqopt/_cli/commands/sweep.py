@@ -16,7 +16,7 @@ import pandas as pd
 from seqopt._cli import options, outputs
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.commands import optimize
-from seqopt._cli.signatures import signature_of
+from seqopt._cli.signatures import Option, signature_of
 from seqopt._files import csv_text, make_folder, read_text, write_folder, write_text
 from seqopt._later import Later
 from seqopt.errors import ProblemError, did_you_mean
@@ -84,8 +84,7 @@ def run(asked: Sweep) -> Answer:
 
 def _cases(asked: Sweep) -> list[dict[str, Any]]:
     """Return every case: words of options by name, and of the scene that they distinguish."""
-    known = signature_of(optimize.run).options
-    flags = {option.flag.removeprefix("--"): name for name, option in known.items()}
+    flags = _flags()
     differs = dict[str, list[str]]()
     for each in asked.over:
         name, sign, values = each.partition("=")
@@ -101,12 +100,18 @@ def _cases(asked: Sweep) -> list[dict[str, Any]]:
     return [{**own, **each, WORDS: words} for own, words in scenes for each in chosen]
 
 
+def _flags() -> dict[str, Option]:
+    """Return the options of `optimize` that have a value, by their words without dashes."""
+    known = signature_of(optimize.run).options.values()
+    return {option.flag.removeprefix("--"): option for option in known if option.value}
+
+
 def _solved(asked: Sweep, case: Mapping[str, str]) -> dict[str, Any]:
     """Return the row of a case: of its plan, and how many steps fall."""
-    known = signature_of(optimize.run).options
-    flags = {option.flag.removeprefix("--"): option for option in known.values()}
-    given = {"scene": case[WORDS], **case} if case[WORDS] else case
-    own = {flags[n].name: flags[n].parse(value) for n, value in given.items() if n in flags}
+    flags = _flags()
+    names = [each.partition("=")[0] for each in asked.over]  # a word of a scene is no option
+    own = {flags[name].name: flags[name].parse(case[name]) for name in names}
+    own = {"scene": case[WORDS], **own} if case[WORDS] else own
     values = {each.name: getattr(asked, each.name) for each in fields(optimize.Optimize)}
     values |= {"out": None, "workers": 1, **own}
     found = optimize.find(optimize.Optimize(**values))
