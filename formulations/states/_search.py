@@ -397,6 +397,12 @@ class ThresholdSearch:
             return False  # what lies below a first threshold is seldom all that a path needs
         trial = self.wide.copy()
         if trial.dive(threshold, below):
+            way = trial.way()
+            if way is not None:
+                best = lexicographic(way.graph)
+                if not close_fallen(trial, way, best.path):
+                    self.incumbent = selected(trial.space, way, best)
+                    return True
             with suppress(InfeasibleError, NothingFoundError):  # of what stands
                 self.incumbent = best_standing(trial)
                 return True

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from itertools import accumulate
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -101,7 +102,7 @@ class Visited(NamedTuple):
         ]
 
 
-FEW = 8  # states that a dive visits at a time
+FEW = 8
 TURNS = 2  # of a dive, over the number of levels
 BAND = 1e-5  # share of a value within which six digits do not decide
 
@@ -194,7 +195,7 @@ class Explorer:
         """
         self._begin_pass(threshold, below, most)
         level, deepest, few = self.space.levels, -1, FEW
-        turns = TURNS * self.space.levels
+        turns = int(TURNS * self.space.levels)
         while not self.whole and turns:
             parts = self._parts[level].items()
             eligible = ((key, part, self._eligible(key, part)) for key, part in parts)
@@ -383,10 +384,47 @@ class Explorer:
         self.nbytes += 2 * rows.nbytes + moves.taken.nbytes
         self.nbytes += (len(to.states) - before) * self._each
 
-    def graph(self) -> Visited:
-        """Return the visited states and the moves among them, states in the order of codes."""
+    def way(self) -> Visited | None:
+        """Return a path to an end, exactly valued: back from each state to the least before it.
+
+        Parts grow as states are discovered, so that a way back within one ends. None where what led
+        to a state was excluded since.
+        """
+        into = defaultdict[Key, list[tuple[int, Key, Any]]](list)
+        for (level, key, to), moves in self._moves.items():
+            into[to].append((level, key, moves))
+        found, rows = list[tuple[float, int, Key, int]](), dict[Key, list[int]]()
+        for key, part in self._parts[-1].items():
+            open_ = np.flatnonzero(part.mark == OPEN)
+            ended = open_[self.space.ended(key, part.states[open_])]
+            found += [(part.values[row, 0], self.space.levels, key, row) for row in ended.tolist()]
+        while found:
+            _, level, key, row = min(found, key=itemgetter(0))
+            rows.setdefault(key, []).append(row)
+            if (level, key, row) == (*self._start, 0):
+                for to, path in rows.items():
+                    own = next(parts[to] for parts in self._parts if to in parts)
+                    own.values[path], own.exact[path] = self._exact(to, own.states[path]), True
+                return self.graph(rows)
+            found = []
+            for level, before, moves in into[key]:
+                part = self._parts[level][before]
+                ways = np.concatenate([source[target == row] for source, target, _ in moves])
+                ways = ways[(part.mark[ways] == OPEN) & ((before != key) | (ways < row))]
+                best = ways[np.argsort(part.values[ways, 0])[:1]].tolist()
+                found += [(part.values[own, 0], level, before, own) for own in best]
+        return None
+
+    def graph(self, among: Mapping[Key, Sequence[int]] | None = None) -> Visited:
+        """Return the visited states and the moves among them, states in the order of codes.
+
+        ``among``: rows of those that are meant, by part; by default all.
+        """
         keys = [(level, key) for level, parts in enumerate(self._parts) for key in parts]
         orders = [self._parts[level][key].order() for level, key in keys]
+        if among is not None:
+            pairs = zip(keys, orders, strict=True)
+            orders = [own[np.isin(own, among.get(key, ()))] for (_, key), own in pairs]
         at = keys.index(self._start)  # the state in which builds begin is the first of its part
         orders[at] = np.concatenate([orders[at][:0], [0], orders[at][orders[at] != 0]])
         firsts = dict(zip(keys, accumulate(map(len, orders), initial=0), strict=False))
