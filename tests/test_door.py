@@ -1,4 +1,4 @@
-"""The door: what ``import seqopt`` gives, and that it stays light."""
+"""The door: what ``import seqopt`` gives; it, help and commands load what they need alone."""
 
 from __future__ import annotations
 
@@ -10,16 +10,7 @@ from pathlib import Path
 import pytest
 
 import seqopt
-
-HEAVY = ("matplotlib", "cvxpy")
-LOADED = f"import sys; print(*[name for name in {HEAVY} if name in sys.modules])"
-
-
-def loaded_by(code):
-    """Return which heavy packages a fresh interpreter has loaded after running some code."""
-    command = [sys.executable, "-c", f"{code}\n{LOADED}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    return done.stdout.splitlines()[-1].split()
+from tests.builders import ROOT
 
 
 def type_checked():
@@ -33,8 +24,9 @@ def type_checked():
 def test_the_door_shows_its_names_and_no_others():
     assert dir(seqopt) == sorted(seqopt.__all__)
     assert 25 <= len(seqopt.__all__) <= 52
-    assert len({*seqopt.__all__}) == len(seqopt.__all__)
     assert all(getattr(seqopt, name) is not None for name in seqopt.__all__)
+    with pytest.raises(AttributeError, match="module 'seqopt' has no attribute 'nothing'"):
+        seqopt.nothing  # noqa: B018
 
 
 def test_both_tables_name_the_same_homes():
@@ -43,63 +35,50 @@ def test_both_tables_name_the_same_homes():
     assert {*lazy, "__version__"} == {*seqopt.__all__}
 
 
-def test_an_unknown_name_is_an_error():
-    with pytest.raises(AttributeError, match="module 'seqopt' has no attribute 'nothing'"):
-        seqopt.nothing  # noqa: B018
-
-
-@pytest.mark.parametrize(
-    "code",
-    [
-        "import seqopt",
-        "import seqopt.report; [getattr(seqopt, name) for name in seqopt.__all__]",
-        "import runpy, sys; sys.argv[1:] = ['--help']\n"
-        "try: runpy.run_module('seqopt', run_name='__main__')\nexcept SystemExit: pass",
-    ],
-    ids=["import", "every name", "help"],
+LIGHT = ("numpy", "pandas", "scipy", "networkx", "shtab")
+LATE = ("pandas.core", "scipy.optimize", "seqopt.exchange.imports", "seqopt.report.page")
+SELDOM = (
+    *("networkx", "scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib"),
+    *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
+    *("seqopt.engines.rigid._refinement", "seqopt.graph._orders"),
+    *("seqopt.plan._states", "seqopt.judge._proof", "seqopt.scene.library"),
+    "seqopt.sequence._rule_space",
 )
-def test_nothing_heavy_is_loaded(code):
-    assert loaded_by(code) == []
-
-
-def test_importing_the_door_loads_none_of_its_rooms():
-    code = "import sys, seqopt; print(*[m for m in sys.modules if m.startswith('seqopt.')])"
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == []
-
-
 FREE = ["optimize", "chain:bricks=7", "--schedule", "free", "--quiet"]
+ASSESS = ["assess", "chain:bricks=7", "--method", "cantilever"]
+MAIN = "from seqopt._cli.main import load, main\n"
+STAGES = {  # what one interpreter does, one after the other, and what is not loaded then
+    "import seqopt": ("numpy", "seqopt.scene", "seqopt._registry"),
+    f"{MAIN}main([])": LIGHT,
+    "main(['--help'])": LIGHT,
+    "main(['--version'])": LIGHT,
+    "load(['optimize'])": SELDOM,
+    "main(['optimize', 'chain:bricks=6'])": ("pandas.core",),
+    f"load({FREE})\nassert main({FREE}) == 0": LATE,
+    f"load({ASSESS})\nassert main({ASSESS}) in (0, 1)": LATE,
+    "import seqopt.report\n[getattr(seqopt, n) for n in seqopt.__all__]": ("matplotlib", "cvxpy"),
+    "assert main(['optimize', 'chain:bricks=6', '--json']) == 0": (),  # a table is made
+}
 
 
-def loaded_by_command(*words):
-    """Return which libraries a command has loaded that wait until they are asked for."""
-    late = ("pandas.core", "scipy.optimize", "seqopt.exchange.imports", "seqopt.report.page")
-    code = (
-        f"import sys\nfrom seqopt._cli.main import load, main\nload({words})\n"
-        f"assert main({words}) in (0, 1)\n"
-        f"print()\nprint(*[name for name in {late} if name in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return done.stdout.splitlines()[-1].split()
-
-
-def test_a_free_plan_loads_no_tables_and_no_programs(tmp_path):
-    assert loaded_by_command(*FREE) == []
-    assert loaded_by_command(*FREE, "--out", str(tmp_path / "out")) == [
-        "pandas.core",
-        "seqopt.report.page",
-    ]
-
-
-def test_verdicts_load_no_tables_and_no_pages():
-    asked = ("assess", "chain:bricks=7", "--method", "cantilever")
-    assert loaded_by_command(*asked) == []
-    pages = loaded_by_command(*asked, "--map", "tilt=0", "--holds", "epoxy")
-    assert "seqopt.report.page" in pages
+def test_nothing_is_loaded_before_it_is_needed():
+    """In a fresh interpreter; in the end a table of pandas shows that loading is seen."""
+    code = "import contextlib, io, sys\n"
+    for stage, late in STAGES.items():
+        quiet = "\n    ".join(stage.splitlines())
+        code += f"with contextlib.redirect_stdout(io.StringIO()):\n    {quiet}\n"
+        code += f"print(*[name for name in {late} if name in sys.modules])\n"
+    code += "print('pandas.core' in sys.modules)"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    *loaded, seen = done.stdout.splitlines()
+    assert dict(zip(STAGES, loaded, strict=True)) == dict.fromkeys(STAGES, "")
+    assert seen == "True"
 
 
 @pytest.mark.slow
 def test_a_heavy_import_is_seen():
-    assert loaded_by("import seqopt.report.charts") == ["matplotlib"]
-    assert "cvxpy" in loaded_by("import seqopt; seqopt.formulations()")
+    code = "import sys, seqopt.report.charts, seqopt; seqopt.formulations()"
+    code += "\nprint(*[name for name in ('cvxpy', 'matplotlib') if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["cvxpy", "matplotlib"]

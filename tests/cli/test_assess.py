@@ -35,24 +35,21 @@ def ended_in(row):
     return until
 
 
-def test_what_was_found_before_an_interrupt_is_written(capsys, tmp_path, monkeypatch):
-    whole, out = tmp_path / "whole.csv", tmp_path / "out.csv"
-    assert main([*WORDS, "--out", str(whole)]) == 1
-    monkeypatch.setattr("seqopt._cli.commands.assess.stability_row", ended_in(6))
+@pytest.mark.parametrize("found", [0, 5])
+def test_what_was_found_before_an_interrupt_is_written(capsys, tmp_path, monkeypatch, found):
+    out = tmp_path / "out.csv"
+    monkeypatch.setattr("seqopt._cli.commands.assess.stability_row", ended_in(found + 1))
     assert main([*WORDS, "--out", str(out)]) == 130
-    assert capsys.readouterr().err == "seqopt: interrupted; 5 of 17 verdicts were found\n"
-    own, other = pd.read_csv(out), pd.read_csv(whole).head(5)
-    pd.testing.assert_frame_equal(own[other.columns[:5]], other[other.columns[:5]])
+    said = f"; {found} of 17 verdicts were found" if found else ""
+    assert capsys.readouterr().err == f"seqopt: interrupted{said}\n"
+    assert out.exists() == bool(found)
+    if found:
+        monkeypatch.undo()
+        own = seqopt.assess(ARCH, method="sequential", mortar="dry").head(found)
+        assert pd.read_csv(out)["verdict"].tolist() == own["verdict"].tolist()
 
 
-def test_an_interrupt_before_any_verdict_writes_nothing(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("seqopt._cli.commands.assess.stability_row", ended_in(1))
-    assert main([*WORDS, "--out", str(tmp_path / "out.csv")]) == 130
-    assert capsys.readouterr().err == "seqopt: interrupted\n"
-    assert not [*tmp_path.iterdir()]
-
-
-@pytest.mark.parametrize(("words", "known"), [("4:6", [4, 5, 6]), ("16:", [16, 17]), ("3", [3])])
+@pytest.mark.parametrize(("words", "known"), [("4:6", [4, 5, 6]), ("16:", [16, 17])])
 def test_margins_of_some_steps(capsys, tmp_path, words, known):
     out = tmp_path / "out.csv"
     assert main([*WORDS, "--steps", words, "--margins", "bond", "--out", str(out)]) == 1
@@ -108,15 +105,6 @@ def test_what_falls_with_the_mortar_of_the_build_is_status_1(capsys, tmp_path):
     assert [*found["verdicts"]] == ["dry, friction 0.3", "epoxy, friction 0.3"]
     assert {each["friction"] for each in found["mortar"].values()} == {0.3}
     assert all(each["does not stand"] for each in found["verdicts"].values())
-
-
-def test_both_mortars_are_assessed_up_to_an_interrupt(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("seqopt._cli.commands.assess.stability_row", ended_in(21))
-    words = ["assess", ARCH, "--method", "sequential", "--json"]
-    assert main(words) == 130
-    found = json.loads(capsys.readouterr().out)
-    assert found["failures"] == ["seqopt: interrupted; 20 of 34 verdicts were found"]
-    assert [row["mortar"] for row in found["steps"]] == ["dry"] * 17 + ["epoxy"] * 3
 
 
 @pytest.mark.parametrize(("fall", "said"), [(-0.005, "leaves their balance"), (-0.5, "not small")])

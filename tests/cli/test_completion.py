@@ -8,7 +8,6 @@ from contextlib import redirect_stdout
 
 import pytest
 
-from seqopt._cli.commands.completion import words
 from seqopt._cli.main import main
 from seqopt.graph.formulation import formulation_names
 
@@ -54,14 +53,7 @@ def offered(shell, script, line, folder):
     [
         ("seqopt op", {"optimize"}),
         ("seqopt optimize arch2", {"arch25"}),
-        ("seqopt optimize --formul", {"--formulation"}),
         ("seqopt optimize --formulation overlap_d", {"overlap_dp"}),
-        ("seqopt optimize --formulation ord", {"order_search"}),
-        ("seqopt optimize --schedule fr", {"free"}),
-        ("seqopt optimize --schedule free --aim minm", {"minmax"}),
-        ("seqopt compare --criteria clos", {"closest-to-plan"}),
-        ("seqopt compare --engine fra", {"frame"}),
-        ("seqopt optimize --limit pay", {"payload"}),
         ("seqopt scene vau", {"vault338", "vault:"}),
         ("seqopt compare --engine qqq", set()),
     ],
@@ -91,9 +83,3 @@ def test_each_script_has_all_names_and_is_one_its_shell_reads(scripts, shell):
         pytest.skip(f"{shell} is not installed")
     done = subprocess.run([shell, "-n", scripts[shell]], capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
-
-
-def test_words_of_different_arguments_have_functions_of_their_own():
-    one, same, other = words(["a"]), words(["a"]), words(["b"])
-    assert one == same != other
-    assert one["bash"] != other["bash"]

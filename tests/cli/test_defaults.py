@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -15,7 +14,6 @@ from seqopt._cli.main import main
 from seqopt._cli.signatures import signature_of
 from seqopt._registry import COMMANDS
 from seqopt.scene.scene_file import save_scene
-from seqopt.work.progress import Stage
 from tests.builders import anywhere, small_arch
 
 DURATIONS = "fetch=30,place=10,approach=10,grip=7,release=5"
@@ -81,43 +79,6 @@ def test_two_robots_get_the_loop_of_two(capsys, tmp_path):
     assert named.problem.schedule.method == "four-robot"
 
 
-def test_budgets_are_kept_in_python():
-    free, bound = seqopt.optimize("arch25"), seqopt.optimize("arch25", budgets="travel=20m")
-    (kept,) = bound.summary()["budgets"].values()
-    assert kept["spent"] <= kept["bound"] == 20
-    assert bound.formulation.name == "labels"  # overlap_dp takes none
-    assert bound.certificate.objective > free.certificate.objective
-
-
-@pytest.mark.parametrize("budgets", [5, ["speed=3"], [7], "travel=fast"])
-def test_budgets_that_are_none_get_one_line(budgets):
-    with pytest.raises(seqopt.SeqoptError, match=r"^budget.*give travel=0\.8") as caught:
-        seqopt.optimize(small_arch(5), budgets=budgets)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_free_schedule_tells_python_how_far_it_is():
-    told = []
-    seqopt.optimize(small_arch(4), "free", progress=told.append)
-    assert all(isinstance(each, str | Stage) for each in told)
-    assert told
-
-
-@pytest.mark.slow
-def test_a_chain_that_opens_its_joints_has_a_plan_in_python_too():
-    """The engine that opens joints is taken where it is asked for."""
-    plan = seqopt.optimize("chain:bricks=75", "three-robot", formulation="cascade")
-    assert len(plan.steps) == 290
-
-
-def test_compare_in_python_is_the_command(capsys, arch):
-    found = answered(capsys, "compare", arch, "--no-stability", "--criteria", "worst-ratio")
-    same = seqopt.compare(arch, stability=False, criterion="worst-ratio")
-    assert [row["name"] for row in found["rows"]] == [*same.table.index]
-    assert [row["F_rob"] for row in found["rows"]] == [*same.table["F_rob"]]
-    assert (found["scene"]["bricks"], found["criterion"]) == (6, "worst-ratio")
-
-
 def test_pareto_in_python_is_the_command(capsys, arch, tmp_path):
     words = ("--aim", "F_largest,steps", "--rule", "least_grips=1")
     found = answered(capsys, "pareto", arch, *words)["points"]
@@ -129,27 +90,19 @@ def test_pareto_in_python_is_the_command(capsys, arch, tmp_path):
     assert (tmp_path / "set" / "pareto.csv").is_file()
 
 
-def test_assess_in_python_is_the_command(capsys, arch, tmp_path):
-    plan = seqopt.optimize(arch, "free")
-    assert main(["optimize", str(arch), "--schedule", "free", "--out", str(tmp_path / "p")]) == 0
+def test_assess_and_replan_in_python_are_the_commands(capsys, arch, tmp_path):
+    """Of a plan, and of the folder that it is written to."""
+    plan, folder = seqopt.optimize(arch, "free"), tmp_path / "p"
+    assert main(["optimize", str(arch), "--schedule", "free", "--out", str(folder)]) == 0
     capsys.readouterr()
-    found = answered(capsys, "assess", tmp_path / "p", "--margins", "bond")["steps"]
-    found = [row for row in found if row["mortar"] == "epoxy"]
-    for built in (plan, tmp_path / "p"):
+    found = answered(capsys, "assess", folder, "--mortar", "epoxy", "--margins", "bond")["steps"]
+    words = ("--at", "4", "--lost", "rob3", "--rule", "least_grips=1")
+    again = answered(capsys, "replan", folder, *words)["plan"]
+    for built in (plan, folder):
         same = seqopt.assess(built, mortar=seqopt.EPOXY, margins="bond")
         assert [row["verdict"] for row in found] == [*same["verdict"]]
-    assert set(seqopt.assess(arch, map="friction=0.5,0.9", holds="dry")["value"]) == {0.5, 0.9}
-
-
-def test_replan_in_python_is_the_command(capsys, arch, tmp_path):
-    plan = seqopt.optimize(arch, "free")
-    assert main(["optimize", str(arch), "--schedule", "free", "--out", str(tmp_path / "p")]) == 0
-    capsys.readouterr()
-    words = ("--at", "4", "--lost", "rob3", "--rule", "least_grips=1")
-    found = answered(capsys, "replan", tmp_path / "p", *words)
-    for built in (plan, tmp_path / "p"):
-        same = seqopt.replan(built, at=4, lost=["rob3"], rules="least_grips=1")
-        assert [row["step"] for row in found["plan"]] == [step.number for step in same.steps]
+        rest = seqopt.replan(built, at=4, lost=["rob3"], rules="least_grips=1")
+        assert [row["step"] for row in again] == [step.number for step in rest.steps]
 
 
 def test_every_command_has_a_function_of_python():
@@ -174,13 +127,6 @@ def test_what_functions_take_is_written_once():
                 assert not option.more.get("shell"), (name, each.name)
 
 
-def test_a_page_of_a_plan_is_named_by_its_scene(arch, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    plan = seqopt.optimize(arch, "free")
-    (page,) = doors.report(plan, stability=False)
-    assert page == Path("-".join(plan.problem.scene.name.split())).with_suffix(".html")
-
-
 def test_a_word_that_python_does_not_know_is_refused():
     with pytest.raises(TypeError, match="aims"):
         seqopt.pareto("arch25", aims="D_max")
@@ -199,30 +145,3 @@ def test_tables_of_python_are_those_of_the_command(capsys, arch):
     assert [row["end_s"] for row in spent["steps"]] == [*table["end_s"]]
     reached = answered(capsys, "reach", arch)["reach"]
     assert [row["reached"] for row in reached] == [*doors.reach(arch)["reached"]]
-
-
-def test_what_commands_write_python_gives(capsys, arch, tmp_path):
-    blocks = answered(capsys, "export", arch, "--format", "csv")["text"]
-    assert doors.export(arch) == doors.export(arch, out=tmp_path / "blocks.csv") == blocks
-    facts = answered(capsys, "instance", arch, "--schedule", "free", "--out", tmp_path / "a.npz")
-    facts = {name: facts[name] for name in ("nodes", "arcs")}
-    found = doors.instance(arch, schedule="free", out=tmp_path / "b.npz")
-    assert json.loads(json.dumps(found.facts_of(), default=str)).items() >= facts.items()
-    assert (tmp_path / "b.npz").is_file()
-    (page,) = doors.report(arch, out=tmp_path / "page.html", stability=False)
-    assert page.is_file()
-
-
-def test_one_grammar_reads_rules(arch):
-    rules = seqopt.FreeRules(least_grips=1, newest="placing")
-    words = ["least_grips=1", "newest=placing"]
-    plans = [seqopt.optimize(arch, "free", rules=each) for each in (rules, words, words[::-1])]
-    assert all(plan.problem.moves == rules for plan in plans)
-    one, same = (seqopt.pareto(arch, aim="F_largest", rules=each) for each in (rules, words))
-    assert one.steps == same.steps
-
-
-def test_whoever_waits_for_python_is_told(arch):
-    told = []
-    seqopt.compare(arch, stability=False, progress=told.append)
-    assert {each.what for each in told if isinstance(each, Stage)} >= {"comparing"}

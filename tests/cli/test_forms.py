@@ -34,13 +34,7 @@ def test_json_of_other_languages_is_asked_for():
 
 
 @pytest.mark.parametrize(
-    "words",
-    [
-        ("scene",),
-        ("scene", "--list"),
-        ("analyze", SMALL, "--method", "sequential"),
-        ("assess", SMALL, "--method", "sequential"),
-    ],
+    "words", [("scene", "--list"), ("assess", SMALL, "--method", "sequential")]
 )
 def test_json_is_one_document_with_the_same_keys_everywhere(capsys, words):
     status, out, _ = run(capsys, *words, "--json")
@@ -68,30 +62,6 @@ def test_json_has_the_facts_of_the_table_with_all_digits(capsys, engine25):
     assert over.startswith("rob2 holds up to 409.4 N")
 
 
-@pytest.mark.slow
-def test_json_of_compare_has_what_the_text_has(capsys):
-    _, out, _ = run(capsys, "compare", "--no-stability", "--json")
-    found = strict(out)
-    _, text, _ = run(capsys, "compare", "--no-stability")
-    rows = {row["name"]: row for row in found["rows"]}
-    for name, row in rows.items():
-        assert f"  {name}" in text or name in ("labels", "beam")
-        assert f"{row['F_rob']:.1f}" in text
-    assert rows["sequential"]["paper"]["F_rob"] == 406.0
-    assert rows["overlap_dp"]["paper"] == {}
-    assert rows["overlap_dp"]["gap"] == pytest.approx(0.0)
-    assert found["paper_by_robot"]["sequential"]["F_rob2 [N]"] == 406.0
-    assert found["largest_by_robot"]["sequential"]["F_rob2 [N]"] == rows["sequential"]["F_rob"]
-    assert rows["sequential"]["objective"] is None
-    said = " ".join(text.split())
-    assert all(" ".join(note.split()) in said.replace("- ", "") for note in _without(found))
-
-
-def _without(found):
-    """Findings as the text has them."""
-    return [note.removeprefix("In the paper: ").replace("- ", "") for note in found["findings"]]
-
-
 def test_json_of_optimize_is_its_summary_and_its_plan(capsys, tmp_path):
     words = ("optimize", SMALL, "--formulation", "overlap_dp", "--out", tmp_path / "a")
     status, out, err = run(capsys, *words, "--json")
@@ -103,12 +73,6 @@ def test_json_of_optimize_is_its_summary_and_its_plan(capsys, tmp_path):
     stored = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
     assert found["summary"]["objective"] == stored["objective"]
     assert len(found["plan"]) == len(pd.read_csv(tmp_path / "a" / "plan.csv"))
-
-
-def test_where_a_command_fails_there_is_no_document(capsys, tmp_path):
-    words = ("optimize", "--formulation", "overlap_dp", "--limit", "F_largest=9")
-    status, out, err = run(capsys, *words, "--out", tmp_path / "a", "--json")
-    assert (status, out, err.count("\n")) == (3, "", 1)
 
 
 def test_an_answer_that_does_not_hold_is_still_a_document(capsys):
@@ -131,19 +95,6 @@ def test_quiet_prints_the_paths_of_what_is_written(capsys, tmp_path):
     said = f"{over}\nrobots: rob3 never grips\n"
     assert (out.startswith("49 steps"), beside_models(err)) == (True, said)
     assert run(capsys, *words, "--quiet") == (0, f"{tmp_path / 'c.csv'}\n", "")
-
-
-def test_quiet_keeps_a_table_that_has_no_file_and_errors(capsys):
-    status, out, err = run(capsys, "analyze", "--method", "cantilever", "--quiet")
-    assert (out.startswith("step,type"), out.count("\n"), err) == (True, 50, "")
-    status, out, err = run(capsys, "scene", "nowhere", "--quiet")
-    assert (status, out, err.count("\n")) == (2, "", 1)
-
-
-def test_one_form_at_a_time(capsys):
-    status, out, err = run(capsys, "scene", "--quiet", "--json")
-    assert (status, out) == (2, "")
-    assert "not allowed with argument" in err
 
 
 def test_values_as_json_can_hold_them():

@@ -1,4 +1,4 @@
-"""The free schedule and Pareto sets on the command line."""
+"""The free schedule, take-downs, scenarios and Pareto sets on the command line."""
 
 from __future__ import annotations
 
@@ -48,54 +48,6 @@ def test_more_robots_come_with_their_scene(capsys, tmp_path, arch):
     steps = read_plan(scene, out / "plan.csv")
     assert steps[-1].held == ()
     assert len(steps[-2].held) == 1
-
-
-@pytest.mark.slow
-def test_states_that_must_stand(capsys, tmp_path, arch):
-    out = tmp_path / "out"
-    words = ["--stands", "dry", "--tilt", "2", "--aim", "steps,minmax"]
-    status, *_ = run(capsys, "optimize", arch, "--schedule", "free", *words, "--out", str(out))
-    assert status == 0
-    rows = pd.read_csv(out / "stability.csv")
-    assert set(rows["verdict"]) == {"stands"}
-    assert rows["tilt_survived_deg"].min() >= 2
-    said = json.loads((out / "summary.json").read_text())["stands"]
-    assert said["tilt_deg"] == pytest.approx(2)
-    assert (said["cohesion_Pa"], said["undecided"]) == (0, 0)
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_the_margin_search_plan_is_in_degrees(capsys, tmp_path, arch):
-    out = tmp_path / "out"
-    words = ["--stands", "dry", "--aim", "tilt"]
-    status, said, _ = run(capsys, "optimize", arch, "--schedule", "free", *words, "--out", str(out))
-    assert status == 0
-    tilt = json.loads((out / "summary.json").read_text())["objective"]["tilt"]
-    assert f"tilt {tilt:.6g}" in said
-    assert tilt <= pd.read_csv(out / "stability.csv")["tilt_survived_deg"].min() + 0.1
-
-
-def test_a_free_schedule_within_a_budget(capsys, tmp_path, arch):
-    out = tmp_path / "out"
-    words = ("--schedule", "free", "--budget", "regrips=0", "--budget", "travel=9m")
-    status, text, error = run(capsys, "optimize", arch, *words, "--out", str(out))
-    assert (status, beside_models(error)) == (0, "")
-    assert ", optimal" in text
-    summary = json.loads((out / "summary.json").read_text())
-    assert summary["budgets"]["regrips"] == {"bound": 0, "spent": 0, "price": None}
-    assert summary["budgets"]["travel"]["spent"] <= 9
-    assert summary["objective"]["travel"] <= 9
-
-
-def test_a_free_schedule_over_scenarios(capsys, tmp_path, arch):
-    out = tmp_path / "out"
-    words = ("--schedule", "free", "--robust", "worst-peak", "--scenarios", "3")
-    status, text, error = run(capsys, "optimize", arch, *words, "--out", str(out))
-    assert (status, beside_models(error)) == (0, "")
-    assert text.splitlines()[0].endswith(", optimal")
-    summary = json.loads((out / "summary.json").read_text())
-    assert summary["scenarios"]["count"] == 3
 
 
 def test_a_loop_by_its_states(capsys, tmp_path, arch):
@@ -149,24 +101,6 @@ def test_figures_that_cannot_be_drawn_are_left_out_and_it_says_so(
     assert "report.html" in plain
 
 
-@pytest.mark.slow
-def test_pareto_of_a_loop_and_bounds_of_what_is_picked(capsys, tmp_path, arch):
-    out = ["--out", str(tmp_path / "front")]
-    loop = ["--schedule", "three-robot", "--aim", "F_largest,T_max"]
-    status, said, _ = run(capsys, "pareto", arch, *loop, *out)
-    assert status == 0
-    assert "complete; --pick D_max also writes" in said
-    words = ["--aim", "F_largest,M_sup,T_max,D_max", "--pick", "steps", "--under", "D_max=1"]
-    status, said, error = run(capsys, "pareto", arch, *words, *out)
-    assert "picked row" in said or "no plan of the set is below all bounds" in error
-    status, _, error = run(capsys, "pareto", arch, "--pick", "steps", "--under", "magic", *out)
-    assert status == 2
-    assert "--under magic" in error
-    status, _, error = run(capsys, "pareto", arch, *loop, "--rule", "regrips=0", *out)
-    assert status == 2
-    assert "only the free schedule has them; give --schedule free" in error
-
-
 def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     out = tmp_path / "out"
     words = ["--schedule", "free", "--order", "search", "--aim", "F_largest,steps"]
@@ -183,9 +117,8 @@ def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     assert len(read_plan(scene, out / "plan.csv")) == summary["steps"]
 
 
-@pytest.mark.parametrize("scene", ["wall:columns=2,courses=2", "chain:bricks=8"])
-def test_one_robot_gets_one_advice_that_works(capsys, scene):
-    asked = ("optimize", scene, "--schedule", "free", "--robots", "1")
+def test_one_robot_gets_one_advice_that_works(capsys):
+    asked = ("optimize", "wall:columns=2,courses=2", "--schedule", "free", "--robots", "1")
     status, _, err = run(capsys, *asked)
     assert status == 3
     advice = re.search(r"\((--rule [^)]*)\)$", err.strip())[1].split()
@@ -202,3 +135,53 @@ def test_one_robot_has_nothing_to_compare(capsys, tmp_path):
     status, out, _ = run(capsys, "compare", scene, "--robots", "2", "--no-stability")
     assert status == 0
     assert "not possible here" not in out
+
+
+DOWN = ("--schedule", "free", "--direction", "take-down")
+PROPPED = ("--props", "5,capacity=300")
+CLOSE = ("--grips", "1e6", "--limit", "tolerance=1nm", "--limit", "T_max=500")
+
+
+@pytest.mark.slow
+def test_a_take_down_is_written_and_read_everywhere(capsys, tmp_path, arch):
+    out = tmp_path / "down"
+    aim = ("--aim", "minmax,steps")
+    status, said, _ = run(capsys, "optimize", arch, *DOWN, *aim, "--out", out)
+    assert (status, "optimal" in said) == (0, True)
+    assert json.loads((out / "summary.json").read_text())["rules"]["direction"] == "take-down"
+    plan = ("--plan", out / "plan.csv")
+    assert run(capsys, "analyze", arch, *plan)[0] == 0
+    status, said, _ = run(capsys, "assess", arch, *plan, "--mortar", "epoxy")
+    assert (status, "nothing stands" in said) == (0, True)
+    status, said, _ = run(capsys, "replan", out, "--at", "3")
+    assert (status, "the new plan is the old one" in said) == (0, True)
+
+
+@pytest.mark.parametrize("words", [PROPPED, CLOSE], ids=" ".join)
+def test_what_limits_follow_from_the_scene_goes_with_it(capsys, tmp_path, arch, words):
+    """Props that bear only so much, and a tolerance beside other limits; also planned again."""
+    out, quick = tmp_path / "propped", "--no-stability"
+    status, said, _ = run(capsys, "optimize", arch, *DOWN, *words, quick, "--out", out)
+    assert (status, "optimal" in said) == (0, True)
+    assert (out / "plan.csv").read_text().splitlines()[-1].split(",")[2] == "0"
+    limits = json.loads((out / "summary.json").read_text())["limits"]
+    assert len(limits) == (2 if words == CLOSE else 1)
+    status, said, _ = run(capsys, "replan", out, "--at", "2", quick)
+    assert (status, "optimal" in said) == (0, True)
+    assert run(capsys, "analyze", out)[0] == 0
+
+
+@pytest.mark.parametrize("aim", ["worst-peak", "cvar=0.5"])
+def test_a_plan_over_scenarios_is_written(capsys, tmp_path, arch, aim):
+    words = ("--robust", aim, "--scenarios", "4", "--seed", "5", "--out", tmp_path)
+    more = ("--criteria", "weighted-published", "--vary", "stiffness=2", "--vary", "position=0")
+    status, out, err = run(capsys, "optimize", arch, *words, *more)
+    assert (status, beside_models(err)) == (0, "")
+    assert f"({aim})" in out
+    assert "optimal over 4 scenarios" in out
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    drawn = {"count": 4, "stiffness": [0.5, 2.0], "density": 0.1, "position_m": 0.0, "seed": 5}
+    assert (summary["scenarios"], summary["aims"]) == (drawn, [aim])
+    assert summary["status"].endswith("optimal")
+    assert summary["bound"][aim] <= summary["objective"][aim]
+    assert run(capsys, "analyze", arch, "--plan", tmp_path / "plan.csv")[0] == 0

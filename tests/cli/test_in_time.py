@@ -14,14 +14,12 @@ import seqopt
 from seqopt._cli import outputs
 from seqopt._cli.answer import answer_of
 from seqopt._cli.arguments import request
-from seqopt._cli.commands import analyze, replan
+from seqopt._cli.commands import analyze
 from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
-from seqopt.graph.formulation import End
 from seqopt.plan import _answers as _paths
 from seqopt.plan import _states
 from seqopt.plan.front import find_front
-from seqopt.plan.plan import Status
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.work.progress import INTERRUPT, TIME, Clock
 from tests.builders import small_arch
@@ -48,8 +46,9 @@ def ended(words, when, how=KeyboardInterrupt):
     return answer
 
 
-@pytest.mark.parametrize(("how", "status"), [(KeyboardInterrupt, 130), (TimeoutError, 0)])
-@pytest.mark.parametrize("words", [FREE, LOOP])
+@pytest.mark.parametrize(
+    ("words", "how", "status"), [(FREE, KeyboardInterrupt, 130), (LOOP, TimeoutError, 0)]
+)
 def test_verdicts_that_are_ended_are_left_out(tmp_path, capsys, monkeypatch, words, how, status):
     monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
     out = tmp_path / "out"
@@ -77,10 +76,11 @@ def in_the_midst(monkeypatch, module, name, how):
 
 
 @pytest.mark.parametrize(
-    ("how", "why", "status"), [(TimeoutError, TIME, 0), (KeyboardInterrupt, INTERRUPT, 130)]
-)
-@pytest.mark.parametrize(
-    ("words", "module", "judge"), [(FREE, _states, "judge_schedule"), (LOOP, _paths, "judge_path")]
+    ("words", "module", "judge", "how", "why", "status"),
+    [
+        (FREE, _states, "judge_schedule", TimeoutError, TIME, 0),
+        (LOOP, _paths, "judge_path", KeyboardInterrupt, INTERRUPT, 130),
+    ],
 )
 def test_a_proof_that_is_ended_leaves_what_is_claimed(
     tmp_path, monkeypatch, words, module, judge, how, why, status
@@ -101,24 +101,8 @@ def test_a_proof_that_is_ended_leaves_what_is_claimed(
     assert read_plan(scene, out / "plan.csv") == read_plan(scene, whole / "plan.csv")
 
 
-def test_an_interrupt_of_the_proof_leaves_a_plan_in_python_too(monkeypatch):
-    engine = seqopt.make_engine("compliance", seqopt.load_scene(WALL))
-    problem = seqopt.pose(engine, seqopt.FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax")
-    in_the_midst(monkeypatch, _states, "judge_schedule", KeyboardInterrupt)
-    plan = seqopt.solve(problem)
-    assert (plan.ended, plan.status, plan.certificate) == (End.INTERRUPTED, Status.FEASIBLE, None)
-    assert "feasible" in repr(plan)
-
-
 @pytest.mark.parametrize(
-    "words",
-    [
-        FREE,
-        LOOP,
-        ("pareto", WALL),
-        ("instance", WALL, "--schedule", "free"),
-        ("analyze", WALL, "--method", "sequential"),
-    ],
+    "words", [LOOP, ("pareto", WALL), ("analyze", WALL, "--method", "sequential")]
 )
 def test_a_limit_that_is_over_at_once_is_a_line(capsys, monkeypatch, tmp_path, words):
     """Whatever comes first, and where nothing is late the same words have an answer."""
@@ -133,14 +117,13 @@ def test_a_limit_that_is_over_at_once_is_a_line(capsys, monkeypatch, tmp_path, w
         pass
 
 
-@pytest.mark.parametrize(("how", "status"), [(KeyboardInterrupt, 130), (TimeoutError, 0)])
-def test_a_page_that_is_ended_is_left_out(tmp_path, monkeypatch, how, status):
+def test_a_page_that_is_ended_is_left_out(tmp_path, monkeypatch):
     """Without its tables too a plan is there, and its folder can be read again."""
     monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
-    in_the_midst(monkeypatch, seqopt.report._pages, "plan_page", how)
-    in_the_midst(monkeypatch, outputs, "plan_files", how)
+    in_the_midst(monkeypatch, seqopt.report._pages, "plan_page", KeyboardInterrupt)
+    in_the_midst(monkeypatch, outputs, "plan_files", KeyboardInterrupt)
     out = tmp_path / "out"
-    assert main([*FREE, "--out", str(out)]) == status
+    assert main([*FREE, "--out", str(out)]) == 130
     assert {p.name for p in out.iterdir()} == {"plan.csv", "scene.json", "summary.json"}
     left = json.loads((out / "summary.json").read_text())["left_out"]
     assert {*left} == {"its tables", "report.html"}
@@ -166,19 +149,18 @@ def test_without_responses_a_plan_is_its_steps(tmp_path, capsys, monkeypatch):
         assert found[name] == known[name]
 
 
-@pytest.mark.parametrize(("how", "status"), [(KeyboardInterrupt, 130), (TimeoutError, 0)])
-def test_a_pareto_set_that_is_ended_has_its_points(tmp_path, monkeypatch, how, status):
+def test_a_pareto_set_that_is_ended_has_its_points(tmp_path, monkeypatch):
     monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
     words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
     out = tmp_path / "out"
-    answer = ended([*words, "--out", out], "drawing and writing the page", how)
-    assert answer.status == status
+    answer = ended([*words, "--out", out], "drawing and writing the page", TimeoutError)
+    assert answer.status == 0
     assert {p.name for p in out.iterdir()} == {
         *("pareto.csv", "plans.csv", "summary.json", "scene.json")
     }
     points = pd.read_csv(out / "pareto.csv")
     assert pd.read_csv(out / "plans.csv")["point"].nunique() == len(points) > 1
-    assert len(answer.failures) == bool(status)
+    assert not answer.failures
 
 
 def test_an_interrupted_search_of_a_pareto_set_has_the_status_of_interrupts():
@@ -199,16 +181,6 @@ def test_a_pareto_set_whose_proof_is_ended_is_not_complete(monkeypatch):
     in_the_midst(monkeypatch, seqopt.plan.front, "_require_complete", KeyboardInterrupt)
     found = find_front(problem)
     assert (found.complete, found.stopped) == (False, INTERRUPT)
-
-
-def test_the_comparison_of_a_new_plan_is_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
-    assert main([*FREE, "--out", str(tmp_path / "a")]) == 0
-    in_the_midst(monkeypatch, replan, "compared", TimeoutError)
-    words = ["replan", str(tmp_path / "a"), "--at", "2", "--out", str(tmp_path / "b")]
-    assert main(words) == 0
-    left = json.loads((tmp_path / "b" / "summary.json").read_text())["left_out"]
-    assert left == {"what the new plan changes": TIME}
 
 
 def test_what_is_said_of_steps_is_left_out(tmp_path, monkeypatch):

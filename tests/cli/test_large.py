@@ -68,14 +68,13 @@ def test_results_do_not_depend_on_workers_and_memory(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "size"),
-    [("2GB", 2e9), ("500 MB", 5e8), ("1.5GiB", 1.5 * 2**30), ("2e9", 2e9), ("7", 7), ("1k", 1000)],
+    ("text", "size"), [("500 MB", 5e8), ("1.5GiB", 1.5 * 2**30), ("2e9", 2e9), ("1k", 1000)]
 )
 def test_sizes(text, size):
     assert parse_size(text) == size
 
 
-@pytest.mark.parametrize("text", ["", "GB", "-1GB", "1XB", "nan", "inf", "1GBs", "1e999"])
+@pytest.mark.parametrize("text", ["", "GB", "-1GB", "1XB", "nan", "1GBs", "1e999"])
 def test_what_is_no_size(text):
     with pytest.raises(ProblemError, match="give a size"):
         parse_size(text)
@@ -97,18 +96,14 @@ def test_what_does_not_fit_is_refused_before(capsys, tmp_path):
 
 @posix
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("workers", "limits"),
-    [pytest.param("1", (60, 340, 370, 4096), marks=pytest.mark.long), ("2", (300, 4096))],
-)
-def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path, workers, limits):
+def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path):
     import resource  # noqa: PLC0415  # POSIX has it alone
 
     scene = tmp_path / "scene.json"
     save_scene(small_arch(25), scene)
-    words = [*WORDS, "overlap_dp", scene, "--workers", workers]
+    words = [*WORDS, "overlap_dp", scene, "--workers", "2"]
     statuses = set()
-    for mebibytes in limits:
+    for mebibytes in (300, 4096):
         limit = (mebibytes * 2**20,) * 2
         out = tmp_path / str(mebibytes)
         limited = partial(resource.setrlimit, resource.RLIMIT_AS, limit)
@@ -193,15 +188,7 @@ def test_fewer_candidates_are_a_heuristic_that_says_so(capsys, tmp_path):
     assert "give near:JOINTS or within:METERS" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "labels",
-        pytest.param("lagrangian", marks=pytest.mark.slow),
-        pytest.param("overlap_mip", marks=pytest.mark.slow),
-    ],
-)
-def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tmp_path, name):
+def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tmp_path):
     """As ctrl-C at the first finding; what is written is whole."""
     came = []
 
@@ -211,7 +198,7 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr("seqopt._cli.commands.optimize.within", lambda tell, seconds: interrupt)
-    words = [*WORDS, name, "--budget", "travel=0.8"]
+    words = [*WORDS, "labels", "--budget", "travel=0.8"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 130
     out, err = capsys.readouterr()
     assert err == "seqopt: interrupted; the plan is the best that was met\n"

@@ -16,13 +16,11 @@ def posed(asked: Optimize):
     return pose_problem(asked).problem
 
 
-FREE, SCENE = {"schedule": "free"}, "chain:bricks=7"
+FREE, SCENE = {"schedule": "free"}, "chain:bricks=6"
 QUESTIONS = [
     {},
     {"limits": ["payload", "F_largest=300"], "budgets": ["travel=0.9"]},
     {"criterion": "T_max,M_sup=2", "robots": "rob1,rob2", "candidates": "near:12"},
-    {"formulation": "schedule_search"},
-    {"stands": "epoxy"},
     FREE,
     {**FREE, "aim": "minmax,steps", "rules": ["newest=free"], "budgets": ["regrips=3"]},
     {**FREE, "order": "search", "aim": "sum"},

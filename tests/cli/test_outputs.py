@@ -25,11 +25,8 @@ def refused(capsys, *words):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="devices are POSIX's")
-@pytest.mark.parametrize(
-    "words", [("analyze", "--method", "sequential", "--out"), ("scene", "--export")]
-)
-def test_a_device_is_no_output(capsys, words):
-    assert "device" in refused(capsys, *words, "/dev/null")
+def test_a_device_is_no_output(capsys):
+    assert "device" in refused(capsys, "scene", "--export", "/dev/null")
     assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
 
 
@@ -66,12 +63,6 @@ def test_a_pipe_is_no_input(capsys, tmp_path):
     os.mkfifo(pipe)
     for words in (("scene", pipe), ("analyze", "--plan", pipe), ("scene", "/dev/zero")):
         assert "it is not a regular file" in refused(capsys, *words)
-
-
-def test_a_failure_makes_no_folder(capsys, tmp_path):
-    words = ("optimize", "--formulation", "overlap_dp", "--limit", "F_largest=9")
-    assert main([*words, "--out", str(tmp_path / "new" / "out")]) != 0
-    assert not list(tmp_path.iterdir())
 
 
 def test_what_a_line_says_is_not_asked_again_for_the_page(monkeypatch, tmp_path):

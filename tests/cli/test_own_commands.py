@@ -98,6 +98,7 @@ def test_a_package_adds_a_command(package):
     assert "did you mean weigh?" in package("weig").stderr
 
 
+@pytest.mark.slow
 def test_a_package_that_fails_is_left_out(package, tmp_path):
     (tmp_path / "my_package.py").write_text("import nothing_of_this_name\n", encoding="utf-8")
     page = package("--help")

@@ -51,14 +51,26 @@ def flags(command):
 
 
 @pytest.mark.parametrize("name", ["", *COMMANDS])
-def test_help_fits_one_screen_and_shows_examples(printed, name):
+def test_help_fits_one_screen_and_shows_what_is_needed_first(printed, name):
+    """What must be given, what examples use, and how many more there are."""
     out = printed(*([name] if name else []), "--help")
     assert len(out.splitlines()) <= LINES == 40
     assert max(map(len, out.splitlines())) <= 80
     assert all(text.count("(") == text.count(")") for text in out.split("\n\n"))
-    if name:
-        for example in signature_of(COMMANDS[name].load()).lines["Examples"]:
-            assert f"\n  {example}\n" in out
+    if not name:
+        return
+    command, examples = command_of(name), signature_of(COMMANDS[name].load()).lines["Examples"]
+    assert [example for example in examples if f"\n  {example}\n" not in out] == []
+    shown = defined(out.partition("\nexample")[0])
+    assert len(shown) == len({*shown})
+    needed = {a.option_strings[0] for a in command._actions if a.required and a.option_strings}
+    used = {word for example in examples for word in example.split()} & {*flags(command)}
+    assert needed | used <= {*shown}
+    if "--help-all has" in out:
+        more = int(out.rpartition("--help-all has ")[2].split()[0])
+        assert more == len({*flags(command)} - {*shown} - {"-h", "--help-all"})
+    else:
+        assert out == printed(name, "--help-all")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -72,32 +84,6 @@ def test_all_help_has_every_option_once(printed, name):
     body = defined("\n".join(kept).partition("\nexample")[0])
     for flag in flags(command):
         assert body.count(flag) == 1, flag
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_the_screen_has_what_must_be_given_and_what_examples_use(printed, name):
-    out, command = printed(name, "--help"), command_of(name)
-    shown = defined(out.partition("\nexample")[0])
-    assert len(shown) == len({*shown})
-    for action in command._actions:
-        if action.required and action.option_strings:
-            assert action.option_strings[0] in shown
-    used = {
-        word
-        for example in signature_of(COMMANDS[name].load()).lines["Examples"]
-        for word in example.split()
-    }
-    assert {word for word in used if word in flags(command)} <= {*shown}
-    if "--help-all has" in out:
-        more = int(out.rpartition("--help-all has ")[2].split()[0])
-        assert more == len({*flags(command)} - {*shown} - {"-h", "--help-all"})
-    else:
-        assert out == printed(name, "--help-all")
-
-
-def test_what_one_needs_first_of_optimize(printed):
-    shown = defined(printed("optimize", "--help"))
-    assert {"SCENE", "--schedule", "--aim", "--criteria", "--stands", "--out"} <= {*shown}
 
 
 class Reasoned(Asked):
@@ -168,15 +154,6 @@ def test_fields_say_how_options_are_read(excused, capsys):
         with pytest.raises(SystemExit):
             excused.parse_args(wrong.split())
     assert capsys.readouterr().err
-
-
-def test_values_of_python_are_the_same_words():
-    call = signature_of(excuse).call
-    found, _, path = call({"needed": "a", "often": 2, "excuse": "x", "reason": [1, 2.5]})
-    assert (found.often, path, found.reason) == (("2",), Path("x"), "1,2.5")
-    assert call({"needed": "a", "often": [1, 2]})[0].often == ("1", "2")
-    with pytest.raises(ProblemError, match=r"^needed 'c' does not exist; give a, b$"):
-        call({"needed": "c"})
 
 
 def test_numbers_are_read_where_they_are_given():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from functools import partial
 
@@ -29,11 +28,11 @@ def without_time(path):
 
 def test_every_row_is_what_one_problem_has(tmp_path, capsys):
     out = tmp_path / "s"
-    assert told("chain:bricks=7..11/3", "--over", "payload=300..500/2", "--out", str(out)) == 0
-    assert "6 problems: 6 optimal" in capsys.readouterr().out
+    assert told("chain:bricks=7..8/2", "--over", "payload=300..500/2", "--out", str(out)) == 0
+    assert "4 problems: 4 optimal" in capsys.readouterr().out
     rows = pd.read_csv(out / "sweep.csv")
     assert list(zip(rows["bricks"], rows["payload"], strict=True)) == [
-        (bricks, payload) for bricks in (7, 9, 11) for payload in (300, 500)
+        (bricks, payload) for bricks in (7, 8) for payload in (300, 500)
     ]
     for _, row in rows.iterrows():
         plan = free(f"chain:bricks={row['bricks']:.0f}")
@@ -47,7 +46,7 @@ def test_every_row_is_what_one_problem_has(tmp_path, capsys):
 def test_a_sweep_that_was_interrupted_goes_on_where_it_ended(tmp_path, workers):
     """Rows that are there are kept as they are, the others are the same as without an end."""
     whole, part = tmp_path / "whole", tmp_path / "part"
-    words = ["chain:bricks=7..13/4", "--out"]
+    words = ["chain:bricks=7..9/3", "--out"]
     assert told(*words, str(whole)) == 0
     assert told(*words, str(part)) == 0
     lines = (part / "sweep.csv").read_text().splitlines()
@@ -59,20 +58,12 @@ def test_a_sweep_that_was_interrupted_goes_on_where_it_ended(tmp_path, workers):
     pd.testing.assert_frame_equal(found.iloc[1:], expected.iloc[1:])
 
 
-def test_another_sweep_needs_another_folder(tmp_path, capsys):
-    words = ["chain:bricks=7..9/2", "--out", str(tmp_path)]
-    assert told(*words) == 0
-    assert main(["sweep", *words, "--aim", "steps"]) == 2
-    assert "a sweep with another aim, F_largest,steps; name another" in capsys.readouterr().err
-    assert json.loads((tmp_path / "sweep.json").read_text())["problems"] == 2
-
-
 def test_a_problem_without_a_plan_is_a_row_that_says_why(capsys):
-    assert told("chain:bricks=7..9/2", "--over", "payload=1,400") == 0
+    assert told("chain:bricks=7..8/2", "--over", "payload=1,400") == 0
     rows = capsys.readouterr().out
     assert rows.count("infeasible") == 2
     assert rows.count("optimal") == 2
-    assert told("chain:bricks=7..9/2", "--over", "payload=1") == 3
+    assert told("chain:bricks=7..8/2", "--over", "payload=1") == 3
 
 
 def test_ranges_are_even_or_in_proportion():
@@ -85,7 +76,7 @@ def test_ranges_are_even_or_in_proportion():
 
 
 def test_scenes_of_ones_own_and_any_function(tmp_path):
-    scenes = [seqopt.load_scene(f"chain:bricks={count}") for count in (7, 9)]
+    scenes = [seqopt.load_scene(f"chain:bricks={count}") for count in (7, 8)]
     path = tmp_path / "rows.csv"
     found = sweep(scenes, free, mortars=["dry"], out=path)
     again = sweep(scenes, lambda scene: pytest.fail("it is known"), mortars=["dry"], out=path)
@@ -93,7 +84,7 @@ def test_scenes_of_ones_own_and_any_function(tmp_path):
     assert {*found["falls_dry"]} <= {*range(20)}
     assert list(again["F_largest"]) == pytest.approx(list(found["F_largest"]), rel=1e-8)
     with pytest.raises(ProblemError, match="it has columns scene, not bricks"):
-        sweep("chain:bricks=7..9/2", free, out=path)
+        sweep("chain:bricks=7..8/2", free, out=path)
     other = sweep([replace(scenes[0], name="other")], free, mortars=["dry"], out=path)
     assert len(other) == 1
     assert len(pd.read_csv(path)) == 3  # rows of other problems stay

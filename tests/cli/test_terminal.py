@@ -13,7 +13,7 @@ import pytest
 from seqopt._cli import watcher
 from seqopt._cli.terminal import columns, complain, show_text, wrapped
 from seqopt._cli.watcher import Watcher
-from seqopt.work.progress import Stage, with_progress, within
+from seqopt.work.progress import Stage
 
 posix = pytest.mark.skipif(os.name != "posix", reason="terminals are POSIX's")
 
@@ -83,20 +83,6 @@ def test_the_time_left_of_a_stage_is_that_of_its_own_work(monkeypatch):
         assert said in tell.line()
 
 
-def test_nothing_is_shown_in_the_first_second_nor_where_nobody_looks(monkeypatch):
-    screen = on_screen(monkeypatch)
-    with Watcher() as tell:
-        tell(Stage("responses", 0.25, 12.0))
-    assert screen.getvalue() == ""
-    monkeypatch.setattr(watcher, "PATIENCE", 0.0)
-    with Watcher(shows=False) as tell:
-        tell(Stage("responses", 0.25, 12.0))
-    monkeypatch.setattr(sys, "stderr", io.StringIO())
-    with Watcher() as tell:
-        tell(Stage("responses", 0.25, 12.0))
-    assert sys.stderr.getvalue() == screen.getvalue() == ""
-
-
 class Seen(Screen):
     """A terminal, and a mark of when something was shown on it."""
 
@@ -136,17 +122,6 @@ def test_it_is_shown_now_and_then_and_goes_away_also_with_an_error(patient, monk
     assert left_on(stream.getvalue()) == ""
 
 
-def test_items_and_times_are_told_as_stages():
-    said = []
-    assert [*with_progress("steps", "ab", said.append)] == ["a", "b"]
-    assert [(stage.what, stage.share) for stage in said] == [("steps", 0.0), ("steps", 0.5)]
-    assert [*with_progress("steps", "ab", None)] == ["a", "b"]
-    within(said.append, float("inf"))("words")
-    assert said[-1] == "words"
-    within(said.append, 60.0)("words")
-    assert (said[-1].what, said[-1].left) == ("words", pytest.approx(60.0, abs=1.0))
-
-
 def test_long_lines_are_wrapped_for_people_only(monkeypatch):
     screen = on_screen(monkeypatch)
     complain("seqopt: error: " + "word " * 40)
@@ -159,7 +134,7 @@ def test_long_lines_are_wrapped_for_people_only(monkeypatch):
     assert sys.stderr.getvalue().count("\n") == 1
 
 
-@pytest.mark.parametrize(("width", "found"), [("80", 80), ("20", 40), ("300", 100)])
+@pytest.mark.parametrize(("width", "found"), [("20", 40), ("300", 100)])
 def test_columns_are_those_of_the_terminal_within_reason(monkeypatch, width, found):
     monkeypatch.setenv("COLUMNS", width)
     assert columns() == found
