@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -105,3 +106,15 @@ def test_a_method_that_is_one_is_left_out_of_a_comparison_with_its_name():
         "cantilever",
     ]
     assert not method_tables(seqopt.make_engine("compliance", hinged(scene, 0)))[0]
+
+
+def test_where_every_step_is_one_there_is_still_a_table(capsys, tmp_path):
+    scene = load_scene(ARCH)
+    ground = replace(scene.grounds[0], rotational_stiffness=(0.0, 0.0, 0.0))
+    path, grounds = tmp_path / "hinge.json", (ground, *scene.grounds[1:])
+    save_scene(replace(scene, grounds=grounds), path)
+    plan = first_steps(tmp_path / "plan.csv", 1)
+    status, out, _ = command(capsys, "analyze", path, "--plan", plan, "--json")
+    found = json.loads(out)
+    assert (status, [row["finding"] for row in found["steps"]]) == (3, ["mechanism (brick 1)"])
+    assert "seqopt: mechanism: every step (step 1)" in found["failures"][0]

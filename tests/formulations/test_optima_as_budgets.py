@@ -26,7 +26,6 @@ from tests.builders import small_arch
 from tests.times.builders import engine_of
 
 FACTORS = (1.0, 1.02)
-SUMS = ("sum(T_max)", "sum(M_sup)", "travel", "steps", "regrips")
 UP, DOWN = FreeRules(), FreeRules(direction="take-down")
 slow = pytest.mark.slow
 
@@ -59,18 +58,21 @@ def check(problem, name, formulation):
 
 
 @pytest.mark.parametrize(
-    ("name", "formulation"),
-    [*((name, "schedule_search") for name in SUMS), ("sum(T_max)", "path_beam")],
-)
-@pytest.mark.parametrize(
-    ("bricks", "moves"), [(4, UP), (4, DOWN), (5, "loop")], ids=["up", "down", "loop"]
+    ("bricks", "moves", "name", "formulation"),
+    [
+        (4, UP, "sum(T_max)", "schedule_search"),
+        (4, UP, "travel", "schedule_search"),
+        (4, UP, "regrips", "schedule_search"),
+        (4, UP, "sum(T_max)", "path_beam"),
+        (4, DOWN, "steps", "schedule_search"),
+        (5, "loop", "sum(M_sup)", "schedule_search"),
+    ],
 )
 def test_states_have_a_plan_within_every_optimum(bricks, moves, name, formulation):
     check(posed(bricks, moves), name, formulation)
 
 
-@pytest.mark.parametrize("name", SUMS)
-@pytest.mark.parametrize("aim", ["sum", pytest.param("steps,minmax", marks=slow)])
+@pytest.mark.parametrize(("name", "aim"), [("sum(M_sup)", "sum"), ("travel", "steps,minmax")])
 def test_so_they_have_for_any_aim(name, aim):
     """Where a sum is to be small, prices of budgets have to find a plan at the edge of them."""
     problem = posed(4, UP).but(goals=aim)
@@ -84,8 +86,7 @@ def test_so_they_have_for_any_aim(name, aim):
     ("name", "formulation"),
     [
         ("regrips", "order_search"),
-        ("steps", "path_beam"),
-        pytest.param("sum(T_max)", "order_search", marks=slow),
+        pytest.param("steps", "path_beam", marks=slow),
         pytest.param("travel", "order_search", marks=slow),
     ],
 )
@@ -93,8 +94,14 @@ def test_orders_have_a_plan_within_every_optimum(name, formulation):
     check(posed(3, UP, "tied"), name, formulation)
 
 
-@pytest.mark.parametrize("name", ["makespan", "sum(T_max)", "regrips"])
-@pytest.mark.parametrize("formulation", ["makespan_labels", "makespan_flow"])
+@pytest.mark.parametrize(
+    ("name", "formulation"),
+    [
+        ("makespan", "makespan_labels"),
+        ("sum(T_max)", "makespan_labels"),
+        ("regrips", "makespan_flow"),
+    ],
+)
 def test_builds_in_time_have_a_plan_within_every_optimum(name, formulation):
     engine = engine_of(3, 3)
     problem = seqopt.pose(engine, FreeRules(), ONES, "makespan")
@@ -110,24 +117,18 @@ def test_builds_in_time_have_a_plan_within_every_optimum(name, formulation):
         assert plan.objective[name] <= factor * least * (1 + 1e-6)
 
 
-@pytest.mark.parametrize("name", ["travel", "steps"])
+@pytest.mark.parametrize("name", ["travel"])
 def test_scenarios_have_a_plan_within_every_optimum(name):
     scene = small_arch(4)
     drawn = seqopt.scenarios(scene, count=2, seed=1).scenes
     check(posed(4, UP).but(scenarios=drawn), name, "schedule_search")
 
 
-@pytest.mark.parametrize(
-    ("bricks", "name", "orders"),
-    [
-        pytest.param(3, "sum(M_sup)", None, marks=slow),
-        pytest.param(4, "sum(T_max)", None, marks=slow),
-        pytest.param(3, "sum(M_sup)", "tied", marks=slow),
-    ],
-)
-def test_margins_are_the_best_within_budgets(bricks, name, orders):
+@slow
+@pytest.mark.parametrize("orders", [None, "tied"])
+def test_margins_are_the_best_within_budgets(orders):
     """The plan of the least bond takes more than the budget: another one keeps it."""
-    problem = posed(bricks, UP, orders).but(goals="bond")
+    problem, name = posed(3, UP, orders).but(goals="bond"), "sum(M_sup)"
     least = seqopt.solve(problem.but(goals=name, stands="epoxy")).objective[name]
     plan = seqopt.solve(problem.but(budgets=words(name, 1.000001 * least)))
     assert plan.objective[name] <= 1.000002 * least
@@ -166,12 +167,11 @@ def least_spent(problem, budget):
 def test_pairs_of_optima_have_the_plans_that_they_are_of():
     """What two sums take of one plan is kept by it, whatever mixtures of others do."""
     problem = posed(4, UP)
-    for aim in ("sum(M_sup),travel", "sum(T_max),sum(M_sup)"):
-        one = seqopt.solve(problem.but(goals=aim)).objective
-        for factor in FACTORS:
-            caps = [words(name, factor * value) for name, value in one.items()]
-            plan = seqopt.solve(problem.but(budgets=caps))
-            assert all(plan.objective[n] <= factor * v * (1 + 1e-6) for n, v in one.items())
+    one = seqopt.solve(problem.but(goals="sum(T_max),sum(M_sup)")).objective
+    for factor in FACTORS:
+        caps = [words(name, factor * value) for name, value in one.items()]
+        plan = seqopt.solve(problem.but(budgets=caps))
+        assert all(plan.objective[n] <= factor * v * (1 + 1e-6) for n, v in one.items())
 
 
 def test_a_narrow_search_finds_none_and_says_no_more():
@@ -199,12 +199,6 @@ def test_a_narrow_search_finds_none_and_says_no_more():
         exact_best(low, tight.budgets)
 
 
-def test_the_two_errors_never_stand_for_each_other():
-    assert not issubclass(NothingFoundError, InfeasibleError)
-    assert not issubclass(InfeasibleError, NothingFoundError)
-    assert not issubclass(InfeasibleError, SolverError)
-
-
 def denies(problem, **_):
     raise InfeasibleError("no plan is within all budgets")
 
@@ -219,21 +213,11 @@ def test_that_none_is_within_budgets_is_not_believed():
         seqopt.solve(capped, fake)
 
 
-def test_the_message_says_what_each_budget_needs_and_that_both_are_too_little():
-    problem = posed(6, UP)
-    one = {n: seqopt.solve(problem.but(goals=n)).objective[n] for n in ("sum(T_max)", "travel")}
-    caps = [words(name, 1.0001 * value) for name, value in one.items()]
-    with pytest.raises(InfeasibleError, match=r"^free .* least [\d.]+ by itself, and") as caught:
-        seqopt.solve(problem.but(budgets=caps))
-    assert str(caught.value).count("by itself") == 2
-
-
 @slow
-@pytest.mark.parametrize("factor", FACTORS)
-def test_the_reference_arch_has_one(factor):
+def test_the_reference_arch_has_one():
     free = {"schedule": "free", "criterion": "worst-ratio-published"}
     least = seqopt.optimize("arch25", aim="sum(T_max)", **free).objective["sum(T_max)"]
-    budgets = [f"sum(T_max)={factor * least!r}"]
+    budgets = [f"sum(T_max)={least!r}"]
     plan = seqopt.optimize("arch25", aim="minmax", budgets=budgets, **free)
-    assert plan.objective["sum(T_max)"] <= factor * least * (1 + 1e-6)
+    assert plan.objective["sum(T_max)"] <= least * (1 + 1e-6)
     assert plan.status == "optimal"

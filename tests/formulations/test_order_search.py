@@ -101,9 +101,8 @@ def test_it_equals_brute_force(build):
 @pytest.mark.parametrize(
     ("aim", "bricks", "robots"),
     [
-        *((aim, 3, 2) for aim in ("regrips,minmax", "sum")),
-        *(pytest.param(aim, 3, 2, marks=LONG[:1]) for aim in ("steps", "travel", "sum(T_max)")),
-        pytest.param("regrips,minmax", 4, 2, marks=LONG),
+        ("regrips,minmax", 3, 2),
+        *(pytest.param(aim, 3, 2, marks=LONG[:1]) for aim in ("sum", "travel")),
         pytest.param("travel", 4, 3, marks=LONG),
     ],
 )
@@ -125,7 +124,7 @@ TAKE_ORDERS = [name for name in seqopt.formulations("order") if name != "order_s
 
 
 @once
-@pytest.mark.parametrize(("aim", "bricks"), [("minmax", 4), ("sum", 3)])
+@pytest.mark.parametrize(("aim", "bricks"), [pytest.param("minmax", 4, marks=LONG[:1]), ("sum", 3)])
 @pytest.mark.parametrize("name", TAKE_ORDERS)
 def test_formulations_of_states_find_the_best_order_too(name, aim, bricks):
     worths, problem = known(bricks, TWO, aim).values(), posed(small_arch(bricks), TWO, aim)
@@ -144,12 +143,6 @@ def test_formulations_of_states_find_the_best_order_too(name, aim, bricks):
     assert found.status == ("optimal" if best else "feasible")
 
 
-def test_orders_of_too_many_sets_are_left_to_the_search(monkeypatch):
-    monkeypatch.setattr("seqopt.graph.states.explored.MOST_PARTS", 2)
-    with pytest.raises(ProblemError, match="more than 2 sets of bricks; give an order"):
-        seqopt.solve(posed(small_arch(4)), "path_dp")
-
-
 def test_another_order_is_found_where_the_own_one_has_no_plan():
     scene = from_both_sides(2, "VL")
     placed_by_one = FreeRules(
@@ -161,7 +154,7 @@ def test_another_order_is_found_where_the_own_one_has_no_plan():
 
 
 @once
-@pytest.mark.parametrize(("workers", "bricks"), [(1, 3), (2, 3), pytest.param(2, 4, marks=LONG)])
+@pytest.mark.parametrize(("workers", "bricks"), [(1, 3), pytest.param(2, 4, marks=LONG[:1])])
 def test_the_worst_of_scenarios_equals_brute_force(workers, bricks):
     """Another order is the best where the worst of some scenarios counts, and it is found."""
     scene = small_arch(bricks)
@@ -283,32 +276,16 @@ def test_the_proof_of_orders_knows_what_must_stand():
     assert better(standing, least * (1 + 1e-6))
 
 
-@pytest.mark.long
 @pytest.mark.slow
-@given(build=free_builds(most_bricks=5, most_robots=3))
-@settings(max_examples=6, deadline=None)
-def test_it_equals_brute_force_on_more_bricks(build):
-    check_against_brute_force(*build)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("columns", "courses"), [(2, 2), (1, 4)])
-def test_it_equals_brute_force_on_walls(columns, courses):
-    scene = wall(WallShape(columns=columns, courses=courses))
+def test_it_equals_brute_force_on_a_wall():
+    scene = wall(WallShape(columns=2, courses=2))
     check_against_brute_force(scene, FreeRules(), "M_sup")
 
 
-@pytest.mark.slow
-@pytest.mark.long
-@pytest.mark.parametrize("count", [4, 5])
-def test_it_equals_brute_force_on_arches(count):
-    check_against_brute_force(small_arch(count), FreeRules())
-
-
 def test_beyond_the_most_sets_the_own_order_has_a_bound():
-    problem = posed(small_arch(5), aim="F_largest")
+    problem = posed(small_arch(4), aim="F_largest")
     best = seqopt.solve(problem, FORMULATION).selection.objective[0]
-    plan = seqopt.solve(problem, FORMULATION, most=6)
+    plan = seqopt.solve(problem, FORMULATION, most=4)
     own = solve(replace(problem, orders=None), "schedule_search").selection.objective[0]
     assert (plan.selection.stopped, plan.status) == ("size", "feasible")
     assert plan.selection.objective[0] == own > best * 1.001
@@ -316,13 +293,6 @@ def test_beyond_the_most_sets_the_own_order_has_a_bound():
     assert plan.summary()["order_status"] == plan.status
     with pytest.raises(ProblemError, match="option most=-1"):
         seqopt.solve(problem, FORMULATION, most=-1)
-
-
-def test_the_aims_after_the_first_are_those_of_the_plan():
-    found = seqopt.solve(posed(small_arch(5), aim="T_max,steps"), FORMULATION)
-    assert found.certificate.gap == 0
-    assert [*found.objective] == ["T_max", "steps"]
-    assert found.engine.network.scene.build_order == found.order
 
 
 def test_time_leaves_an_order_and_a_bound():
@@ -382,7 +352,7 @@ def test_a_formulation_that_names_a_bad_order_is_not_believed(least, order, said
 
 
 def test_a_bound_that_is_not_proven_is_claimed(monkeypatch):
-    problem = posed(small_arch(5), aim="F_largest")
+    problem = posed(small_arch(4), aim="F_largest")
     found = seqopt.solve(problem, FORMULATION, proof=False)
     assert (found.status, found.summary()["order_bound_proven"]) == ("unproven", False)
     assert "claimed, not proven" in found.order_bound_said
@@ -423,25 +393,3 @@ def test_what_is_no_problem_gets_one_line():
         posed(small_arch(4), among="all")
     with pytest.raises(ProblemError, match="option depth: order_search has most"):
         seqopt.solve(posed(small_arch(4)), FORMULATION, depth=1)
-
-
-def test_limits_hold_in_the_best_order():
-    limits = [seqopt.Limit("F_largest", 150.0)]
-    found = seqopt.solve(posed(small_arch(5), limits=limits), FORMULATION)
-    forces = found.responses().filter(regex="^F_rob").abs().to_numpy()
-    assert np.nanmax(forces) <= 150.0 * (1 + 1e-9)
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_the_arch_of_the_paper_in_its_best_order(arch25):
-    """A few bricks from one end, the rest from the other: 0.7693 instead of 0.8401."""
-    criterion = seqopt.CRITERIA["worst-ratio-published"]
-    engine = seqopt.make_engine("compliance", arch25)
-    problem = among_orders(build_states(engine, FreeRules(), criterion), "tied")
-    found = seqopt.solve(problem, FORMULATION)
-    assert found.status == "optimal"
-    assert found.selection.objective[0] == pytest.approx(0.76929, abs=1e-5)
-    assert found.order != arch25.build_order
-    own = seqopt.solve(problem.at(found.order), "schedule_search")
-    assert own.certificate.objective == pytest.approx(found.certificate.objective, rel=1e-9)

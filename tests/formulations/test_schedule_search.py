@@ -9,7 +9,7 @@ from itertools import pairwise, product
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
@@ -26,9 +26,8 @@ from seqopt.graph.states.states import build_states
 from seqopt.judge._schedules import judge_schedule, plan_values
 from seqopt.network.build import build_network
 from seqopt.plan.front import FrontProblem, find_front, pick, upper_bounds
-from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
-from seqopt.sequence.methods import modified_sequential, three_robot_loop
+from seqopt.sequence.methods import modified_sequential
 from seqopt.sequence.rules import FreeRules, with_robots
 from tests.brute_force import FOUR, ONES, least_peak, peaks, whole_graph
 from tests.builders import small_arch
@@ -113,15 +112,6 @@ def test_over_scenarios_it_equals_brute_force(build):
     if milder:  # the control: what is worst is seen to be missing
         with pytest.raises(SolverError, match=r"minmax is .*, not .* as claimed"):
             judge_schedule(replace(problem, scenarios=tuple(milder)), plan.selection, plan.steps)
-
-
-@pytest.mark.long
-@pytest.mark.slow
-@given(build=free_builds(most_bricks=6, most_robots=4))
-@settings(max_examples=8, deadline=None)
-def test_it_equals_brute_force_on_more_bricks_and_robots(build):
-    assume(len(build[0].bricks) >= 4)
-    check_against_brute_force(*build)
 
 
 def dominated(point, points):
@@ -222,25 +212,6 @@ def arch(engine25):
     return build_states(engine25, FreeRules(), seqopt.CRITERIA["worst-ratio-published"], "minmax")
 
 
-@pytest.mark.slow
-def test_the_arch_of_the_paper(arch):
-    """0.8401 against 1.185 of the loop; 50 steps with the one in which all let go."""
-    plan = seqopt.solve(replace(arch, goals=pose_goals("minmax,steps,regrips")), "schedule_search")
-    assert plan.certificate.values == pytest.approx((0.84009, 50, 1), abs=1e-5)
-    assert plan.summary()["steps_before_release"] == 49
-    assert plan.problem.models < 8000  # of 19,490 that robots can hold
-    assert not plan.overloads
-
-
-@pytest.mark.slow
-def test_fewest_steps_that_beat_every_published_maximum(arch, engine25):
-    limits = [Limit(name, bound) for name, bound in arch.criterion.limits]
-    problem = build_states(engine25, FreeRules(), arch.criterion, "steps,regrips,minmax", limits)
-    plan = seqopt.solve(problem, "schedule_search")
-    assert plan.certificate.values == pytest.approx((48, 0, 0.88289), abs=1e-5)
-    assert plan.summary()["steps_before_release"] == 47
-
-
 def pose_goals(text):
     engine = ComplianceEngine(build_network(small_arch(4)))
     return build_states(engine, FreeRules(), ONES, text).goals
@@ -326,7 +297,6 @@ class Clock:
     ("limit", "said"),
     [
         (0.5e6, "no plan is allowed; time was over before it was known what helps"),
-        (5.5e6, r"brick \d \(\d of 5\) is never placed; time was over before it was known"),
         (np.inf, "is never placed; it becomes possible with F_largest="),
     ],
 )
@@ -372,34 +342,9 @@ def test_the_front_of_the_arch_rounded(arch):
         pick(front.table, "speed")
 
 
-@pytest.mark.slow
-def test_steps_can_be_among_what_is_to_be_small(arch, engine25):
-    problem = build_states(engine25, FreeRules(), arch.criterion, "F_largest,M_sup,steps")
-    front = find_front(FrontProblem(problem, {"F_largest": 10.0, "M_sup": 2.0}))
-    steps = front.table["steps"].to_numpy()
-    assert steps.min() == 48
-    assert len({*steps}) > 1
-    with pytest.raises(ProblemError, match="pareto: travel adds up along a plan"):
-        FrontProblem(build_states(engine25, FreeRules(), arch.criterion, "steps,travel"))
-
-
-@pytest.mark.slow
-def test_the_front_of_the_loop_holds_its_best_peak(engine25):
-    loop = three_robot_loop(engine25.network)
-    posed = build_states(engine25, loop, ONES, "F_largest,M_sup")
-    front = find_front(FrontProblem(posed, rounding={"F_largest": 5.0}))
-    assert front.complete
-    alone = seqopt.solve(
-        seqopt.pose(engine25, loop, WorstRatio("F", (("F_largest", 1.0),))), "minimax"
-    )
-    least = np.ceil(alone.certificate.objective / 5) * 5
-    assert front.table["F_largest"].min() == pytest.approx(least)
-
-
-@pytest.mark.parametrize("count", [5, pytest.param(6, marks=pytest.mark.slow)])
-def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force(count):
+def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force():
     """Where a step without an open grip decides, less in the open ones is worth nothing."""
-    engine = ComplianceEngine(build_network(small_arch(count)))
+    engine = ComplianceEngine(build_network(small_arch(5)))
     loop = modified_sequential(engine.network)
     problem = build_states(engine, loop, ONES, "T_max,F_largest")
     front, values = find_front(FrontProblem(problem)), set()
@@ -431,13 +376,8 @@ def test_the_short_cut_does_what_the_long_way_does():
     ("words", "said"),
     [
         ({"criterion": "equations-2-3"}, "equations-2-3: it ranks the choices of a move"),
-        ({"formulation": "assignment_tight"}, "assignment_tight: it writes one sum of costs down"),
         ({"formulation": "pareto_zones"}, "states of a build are asked for; use .*schedule_search"),
-        ({"search": Search(workers=0)}, "workers is 0; give a whole number from 1"),
-        ({"rules": {"regrips": 0}}, "rules {'regrips': 0}: give a seqopt.FreeRules"),
         ({"rules": "regrip=0"}, r"rules regrip=0 does not exist \(did you mean regrips\?\)"),
-        ({"robots": 9}, "9 robots: the free schedule takes one to 5"),
-        ({"robots": "rob9"}, "robot 'rob9' does not exist; give some of rob1"),
         (
             {"search": Search(options={"width": 3, "depth": 1})},
             "option depth: schedule_search has width",
@@ -471,11 +411,10 @@ def strictly_below(problem, value):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("aim", ["minmax", "minmax,steps"])
-def test_a_large_search_looks_at_little_more_than_its_proof_needs(aim):
+def test_a_large_search_looks_at_little_more_than_its_proof_needs():
     """The models of states strictly below the least worst value, and a tenth for a first plan."""
     scene = longer(seqopt.load_scene("arch25"), 4.0)
-    asked = FreeRules(), seqopt.CRITERIA["worst-ratio"], aim
+    asked = FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps"
     plan = seqopt.solve(build_states(seqopt.make_engine("compliance", scene), *asked))
     fresh = build_states(seqopt.make_engine("compliance", scene), *asked)
     assert plan.certificate.gap == 0

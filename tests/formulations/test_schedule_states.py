@@ -103,12 +103,12 @@ def goals(aim, scene, steps, table):
 
 
 @once
-@pytest.mark.parametrize("name", ["three-robot", "modified", "four"])
+@pytest.mark.parametrize("name", ["modified", "four"])
 def test_every_aim_equals_brute_force(name):
     engine, schedule, plans = plans_of(name)
     scene = engine.network.scene
     assert len(plans) > 10
-    for aim in ("minmax", "sum", "minmax,travel", "travel,sum(M_sup)", "T_max,steps", "steps,sum"):
+    for aim in ("sum", "minmax,travel", "travel,sum(M_sup)", "T_max,steps"):
         plan = seqopt.solve(build_states(engine, schedule, ONES, aim), "schedule_search")
         best = list(plan.selection.objective)
         left = [goals(aim, scene, *each) for each in plans]
@@ -192,9 +192,13 @@ def test_the_judge_of_budgets_has_prices_of_its_own_to_check():
 
 @once
 @pytest.mark.parametrize(
-    "mortar", ["dry", "bond=2e3", pytest.param("bond=2e4", marks=pytest.mark.slow)]
+    ("name", "mortar"),
+    [
+        ("four", "dry"),
+        ("three-robot", "bond=2e3"),
+        pytest.param("three-robot", "bond=2e4", marks=pytest.mark.slow),
+    ],
 )
-@pytest.mark.parametrize("name", ["three-robot", "four"])
 def test_what_stands_equals_brute_force(name, mortar):
     """Standing is asked of every state by the cone program; where no plan stands, none is found."""
     engine, schedule, plans = plans_of(name)
@@ -223,15 +227,6 @@ def test_what_stands_equals_brute_force(name, mortar):
             InfeasibleError, match=r"becomes possible with a bond of|no requirement"
         ):
             seqopt.solve(problem, "schedule_search")
-
-
-def test_one_call_and_loops_of_costs_agree_where_both_are_asked():
-    """With costs of moves, only steps in which a grip is open count; here all of them do."""
-    scene = small_arch(6)
-    plan = seqopt.optimize(scene, "three-robot", ONES, aim="minmax", candidates="near:4")
-    loop = seqopt.optimize(scene, "three-robot", ONES, "minimax", candidates="near:4")
-    rows = loop.responses()
-    assert costs(rows, scene)[0].max() == pytest.approx(plan.selection.objective[0], rel=1e-7)
 
 
 @once

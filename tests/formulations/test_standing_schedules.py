@@ -4,38 +4,33 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from math import pi, radians
 
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, reject, settings
 
 import seqopt
 from formulations.contact.limit_analysis import compile_equilibrium
-from seqopt.contact.faces import bare_assembly, step_assembly
+from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneError, SolverError
+from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
 from seqopt.graph.states.states import build_states
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
 from seqopt.plan._infeasible import worst_least
-from seqopt.plan.front import FrontProblem, find_front
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
-from seqopt.problem.standing import NARROW, Standing, StandingSets, _without_implied, slack
+from seqopt.problem.standing import NARROW, Standing, _without_implied, slack
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.sequence.rules import FreeRules
 from seqopt.stability._prover import Prover
-from seqopt.stability._screens import Margins
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import GAP
 from tests.builders import small_arch
 from tests.plain_rules import PlainBook
-from tests.strategies import free_builds
 
 slow, long = pytest.mark.slow, (pytest.mark.slow, pytest.mark.long)
 TILTS = pytest.param("tilt,minmax", marks=long)
@@ -103,22 +98,8 @@ def check(scene, rules, mortar="dry"):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("least", [pytest.param(1, marks=pytest.mark.long), 2])
-def test_a_small_arch_equals_brute_force(least):
-    check(small_arch(4), FreeRules(least_grips=least))
-
-
-@pytest.mark.long
-@pytest.mark.slow
-@given(build=free_builds(most_bricks=4, most_robots=3))
-@settings(max_examples=6, deadline=None)
-def test_it_equals_brute_force(build):
-    scene, rules = build
-    try:
-        bare_assembly(build_network(scene), len(scene.bricks))
-    except SceneError:  # faces do not meet in joints as they were drawn
-        reject()
-    check(scene, replace(rules, payload="kept"), "bond=500")
+def test_a_small_arch_equals_brute_force():
+    check(small_arch(4), FreeRules(least_grips=2))
 
 
 @pytest.fixture(scope="module")
@@ -136,19 +117,6 @@ def test_a_plan_that_does_not_stand_is_seen(dry):
     assert Verdict.FALLS in verdicts
     with pytest.raises(SolverError, match=r"step \d+ is not proven to stand as demanded"):
         judge_schedule(dry, plan.selection, plan.steps)
-
-
-@pytest.mark.slow
-def test_a_better_plan_that_stands_is_seen(dry):
-    strict = replace(dry, standing=Standing(DRY, radians(5.0)))
-    plan = seqopt.solve(strict, "schedule_search")
-    assert plan.stability()["tilt_survived_deg"].min() >= 5.0
-    best = seqopt.solve(dry, "schedule_search")
-    assert best.selection.objective[0] <= plan.selection.objective[0]
-    worse = replace(plan.selection, objective=plan.selection.objective)
-    if best.selection.objective[0] < plan.selection.objective[0] * (1 - 1e-6):
-        with pytest.raises(SolverError, match="a plan has less"):
-            judge_schedule(dry, worse, plan.steps)
 
 
 @pytest.mark.parametrize(
@@ -249,12 +217,6 @@ def test_demands_that_others_imply_are_not_asked():
     assert _without_implied((weak, strong, tilted, weak)) == (strong, tilted)
 
 
-def test_margins_come_before_other_aims(dry):
-    problem = build_states(dry.engine, dry.rules, ONES, "minmax,tilt")
-    with pytest.raises(ProblemError, match="name bond, friction and tilt before all others"):
-        seqopt.solve(problem, "schedule_search")
-
-
 def test_a_robot_that_holds_anything_says_nothing_of_what_stands(dry):
     with pytest.raises(ProblemError, match="without a largest force holds up anything"):
         build_states(dry.engine, FreeRules(payload="ignored"), ONES, "minmax", stands="dry")
@@ -282,46 +244,3 @@ def test_the_bond_that_is_named_is_enough():
     assert seqopt.solve(strong, "schedule_search").status == "optimal"
     with pytest.raises(InfeasibleError):
         seqopt.solve(weak, "schedule_search")
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_tilts_by_steps_are_those_of_the_program(dry):
-    network = dry.network
-    payload = np.array([robot.payload for robot in network.scene.robots])
-    sets = StandingSets(network, Standing("dry"), payload)
-    held = np.array([[0, 0, 8], [0, 6, 8], [2, 6, 8], [0, 2, 3]])
-    loads = np.full(held.shape, payload[0])
-    exact = Margins(network, "dry").tilt(4, held, loads)
-    low, high = (pi / 2 - sets.margins("tilt", 4, held, loads)).T
-    for (least, most), a, b in zip(exact, high, low, strict=True):
-        if np.isnan(least):
-            assert np.isinf(a)
-        else:
-            assert a <= most + 1e-6
-            assert b >= least - 1e-6
-            assert b - a <= 2e-3
-
-
-@pytest.mark.slow
-def test_pareto_sets_with_a_margin(dry):
-    problem = build_states(dry.engine, dry.rules, ONES, "F_largest,bond")
-    front = find_front(FrontProblem(problem, {"F_largest": 10.0, "bond": 500.0}))
-    assert front.complete
-    assert (front.table["bond"] % 500 == 0).all()
-    assert front.table["bond"].is_monotonic_decreasing
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_the_arch_is_built_dry(engine25):
-    """Three robots can, but not two."""
-    criterion = seqopt.CRITERIA["worst-ratio-published"]
-    problem = build_states(engine25, FreeRules(), criterion, "steps,minmax", stands="dry")
-    plan = seqopt.solve(problem, "schedule_search")
-    assert plan.certificate.values == pytest.approx((48, 0.919157), abs=1e-5)
-    assert set(plan.stability()["verdict"]) == {"stands"}
-    assert plan.regrips == 0
-    two = replace(problem, rules=FreeRules(robots=("rob1", "rob2"), least_grips=0))
-    with pytest.raises(InfeasibleError, match="brick 25"):
-        seqopt.solve(two, "schedule_search")

@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from formulations.exhibits import _assigned, _below
 from formulations.flow import ACCURACY, OVERLAP_MIP, unit_flow
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.decision_costs import LayeredCosts
@@ -59,12 +58,6 @@ def test_one_without_a_choice_is_infeasible(name):
         answer(Costs(LayeredCosts(costs.single, (costs.shared[0], *never))), name)
 
 
-def test_what_is_read_from_assignments():
-    graph = Costs(costs_of(1.0)).compiled().instance.asked  # 3, 4 and 2 candidates
-    picks = np.array([1.0, 0.1, 0.9, 0.0, 0.2, 0.8, 0.1, 0.3, 0.4, 0.4])
-    assert _assigned(graph, apart=False).path(picks) == (2, 5, 8)
-
-
 def test_an_assignment_needs_a_state_of_every_level():
     source, target = np.array([0, 0, 1]), np.array([1, 2, 2])
     ends = np.array([False, False, True])
@@ -73,13 +66,6 @@ def test_an_assignment_needs_a_state_of_every_level():
         graph = Graph(source, target, np.ones((3, 1)), (peak,), ends)
         with pytest.raises(ProblemError, match="an assignment chooses a state of every level"):
             PROGRAMS[name].solve.choose(graph, Watch())
-
-
-@pytest.mark.parametrize("scale", [4.0, 0.5])
-@pytest.mark.parametrize("value", [-7.0, 0.25, 3.0])
-def test_a_bound_is_lower_by_what_a_solver_may_be_off(scale, value):
-    off = ACCURACY * max(abs(value), 1.0)
-    assert _below(scale)(value) == pytest.approx(scale * (value - off), rel=1e-15)
 
 
 def test_pairs_cost_the_worst_of_both():
