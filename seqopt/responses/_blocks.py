@@ -12,9 +12,9 @@ import math
 import pickle
 import threading
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
-from functools import lru_cache, reduce
+from functools import reduce
 from itertools import groupby
 from operator import or_
 from typing import Protocol
@@ -128,9 +128,10 @@ def packed(engine: Engine) -> bytes:
 
     Raises `SceneError` if a user's engine cannot be pickled.
     """
-    recipe = _known_recipe(engine)
+    recipe = recipe_of(engine)
+    known = recipe is not None and recipe.network == engine.network  # else it makes another engine
     try:
-        return pickle.dumps(engine if recipe is None else recipe)
+        return pickle.dumps(recipe if known else engine)
     except Exception as error:  # foreign code may raise any error
         raise SceneError(
             f"engine {type(engine).__name__}: it cannot be sent to other processes ({error}); take "
@@ -138,35 +139,31 @@ def packed(engine: Engine) -> bytes:
         ) from error
 
 
-def _known_recipe(engine: Engine) -> Recipe | None:
-    """Return the recipe of an engine; None if it has none, or one for another network."""
-    recipe = recipe_of(engine)
-    return recipe if recipe is not None and recipe.network == engine.network else None
-
-
-def remade(content: bytes) -> Engine:
-    """Build an engine from its `packed` form."""
-    found: Recipe | Engine = pickle.loads(content)  # our own, of `packed`
-    return found.make() if isinstance(found, Recipe) else found
-
-
 class _Made(threading.local):
-    """The last two engines of each thread of a worker: of consecutive runs.
+    """The engines of the last two runs of each thread of a worker.
 
     Executors of users have no storage for workers' data between tasks; without this cache each
     task would build its engine again.
     """
 
     def __init__(self) -> None:
-        self.engine = lru_cache(maxsize=2)(remade)
+        self.engines: dict[bytes, Engine] = {}
 
 
 _OF_THREAD = _Made()
 
 
 def unpacked(engine: Engine | bytes) -> Engine:
-    """Return an engine unchanged, or the cached one of a `packed` form."""
-    return _OF_THREAD.engine(engine) if isinstance(engine, bytes) else engine
+    """Return an engine unchanged, or the one of a `packed` form, built once for a thread."""
+    if not isinstance(engine, bytes):
+        return engine
+    made = _OF_THREAD.engines
+    if engine not in made:
+        found: Recipe | Engine = pickle.loads(engine)  # our own, of `packed`
+        made[engine] = found.make() if isinstance(found, Recipe) else found
+        if len(made) > 2:
+            del made[next(iter(made))]
+    return made[engine]
 
 
 BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
@@ -221,21 +218,16 @@ class Batch(FrozenValue):
     states: Ints  # (S, r); the different grip sets in them, numbers ascending
     state: Ints  # (P,); which of these each choice leads to
 
-    def blocks(self, *, compiled: bool = False) -> Iterator[Block]:
-        """Yield the states in blocks, one at least. ``compiled``: as of `Block`."""
+    def blocks(self, *, compiled: bool = False) -> list[Block]:
+        """Return the states in blocks, one at least. ``compiled``: as of `Block`."""
         asked = sorted(frozenset().union(*self.names))
         known = (*CHOSEN_BY, PROP_EXCESS)
         names = tuple(name for name in asked if name in known or is_tolerance(name))
         bricks = self.steps[0].bricks
         props = self.schedule.scene.prop_numbers(bricks, held=True)
-        for start in range(0, max(len(self.states), 1), BLOCK):
-            states = self.states[start : start + BLOCK].copy()
-            yield Block(bricks, states, names, props=props, compiled=compiled)
-
-    @property
-    def count(self) -> int:
-        """Number of blocks."""
-        return max(-(-len(self.states) // BLOCK), 1)
+        starts = range(0, max(len(self.states), 1), BLOCK)
+        parts = (self.states[start : start + BLOCK].copy() for start in starts)
+        return [Block(bricks, part, names, props=props, compiled=compiled) for part in parts]
 
     def choices(self, answers: Sequence[Answers]) -> list[StepChoices]:
         """Return the responses of every step's choices. ``answers``: to the blocks."""
@@ -369,8 +361,11 @@ _SHARE = 0.8  # of the free memory that responses and costs may take
 def _bytes_of_choices(schedule: Schedule, wanted: Wanted) -> int:
     """Estimate the memory of the responses of all choices of a schedule, bytes."""
     return sum(
-        _NUMBER * (len(wanted(schedule.moves[step.moves[-1]].bricks)) + _BESIDE) * choices
-        for step, choices in _open_steps(schedule)
+        _NUMBER
+        * (len(wanted(schedule.moves[step.moves[-1]].bricks)) + _BESIDE)
+        * choices_of(schedule, step)
+        for step in schedule.steps
+        if step.moves
     )
 
 
@@ -378,16 +373,11 @@ def _bytes_of_costs(schedule: Schedule) -> int:
     """Estimate the memory of all costs if responses are computed step by step, bytes."""
     of_moves: dict[tuple[int, ...], int] = {}
     of_bricks = Counter[int]()
-    for step, choices in _open_steps(schedule):
-        of_moves[step.moves] = choices
-        of_bricks[step.bricks] += choices
+    for step in (step for step in schedule.steps if step.moves):
+        of_moves[step.moves] = choices_of(schedule, step)
+        of_bricks[step.bricks] += of_moves[step.moves]
     at_once = _AT_ONCE * max(of_bricks.values(), default=0)
     return _NUMBER * (_COSTS * sum(of_moves.values()) + at_once)
-
-
-def _open_steps(schedule: Schedule) -> Iterator[tuple[OpenStep, int]]:
-    """Yield the open steps and their numbers of choices."""
-    return ((step, choices_of(schedule, step)) for step in schedule.steps if step.moves)
 
 
 def require_memory(schedule: Schedule, wanted: Wanted, most: float | None = None) -> bool:

@@ -22,7 +22,7 @@ from typing import cast
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Terse
+from seqopt.arrays import Ints, Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import MemoryShortError
 from seqopt.responses._blocks import (
@@ -42,7 +42,7 @@ from seqopt.responses._blocks import (
     work,
 )
 from seqopt.responses._grip_sets import answer_blocks
-from seqopt.responses._tolerance import is_tolerance, with_tolerances
+from seqopt.responses._tolerance import COLUMN, is_tolerance, tolerances_along
 from seqopt.responses.quantities import OFFERED
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
@@ -84,15 +84,12 @@ class Evaluation(Terse):
         some = (step for step in self.schedule.steps if not step.moves and step.bricks)
         return tuple(Step(s.number, s.kind, s.bricks, cast(Grips, s.grips)) for s in some)
 
-    @cached_property
-    def _given_table(self) -> pd.DataFrame:
-        return analyze(self.engine, self.given)
-
     def table_of_given(self, names: Iterable[str]) -> pd.DataFrame:
         """Return the table of `seqopt.analyze` of given steps, with the tolerances in ``names``."""
-        table = self._given_table
+        table = analyze(self.engine, self.given)
         for name in {*filter(is_tolerance, names)}:
-            table = with_tolerances(self.engine, self.given, table, name)
+            distances = tolerances_along(self.engine, self.given, name)
+            table = table.assign(**{COLUMN: distances})
         return table
 
     @property
@@ -120,7 +117,7 @@ class Evaluation(Terse):
                 "the responses of all choices do not fit into the memory that may be used; take "
                 "them from levels(), step by step, or raise max_memory"
             )
-        return self._found.steps
+        return self._found[0]
 
     def levels(self) -> Generator[Sequence[StepChoices], None, None]:
         """Return all open steps, in order, those of one brick count after the other.
@@ -132,7 +129,7 @@ class Evaluation(Terse):
         """
         keep = not self.streams
         if self._kept and keep:
-            yield self._kept[0].steps
+            yield self._kept[0][0]
             return
         steps: list[StepChoices] = []
         models, seconds, start = 0, 0.0, time.perf_counter()
@@ -143,7 +140,7 @@ class Evaluation(Terse):
                 steps += found if keep else ()
                 yield found
                 start = time.perf_counter()
-        self._kept[:] = [_Found(tuple(steps), models, seconds + time.perf_counter() - start)]
+        self._kept[:] = [(tuple(steps), models, seconds + time.perf_counter() - start)]
 
     @property
     def is_kept(self) -> bool:
@@ -151,12 +148,12 @@ class Evaluation(Terse):
         return bool(self._kept) and not self.streams
 
     @cached_property
-    def _kept(self) -> list[_Found]:
-        """The evaluation, after computing all levels."""
+    def _kept(self) -> list[tuple[tuple[StepChoices, ...], int, float]]:
+        """After computing all levels: steps, if memory suffices for them, models and seconds."""
         return []
 
     @property
-    def _found(self) -> _Found:
+    def _found(self) -> tuple[tuple[StepChoices, ...], int, float]:
         if not self._kept:
             deque(self.levels(), maxlen=0)
         return self._kept[0]
@@ -164,47 +161,37 @@ class Evaluation(Terse):
     @property
     def models(self) -> int:
         """Number of distinct models: a model is a brick count and the nodes held."""
-        return self._found.models
+        return self._found[1]
 
     @property
     def seconds(self) -> float:
         """Run time of solving them, s."""
-        return self._found.seconds
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Found(Terse):
-    """Cached results of an evaluation; without steps if memory does not suffice."""
-
-    steps: tuple[StepChoices, ...]
-    models: int
-    seconds: float
+        return self._found[2]
 
 
 def _by_level(evaluation: Evaluation) -> Generator[tuple[list[StepChoices], int], None, None]:
     """Yield the steps by brick count, with their number of models."""
-    schedule = evaluation.schedule
-    levels = steps_of_batches(schedule)
-    under_way: deque[list[Batch]] = deque()
+    schedule, total = evaluation.schedule, evaluation.work
+    compiled = total + evaluation.more_work >= COMPILED
+    under_way: deque[list[tuple[Batch, int]]] = deque()  # and numbers of blocks
 
     def blocks() -> Iterator[Block]:
-        for level in levels:
+        for level in steps_of_batches(schedule):
             groups = [batch_of(schedule, steps, evaluation.wanted) for steps in level]
-            under_way.append(groups)
-            for group in groups:
-                yield from group.blocks(compiled=total + evaluation.more_work >= COMPILED)
+            each = [group.blocks(compiled=compiled) for group in groups]
+            under_way.append([*zip(groups, map(len, each), strict=True)])
+            yield from chain.from_iterable(each)
 
-    total = evaluation.work
     engine, resources = evaluation.engine, evaluation.resources
     with closing(answer_blocks(engine, blocks(), total, resources)) as answers:
         for first in answers:  # blocks, and so `under_way`, are taken no earlier
             groups, here = under_way.popleft(), chain([first], answers)
             yield (  # in no variable: what is not kept is free while the next ones are computed
                 sorted(
-                    [each for g in groups for each in g.choices([*islice(here, g.count)])],
+                    [each for g, count in groups for each in g.choices([*islice(here, count)])],
                     key=lambda choices: choices.step.number,
                 ),
-                sum(len(group.states) for group in groups),
+                sum(len(group.states) for group, _ in groups),
             )
 
 
@@ -216,17 +203,17 @@ def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
 
     ``choice``: the chosen candidate of every move.
     """
+
+    def states(step: OpenStep) -> Ints:
+        if len(step.moves) == 2:
+            first = step.moves[0]
+            node = schedule.moves[first].candidates[choice[first]]
+            given = tuple(node if grip == OpenGrip(first) else grip for grip in step.grips)
+            step = replace(step, grips=given)
+        rows = combinations(schedule, step)
+        return np.sort(_grip_rows(schedule, step, rows[no_node_twice(rows)]), axis=1)
+
     return sum(
-        len(distinct(np.concatenate([_window_states(schedule, step, choice) for step in steps]))[0])
+        len(distinct(np.concatenate([*map(states, steps)]))[0])
         for steps in chain(*steps_of_batches(schedule))
     )
-
-
-def _window_states(schedule: Schedule, step: OpenStep, choice: Sequence[int]) -> np.ndarray:
-    """Return the nodes held (S, r), ascending, of open choices given the earlier move."""
-    if len(step.moves) == 2:
-        first = step.moves[0]
-        node = schedule.moves[first].candidates[choice[first]]
-        step = replace(step, grips=tuple(node if g == OpenGrip(first) else g for g in step.grips))
-    rows = combinations(schedule, step)
-    return np.sort(_grip_rows(schedule, step, rows[no_node_twice(rows)]), axis=1)

@@ -13,7 +13,7 @@ from seqopt.contact.mortar import _mortar_name, _with_mortar
 from seqopt.engines.interface import OpeningEngine
 from seqopt.engines.registry import AutoEngine, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.responses._tolerance import each_tolerance, is_linear, is_tied
+from seqopt.responses._tolerance import each_tolerance
 from seqopt.responses.quantities import RESPONSES, _plain, length_text
 from seqopt.responses.table import LinearRange, _Columns, _node, force_column, held_in_table
 
@@ -125,7 +125,8 @@ def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     Empty if the engine is not linear, there are many bricks, or a payload is exceeded anyway.
     """
     scene = within.engine.network.scene
-    if not is_linear(within.engine) or len(scene.bricks) > _FEW:
+    linear = isinstance(within.engine, AutoEngine | ComplianceEngine)
+    if not linear or len(scene.bricks) > _FEW:
         return ""
     carried = (
         (robot, table[force_column(robot)]) for table in builds.values() for robot in scene.robots
@@ -133,12 +134,9 @@ def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     if any((np.abs(np.asarray(force)) > robot.payload).any() for robot, force in carried):
         return ""
     held = {name: held_in_table(scene, table) for name, table in builds.items()}
-    every = [*chain.from_iterable(held.values())]
-    if is_tied(within.engine, every):  # then none may be off, and the rest need not be asked
-        return ""
-    found = each_tolerance(within.engine, every, within.offs)
+    found = each_tolerance(within.engine, [*chain.from_iterable(held.values())], within.offs)
     at = int(found.argmin())
-    if not 0 < found[at] < np.inf:
+    if not 0 < found[at] < np.inf:  # two rigid grips on one brick have no tolerance
         return ""
     places = [(name, step) for name, steps in held.items() for step, *_ in steps]
     where = f"step {places[at][1]}{f' of {places[at][0]}' if len(builds) > 1 else ''}"

@@ -171,17 +171,14 @@ def solve_sets(engine: Engine, sets: Block, resources: Resources = HERE) -> Floa
     `SolverError`, `WorkerError`.
     """
     grips, alone = sets.grips, resources.executor is None and resources.workers == 1
-    shared = max(64, len(grips) // 32)  # sets of a task
-    most = BLOCK if alone else min(BLOCK, shared)
+    most = BLOCK if alone else min(BLOCK, max(64, len(grips) // 32))  # sets of a task
     parts = [replace(sets, grips=grips[at : at + most]) for at in range(0, len(grips), most)]
     quiet = replace(resources, progress=None) if len(parts) > 1 else resources.alone()
-    found = answer_blocks(engine, parts, sets.work, quiet, loose=True)
-    none = np.zeros((0, len(sets.names) + grips.shape[1]))
-    return np.concatenate([none, *(_columns(sets, part) for part in found)])
-
-
-def _columns(part: Block, found: Answers) -> Floats:
-    return np.column_stack([*(found.values[name] for name in part.names), found.forces])
+    rows = [np.zeros((0, len(sets.names) + grips.shape[1]))]
+    for found in answer_blocks(engine, parts, sets.work, quiet, loose=True):
+        columns = [found.values[name] for name in sets.names]
+        rows.append(np.column_stack([*columns, found.forces]))
+    return np.concatenate(rows)
 
 
 _SEVERAL = 4  # chunks of work that states of one brick count may be before they are parted

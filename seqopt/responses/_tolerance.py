@@ -17,13 +17,11 @@ import pandas as pd
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine, OpeningEngine, Want, grip_columns, select_sets
 from seqopt.engines.registry import USUAL, AutoEngine, Recipe, recipe_of
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
 from seqopt.responses.table import _Columns, _grips_of, _Held, _Key
-from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
 _AT_ONCE = 4096  # grip sets that are solved together
@@ -52,12 +50,6 @@ class Allowed:
 
     tension: float = np.inf
     shift: float = np.inf
-
-    @property
-    def wanted(self) -> Want:
-        """The fields that the limits need."""
-        edges = Want.EDGES if np.isfinite(self.tension) else Want(0)
-        return edges | (Want.DISPLACEMENTS if np.isfinite(self.shift) else Want(0))
 
     @property
     def name(self) -> str:
@@ -108,11 +100,17 @@ class _Group:
     own: Floats  # (S, n, 3)
     change: Floats  # (S, n, r, 3, 3); by component, for a meter in each direction
     most: Floats  # (S, n)
+    axial: bool = False  # only the first component is limited, and only upward
 
     def rates(self) -> tuple[Floats, Floats]:
         """Return their rates (S, n) and directions (S, n, 3)."""
-        found, direction = worst_rates(*self._flat)
-        return found.reshape(self.most.shape), direction.reshape(self.own.shape)
+        if not self.axial:
+            found, direction = worst_rates(*self._flat)
+            return found.reshape(self.most.shape), direction.reshape(self.own.shape)
+        room = self.most - self.own[..., 0]
+        added = np.linalg.norm(self.change[..., 0, :], axis=3).sum(axis=2)
+        rate = np.where(room > 0, added / np.where(room > 0, room, 1.0), np.inf)
+        return rate, np.broadcast_to([1.0, 0.0, 0.0], self.own.shape)
 
     @property
     def _flat(self) -> tuple[Floats, Floats, Floats]:
@@ -121,42 +119,29 @@ class _Group:
 
     def proven(self, direction: Floats) -> float:
         """Return an upper bound of the rates of the one grip set."""
+        if self.axial:
+            return float(self.rates()[0].max())
         return float(proven_rates(*self._flat, direction.reshape(-1, 3))[1].max())
-
-
-class _Tensions(_Group):
-    """Axial forces, the first of three components, without lower limit."""
-
-    def rates(self) -> tuple[Floats, Floats]:
-        room = self.most - self.own[..., 0]
-        added = np.linalg.norm(self.change[..., 0, :], axis=3).sum(axis=2)
-        rate = np.where(room > 0, added / np.where(room > 0, room, 1.0), np.inf)
-        return rate, np.broadcast_to([1.0, 0.0, 0.0], self.own.shape)
-
-    def proven(self, direction: Floats) -> float:
-        return float(self.rates()[0].max())
-
-
-def _linear(engine: Engine) -> Engine:
-    """Return the engine of joints that never fail, which is linear in misplacements."""
-    if isinstance(engine, OpeningEngine):
-        raise ProblemError(
-            f"tolerance: a {type(engine).__name__} is not linear in where grips are; take the "
-            "engine compliance or auto"
-        )
-    return engine.rigid if isinstance(engine, AutoEngine) else engine
 
 
 def _groups(
     engine: Engine, bricks: int, grips: Ints, payload: Floats, allowed: Allowed
 ) -> Iterator[_Group]:
-    """Yield the limited responses of grip sets (S, r)."""
-    engine, (sets, held) = _linear(engine), grips.shape
-    fields = engine.solve(bricks, grips, allowed.wanted)
+    """Yield the limited responses of grip sets (S, r), of joints that never fail."""
+    if isinstance(engine, OpeningEngine):
+        raise ProblemError(
+            f"tolerance: a {type(engine).__name__} is not linear in where grips are; take the "
+            "engine compliance or auto"
+        )
+    engine = engine.rigid if isinstance(engine, AutoEngine) else engine
+    wanted = Want.EDGES if np.isfinite(allowed.tension) else Want(0)
+    wanted |= Want.DISPLACEMENTS if np.isfinite(allowed.shift) else Want(0)
+    sets, held = grips.shape
+    fields = engine.solve(bricks, grips, wanted)
     moved = np.zeros((sets, 3 * held, held, 3))
     moved.reshape(sets, 3 * held, 3 * held)[:] = np.eye(3 * held)
     again = np.repeat(np.arange(sets), 3 * held)
-    off = engine.solve(bricks, grips[again], allowed.wanted, moved.reshape(-1, held, 3))
+    off = engine.solve(bricks, grips[again], wanted, moved.reshape(-1, held, 3))
     dead = select_sets(fields, again)
 
     def changes(name: str) -> Floats:
@@ -171,7 +156,7 @@ def _groups(
         own, change = fields.edge_force, changes("edge_force").transpose(0, 3, 1, 2)
         most, first = np.full(own.shape, allowed.tension), np.array([1.0, 0.0, 0.0])
         parts = own[..., None] * first, change[..., None, :] * first[:, None]
-        yield _Tensions("tension", *parts, most)
+        yield _Group("tension", *parts, most, axial=True)
     if np.isfinite(allowed.shift):
         most = np.full(fields.displacement.shape[:2], allowed.shift)
         yield vectors("displacement", "displacement", most)
@@ -239,22 +224,6 @@ def step_tolerance(engine: Engine, step: Step, allowed: Allowed = ROBOTS_ALONE) 
     return replace(worst, proven=1 / proven if proven else np.inf)
 
 
-def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
-    """Return the bricks and grips of every step."""
-    return [(s.number, s.bricks, scene.grip_numbers(s.grips, s.bricks)) for s in steps]
-
-
-def is_linear(engine: Engine) -> bool:
-    """Return whether an engine is known to be linear in misplacements of grips."""
-    return isinstance(engine, AutoEngine | ComplianceEngine)
-
-
-def is_tied(engine: Engine, steps: Sequence[_Held]) -> bool:
-    """Return whether a step has two rigid grips on one brick, and so no tolerance."""
-    several = {(bricks, held) for _, bricks, held in steps if len(held) > 1}
-    return any(bool(_tied(engine, bricks, np.array([held]))[0]) for bricks, held in several)
-
-
 def each_tolerance(
     engine: Engine, steps: Sequence[_Held], known: dict[_Key, float] | None = None
 ) -> Floats:
@@ -288,7 +257,8 @@ def stiffness_for(engine: Engine, steps: Sequence[Step], distance: float) -> flo
 
     def enough(stiffness: float | None) -> bool:
         soft = scene.with_grips(stiffness)
-        found = each_tolerance(recipe.make(soft), held_in_steps(soft, steps))
+        held = [(s.number, s.bricks, soft.grip_numbers(s.grips, s.bricks)) for s in steps]
+        found = each_tolerance(recipe.make(soft), held)
         return bool(found.min(initial=np.inf) >= distance)
 
     if enough(None):
@@ -308,13 +278,6 @@ COLUMN = "tolerance_mm"
 def tolerances_along(engine: Engine, steps: Sequence[Step], name: str = TOLERANCE) -> list[float]:
     """Return the tolerances of steps, mm, for a tolerance's name."""
     return [1e3 * step_tolerance(engine, step, allowed_by(name)).distance for step in steps]
-
-
-def with_tolerances(
-    engine: Engine, steps: Sequence[Step], table: pd.DataFrame, name: str = TOLERANCE
-) -> pd.DataFrame:
-    """Return a table of steps with a column of tolerances, mm."""
-    return table.assign(**{COLUMN: tolerances_along(engine, steps, name)})
 
 
 def tolerance_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:

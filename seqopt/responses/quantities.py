@@ -128,7 +128,8 @@ class Response:
 
 def lengths(vectors: Floats) -> Floats:
     """Return the lengths (...) of vectors (..., 3)."""
-    return np.asarray(np.sqrt(_squared(vectors)))
+    x, y, z = (vectors[..., i] for i in range(3))  # adding whole arrays outruns sums of three
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
 _TAKEN = {"rob", "prop", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
@@ -180,12 +181,6 @@ def support_moments(fields: Fields) -> Floats:
     return lengths(fields.support[..., 3:])
 
 
-def _squared(vectors: Floats) -> Floats:
-    """Return the squared lengths of vectors (..., 3)."""
-    x, y, z = (vectors[..., i] for i in range(3))  # adding whole arrays outruns sums of three
-    return np.asarray(x * x + y * y + z * z)
-
-
 def _signed(network: Network, vectors: Floats) -> Floats:
     size = lengths(vectors)
     return np.asarray(np.copysign(size, vectors @ np.array(network.scene.up) + _LEVEL * size))
@@ -196,10 +191,6 @@ def _largest_force(network: Network, fields: Fields) -> Floats:
     forces = support_forces(network, fields)
     up, down = forces.max(axis=1), forces.min(axis=1)
     return np.asarray(np.where(up >= -down, up, down))
-
-
-def _largest_shift(_: Network, fields: Fields) -> Floats:
-    return np.asarray(np.sqrt(_squared(fields.displacement).max(axis=1)))
 
 
 def _in_tension(network: Network, fields: Fields) -> Floats:
@@ -218,7 +209,7 @@ RESPONSES: dict[str, Response] = {
         Response("T_max", "F_max_N", *_EDGES, lambda _, f: f.edge_force.max(axis=1)),
         Response("F_avg", "F_avg_N", *_EDGES, lambda _, f: f.edge_force.mean(axis=1)),
         Response("T_pct", "T_pct", *_EDGES, _in_tension),
-        Response("D_max", "D_max_1e-3mm", *_MOTION, _largest_shift),
+        Response("D_max", "D_max_1e-3mm", *_MOTION, lambda _, f: lengths(f.displacement).max(1)),
         Response("D_avg", "D_avg_1e-3mm", *_MOTION, lambda _, f: lengths(f.displacement).mean(1)),
         Response("D_std", "D_std_1e-3mm", *_MOTION, lambda _, f: lengths(f.displacement).std(1)),
     )
@@ -324,19 +315,18 @@ def _props_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
             force = engine.solve(step.bricks, numbers, Want(0)).grip_force[0, len(step.held) :]
             for prop, own in zip(props, force, strict=True):
                 found.setdefault(scene.props.index(prop), []).append((step.number, own))
-    return pd.DataFrame([_row(scene, scene.props[i], found[i]) for i in sorted(found)])
-
-
-def _row(scene: Scene, prop: Prop, held: Sequence[tuple[int, Floats]]) -> dict[str, object]:
-    force = np.array([own for _, own in held])
-    size = lengths(force)
-    push = np.nan if prop.direction is None else float((force @ np.array(prop.direction)).min())
-    return {
-        "node": prop.node,
-        "brick": scene.brick_of_node[prop.node].name,
-        "from_step": held[0][0],
-        "to_step": held[-1][0],
-        "largest_force_N": float(size.max()),
-        "at_step": held[int(size.argmax())][0],
-        "least_push_N": push,
-    }
+    rows = []
+    for index, held in sorted(found.items()):
+        prop, force = scene.props[index], np.array([own for _, own in held])
+        pushed = None if prop.direction is None else force @ np.array(prop.direction)
+        row = {
+            "node": prop.node,
+            "brick": scene.brick_of_node[prop.node].name,
+            "from_step": held[0][0],
+            "to_step": held[-1][0],
+            "largest_force_N": float(lengths(force).max()),
+            "at_step": held[int(lengths(force).argmax())][0],
+            "least_push_N": np.nan if pushed is None else float(pushed.min()),
+        }
+        rows.append(row)
+    return pd.DataFrame(rows)

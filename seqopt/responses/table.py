@@ -10,7 +10,6 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import chain, groupby
 from operator import attrgetter, itemgetter
 from typing import Any, TypeAlias
@@ -83,14 +82,15 @@ class LinearRange:
     """Checks the steps of builds against the linear range of an engine.
 
     ``engine``: its engine; ``mortar``: with the elastic limits of joints; ``unchecked``: one line
-    that says why stresses in joints are not checked, or empty; ``offs``: cached tolerances of
-    grips, m.
+    that says why stresses in joints are not checked, or empty; ``far``: the limit of displacements,
+    m; ``offs``: cached tolerances of grips, m.
     """
 
     def __init__(self, engine: Engine) -> None:
         self.engine, self._network = engine, engine.network
         self._breaks = isinstance(engine, AutoEngine | OpeningEngine)
         self._engine = engine.rigid if isinstance(engine, AutoEngine) else engine
+        self.far = linear_limit(engine.network.scene)
         self._known: dict[_Key, Floats] = {}
         self.offs: dict[_Key, float] = {}
         thickness = engine.network.springs.thickness
@@ -104,11 +104,6 @@ class LinearRange:
                 self._limits = find_elastic_limits(engine.network, self.mortar)
         except SceneError as error:
             self.unchecked = (f"stresses in joints are not checked: {error}",)
-
-    @property
-    def far(self) -> float:
-        """The limit of displacements, m."""
-        return linear_limit(self._network.scene)
 
     def departures(
         self, table: _Columns, fields: Iterable[Fields] | None = None
@@ -128,7 +123,9 @@ class LinearRange:
         """
         shift, far = RESPONSES["D_max"], self.far
         moved = np.asarray(table[shift.column], dtype=float) / shift.scale
-        turned, strained, stressed = self._measured(table, fields)[:, :3].T
+        of_fields = None if fields is None else [self._of(each) for each in fields]
+        measures = self._measured(table) if of_fields is None else np.concatenate(of_fields)
+        turned, strained, stressed = measures[:, :3].T
         stressed = np.where(self._breaks, -np.inf, stressed)
         steps = np.asarray(table["step"], dtype=int)
         within = f", more than {length_text(far)}, a tenth of the smallest side of a brick"
@@ -161,7 +158,7 @@ class LinearRange:
 
     def of_builds(self, tables: Mapping[str, _Columns]) -> dict[str, tuple[Departure, ...]]:
         """Return the limits that builds exceed, for those that exceed any, by name."""
-        self._ask(key for table in tables.values() for key in self._keys(table))
+        self._measured(*tables.values())
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
     def of_steps(self, builds: Mapping[str, Sequence[Step]]) -> dict[str, tuple[Departure, ...]]:
@@ -188,84 +185,47 @@ class LinearRange:
 
         The margin is negative beyond them; NaN, without a joint, if it is not known.
         """
-        excess, joint = self._measured(table, None)[:, 2:].T
+        excess, joint = self._measured(table)[:, 2:].T
         at = int(excess.argmax())
         if self._limits is None or not np.isfinite(excess[at]):
             return np.nan, "", 0
         name = self._limits.assembly.contact_name[int(joint[at])]
         return -float(excess[at]), f"joint {name}", int(np.asarray(table["step"])[at])
 
-    def _measured(self, table: _Columns, fields: Iterable[Fields] | None) -> Floats:
+    def _measured(self, *tables: _Columns) -> Floats:
         """Return rotation, strain, excess of stress and in which joint, of every step, (n, 4)."""
-        if fields is not None:
-            return np.concatenate([self._of(each) for each in fields])
+        every = [held_in_table(self._network.scene, table) for table in tables]
+        keys = [(bricks, held) for _, bricks, held in chain.from_iterable(every)]
         if isinstance(self._engine, OpeningEngine):
-            return np.full((len(table["step"]), 4), -np.inf)  # far motions are unstable
-        keys = self._keys(table)
-        self._ask(keys)
+            return np.full((len(keys), 4), -np.inf)  # far motions are unstable
+        new = [key for key in keys if key not in self._known]
+        self._known |= {key: np.array([0.0, 0.0, -np.inf, 0.0]) for key in new if not key[0]}
+        for alike, fields in _solved_alike(self._engine, new, _MEASURED):
+            self._known.update(zip(alike, self._of(fields), strict=True))
         return np.array([self._known[key] for key in keys])
 
-    def _keys(self, table: _Columns) -> list[_Key]:
-        """Return the bricks and grips of every step."""
-        return [(b, held) for _, b, held in held_in_table(self._network.scene, table)]
-
-    def _ask(self, keys: Iterable[_Key]) -> None:
-        """Compute the measures of states that are not cached."""
-        if isinstance(self._engine, OpeningEngine):
-            return
-        asked, found = list[_Key](), list[Fields]()
-        for key in (new := [key for key in keys if key not in self._known]):
-            if not key[0]:  # nothing stands
-                self._known[key] = np.array([0.0, 0.0, -np.inf, 0.0])
-        for alike, fields in _solved_alike(self._engine, new, _MEASURED):
-            asked += alike
-            found.append(fields)
-        if asked:
-            self._known.update(zip(asked, self._of(*found), strict=True))
-
-    @cached_property
-    def _lever(self) -> Floats:
-        """Distance of every corner from the center of its joint, (K,), m."""
-        assert self._limits is not None
-        assembly = self._limits.assembly
-        return lengths(assembly.corner - self._network.springs.position[assembly.contact])
-
-    def _of(self, *parts: Fields) -> Floats:
-        """Return rotation, rad, strain, excess over elastic limits, Pa, and joint index, (S, 4).
-
-        A row per grip set of all ``parts``, the last of which has the most bricks.
-        """
-        springs, bricks = self._network.springs, parts[-1].brick_twist.shape[1]
+    def _of(self, fields: Fields) -> Floats:
+        """Return rotation, rad, strain, excess over elastic limits, Pa, and joint index, (S, 4)."""
+        springs, bricks = self._network.springs, fields.brick_twist.shape[1]
         acting = max(1, int(np.searchsorted(springs.since, bricks, side="right")))
-        joints = _stacked([fields.joint_wrench[:, :acting] for fields in parts])  # else they bear
-        twist = _stacked([fields.brick_twist for fields in parts])  # nothing
+        joints = fields.joint_wrench[:, :acting]  # others bear nothing
         wrench = joints.reshape(*joints.shape[:2], 2, 3) @ springs.axes[:acting].transpose(0, 2, 1)
         stiffness = springs.stiffness[:acting].reshape(-1, 2, 3)
         given = np.divide(wrench, stiffness, out=np.zeros_like(wrench), where=stiffness > 0)
         shift, turn = lengths(given).transpose(2, 0, 1)
-        turned = np.hstack([turn, lengths(twist[..., 3:])]).max(axis=1)
+        turned = np.hstack([turn, lengths(fields.brick_twist[..., 3:])]).max(axis=1)
         if self._limits is None:
             strain, none = shift / self._thickness[:acting], np.zeros(len(turned))
             return np.column_stack([turned, strain.max(axis=1), none - np.inf, none])
-        corners = int(np.searchsorted(self._limits.assembly.contact, acting))
-        face, lever = self._limits.assembly.contact[:corners], self._lever[:corners]
+        assembly = self._limits.assembly
+        corners = int(np.searchsorted(assembly.contact, acting))
+        face = assembly.contact[:corners]
+        lever = lengths(assembly.corner[:corners] - springs.position[face])
         strain = (shift[:, face] + turn[:, face] * lever) / self._thickness[face]
         excess = self._limits.excess(joints)
         most = excess.max(axis=1, keepdims=True)
         first = np.isclose(excess, most, rtol=1e-9, atol=0.0).argmax(axis=1)  # of those that tie
         return np.column_stack([turned, strain.max(axis=1), most[:, 0], first])
-
-
-def _stacked(parts: Sequence[Floats]) -> Floats:
-    """Return arrays (S, n, 6) one after the other, zero where one has less than the last."""
-    if len(parts) == 1:
-        return parts[0]
-    out = np.zeros((sum(map(len, parts)), *parts[-1].shape[1:]))
-    first = 0
-    for part in parts:
-        out[first : first + len(part), : part.shape[1]] = part
-        first += len(part)
-    return out
 
 
 def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:
@@ -333,17 +293,16 @@ def _analyzed(engine: Engine, steps: Sequence[Step]) -> dict[str, list[object]]:
 
 def _analyze_builds(engine: Engine, builds: Sequence[Sequence[Step]]) -> list[pd.DataFrame]:
     """Return the table of `analyze` of every build; states that builds share are computed once."""
-    states, network = _distinct(builds), engine.network
+    states = _distinct(builds)
     pairs = zip(states.items(), _each_fields(engine, states.values()), strict=True)
-    rows = {state: _row(network, step, fields) for (state, step), fields in pairs}
-    every = (
-        [
-            rows[step.bricks, step.grips] | {"step": step.number, "type": step.kind.value}
-            for step in steps
-        ]
-        for steps in builds
-    )
-    return [_table_of(_columns_of(each)) for each in every]
+    rows = {state: _row(engine.network, step, fields) for (state, step), fields in pairs}
+    tables = []
+    for steps in builds:
+        own = [rows[step.bricks, step.grips] for step in steps]
+        table = _table_of({name: [row[name] for row in own] for name in (own[0] if own else ())})
+        kinds = [step.kind.value for step in steps]
+        tables.append(table.assign(step=[step.number for step in steps], type=kinds))
+    return tables
 
 
 def _distinct(builds: Iterable[Sequence[Step]]) -> dict[tuple[int, Grips], Step]:
@@ -361,10 +320,7 @@ def _response_columns(
     network: Network, answers: Iterable[tuple[Step, Fields]]
 ) -> dict[str, list[object]]:
     """Return the columns of that table, with None where a robot does not grip."""
-    return _columns_of([_row(network, step, fields) for step, fields in answers])
-
-
-def _columns_of(rows: Sequence[Mapping[str, object]]) -> dict[str, list[object]]:
+    rows = [_row(network, step, fields) for step, fields in answers]
     return {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
 
 

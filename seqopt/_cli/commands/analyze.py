@@ -25,7 +25,7 @@ from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
 from seqopt.problem.requirements import _prop_faults, length_word, overloads
 from seqopt.responses._enough import Enough, what_was_enough
-from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
+from seqopt.responses._tolerance import COLUMN, stiffness_for, tolerances_along
 from seqopt.responses.quantities import _plain, _steps_in_words, length_text
 from seqopt.responses.table import (
     Departure,
@@ -244,7 +244,7 @@ def _with_tolerances(
     length: str, engine: Engine, steps: Sequence[Step], table: pd.DataFrame
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Return a table with tolerances of grips, and a note; ``length``: how far off they may be."""
-    table = with_tolerances(engine, steps, table)
+    table = table.assign(**{COLUMN: tolerances_along(engine, steps)})
     off, numbers = 1e-3 * table[COLUMN].to_numpy(float), table["step"].astype(int)
     at = int(off.argmin())
     said = f"tolerance: grips may be {length_text(float(off[at]))} off (step {numbers.iloc[at]})"
