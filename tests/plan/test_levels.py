@@ -27,8 +27,7 @@ WALL, ARCH = load_scene("wall:columns=3,courses=2"), small_arch(5)
 WEAK = bond_mortar(3e4)  # some joints of the small arch would leave its limits
 
 
-@pytest.mark.parametrize("schedule", [None, "free"])
-@pytest.mark.parametrize("scene", [WALL, ARCH])
+@pytest.mark.parametrize(("scene", "schedule"), [(WALL, None), (ARCH, "free")])
 def test_it_chooses_as_rigid_bricks_do_and_asks_no_joint(scene, schedule, monkeypatch):
     wanted, real = set(), ComplianceEngine._found
 

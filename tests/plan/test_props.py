@@ -33,10 +33,11 @@ def weak(count, payload, robots=2):
     return scene.with_robots(*(replace(r, payload=payload) for r in scene.robots[:robots]))
 
 
-@pytest.mark.parametrize("rules", [LOOSE, seqopt.FreeRules(), seqopt.FreeRules(newest="free")])
-@pytest.mark.parametrize("nodes", [(5,), (3, 8)])
+@pytest.mark.parametrize(
+    ("rules", "nodes"), [(LOOSE, (5,)), (seqopt.FreeRules(newest="free"), (3,))]
+)
 def test_the_best_plan_with_props_is_that_of_brute_force(rules, nodes):
-    scene = weak(4, 300.0).with_props(*(Prop(node=node) for node in nodes if node < 8))
+    scene = weak(4, 300.0).with_props(*(Prop(node=node) for node in nodes))
     engine = seqopt.make_engine("compliance", scene)
     best = best_values(engine, rules, "minmax,steps")
     if best is None:
@@ -129,18 +130,6 @@ def test_the_judge_finds_the_props_that_hold_by_itself():
         for robots in (0, 1):
             own = [number for number, _ in props_that_hold(scene, bricks, robots)]
             assert own == [*scene.prop_numbers(bricks, held=bool(robots))]
-
-
-def test_scenarios_and_orders_go_with_props():
-    scene = weak(4, 300.0).with_props(Prop(node=5))
-    scenes = seqopt.scenarios(scene, count=3, seed=1)
-    over = seqopt.solve(posed(scene, scenarios=scenes))
-    alone = [
-        seqopt.solve(posed(each, aim="minmax")).certificate.values[0] for each in scenes.scenes
-    ]
-    assert over.certificate.values[0] >= max(alone) * (1 - 1e-9)
-    best = seqopt.solve(posed(scene, aim="minmax", orders="tied"))
-    assert best.certificate.values[0] <= seqopt.solve(posed(scene)).certificate.values[0] + 1e-9
 
 
 def test_props_make_plans_stand_dry():

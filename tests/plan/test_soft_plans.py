@@ -88,15 +88,14 @@ def test_scenarios_keep_who_is_like_whom(unlike):
     assert plan.status == "optimal"
 
 
-@pytest.mark.parametrize("turning", [None, 1e3])
-def test_staged_builds_let_grips_give_way(turning):
+def test_staged_builds_let_grips_give_way():
     """Nearly rigid grips change nothing; soft ones do, and all that is held is in balance."""
     scene = small_arch(5)
     steps = seqopt.sequential(build_network(scene))
     rigid, near = (analyze_staged(s, steps) for s in (scene, scene.with_grips(1e14)))
     name = "D_max_1e-3mm"
     assert near[name].to_numpy() == pytest.approx(rigid[name].to_numpy(), rel=1e-4)
-    soft = analyze_staged(scene.with_grips(1e5, turning), steps)
+    soft = analyze_staged(scene.with_grips(1e5, 1e3), steps)
     assert np.abs(soft[name] - rigid[name]).max() > 0.1 * rigid[name].max()
-    first = analyze(make_engine("compliance", scene.with_grips(1e5, turning)), steps[:1])
+    first = analyze(make_engine("compliance", scene.with_grips(1e5, 1e3)), steps[:1])
     assert soft[name][0] == pytest.approx(first[name][0], rel=1e-9)

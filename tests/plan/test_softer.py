@@ -13,7 +13,7 @@ from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan._infeasible import payload_advice, whole_load
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.requirements import Limit, overloads
+from seqopt.problem.requirements import overloads
 from seqopt.responses.table import analyze
 from seqopt.sequence.methods import sequential
 from seqopt.sequence.rules import FreeRules
@@ -72,13 +72,12 @@ def test_weights_loads_and_wind_are_the_most_that_robots_need_to_carry():
     assert whole_load(build_network(scene)) == pytest.approx((2.0 + 0.25) * weight, rel=1e-9)
 
 
-@pytest.mark.parametrize("limits", [(), (Limit("F_largest", 200.0),)])
-def test_a_free_schedule_names_grips_with_which_there_is_a_plan(limits):
+def test_a_free_schedule_names_grips_with_which_there_is_a_plan():
     engine = seqopt.make_engine("compliance", settled(bricks=4))
-    problem = build_states(engine, FreeRules(), ONES, "steps", limits)
+    problem = build_states(engine, FreeRules(), ONES, "steps")
     with pytest.raises(InfeasibleError, match=r"becomes possible with .*grips of") as found:
         seqopt.solve(problem, "schedule_search")
     newtons = [int(n) for n in re.findall(r"--payload (\d+)", str(found.value))]
     assert max(newtons, default=0) <= whole_load(engine.network)
     soft = seqopt.make_engine("compliance", settled(bricks=4).with_grips(grips(str(found.value))))
-    assert seqopt.solve(build_states(soft, FreeRules(), ONES, "steps", limits)).steps
+    assert seqopt.solve(build_states(soft, FreeRules(), ONES, "steps")).steps

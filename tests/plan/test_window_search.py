@@ -52,6 +52,7 @@ def test_the_table_says_what_the_next_one_costs(engine25):
     assert table["margin"].iloc[-1] == last[1] - last[0]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not can_compile(), reason="no numba")
 @pytest.mark.xdist_group("compiled loops")
 def test_the_search_answers_steps_on_its_way(monkeypatch):
@@ -74,7 +75,6 @@ def test_the_search_answers_steps_on_its_way(monkeypatch):
     ("name", "options", "said"),
     [
         ("overlap_dp", {}, "overlap_dp looks beyond"),
-        ("beam", {}, "beam looks beyond"),
         ("cascade", {"charge": "earlier"}, "cascade charge=earlier looks beyond"),
         ("rank_search", {"horizon": 2}, "rank_search horizon=2 looks beyond"),
     ],
