@@ -95,18 +95,6 @@ def test_without_a_mortar_both_answers_are_given(capsys, tmp_path):
     assert both["verdict"].tolist() == table["verdict"].tolist()
 
 
-def test_what_falls_with_the_mortar_of_the_build_is_status_1(capsys, tmp_path):
-    """And friction that is given is that of both."""
-    scene = replace(load_scene(ARCH), weight_factor=1e4)
-    save_scene(scene, path := tmp_path / "heavy.json")
-    words = ["assess", str(path), "--method", "sequential", "--friction", "0.3", "--json"]
-    assert main(words) == 1
-    found = json.loads(capsys.readouterr().out)
-    assert [*found["verdicts"]] == ["dry, friction 0.3", "epoxy, friction 0.3"]
-    assert {each["friction"] for each in found["mortar"].values()} == {0.3}
-    assert all(each["does not stand"] for each in found["verdicts"].values())
-
-
 @pytest.mark.parametrize(("fall", "said"), [(-0.005, "leaves their balance"), (-0.5, "not small")])
 def test_a_movement_of_the_ground_is_said_to_enter_no_verdict(capsys, tmp_path, fall, said):
     """It was left out without a word; of ground at rest nothing is said."""
@@ -129,13 +117,3 @@ def test_a_movement_of_the_ground_is_said_to_enter_no_verdict(capsys, tmp_path, 
     assert start in capsys.readouterr().err
     assert main(["assess", ARCH, *words[1:]]) == 0
     assert "movement" not in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_a_map_of_all_methods_reads_in_80_columns(capsys):
-    assert main(["assess", ARCH, "--map", "tilt=0,5"]) == 1
-    out = capsys.readouterr().out
-    assert max(map(len, out.splitlines())) <= 80
-    for name in ("sequential, dry", "cantilever, epoxy", "three-robot, dry", "free, epoxy"):
-        assert name in out
-    assert "every step stands with a bond of" in " ".join(out.split())

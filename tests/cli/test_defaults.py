@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import json
-from dataclasses import replace
 
 import pytest
 
@@ -14,9 +13,8 @@ from seqopt._cli.main import main
 from seqopt._cli.signatures import signature_of
 from seqopt._registry import COMMANDS
 from seqopt.scene.scene_file import save_scene
-from tests.builders import anywhere, small_arch
+from tests.builders import small_arch
 
-DURATIONS = "fetch=30,place=10,approach=10,grip=7,release=5"
 UNLIKE = ("seconds", "models_paper_count", "stability")  # of one run, or added by the command
 
 
@@ -67,18 +65,6 @@ def test_optimize_alone_says_what_it_found_and_how_to_keep_it(capsys):
     assert "--out DIR writes the plan" in second
 
 
-def test_two_robots_get_the_loop_of_two(capsys, tmp_path):
-    scene = replace(small_arch(5), robots=anywhere(2))
-    save_scene(scene, tmp_path / "two.json")
-    found = answered(capsys, "optimize", tmp_path / "two.json")
-    assert found["summary"]["schedule"] == "two-robot"
-    assert seqopt.optimize(scene).problem.schedule.method == "two-robot"
-    four = replace(scene, robots=anywhere(4))
-    assert seqopt.optimize(four).problem.schedule.method == "three-robot"
-    named = seqopt.optimize(four, robots=[robot.name for robot in four.robots])
-    assert named.problem.schedule.method == "four-robot"
-
-
 def test_pareto_in_python_is_the_command(capsys, arch, tmp_path):
     words = ("--aim", "F_largest,steps", "--rule", "least_grips=1")
     found = answered(capsys, "pareto", arch, *words)["points"]
@@ -125,23 +111,3 @@ def test_what_functions_take_is_written_once():
                 assert each.annotation == option.kind
                 assert each.default in (option.default, inspect.Parameter.empty)
                 assert not option.more.get("shell"), (name, each.name)
-
-
-def test_a_word_that_python_does_not_know_is_refused():
-    with pytest.raises(TypeError, match="aims"):
-        seqopt.pareto("arch25", aims="D_max")
-    with pytest.raises(seqopt.SeqoptError, match=r"^engine 'complianc' does not exist .*give "):
-        seqopt.pareto("arch25", engine="complianc")
-    with pytest.raises(seqopt.SeqoptError, match=r"^scene arch26: no such"):
-        seqopt.assess("arch26")
-
-
-def test_tables_of_python_are_those_of_the_command(capsys, arch):
-    rows = answered(capsys, "analyze", arch, "--method", "cantilever")["steps"]
-    table = doors.analyze(arch, method="cantilever")
-    assert [row["F_max_N"] for row in rows] == [*table["F_max_N"]]
-    spent = answered(capsys, "times", arch, "--method", "cantilever", "--durations", DURATIONS)
-    table = doors.times(arch, method="cantilever", durations=DURATIONS)
-    assert [row["end_s"] for row in spent["steps"]] == [*table["end_s"]]
-    reached = answered(capsys, "reach", arch)["reach"]
-    assert [row["reached"] for row in reached] == [*doors.reach(arch)["reached"]]

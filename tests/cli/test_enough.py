@@ -88,7 +88,3 @@ def test_a_reach_to_one_side_moves_by_as_much_as_is_enough():
         near = replace(far, point=(0.0, 0.5 - more - off, 0.0))
         moved = scene.with_robots(replace(scene.robots[0], reach=near), *scene.robots[1:])
         assert exists(moved) is holds
-
-
-def test_where_no_reach_helps_none_is_named():
-    assert [*_enough_reach(reaching(0.7, 0.7, 0.7), lambda _: False)] == []

@@ -38,18 +38,6 @@ def test_optimize_writes_a_plan_that_reads_back(capsys, tmp_path, arch):
     assert load_scene(out / "scene.json") == load_scene(arch)
 
 
-def test_more_robots_come_with_their_scene(capsys, tmp_path, arch):
-    out = tmp_path / "out"
-    words = ["--robots", "4", "--rule", "ending=one-by-one", "--rule", "regrips=1"]
-    status, *_ = run(capsys, "optimize", arch, "--schedule", "free", *words, "--out", str(out))
-    assert status == 0
-    scene = load_scene(out / "scene.json")
-    assert [robot.name for robot in scene.robots][3:] == ["rob4"]
-    steps = read_plan(scene, out / "plan.csv")
-    assert steps[-1].held == ()
-    assert len(steps[-2].held) == 1
-
-
 def test_a_loop_by_its_states(capsys, tmp_path, arch):
     """Aims, limits and standing go with schedules of open grips too."""
     out = tmp_path / "out"

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError
-from seqopt.report.text import _headline
 from seqopt.responses.quantities import _payload_text, _rounded_up
-from seqopt.sequence.rules import FreeRules, with_robots
+from seqopt.sequence.rules import FreeRules
 from tests.commands import command as run
 
 WALL = "wall:columns=2,courses=2"
@@ -37,19 +35,6 @@ def test_optimize_begins_with_what_robots_hold(capsys, tmp_path):
     assert all(len(digits.replace(".", "").lstrip("0")) <= 3 for digits in found.groups())
     assert re.search(r"; minmax [0-9.]+, optimal$", first)
     assert second.startswith("schedule_search (exact): ")
-
-
-def test_the_share_is_that_of_the_robot_that_holds_most():
-    scene = with_robots(seqopt.load_scene(WALL), 2)
-    weak, strong = (replace(scene.robots[k], payload=p) for k, p in ((0, 50.0), (1, 400.0)))
-    table = {
-        "step": [1, 2],
-        "F_rob1_N": [10.0, 20.0],
-        "F_rob2_N": [None, 100.0],
-        "D_max_1e-3mm": [1.0, 2345.6],
-    }
-    said = _headline(scene.with_robots(weak, strong), table)
-    assert said == "largest force 100 N (25 % of payload), displacement 2.35 mm"
 
 
 @pytest.mark.parametrize(

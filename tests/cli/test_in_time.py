@@ -14,7 +14,6 @@ import seqopt
 from seqopt._cli import outputs
 from seqopt._cli.answer import answer_of
 from seqopt._cli.arguments import request
-from seqopt._cli.commands import analyze
 from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
 from seqopt.plan import _answers as _paths
@@ -183,15 +182,6 @@ def test_a_pareto_set_whose_proof_is_ended_is_not_complete(monkeypatch):
     assert (found.complete, found.stopped) == (False, INTERRUPT)
 
 
-def test_what_is_said_of_steps_is_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
-    words = ["analyze", WALL, "--method", "sequential", "--out", str(tmp_path / "a.csv")]
-    for how, status in ((TimeoutError, 0), (KeyboardInterrupt, 130)):
-        in_the_midst(monkeypatch, analyze, "what_was_enough", how)
-        assert main(words) == status
-        assert len(pd.read_csv(tmp_path / "a.csv")) == 7
-
-
 def test_a_clock_ends_what_is_late_and_names_it():
     clock = Clock(100.0)
     assert clock.spare("a", lambda: 3, 4) == 3
@@ -203,11 +193,3 @@ def test_a_clock_ends_what_is_late_and_names_it():
     assert [clock.why(stopped) for stopped in (INTERRUPT, "memory", "")] == [
         *(INTERRUPT, "memory", "")
     ]
-
-
-def test_a_clock_that_is_over_begins_with_nothing(monkeypatch):
-    monkeypatch.setattr("seqopt.work.progress.GRACE", 0.0)
-    clock, done = Clock(0.0), []
-    assert clock.spare("a", lambda: done.append(1), "none") == "none"
-    assert (done, clock.left_out, clock.left, clock.late) == ([], {"a": TIME}, 0.0, True)
-    assert clock.why(INTERRUPT) == TIME

@@ -171,23 +171,6 @@ def test_a_killed_worker_is_replaced(tmp_path):
     assert contents(tmp_path / "out") == contents(tmp_path / "plain")
 
 
-@pytest.mark.slow
-def test_fewer_candidates_are_a_heuristic_that_says_so(capsys, tmp_path):
-    words = [*WORDS, "overlap_dp", "--criteria", "worst-ratio-published"]
-    whole, near = tmp_path / "whole", tmp_path / "near"
-    assert main([*words, "--out", str(whole)]) == 0
-    assert main([*words, "--out", str(near), "--candidates", "near:6"]) == 0
-    assert "optimal, among these: near:6 keeps" in capsys.readouterr().out
-    first, second = contents(whole)["summary.json"], contents(near)["summary.json"]
-    assert (first["status"], first["candidates"]) == ("optimal", "all")
-    assert second["status"] == "optimal among these"
-    assert second["candidates"].startswith("heuristic: near:6 keeps")
-    assert second["models_evaluated"] < 0.8 * first["models_evaluated"]
-    assert second["objective"]["sum"] >= first["objective"]["sum"]
-    assert main([*words, "--out", str(near), "--candidates", "far:6"]) == 2
-    assert "give near:JOINTS or within:METERS" in capsys.readouterr().err
-
-
 def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tmp_path):
     """As ctrl-C at the first finding; what is written is whole."""
     came = []

@@ -18,7 +18,6 @@ from seqopt._cli.main import main
 from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import cantilever, sequential
-from seqopt.sequence.schedule_file import schedule_text
 from seqopt.study.published import printed_steps
 from tests.builders import anywhere, from_both_ends
 from tests.commands import beside_models
@@ -176,16 +175,6 @@ def test_optimize(capsys, tmp_path):
     assert (status, out.count("\n")) == (0, 91)
 
 
-def test_a_schedule_is_not_written_over(capsys, tmp_path, loop25):
-    path = tmp_path / "plan.csv"
-    path.write_text(schedule_text(loop25), encoding="utf-8")
-    words = ("--formulation", "overlap_dp", "--schedule", str(path), "--out", str(tmp_path))
-    status, _, err = run(capsys, "optimize", *words)
-    assert (status, err.count("\n")) == (2, 1)
-    assert "plan.csv: it is the input; name another file" in err
-    assert path.read_text(encoding="utf-8") == schedule_text(loop25)
-
-
 def test_robots_by_name_and_those_that_never_grip(capsys, tmp_path):
     words = ("--schedule", "two-robot", "--robots", "rob3,rob1", "--formulation", "overlap_dp")
     status, _, err = run(capsys, "optimize", *words, "--no-stability", "--out", str(tmp_path))
@@ -200,24 +189,6 @@ def test_robots_by_name_and_those_that_never_grip(capsys, tmp_path):
     assert first["rob3_node"] == 1
     assert np.isnan(first["rob2_node"])
     assert beside_models(run(capsys, "analyze", "--method", "published")[2]) == ""
-
-
-def test_optimize_with_words_of_ones_own(capsys):
-    arguments = ("--criteria", "T_max,M_sup=2,F_move", "--limit", "payload")
-    chosen = ("--formulation", "beam", "--option", "width=10", "--schedule", "modified-sequential")
-    report = summary(capsys, *arguments, *chosen)
-    assert report["criterion"] == "T_max,M_sup=2,F_move"
-    assert report["schedule"] == "modified-sequential"
-
-
-@pytest.mark.slow
-def test_compare_writes_tables_and_figures(capsys, tmp_path):
-    words = ("compare", "--criteria", "weighted-published", "--no-stability")
-    assert run(capsys, *words, "--out", str(tmp_path))[0] == 0
-    names = {path.name for path in tmp_path.iterdir()}
-    assert {"comparison.csv", "steps_overlap_dp.csv"} <= names
-    assert (tmp_path / "responses.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "responses.svg").read_bytes().startswith(b"<?xml")
 
 
 @pytest.mark.slow

@@ -12,11 +12,9 @@ import pytest
 import seqopt
 from seqopt._cli.answer import Status
 from seqopt._cli.commands.analyze import _fault, _status_of
-from seqopt.contact.mortar import bond_mortar
 from seqopt.errors import MechanismError, SolverError
-from seqopt.report.comparison import method_tables
 from seqopt.scene.scene_file import load_scene, save_scene
-from tests.builders import hinged, small_arch
+from tests.builders import hinged
 from tests.commands import command
 
 ARCH = "arch:span=1,rise=0.4,pattern=VLR"
@@ -91,21 +89,6 @@ def test_a_failed_solver_is_a_mechanism_only_where_one_is_proven():
     elastic = seqopt.make_engine("frame", loose)
     kinds = {type(_fault(elastic, step, failed)) for step in seqopt.sequential(loose)}
     assert kinds == {MechanismError, SolverError}
-
-
-@pytest.mark.slow
-def test_a_method_that_is_one_is_left_out_of_a_comparison_with_its_name():
-    """One mechanism ended the comparison, and nobody said of which method."""
-    scene = small_arch(5)
-    tables, notes, _ = method_tables(seqopt.make_engine("discrete", scene, bond_mortar(1e5)))
-    assert [*tables] == ["sequential"]
-    said = [note for note in notes if note.startswith("cantilever: not possible here; step ")]
-    assert ["becomes unstable" in note for note in said] == [True]
-    assert [*method_tables(seqopt.make_engine("discrete", scene))[0]] == [
-        "sequential",
-        "cantilever",
-    ]
-    assert not method_tables(seqopt.make_engine("compliance", hinged(scene, 0)))[0]
 
 
 def test_where_every_step_is_one_there_is_still_a_table(capsys, tmp_path):

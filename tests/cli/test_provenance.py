@@ -6,7 +6,6 @@ import json
 import platform
 from importlib.metadata import version
 
-import numpy as np
 import pytest
 
 import seqopt
@@ -69,11 +68,3 @@ def test_a_free_schedule_says_which_level_an_automatic_engine_took(capsys, tmp_p
     assert (engine["name"], engine["reason"]) == ("auto", "the default")
     assert engine["mortar"]["tensile_strength"] == seqopt.EPOXY.tensile_strength
     assert engine["level"]["engine"] == "compliance"
-
-
-def test_one_step_after_the_other_says_it_too(capsys, arch):
-    assert main(["analyze", arch, "--method", "cantilever", "--engine", "frame", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["engine"] == {"name": "frame", "reason": "asked for by name"}
-    assert main(["assess", arch, "--method", "cantilever", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["versions"]["numpy"] == np.__version__

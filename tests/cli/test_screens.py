@@ -7,15 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from seqopt._cli import arguments
-from seqopt._cli.arguments import LINES, first_screen, parser
+from seqopt._cli.arguments import LINES, parser
 from seqopt._cli.main import main
 from seqopt._cli.options import Asked, word
 from seqopt._cli.signatures import signature_of
 from seqopt._registry import COMMANDS
 from seqopt.errors import ProblemError
-
-WRITTEN = "What is written and printed?"
 
 
 @pytest.fixture
@@ -128,20 +125,6 @@ def excused():
     command = argparse.ArgumentParser()
     signature_of(excuse).fill(command)
     return command
-
-
-def test_a_question_is_asked_once(excused, monkeypatch):
-    titles = [group.title for group in excused._action_groups]
-    assert titles == ["positional arguments", "options", "Why?", "How?", WRITTEN]
-    why = next(group for group in excused._action_groups if group.title == "Why?")
-    assert why.description == "One or the other."
-    assert [a.dest for a in why._group_actions] == ["reason", "needed", "often", "excuse"]
-    monkeypatch.setattr(arguments, "LINES", 0)  # a screen is too small for anything
-    text = first_screen(excused)
-    assert "this" in text
-    assert "--loud" in text
-    assert "--reason" not in text
-    assert "and this" not in text
 
 
 def test_fields_say_how_options_are_read(excused, capsys):

@@ -92,38 +92,6 @@ def test_an_interrupt_is_one_line(tmp_path, which, after):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
-@posix
-def test_an_interrupt_is_not_lost_at_the_end_of_an_object():
-    program = """
-import os, signal, sys, time
-import seqopt._cli.commands.scene
-from seqopt.__main__ import run
-
-class Ends:
-    def __del__(self):
-        os.kill(os.getpid(), signal.SIGTERM)
-        time.sleep(0.1)
-
-def wait():
-    Ends()
-    time.sleep(20)
-
-seqopt._cli.commands.scene.run = wait
-sys.argv = ["seqopt", "scene"]
-sys.exit(run())
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        check=False,
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=30,
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "seqopt: interrupted\n")
-
-
 @pytest.mark.parametrize(
     ("error", "status", "said"),
     [
@@ -185,12 +153,6 @@ def test_strict_asks_for_payloads(capsys, words, status):
     assert main(list(words)) == status
     err = capsys.readouterr().err
     assert ("seqopt: payload exceeded: rob2 holds up to" in err) == (status == 1)
-
-
-@pytest.mark.slow
-def test_strict_is_content_where_payloads_hold(capsys, tmp_path):
-    words = ("optimize", "--formulation", "overlap_dp", "--strict", "--no-stability")
-    assert main([*words, "--limit", "F_largest=300", "--out", str(tmp_path / "o")]) == 0
 
 
 def test_a_mechanism_has_no_answer(capsys, tmp_path):

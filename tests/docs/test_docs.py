@@ -10,7 +10,7 @@ import sys
 import pandas as pd
 import pytest
 
-from experiments.harness.results import RESULTS, markdown, stored, two
+from experiments.harness.results import RESULTS, stored, two
 from experiments.placement.formulations import CUT, QUESTIONS
 from seqopt._registry import COMMANDS
 from seqopt.graph.formulation import exhibits, formulations
@@ -186,12 +186,6 @@ def test_readme_in_words_what_is_stored():
     assert f"of {round(1 / speed['fast_s_per_set'], -4):,.0f} three-grip sets a second" in text
     assert f"is {round(speed['ratio_median'], -2):,.0f} times as fast in the median" in text
     assert f"({round(speed['ratio_lowest'], -1):.0f} in the lowest)" in text
-
-
-def test_figures_and_tables_in_words():
-    shown = [two(value) for value in (0.00034, 0.0996, 1, 12.3, 99.7, 1299.0, 0.0, float("nan"))]
-    assert shown == ["0.00034", "0.100", "1.0", "12", "100", "1,300", "0", "–"]
-    assert markdown(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"
 
 
 def test_readme_python_runs(capsys):

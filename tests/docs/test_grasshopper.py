@@ -72,13 +72,6 @@ def test_a_plan_of_the_gallery_is_shown_where_it_is(component):
 
 
 @pytest.mark.slow
-def test_it_plans_and_says_what_was_read_and_found(planned):
-    _, said = planned
-    assert "density of 4 blocks is 2400 kg/m³, as given" in said
-    assert "optimal" in said
-
-
-@pytest.mark.slow
 def test_blocks_of_the_plan_are_those_that_were_given(component, planned, blocks):
     plan = component.read_plan(planned[0])
     places = {tuple(np.round(block.centroid(), 3)) for block in blocks}

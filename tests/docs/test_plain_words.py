@@ -72,11 +72,7 @@ def test_docstrings_and_messages_are_in_plain_words():
     [
         ("as the study does", 1),
         ("It says what does not\nadd up, but times are left out.", 2),
-        ("at step 9 the brick goes", 1),
-        ("3 is no scene", 1),
-        ("the weights add up to one", 0),
         ("The studies agree; the build goes on.", 0),
-        ("it prints all numbers except times", 0),
     ],
 )
 def test_a_phrase_is_seen_and_plain_words_are_not(text, seen):

@@ -8,7 +8,6 @@ import subprocess
 import tomllib
 from pathlib import Path
 
-import furo
 import pytest
 import yaml
 
@@ -104,60 +103,12 @@ def test_hooks_check_what_ci_checks():
     assert pinned <= {*project["project"]["optional-dependencies"]["test"]}
 
 
-def test_templates_are_forms_with_questions():
-    forms = [loaded(p) for p in (ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml")]
-    asked = [form for form in forms if "body" in form]
-    assert len(asked) >= 2
-    assert all(form["name"] and form["description"] for form in asked)
-    assert all(part["attributes"]["label"] for form in asked for part in form["body"])
-
-
 def test_one_version_is_said_everywhere():
     project = re.search(r'^version = "(.*)"', (ROOT / "pyproject.toml").read_text(), re.M)[1]
     cited = loaded(ROOT / "CITATION.cff")
     assert str(cited["version"]) == project
     headings = re.findall(r"^## .*", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)
     assert headings[:2] == ["## [Unreleased]", f"## [{project}] - {cited['date-released']}"]
-
-
-FURO = (Path(furo.__file__).parent / "theme/furo/static/styles/furo.css").read_text("utf-8")
-
-
-def text_width(css, pixels):
-    """The width of the text in em and by how much a page is wider than the window, as boxes flex.
-
-    Letters are a tenth larger from 97em on. A scroll bar takes 17 pixels.
-    """
-    em = 17.6 if pixels >= 97 * 16 else 16
-    window = (pixels - 17) / em
-    (width,) = map(float, re.findall(r"\.content \{ width: (\d+)em", css))
-    (padding,) = map(float, re.findall(r"\.content\{[^}]*padding:0 (\d+)em;width", FURO))
-    (bar,) = map(float, re.findall(r"\.toc-drawer\{box-sizing:border-box;width:(\d+)em", FURO))
-    wide = re.search(
-        r"\(min-width: 82.01em\) \{ \.sidebar-drawer \{ width: calc\(50% - (\d+)em", css
-    )
-    half = re.search(r"\.sidebar-drawer\{[^}]*width:calc\(50% - (\d+)em\)", FURO)
-    left = max(bar, window / 2 - float((wide or half)[1])) if pixels > 82 * 16 else 18.5
-    left = max(bar, window / 2 - left) if pixels <= 82 * 16 else left
-    beside = left + (bar if pixels > 82 * 16 else 0) + 2 * padding
-    shrinks = re.search(r"\.main, \.content \{ min-width: 0; \}", css)
-    text = min(width, window - beside) if shrinks else width
-    return text, beside + text - window
-
-
-def test_no_page_is_wider_than_the_window():
-    css = (ROOT / "docs" / "_static" / "site.css").read_text(encoding="utf-8")
-    for pixels in range(68 * 16, 2600):
-        text, over = text_width(css, pixels)
-        assert over <= 1e-9, pixels
-        assert text >= 43, pixels
-    assert text == 56
-    fixed = css.replace("min-width: 0", "")  # the control
-    assert [text_width(fixed, pixels)[1] > 3 for pixels in (1366, 1400, 1900)] == [
-        True,
-        True,
-        False,
-    ]
 
 
 def test_every_thumbnail_leads_to_a_page_that_shows_it():

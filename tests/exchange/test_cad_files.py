@@ -157,14 +157,6 @@ def profile():
     return out.ToPolylineCurve()
 
 
-def test_a_rhino_extrusion_that_is_not_convex_keeps_its_polygons(tmp_path):
-    model = Rhino(rhino.UnitSystem.Meters)
-    model.add(rhino.Extrusion.Create(profile(), 2.0, cap=True), "angle")
-    scene = import_scene(model.written(tmp_path), given=DENSE)
-    assert scene.bricks[0].mass == pytest.approx(2000.0 * 6 * 2)
-    assert sorted(map(len, scene.bricks[0].shape.faces)) == [4] * 6 + [6] * 2
-
-
 def drum(*_):
     cylinder = rhino.Cylinder(rhino.Circle(1.0), 2.0)
     return rhino.Brep.CreateFromCylinder(cylinder, capBottom=True, capTop=True)

@@ -53,26 +53,6 @@ def test_a_face_that_is_not_convex_is_cut_into_pieces_that_are():
         assert all(face_joint((1, 2), flat, MASONRY).face for flat in flats)
 
 
-def test_blocks_that_interlock_touch_on_several_planes():
-    """A block in the notch of a C: below, above and at the back."""
-    key = box((2, 1, 1), at=(1, 1, 0))
-    faces = touching_faces([prism(C_SHAPE), key], GAP)
-    normals = {tuple(np.round(face.normal).astype(int).tolist()) for face in faces}
-    assert normals == {(0, 1, 0), (0, -1, 0), (1, 0, 0)}
-
-
-def test_triangles_make_the_face_that_they_are_parts_of():
-    base = box((2, 1, 1))
-    cut = [
-        part for face in base.faces for part in ((face[0], face[1], face[2]), (face[0], *face[2:]))
-    ]
-    mesh = replace(base, faces=tuple(cut))
-    above = replace(mesh, vertices=as_vectors(mesh.points + np.array([0.5, 0, 1])))
-    (face,) = touching_faces([mesh, above], GAP)
-    assert flat_face(face.corners, face.normal).area == pytest.approx(1.5)
-    assert len(face.corners) == 4
-
-
 def test_what_cannot_touch_is_one_line():
     with pytest.raises(SceneError, match="gap is 'x'; give a positive number"):
         touching_faces([box((1, 1, 1))], "x")

@@ -11,7 +11,6 @@ import pytest
 from seqopt._files import write_text
 from seqopt.errors import FileError, SceneError, StepError
 from seqopt.exchange._content import Given
-from seqopt.exchange._formats import writable
 from seqopt.exchange._tables import BlockState, step_states
 from seqopt.exchange.exports import export_plan, read_folder
 from seqopt.exchange.imports import import_scene
@@ -93,11 +92,6 @@ def test_a_folder_is_read_whole(tmp_path):
         read_folder(tmp_path)
     write_text(tmp_path / "plan.csv", export_plan(SCENE, STEPS, "csv"))
     assert read_folder(tmp_path) == (SCENE, STEPS)
-
-
-@pytest.mark.parametrize("form", [f for f in writable() if f != "compas_assembly"])
-def test_every_format_is_text_of_a_line_or_more(form):
-    assert export_plan(SCENE, STEPS, form).endswith("\n")
 
 
 def test_what_does_not_fit_is_refused(sources, tmp_path):

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.errors import SceneError
-from seqopt.exchange._content import Given
-from seqopt.exchange.imports import import_scene
 from seqopt.scene.library.common import _touching_order
-from tests.blocks import box
-from tests.documents import obj
 
 
 @given(
@@ -29,10 +23,3 @@ def test_each_touches_what_stands(count, links, rank):
     assert sorted(order) == sorted(reached)
     for k, i in enumerate(order):
         assert i == 0 or any({i, j} in ({a, b} for a, b in pairs) for j in order[:k])
-
-
-def test_those_left_over_are_named(tmp_path):
-    path = tmp_path / "a.obj"
-    path.write_text(obj(*(box((1, 1, 1), at=(0, 0, z)) for z in (0, 1, 5))), encoding="utf-8")
-    with pytest.raises(SceneError, match=r"1 blocks touch nothing .* block_2; name supports"):
-        import_scene(path, given=Given(unit="m", density=1.0))

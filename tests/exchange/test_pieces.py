@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from seqopt.errors import FileError, SceneError
+from seqopt.errors import SceneError
 from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene
 from tests.blocks import L_SHAPE, box, prism
@@ -29,12 +29,6 @@ def test_faces_without_area_are_no_blocks(imported):
     assert len(imported(obj(*TOWER) + "f 4 4 8\nf 4 8 8\n").bricks) == len(TOWER)
 
 
-def test_a_block_that_is_open_is_named(imported):
-    text = obj(*TOWER).rsplit("f ", 1)[0]
-    with pytest.raises(SceneError, match=r"block block_2: .* one side only; close the shape"):
-        imported(text)
-
-
 def test_faces_inside_a_block_are_named(imported):
     """A wall across an L, between edges of which each has two faces without it."""
     shape, corners = prism(L_SHAPE, 0.1, at=(0.0, 0.0, 0.1)), len(L_SHAPE)
@@ -47,8 +41,3 @@ def test_an_object_of_several_blocks_is_said(imported):
     cubes = [box((0.2, 0.2, 0.1), at=(x, 0, 0)) for x in (0.0, 0.3)]
     said = imported(obj(*cubes).replace("o block_1\n", "")).provenance
     assert "2 closed pieces are called block_0: each is a block of its own" in said
-
-
-def test_a_folder_is_no_file(tmp_path):
-    with pytest.raises(FileError, match="is a folder; give a file with all blocks"):
-        import_scene(tmp_path, given=GIVEN)

@@ -65,8 +65,6 @@ def loose(*, turned=False):
 
 FILES = {
     "binary.stl": lambda: whole().export(file_type="stl"),
-    "text.stl": lambda: whole().export(file_type="stl_ascii"),
-    "parts.ply": lambda: whole().export(file_type="ply"),
     "shared.ply": lambda: merged().export(file_type="ply"),
     "shared.obj": lambda: merged().export(file_type="obj"),
     "loose.obj": loose,
@@ -117,14 +115,6 @@ def test_blocks_that_share_a_vertex_alone_are_two():
     mesh.merge_vertices()
     assert len(mesh.vertices) == 15
     assert len(keys(mesh.export(file_type="obj"))) == 2
-
-
-def test_faces_that_stand_there_twice_stay_one_block(tmp_path):
-    faces, path = lines(obj(LOW), "f"), tmp_path / "twice.obj"
-    for doubled in ([*faces, *faces], [face for face in faces for _ in (0, 1)]):
-        path.write_text("\n".join([*lines(obj(LOW), "v"), *doubled]), encoding="utf-8")
-        (block,) = read_content(path).blocks
-        assert repair_shape(block).solid.volume == pytest.approx(1.0)
 
 
 def test_what_is_open_is_said_to_be_open(tmp_path):

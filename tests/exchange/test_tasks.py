@@ -15,14 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.harness.scenes import running_bond
-from seqopt.errors import SeqoptError
 from seqopt.exchange._grip_frames import hold
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_csv, tasks_json
 from seqopt.exchange.contacts import face_ground, flat_face
-from seqopt.exchange.exports import export_plan
 from seqopt.network.build import build_network
 from seqopt.scene._armed import PlanPostures
-from seqopt.scene.boxes import block_brick, vertices_of
+from seqopt.scene.boxes import block_brick
 from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene import Scene
@@ -193,18 +191,3 @@ def test_postures_are_written_where_they_are_given():
     assert (lines[1]["joint_1"], lines[1]["joint_2"]) == ("0.1", "-2")
     assert lines[0]["joint_1"] == ""
     assert "joint_3" not in lines[0]
-
-
-def test_what_is_wrong_is_one_line():
-    with pytest.raises(SeqoptError, match=r"distance is 0\.0"):
-        [*plan_tasks(SCENE, STEPS, 0.0)]
-    with pytest.raises(SeqoptError, match="format csv takes no distance; leave it out, or write t"):
-        export_plan(SCENE, STEPS, "csv", distance=0.1)
-
-
-def test_shapes_are_those_of_the_scene():
-    blocks = json.loads(export_plan(SCENE, STEPS, "tasks"))["blocks"]
-    assert [block["block"] for block in blocks] == list(SCENE.build_order)
-    for block, brick in zip(blocks, SCENE.placed, strict=True):
-        vertex = block["shape"]["data"]["vertex"]
-        assert [[v[a] for a in "xyz"] for v in vertex.values()] == vertices_of(brick)[0].tolist()

@@ -6,13 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.discrete.discrete_arches import (
-    best_sides,
-    largest_fall,
-    row_of,
-    stresses,
-    within_limits,
-)
+from experiments.discrete.discrete_arches import row_of, stresses, within_limits
 from experiments.discrete.parts.arch_pads import (
     CORNERS,
     Across,
@@ -24,10 +18,10 @@ from experiments.discrete.parts.arch_pads import (
     pads_at_corners,
     readings,
 )
-from experiments.harness.yardstick import STEPS, error, moved
+from experiments.harness.yardstick import STEPS, moved
 from seqopt.engines.interface import Want
 from seqopt.sequence.methods import sequential
-from seqopt.study.published import STUDY_BED, STUDY_PADS, printed
+from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 
 @pytest.fixture(scope="module")
@@ -87,31 +81,3 @@ def test_nothing_breaks_or_slips_and_a_bond_too_weak_would_tell(engine25, step):
     assert within_limits(table)
     assert not within_limits(table.assign(shear_used=-0.1))  # tension beyond all shear
     assert not within_limits(table.assign(tension_MPa=3.1))
-
-
-def test_errors_are_those_of_the_first_model():
-    assert error(np.array([2.0, 1.0]), np.array([1.0, 2.0])) == pytest.approx(25.0)
-
-
-def test_the_best_pads_are_the_least_far_from_print():
-    study = pd.Series({17: 20.0, 23: -10.0})
-    rows = [("pads, width", 10.0, "a", 20.0, 0.0), ("pads, width", 12.0, "a", 19.0, -5.0),
-            ("pads, width", 14.0, "b", 20.0, -9.0)]  # fmt: skip
-    table = pd.DataFrame(rows, columns=["grip", "side_mm", "joint", 17, 23])
-    best = best_sides(table.set_index(["grip", "side_mm", "joint"]), study)
-    assert list(best.index.get_level_values("side_mm")) == [14.0, 12.0]
-
-
-def test_the_largest_fall_is_between_the_arches_where_print_falls():
-    rows = [("pads, width", 10.0, "a", 9.0, 2.0), ("pads, width", 12.0, "b", 1.0, 8.0)]
-    table = pd.DataFrame(rows, columns=["grip", "side_mm", "joint", 17, 23])
-    text = largest_fall(table.set_index(["grip", "side_mm", "joint"]), pd.Series({17: 20, 23: -10}))
-    assert text.startswith("from 17 to 23 bricks print falls by 30.0 points, of 2 readings none by")
-    assert text.endswith("more than 7.0: pads, width, 10 mm, a")
-
-
-def test_the_study_compares_as_many_nodes(engine25):
-    study = printed("de_validation").set_index("bricks")["nodes"]
-    for bricks, number in STEPS.items():
-        step = sequential(engine25.network)[number - 1]
-        assert len(moved(engine25, step)) == study[bricks]

@@ -10,7 +10,7 @@ import pytest
 
 import seqopt
 from experiments.failing import where_methods_fail
-from experiments.failing.parts import engine_cells, heat_maps, step_cells
+from experiments.failing.parts import engine_cells, step_cells
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.frame import FrameEngine
@@ -74,14 +74,6 @@ def test_a_missed_and_a_false_mechanism_are_wrong():
     assert engine_cells.ending("compliance", made, (), exact[0])["status"] == "wrong"
 
 
-def test_units_change_nothing_but_units():
-    scene, rescaled = engine_cells.chain(5), engine_cells.in_units(engine_cells.chain(5), 1e3)
-    one, other = (
-        ComplianceEngine(seqopt.build_network(each)).solve(5, [[9]]) for each in (scene, rescaled)
-    )
-    np.testing.assert_allclose(other.displacement, 1e3 * one.displacement, rtol=1e-9, atol=1e-12)
-
-
 def test_a_refusal_without_a_way_out_is_seen():
     """Another method answers, or a message says that none can."""
     row = {"half": "engines", "kernel": "one", "axis": "a", "value": "1", "error": np.nan}
@@ -130,23 +122,6 @@ def test_own_programs_agree_with_the_verdicts_and_contradict_false_ones(monkeypa
     monkeypatch.setattr(step_cells, "find_mortar", lambda _: Mortar(friction=1, cohesion=1e6,
                         tensile_strength=1e6))  # fmt: skip
     assert next(step_cells.rows(*asked))["contradicted"] == row["fall"]
-
-
-@pytest.mark.parametrize(
-    ("ends", "place", "sign"),
-    [
-        ({"answered": 3, "error": 1e-13}, 0, ""),
-        ({"answered": 2, "refused": 1, "error": 1e-7}, 2, "r"),
-        ({"refused": 1}, 4, "r"),
-        ({"mechanism": 1}, 5, "m"),
-        ({"answered": 3, "off": 1.1}, 6, ""),
-        ({"answered": 3, "wrong": 1}, 6, ""),
-    ],
-)
-def test_a_cell_shows_the_worst_of_it(ends, place, sign):
-    row = dict.fromkeys(("answered", "refused", "mechanism", "infeasible", "failed", "wrong"), 0)
-    row |= {"error": 0.0, "off": 0.0} | ends
-    assert (heat_maps.color(row), heat_maps.letter(row)) == (place, sign)
 
 
 @pytest.mark.slow

@@ -50,11 +50,6 @@ def test_a_link_is_followed_and_a_mode_is_kept(tmp_path):
     assert names(tmp_path) == ["link", "target"]
 
 
-def test_a_folder_is_no_file(tmp_path):
-    with pytest.raises(FileError, match="it is a folder"):
-        write_text(tmp_path, "x")
-
-
 @pytest.mark.parametrize("length", [246, 255])
 def test_a_long_name_is_a_name(tmp_path, length):
     path = tmp_path / ("x" * length)
@@ -150,20 +145,6 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path, monkeypatch, there, coun
     assert names(folder) == sorted(FILES)
     assert (folder / "one").read_text(encoding="utf-8") == "1"
     assert names(tmp_path) == sorted(["new", "out", *FILES])
-
-
-@posix
-def test_a_new_folder_is_as_open_as_any(tmp_path):
-    (tmp_path / "any").mkdir()
-    write_folder(tmp_path / "new", FILES)
-    modes = {(tmp_path / name).stat().st_mode for name in ("any", "new")}
-    assert len(modes) == 1
-
-
-def test_other_files_of_a_folder_stay(tmp_path):
-    (tmp_path / "mine").write_text("mine", encoding="utf-8")
-    write_folder(tmp_path, FILES)
-    assert names(tmp_path) == sorted([*FILES, "mine"])
 
 
 def test_nobody_sees_a_part_of_a_new_folder(tmp_path):

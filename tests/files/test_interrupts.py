@@ -9,7 +9,6 @@ import time
 
 import pytest
 
-from seqopt._files import write_folder
 from seqopt._interrupts import answered, ending, undisturbed
 
 
@@ -81,13 +80,6 @@ def test_signals_that_others_answer_are_left_to_them():
     assert came == ["theirs"]
 
 
-def test_other_threads_write_without_signals(tmp_path):
-    writer = threading.Thread(target=write_folder, args=(tmp_path / "out", {"a.txt": "a"}))
-    writer.start()
-    writer.join()
-    assert (tmp_path / "out" / "a.txt").read_text(encoding="utf-8") == "a"
-
-
 def wait():
     while True:
         time.sleep(0.001)
@@ -110,13 +102,6 @@ def test_what_takes_too_long_ends_where_interrupts_are_ignored():
         assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def test_what_has_no_time_does_not_begin():
-    done = []
-    with pytest.raises(TimeoutError), ending(0.0):
-        done.append(1)
-    assert not done
 
 
 @pytest.mark.parametrize("seconds", [1e300, float("inf")])

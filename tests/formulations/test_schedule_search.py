@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import product
 
 import networkx as nx
 import numpy as np
@@ -15,10 +15,6 @@ from hypothesis import strategies as st
 import seqopt
 from experiments.harness.scenes import longer
 from seqopt import Search
-from seqopt.contact._elastic_limits import find_elastic_limits
-from seqopt.contact.mortar import EPOXY
-from seqopt.engines.interface import Want
-from seqopt.engines.registry import AutoEngine, Level
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError, TimeUpError
 from seqopt.graph.states.explored import explore
@@ -254,33 +250,6 @@ def test_where_memory_ends_there_is_a_bound(arch):
             problem = replace(arch, goals=pose_goals(aim))
             with pytest.raises(error, match=said):
                 seqopt.solve(problem, "schedule_search", **words)
-
-
-def test_travel_is_that_of_the_steps():
-    network = build_network(with_robots(small_arch(5), 4))
-    problem = build_states(ComplianceEngine(network), FreeRules(), ONES, "minmax,travel")
-    plan = seqopt.solve(problem, "schedule_search")  # its certificate recomputes both
-    scene = network.scene
-    ways = 0.0
-    for robot in range(4):
-        held = [s.grips[robot] for s in plan.steps if s.grips[robot] is not None]
-        ways += sum(
-            np.linalg.norm(np.subtract(scene.node_position(a), scene.node_position(b)))
-            for a, b in pairwise(held)
-        )
-    assert plan.certificate.values[1] == pytest.approx(ways)
-
-
-@pytest.mark.slow
-def test_what_opens_a_way_is_asked_of_rigid_bricks(arch25):
-    """Far beyond what joints carry, discrete elements would take seconds a state."""
-    engine = AutoEngine(arch25)
-    two = FreeRules(robots=("rob1", "rob2"), least_grips=1)
-    with pytest.raises(InfeasibleError, match=r"brick 25 .* with a payload of "):
-        seqopt.solve(build_states(engine, two, ONES, "steps"), "schedule_search")
-    assert {choice.level for choice in engine.tally} == {Level.RIGID}
-    far = engine.rigid.solve(24, [[1]], Want.JOINTS).joint_wrench  # a state on the way
-    assert find_elastic_limits(engine.network, EPOXY).exceeded(far).all()
 
 
 class Clock:

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from formulations.flow import ACCURACY, OVERLAP_MIP, unit_flow
-from seqopt.errors import InfeasibleError, ProblemError
+from formulations.flow import OVERLAP_MIP
+from seqopt.errors import ProblemError
 from seqopt.graph.decision_costs import LayeredCosts
 from seqopt.graph.formulation import Watch, exhibits
 from seqopt.graph.graph import Graph
@@ -50,14 +50,6 @@ def test_without_time_it_is_an_allowed_choice_and_what_is_known_of_the_least(nam
     assert costs.worth(found.choice, aim) == pytest.approx(found.objective, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
-def test_one_without_a_choice_is_infeasible(name):
-    costs = costs_of(1.0)
-    never = tuple(np.full(part.shape, np.inf) for part in costs.shared[1:])
-    with pytest.raises(InfeasibleError, match="move 2: none of its 4"):
-        answer(Costs(LayeredCosts(costs.single, (costs.shared[0], *never))), name)
-
-
 def test_an_assignment_needs_a_state_of_every_level():
     source, target = np.array([0, 0, 1]), np.array([1, 2, 2])
     ends = np.array([False, False, True])
@@ -66,14 +58,3 @@ def test_an_assignment_needs_a_state_of_every_level():
         graph = Graph(source, target, np.ones((3, 1)), (peak,), ends)
         with pytest.raises(ProblemError, match="an assignment chooses a state of every level"):
             PROGRAMS[name].solve.choose(graph, Watch())
-
-
-def test_pairs_cost_the_worst_of_both():
-    costs = costs_of(1.0)
-    graph = Costs(costs).compiled(Aim.PEAK).instance.asked
-    pairs = zip(costs.shared, costs.single, strict=True)
-    worst = np.concatenate([np.maximum(shared, single).ravel() for shared, single in pairs])
-    assert graph.amounts[:, 0] == pytest.approx(worst)
-    flow = unit_flow(graph)
-    assert flow.cost == pytest.approx(worst / worst.max(), rel=1e-12)
-    assert flow.bound(0.5) == pytest.approx((0.5 - ACCURACY) * worst.max(), rel=1e-12)

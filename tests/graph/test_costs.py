@@ -75,8 +75,6 @@ def test_candidates_on_paths_are_those_of_allowed_choices(problem):
     ("part", "move", "value", "named"),
     [
         ("single", 0, [INF, INF], "move 1: none of its 2 candidates"),
-        ("shared", 0, [[INF, INF]], "move 1: none of its 2 candidates"),
-        ("single", 1, [INF, INF, INF], "move 2: none of its 3 candidates"),
         ("shared", 1, np.full((2, 3), INF), "move 2: none of its 3 candidates"),
         ("single", 2, [INF, INF], "move 3: none of its 2 candidates"),
     ],
@@ -90,42 +88,14 @@ def test_the_move_that_ends_every_choice_is_named(part, move, value, named):
     ("part", "move", "value", "named"),
     [
         ("single", 0, [], "move 1 has no candidates"),
-        ("single", 1, [], "move 2 has no candidates"),
         ("shared", 0, np.zeros((2, 2)), r"move 1: shared costs \(2, 2\); give them for \(1, 2\)"),
-        ("shared", 1, np.zeros((3, 2)), r"move 2: shared costs \(3, 2\); give them for \(2, 3\)"),
-        ("shared", 1, np.zeros((2, 2)), r"move 2: shared costs \(2, 2\); give them for \(2, 3\)"),
-        ("shared", 2, np.zeros((3, 3)), r"move 3: shared costs \(3, 3\); give them for \(3, 2\)"),
-        ("single", 2, [np.nan, 0.0], "move 3: a single cost is NaN"),
         ("single", 0, [0.0, -INF], "move 1: a single cost is NaN or -inf"),
         ("shared", 1, [[0, 0, 0], [0, 0, np.nan]], "move 2: a shared cost is NaN"),
-        ("shared", 1, [[0, 0, 0], [0, 0, -INF]], "move 2: a shared cost is NaN or -inf"),
     ],
 )
 def test_what_is_wrong_with_costs_is_named_with_its_move(part, move, value, named):
     with pytest.raises(ProblemError, match=named):
         changed(part, move, np.array(value, dtype=float))
-
-
-def test_as_many_shared_as_single_costs():
-    costs = three_moves()
-    with pytest.raises(ProblemError, match="the problem has no moves"):
-        LayeredCosts((), ())
-    with pytest.raises(ProblemError, match="3 single and 2 shared costs"):
-        LayeredCosts(costs.single, costs.shared[:2])
-    with pytest.raises(ProblemError, match="2 single and 3 shared costs"):
-        LayeredCosts(costs.single[:2], costs.shared)
-
-
-def test_what_is_not_allowed_may_be_marked_everywhere_and_large_costs_stay():
-    """Infinite costs do not count as large; the rest may be so as long as it has a sum."""
-    costs = changed("single", 1, np.full(3, INF))
-    assert costs.worst((0, 0, 0)) == INF
-    large = changed("single", 0, np.array([-1e308, INF]))
-    assert large.cost((0, 0, 0)) == -1e308
-    with pytest.raises(ProblemError, match="so large that their sum overflows"):
-        changed("shared", 2, np.full((3, 2), -1e308)).__class__(
-            large.single, (*large.shared[:2], np.full((3, 2), 1e308))
-        )
 
 
 def use(bound):

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.sparse.csgraph import breadth_first_order
 
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph import Explorer, Graph, lexicographic
@@ -78,41 +77,6 @@ def test_the_least_worst_amount_is_that_of_trying_every_one(graph, goal):
         assert least_peak(graph, goal) == tried(graph, goal)
     except InfeasibleError:
         assert tried(graph, goal) == np.inf
-
-
-def ladder(levels=40, width=12):
-    """Levels of states, each with moves to all of the next, and as many amounts as moves."""
-    places = np.arange(levels * width).reshape(levels, width)
-    source = np.concatenate([[0] * width, np.repeat(places[:-1].ravel() + 1, width)])
-    target = np.concatenate([places[0] + 1, np.repeat(places[1:] + 1, width, axis=0).ravel()])
-    amounts = np.random.default_rng(3).permutation(len(source)).astype(float)
-    ends = np.zeros(levels * width + 1, dtype=bool)
-    ends[-width:] = True
-    return Graph(source, target, amounts[:, None], (True,), ends)
-
-
-def test_a_worst_value_is_sought_on_fewer_states_with_every_probe(monkeypatch):
-    graph, sizes = ladder(), []
-
-    def counted(matrix, *start, **how):
-        sizes.append(matrix.shape[0])
-        return breadth_first_order(matrix, *start, **how)
-
-    monkeypatch.setattr("seqopt.graph.paths.breadth_first_order", counted)
-    found = least_peak(graph, 0)
-    assert sizes == sorted(sizes, reverse=True)
-    assert sizes[-1] < 0.9 * graph.states
-    assert found == tried(graph, 0)
-
-
-def test_parts_of_a_graph_are_not_checked_again(monkeypatch):
-    """What is no number is refused once: a part of a graph has no others."""
-    graph = line()
-    monkeypatch.setattr(Graph, "__post_init__", lambda _: pytest.fail("checked again"))
-    part = graph.only(np.array([True, False, True]))
-    assert lexicographic(part).values == (4.0,)
-    with pytest.raises(ValueError, match="read-only"):
-        part.amounts[0] = 1.0
 
 
 def line():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -75,19 +74,3 @@ def test_who_never_knows_leaves_no_path():
 
     assert _lazy_path(graph, np.arange(2), known, unsure, unsure) is None
     assert known.tolist() == [PASSES, FAILS]
-
-
-@pytest.mark.parametrize("told", [0, 3])
-def test_it_tells_before_every_path(told):
-    graph = Graph(
-        np.zeros(3, np.int32), np.arange(1, 4, dtype=np.int32), np.ones((3, 1)), (False,),
-        np.array([False, True, True, True]),
-    )  # fmt: skip
-    count = []
-    known = np.array([PASSES, 0, 0, 0])
-
-    def ask(part, rows):
-        return np.where(rows > told, PASSES, FAILS)
-
-    _lazy_path(graph, np.arange(4), known, ask, lambda _, rows: 0 * rows, lambda: count.append(1))
-    assert len(count) == (2 if told == 0 else 4)

@@ -105,9 +105,7 @@ def exactly_within(problem):
     }
 
 
-@pytest.mark.parametrize(
-    "draws", [30, pytest.param(200, marks=(pytest.mark.slow, pytest.mark.long))]
-)
+@pytest.mark.parametrize("draws", [12, pytest.param(200, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", TAKERS)
 def test_none_is_within_only_where_enumeration_finds_none(name, draws):
     """Prices may rise without end where costs tie; rounding must not decide what is possible."""
@@ -216,23 +214,3 @@ def test_what_a_budget_costs(problem25):
     np.testing.assert_allclose(relaxed, prices[:2])
     with pytest.raises(InfeasibleError):
         solve(replace(problem25, budgets=(travel(problem25, 10.0),)), "labels")
-
-
-def test_a_budget_without_a_bound_is_none(problem25):
-    free = replace(problem25, budgets=(travel(problem25, np.inf),))
-    best = solve(problem25, "overlap_dp").certificate.objective
-    for name in ("labels", "lagrangian"):
-        plan = solve(free, name)
-        assert plan.certificate.objective == pytest.approx(best)
-        assert plan.certificate.spent == {b.name: b.spent(plan.choice) for b in free.budgets}
-
-
-def test_what_is_spent_may_be_below_zero(problem25):
-    """Of amounts of both signs it is the sum, however the search counts them."""
-    way = travel(problem25, 20.0)
-    less = replace(way, single=tuple(each - 1.0 for each in way.single), bound=20.0 - 22)
-    plans = [solve(replace(problem25, budgets=(b,)), "labels") for b in (way, less)]
-    assert plans[0].choice == plans[1].choice
-    (spent,), (lower,) = (plan.certificate.spent.values() for plan in plans)
-    assert lower == pytest.approx(spent - 22)
-    assert plans[0].selection.prices[0] == pytest.approx(plans[1].selection.prices[0])

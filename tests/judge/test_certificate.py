@@ -38,14 +38,6 @@ def test_promises_are_held(problem25):
         solve(problem25, changed(cascade, bounded(lambda value: 0.995 * value)))
 
 
-def test_within_a_budget_the_certificate_proves_the_optimum_itself(problem25):
-    capped = replace(problem25, budgets=(travel(problem25, 20.0),))
-    for name in ("overlap_mip", "labels"):
-        certificate = solve(capped, name).certificate
-        assert certificate.gap <= 1e-6
-        assert certificate.bound > solve(problem25, "overlap_dp").certificate.bound + 1.0
-
-
 def test_within_a_budget_a_poor_answer_is_seen_and_prices_need_not_be_believed(problem25):
     capped = replace(problem25, budgets=(travel(problem25, 20.0),))
     best = solve(capped, "labels")
@@ -82,7 +74,7 @@ def test_the_least_of_any_choice_is_that_of_enumeration(problem):
             assert proven(problem, aim) == problem.best(aim)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_least_is_found_among_costs_of_any_size_and_sign(seed):
     rng = np.random.default_rng(seed)
     sizes = rng.integers(1, 5, size=4)
@@ -134,14 +126,6 @@ def test_how_high_a_claimed_bound_may_be(aim):
             answer(signed(), told(signed(), choice, value, bound, aim=aim))
 
 
-def test_gaps_are_shares_of_what_the_path_takes():
-    proof = answer(signed(), told(signed(), (1, 1), 3.0)).certificate
-    assert (proof.objective, proof.bound) == (3, -2)
-    assert proof.gap == proof.claimed_gap == 5 / 6  # every path takes 3 less than its arcs
-    peak = answer(signed(), told(signed(), (1, 1), 2.0, aim=Aim.PEAK)).certificate
-    assert (peak.bound, peak.gap) == (1, 1 / 2)
-
-
 def test_with_budgets_a_bound_may_lie_above_the_least_but_not_above_the_value():
     claimed = (1, 1), 3.0, 2.5
     with pytest.raises(SolverError, match="claimed bound"):
@@ -160,14 +144,6 @@ def test_how_far_a_budget_may_be_exceeded():
     costs = signed(9.0, 1 - 2 * TOLERANCE)
     with pytest.raises(SolverError, match=r"use 0\.9\S* is 1, more than the 0\.9\S* allowed; use"):
         answer(costs, told(costs, BEST, -2.0))
-
-
-def test_choices_that_cost_nothing_have_no_gap():
-    free = Costs(LayeredCosts((np.zeros(2),), (np.zeros((1, 2)),)))
-    for aim in Aim:
-        assert answer(free, told(free, (0,), 0.0, aim=aim)).certificate.gap == 0
-        with pytest.raises(SolverError, match="as claimed"):
-            answer(free, told(free, (0,), 1e-300, aim=aim))
 
 
 @pytest.mark.parametrize("kind", FormulationKind)

@@ -71,9 +71,7 @@ def test_tables_say_what_the_book_says(build, data):
     assert len(reached) > 1 or not {*told(book, tables, *reached.pop())}
 
 
-@pytest.mark.parametrize(
-    "aim", ["minmax,steps", "steps,minmax", "T_max,M_sup,steps", "sum(D_max),regrips", "travel"]
-)
+@pytest.mark.parametrize("aim", ["minmax,steps", "sum(D_max),regrips", "travel"])
 @given(build=free_builds(most_bricks=4, most_robots=3), told=st.booleans())
 @few
 def test_bounds_are_the_values_of_the_best_plan(aim, build, told):

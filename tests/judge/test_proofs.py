@@ -74,7 +74,7 @@ def test_the_proof_looks_at_every_state_that_a_better_plan_could_pass(aim, join)
 
 
 @pytest.mark.parametrize("ending", list(Ending))
-@pytest.mark.parametrize(("robots", "regrips"), [(2, None), (3, None), (4, 0), (4, 2)])
+@pytest.mark.parametrize(("robots", "regrips"), [(2, None), (4, 0)])
 def test_what_all_plans_have_in_common_bounds_every_path(ending, robots, regrips):
     """The search and the judge say the same, and no path through all states stays below."""
     rules = FreeRules(ending=ending, regrips=regrips, least_grips=1)
@@ -137,8 +137,7 @@ def test_a_proof_by_the_end_alone_is_not_given_to_a_worse_plan():
     assert proof.states > 200
 
 
-@pytest.mark.parametrize("aim", ["F_largest", "sum(M_sup)"])
-@pytest.mark.parametrize("by", ["payloads", "limits"])
+@pytest.mark.parametrize(("aim", "by"), [("F_largest", "limits"), ("sum(M_sup)", "payloads")])
 def test_the_proof_lets_robots_carry_all_they_may(aim, by):
     """They may just carry what any plan needs: plans above the best one are found."""
     scene = small_arch(5)
@@ -164,14 +163,14 @@ def signed_problem(rng, moves=3, size=5):
     return problem, sorted(problem.within().values())
 
 
-@pytest.mark.parametrize(("most", "climbs"), [(1, 80), (3, 1)])
+@pytest.mark.parametrize(("most", "climbs"), [(1, 20), (3, 1)])
 def test_what_is_set_aside_counts_and_prices_are_not_negative(monkeypatch, most, climbs):
     """Few partial choices are kept, prices of any sign are claimed: no choice is below a bound."""
     monkeypatch.setattr(budget_proof, "MOST", most)
     monkeypatch.setattr(budget_proof, "MIXTURES", climbs)
     rng = np.random.default_rng(4)
     proven = 0
-    for _ in range(6):
+    for _ in range(3):
         problem, found = signed_problem(rng)
         compiled = problem.compiled()
         graph, costs = compiled.instance.graph, compiled.instance.amounts[:, 0]
@@ -189,7 +188,7 @@ def test_what_was_left_out_for_a_threshold_bounds_all_orders(monkeypatch):
     """Whatever the threshold; and with few sets looked at nothing is proven."""
     problem = among_orders(posed("F_largest", count=4), "tied")
     best = seqopt.solve(problem).certificate.objective
-    for share in (0.0, 1e-3, 0.5, 0.99):
+    for share in (0.0, 0.5, 0.99):
         found = Explorer(OrderSpace(problem))
         assert not found.rise(share * best)
         assert share * best < found.excluded <= best * (1 + 1e-6)
@@ -212,11 +211,3 @@ def test_goals_that_take_no_more_than_all_must_leave_the_cut_of_the_first():
     assert proof.states == alone.states
     assert Proof(problem).bounds((1.01 * best[0], best[1]))[0] < 1.01 * best[0]
     assert Proof(problem).bounds((best[0], best[1] + 1))[1] <= best[1]
-
-
-def test_a_plan_with_more_regrips_is_found_within_the_same_peak():
-    """A peak is the largest of all steps, however many there are of them."""
-    problem = posed("minmax,regrips")
-    peak, regrips = solve(problem, "schedule_search", proof=False).selection.objective
-    assert Proof(problem).bounds((peak, regrips)) == pytest.approx((peak, regrips))
-    assert Proof(problem).bounds((peak, regrips + 1)) == pytest.approx((peak, regrips))

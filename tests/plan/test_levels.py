@@ -8,17 +8,8 @@ import seqopt
 from seqopt._cli.main import main
 from seqopt.contact.mortar import bond_mortar
 from seqopt.engines.interface import Want
-from seqopt.engines.registry import (
-    AutoEngine,
-    _chooser_of,
-    engine_for,
-    make_engine,
-    provenance,
-    recipe_of,
-    simplest,
-)
+from seqopt.engines.registry import AutoEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.responses._blocks import packed, unpacked
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene_file import load_scene, save_scene
 from tests.builders import small_arch
@@ -56,24 +47,6 @@ def test_without_a_name_python_and_the_command_line_take_it(capsys, tmp_path):
     assert "engine: " not in said.err
     assert main(["optimize", str(path), "--engine", "auto"]) == 0
     assert "engine: compliance: the simplest, until a joint" in capsys.readouterr().err
-
-
-def test_each_grip_set_by_itself_is_answered_as_before():
-    engine = make_engine("auto", ARCH, WEAK)
-    engine.solve(2, [[3], [2]], Want.EDGES)
-    assert sum(engine.tally.values()) == 2
-    level = simplest(engine)
-    assert (_chooser_of(level), simplest(level)) == (engine, level)
-    assert "levels" in provenance(engine)["engine"]
-    assert provenance(level)["engine"]["mortar"]["tensile_strength"] == 3e4
-
-
-def test_what_it_chose_can_be_sent():
-    level = simplest(make_engine("auto", WALL))
-    for sent in (unpacked(packed(level)), engine_for(level, WALL)):
-        assert type(sent) is ComplianceEngine
-        assert recipe_of(sent) == recipe_of(level)
-    assert recipe_of(level).name == "compliance"
 
 
 def test_a_plan_that_leaves_elastic_limits_says_so_first_and_what_to_do():

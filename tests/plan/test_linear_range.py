@@ -21,7 +21,6 @@ from seqopt.plan.solve import NONE_KEEPS, UNKNOWN, keeping
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.filters import parse_limits
 from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits
-from seqopt.report.comparison import compare
 from seqopt.responses._grip_sets import Moved, most_moved
 from tests.builders import scaled, small_arch
 
@@ -230,19 +229,3 @@ def test_words_are_the_same_in_python_and_on_the_command_line():
     with pytest.raises(ProblemError, match="give a share above zero"):
         Limit(LINEAR_RANGE, -1.0)
     assert replace(HARD, bound=2.0).label == LINEAR_RANGE
-
-
-@pytest.mark.slow
-def test_all_plans_that_are_compared_keep_it():
-    scene = between({"loop": True}, None)
-    engine = seqopt.make_engine("compliance", scene)
-    found = compare(engine, FORCES)
-    chosen = found.table.index[found.table["problem"] == "three-robot"]
-    assert len(chosen) > 5
-    far = linear_limit(scene)
-    for name in chosen:
-        assert found.tables[name]["D_max_1e-3mm"].max() * 1e-6 <= far * (1 + 1e-6), name
-    soft = seqopt.make_engine("compliance", scaled(small_arch(5), stiffness=SOFT))
-    left = compare(soft, FORCES).departures
-    assert "overlap_dp" in left
-    assert "free" in left

@@ -114,11 +114,6 @@ def says_so(_):
     raise InfeasibleError("no choice is within all budgets")
 
 
-def test_that_there_is_no_choice_is_not_believed(problem):
-    with pytest.raises(SolverError, match="no path is allowed, and some are: no choice is with"):
-        solve(problem, replace(find_formulation("overlap_dp"), solve=says_so))
-
-
 HEURISTIC = FormulationKind.HEURISTIC
 
 

@@ -162,16 +162,6 @@ def test_a_tail_is_the_least_over_thresholds(each, level):
     assert aim.ordered_weights(len(each)).sum() == pytest.approx(1.0)
 
 
-def test_one_scenario_is_the_nominal_problem():
-    problem = posed()
-    alone = seqopt.solve(robust(problem, [problem.schedule.scene], WORST_TOTAL))
-    known = seqopt.solve(problem, "overlap_dp").certificate
-    assert alone.certificate.objective == pytest.approx(known.objective)
-    peak = seqopt.solve(robust(problem, [problem.schedule.scene], WORST_PEAK))
-    least = seqopt.solve(problem, "minimax").certificate.objective
-    assert peak.certificate.objective == pytest.approx(least, rel=1e-9)
-
-
 # negative controls: a wrong claim is seen
 
 

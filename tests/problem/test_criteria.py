@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -15,7 +15,6 @@ from seqopt.problem.criteria import (
     RankSum,
     WeightedSum,
     _mean_ranks,
-    _present,
     _ranks_of,
     equal,
 )
@@ -86,7 +85,7 @@ def test_ranks_of_pairs_run_as_far_as_those_of_candidates():
     assert _mean_ranks(np.array([7.0, 1.0, 7.0, 7.0, 3.0])).tolist() == [4, 1, 4, 4, 2]
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(3))
 def test_given_the_choice_before_every_row_is_ranked_for_itself(seed):
     rng = np.random.default_rng(seed)
     values = rng.integers(-4, 5, size=rng.integers(1, 7, size=2)) + rng.uniform(-0.4, 0.4)
@@ -172,20 +171,3 @@ def test_scales_are_given_or_the_scenes():
     names = [name for name, _ in WORST_OVER_METHODS.limits]
     assert names == [name for name, _, _ in OVER_METHODS.terms]
     assert sorted(names) == sorted(Facts().reference)
-
-
-def test_only_a_robot_that_never_grips_counts_as_nothing():
-    assert _present(np.full(2, NAN)).tolist() == [0, 0]
-    assert _present(np.array([NAN, 2.0])) == pytest.approx([NAN, 2], nan_ok=True)
-
-
-def test_equal_terms_weigh_one():
-    assert equal("T_max", "M_sup") == (("T_max", 1.0), ("M_sup", 1.0))
-
-
-@pytest.mark.parametrize("criterion", [ranked(equal("T_max")), OVER_METHODS, WORST_OVER_METHODS])
-def test_criteria_are_values(criterion):
-    assert replace(criterion) == criterion
-    assert hash(replace(criterion)) == hash(criterion)
-    with pytest.raises(FrozenInstanceError):
-        criterion.name = "other"

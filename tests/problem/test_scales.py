@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +12,8 @@ from hypothesis import strategies as st
 import seqopt
 from experiments.harness.scenes import running_bond
 from seqopt._cli.main import main
-from seqopt.contact.mortar import bond_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import MechanismError, ProblemError, StepError
+from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import OVER_METHODS, RankSum, WeightedSum, equal
 from seqopt.problem.requirements import NEVER, ROUNDED, SceneFacts, crown
@@ -48,10 +46,6 @@ def test_a_build_from_both_ends_has_no_crown():
     assert crown(replace(small_arch(15), build_order=tuple(order))) == NEVER
 
 
-def test_gravity_says_what_is_high(arch25):
-    assert crown(replace(arch25, gravity=(0.0, 0.0, 9.81))) == NEVER
-
-
 def test_rounding_is_the_papers_on_its_arch(arch25):
     criterion = EQUATIONS.for_scene(facts_of(arch25))
     assert criterion.crown == 13
@@ -71,12 +65,6 @@ def test_the_user_sets_the_crown_and_the_rounding(arch25):
     assert plan.nodes != seqopt.optimize(arch25).nodes
 
 
-def test_the_summary_says_which_crown_was_used(arch25):
-    assert seqopt.optimize(arch25).summary()["crown"] == 13
-    wall = running_bond(4, 3)
-    assert seqopt.optimize(wall, engine="compliance").summary()["crown"] is None
-
-
 def test_scales_are_those_of_the_scenes_own_methods(arch25):
     facts = facts_of(arch25)
     tables = [seqopt.analyze(facts.engine, m(facts.engine.network)) for m in (
@@ -88,26 +76,6 @@ def test_scales_are_those_of_the_scenes_own_methods(arch25):
     )
     for name, value in facts.reference.items():
         assert heavy.reference[name] == pytest.approx(2 * value)
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_a_method_that_falls_on_its_way_gives_no_scales():
-    network = build_network(small_arch(9))
-    for strength, falls in ((1.5e5, {"cantilever"}), (3e4, {*METHODS})):
-        engine = seqopt.make_engine("auto", network, bond_mortar(strength))
-        stand = {}
-        for name, method in METHODS.items():
-            with suppress(MechanismError):
-                stand[name] = seqopt.analyze(engine, method(network))
-        assert METHODS.keys() - stand.keys() == falls
-        facts = SceneFacts(engine)
-        if stand:
-            (table,) = stand.values()
-            assert facts.reference["M_sup"] == table["M_sup_Nm"].max()
-        else:
-            assert facts.reference == facts.own_scales
-            assert facts.basis == " over payload, weight and size"
 
 
 def one_places(count):
@@ -168,12 +136,12 @@ def test_a_criterion_that_is_not_posed_says_so():
             criterion.costs({name: np.ones(3) for name in ("T_max", "F_largest")}, 3, 3)
 
 
-@pytest.mark.parametrize("name", ["equations-2-3", "closest-to-plan", "weighted", "worst-ratio"])
+@pytest.mark.parametrize("name", ["equations-2-3", "worst-ratio"])
 @given(
     scene=arches(min_bricks=4, max_bricks=7).map(far_reaching),
     power=st.tuples(*[st.integers(-8, 8)] * 3),
 )
-@settings(max_examples=6)
+@settings(max_examples=4)
 def test_units_change_no_choice(name, scene, power):
     """Powers of two: the same digits in other units of length, force and stiffness."""
     other = rescaled(scene, *(2.0**p for p in power))
@@ -182,10 +150,8 @@ def test_units_change_no_choice(name, scene, power):
     assert b.certificate.objective == pytest.approx(a.certificate.objective, rel=1e-9)
 
 
-@pytest.mark.parametrize("density", [0.1, 10.0])
-@pytest.mark.parametrize("scene", ["arch25", "wall"])
-def test_the_density_of_all_bricks_changes_no_choice(arch25, scene, density):
-    scene = arch25 if scene == "arch25" else running_bond(5, 4)
+def test_the_density_of_all_bricks_changes_no_choice():
+    scene, density = running_bond(5, 4), 10.0
     bricks = tuple(replace(b, density=density * b.density) for b in scene.bricks)
     other = replace(scene, bricks=bricks)
     plans = [seqopt.optimize(s, engine="compliance") for s in (scene, other)]

@@ -12,7 +12,7 @@ from PIL import Image
 
 import seqopt
 from seqopt.problem.problem import Orders
-from seqopt.report._notebook import card, facts
+from seqopt.report._notebook import facts
 from seqopt.report._robots import ROBOT_COLORS
 from seqopt.report.comparison import largest
 
@@ -44,14 +44,6 @@ def test_every_value_has_a_table_and_a_picture_and_is_light(values):
         assert html.count("<table") == html.count("</table>") == 1
 
 
-def test_a_plan_of_the_reference_arch_is_light_too(problem25):
-    plan = seqopt.solve(problem25, "overlap_dp")
-    html = card(plan)
-    assert html == plan._repr_html_()
-    assert len(html) < HEAVIEST
-    assert len(images(html)) == 2
-
-
 def test_colors_of_robots_survive_in_small_pictures(values):
     steps, _ = images(values["Plan"]._repr_html_())
     colors = {color for _, color in steps.convert("RGB").getcolors(100_000)}
@@ -74,21 +66,8 @@ def test_figures_are_those_of_the_plan(values):
     assert f"{rows['largest grip force, N']}</td>" in plan._repr_html_()
 
 
-def test_facts_of_a_problem_are_not_computed_for_them(problem25):
-    fresh = replace(problem25, evaluation=replace(problem25.evaluation))
-    fresh._repr_html_()
-    assert "_found" not in vars(fresh.evaluation)
-    assert "_sums" not in vars(fresh)
-
-
 def test_names_of_others_are_escaped(values):
     wild = replace(values["Scene"], name="<script>alert(1)</script>")
     html = wild._repr_html_()
     assert "<script" not in html
     assert "&lt;script&gt;" in html
-
-
-def test_a_value_of_another_kind_is_its_words():
-    assert facts(3)[:2] == ("int", {"": "3"})
-    network = seqopt.build_network(seqopt.load_scene("chain:bricks=7"))
-    assert "7 bricks" in network._repr_html_()

@@ -9,10 +9,7 @@ import trimesh
 
 from seqopt.engines.interface import Want
 from seqopt.network.build import build_network
-from seqopt.report.charts import draw_responses
 from seqopt.report.draw import View, _inner_edges, draw_bricks, draw_grips, draw_network
-from seqopt.responses.table import analyze
-from seqopt.sequence.methods import METHODS
 from tests.blocks import with_shapes
 from tests.builders import six_bricks
 
@@ -25,19 +22,6 @@ def axes():
     figure, axes = plt.subplots()
     yield axes
     plt.close(figure)
-
-
-@pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (35, 22), (-120, 80)])
-def test_a_view_is_a_rotation(azimuth, elevation):
-    matrix = View(azimuth, elevation).axes()
-    assert matrix @ matrix.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert np.linalg.det(matrix) == pytest.approx(1)
-
-
-def test_a_brick_is_six_faces(axes, engine25):
-    draw_bricks(axes, engine25.network, 7, View())
-    (faces,) = axes.collections
-    assert len(faces.get_paths()) == 6 * 7
 
 
 def test_twists_move_bricks_and_magnify(axes, engine25):
@@ -59,21 +43,6 @@ def test_tension_and_compression_differ_in_color(axes, engine25):
     colors = axes.collections[0].get_colors()
     assert len({tuple(color) for color in colors}) == 2
     assert len(axes.collections[0].get_segments()) == engine25.network.count_edges(12)
-
-
-def test_grips_are_named(axes, engine25):
-    draw_grips(axes, engine25.network, (None, 35, 20), View())
-    assert [text.get_text() for text in axes.texts] == ["rob2 at 35", "rob3 at 20"]
-
-
-def test_methods_share_an_axis(engine25):
-    tables = {name: analyze(engine25, method(engine25.network)) for name, method in METHODS.items()}
-    figure, axes = plt.subplots(2, 1)
-    draw_responses(axes, tables, {"M_sup_Nm": "M", "D_max_1e-3mm": "D"})
-    for line in axes[0].lines:
-        assert line.get_xdata()[-1] == 25
-    assert [line.get_label() for line in axes[0].lines] == list(METHODS)
-    plt.close(figure)
 
 
 def test_blocks_of_any_shape_show_the_faces_that_look_at_the_viewer(axes):

@@ -41,10 +41,6 @@ def test_bars_are_the_grips_of_the_steps(plan25, arch25, loop25):
     assert bars(loop25.gantt()) == expected(arch25, loop25.steps)
 
 
-def test_a_step_less_is_seen(plan25, arch25):
-    assert bars(plan25.gantt()) != expected(arch25, plan25.steps[:-1])
-
-
 def test_words_name_brick_and_node_and_open_moves(plan25, loop25):
     words = [text.get_text() for text in plan25.gantt().axes[0].texts]
     assert len(words) == len(plan25.grips())
@@ -66,12 +62,6 @@ def test_shades_follow_the_forces(engine25):
         force = table.set_index("step").loc[round(patch.get_x() + 0.5), f"F_{robot.name}_N"]
         assert patch.get_facecolor() == pytest.approx(to_rgba(scale.to_rgba(force)))
     assert len(shaded) == int(np.isfinite(table[["F_rob1_N", "F_rob2_N"]].to_numpy()).sum())
-
-
-def test_bricks_that_are_placed_are_marked(plan25, arch25):
-    marks = [line.get_xdata()[0] + 0.5 for line in plan25.gantt().axes[0].lines]
-    placed = [hold.first for hold in holds(arch25, plan25.steps) if hold.places is not None]
-    assert sorted(marks) == sorted(placed)
 
 
 def test_part_of_the_steps_is_drawn_and_others_are_refused(plan25, arch25):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import subprocess
 
@@ -132,37 +131,3 @@ def test_a_summary_is_one_sheet(page, tmp_path):
     text = re.sub('<meta http-equiv="Content-Security-Policy"[^>]*>', "", text)
     page.write_text(text.replace("@media print", "@media speech"), "utf-8")
     assert sheets(page) > 1  # the control
-
-
-FRAME = """<iframe src="inner.html" width="390" height="844"></iframe>
-<script>addEventListener("message", (e) => { document.body.dataset.wide = e.data; });</script>"""
-ASK = """<script>const timer = setInterval(() => {
-  if (document.body.dataset.ready !== "true") return;
-  clearInterval(timer);
-  parent.postMessage(document.documentElement.scrollWidth <= innerWidth, "*");
-}, 50);</script></body>"""
-
-
-@pytest.mark.slow
-@browser
-def test_a_telephone_scrolls_one_way(page, tmp_path):
-    text = re.sub('<meta http-equiv="Content-Security-Policy"[^>]*>', "", page.read_text("utf-8"))
-    (tmp_path / "frame.html").write_text(FRAME, "utf-8")
-    seen = []
-    for wrong in ("", "<style>#use { min-width: 600px; } #say { overflow: visible; }</style>"):
-        inner = text.replace("</body>", wrong + ASK)
-        (tmp_path / "inner.html").write_text(inner, "utf-8")
-        seen.append(browsed(tmp_path, f"file://{tmp_path / 'frame.html'}", PLAIN)[0])
-    assert 'data-wide="true"' in seen[0]
-    assert 'data-wide="false"' in seen[1]  # the control
-
-
-def test_numbers_of_pages_are_whole_words(engine25, steps, table):
-    """Robots and units as people write them; what a script reads stays as it is."""
-    text = report_page(engine25, [Build("sequential", steps, table)], "")
-    data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', text, re.S)[1])
-    assert [robot["words"] for robot in data["structure"]["robots"]] == [
-        "robot 1", "robot 2", "robot 3",
-    ]  # fmt: skip
-    assert "D_max_1e-3mm" in data["builds"][0]["columns"]
-    assert not any("1e-3" in words for words in data["responses"].values())

@@ -22,7 +22,7 @@ from seqopt.exchange.contacts import face_ground, flat_face
 from seqopt.network.build import build_network
 from seqopt.plan.build import GivenSequence
 from seqopt.report import page
-from seqopt.report._pages import OVER, comparison_page, plan_page
+from seqopt.report._pages import OVER, plan_page
 from seqopt.report.page import LARGEST, Build, Scatter, _build_data, _structure_data, report_page
 from seqopt.responses.table import analyze
 from seqopt.scene.boxes import block_brick
@@ -30,7 +30,6 @@ from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import cantilever, sequential
-from seqopt.workflow import optimize
 from tests.blocks import L_SHAPE, prism
 from tests.browser import BROWSER, PLAIN, WORDS, browsed, browses
 
@@ -89,15 +88,6 @@ def test_reactions_are_those_of_the_table(engine25, builds):
         found = unpacked(data[name], len(build.steps)).reshape(len(build.steps), -1, 3)
         sizes = np.linalg.norm(found, axis=2).max(axis=1)
         np.testing.assert_allclose(sizes, build.table[column].abs(), rtol=3 / LARGEST)
-
-
-def test_a_point_for_each_build(engine25, builds):
-    points = pd.DataFrame({"time, s": [1.0, np.nan], "gap, %": [2, 3]}, index=[*builds])
-    page = report_page(engine25, [*builds.values()], "", (), Scatter("both", points, ["time, s"]))
-    found = data_of(page)["scatter"]
-    assert found["builds"] == [*builds]
-    assert found["values"] == {"time, s": [1.0, None], "gap, %": [2.0, 3.0]}
-    assert data_of(report_page(engine25, [*builds.values()], ""))["scatter"] is None
 
 
 def test_the_structure_is_that_of_the_network(engine25):
@@ -242,35 +232,6 @@ def test_what_robots_cannot_carry_is_said_first_in_the_table_and_at_the_step(eng
     assert [k for k, said in enumerate(marks) if said] == [3, 8, 46]
     assert marks[3] == "robot 1 exceeds its payload"
     assert data_of(text)["builds"][0]["bounds"] == {"F_largest": 392.4}
-
-
-def test_what_robots_carry_is_not_said_to_be_too_much(arch25):
-    plan = optimize(arch25, "free")
-    text = plan_page(plan)
-    assert '<p id="sentence">3 robots build arch25 in 48 steps; all within payload, 75 % ' in text
-    data = data_of(text)["builds"][0]
-    assert not any(data["marks"])
-    assert data["sentence"] in text
-    forces = plan.responses().filter(regex=r"^F_rob\d_N$").abs().max(axis=1)
-    assert data["decides"] == forces.argmax()  # all payloads are alike
-
-
-def test_large_numbers_are_readable(engine25, builds):
-    table = builds["sequential"].table.copy()
-    table.loc[3, "D_max_1e-3mm"] = 1.163e5
-    text = plan_page(GivenSequence(engine25, builds["sequential"].steps, "cascade"), table=table)
-    text = text.split('id="data"')[0]
-    assert "<th>displacement, mm</th>" in text
-    assert "<td>116.3</td>" in text
-    assert not re.search(r"\de[+-]?\d|1e-3", text.split("</style>")[1])
-
-
-@pytest.mark.slow
-@pytest.mark.xdist_group("comparison")
-def test_the_free_schedule_is_seen_in_the_table_of_a_comparison(engine25, compared25):
-    """Of all formulations it would be the last row, below what is seen at once."""
-    text = comparison_page(engine25, compared25)
-    assert [row[0] for row in tables_of(text)[:4]][1:] == ["sequential", "cantilever", "free"]
 
 
 def unguarded(text):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import contextmanager, nullcontext
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,7 +10,7 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt.errors import NothingFoundError, ProblemError
+from seqopt.errors import NothingFoundError
 from seqopt.plan.pose import states_of
 from seqopt.report._regret._chart import PALE, regret_chart
 from seqopt.report._regret._measure import RIGID_GRIPS, Timer, measure_regret
@@ -54,7 +53,7 @@ def beats(one, other):
     return no_worse and (SAME * one[0] < other[0] or any(a < b for a, b in pairs))
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(2))
 def test_what_is_beaten_is_so_by_the_definition(seed):
     rng = np.random.default_rng(seed)
     size = 25
@@ -87,13 +86,6 @@ def test_what_to_take_is_computed():
     assert "no plan known is better" not in unproven.sentence  # it is not the best known
     luck = made(FOUR[0], ("compliance", FREE, "path_beam", "", False, 0.05, 0.0))
     assert luck.take["formulation"] == "schedule_search"  # what proves comes first
-
-
-def test_long_reasons_are_wrapped():
-    found = made(*FOUR)
-    found.table.loc[2, ["regret", "why"]] = [np.nan, "brick 5: " + "it is too far " * 9]
-    assert max(map(len, str(found).splitlines())) <= 80
-    assert sum("too far" in line for line in found.lines()) > 1
 
 
 @pytest.fixture(scope="module")
@@ -223,17 +215,3 @@ def test_what_is_stopped_is_said():
     assert any("stopped" in line for line in found.lines())
     with pytest.raises(NothingFoundError, match="give more seconds"):
         measure_regret(engine, WORST, seconds=60.0, timer=Timer(within=_Late(0).within))
-
-
-def test_other_references_are_refused():
-    engine = seqopt.make_engine("compliance", small_arch(4))
-    with pytest.raises(ProblemError, match="reference 'rigid' does not exist; give one of"):
-        measure_regret(engine, WORST, reference="rigid")
-
-
-def test_without_weight_nothing_is_regretted():
-    light = small_arch(3)
-    light = replace(light, gravity=(0.0, 0.0, 0.0))
-    found = measure_regret(seqopt.make_engine("compliance", light), WORST, **ONCE)
-    assert (found.table["value"] == 0).any()
-    assert (found.table["regret"].dropna() == 0).all()

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
 
-from seqopt.report._style import look, looks, new_figure, picture_files, plain, styled
-from seqopt.report.charts import _merged, front_figure, responses_figure
+from seqopt.report._style import look, looks, new_figure, picture_files, plain
+from seqopt.report.charts import _merged, front_figure
 from seqopt.report.draw import POINTS, _aside
-from seqopt.report.text import WORDS, in_words, typed
 from tests.pictures import flaws
 
 
@@ -22,13 +20,6 @@ def test_seventy_series_differ_and_ten_do_without_color():
     assert len({one.marker for one in every[:10]}) == 10
     assert len({one.color for one in every[:7]}) == 7
     assert list(looks(["a", "b", "a"])) == ["a", "b"]
-
-
-def test_the_style_is_left_where_it_ends():
-    before = mpl.rcParams["font.size"]
-    inside = styled(lambda: mpl.rcParams["font.size"])()
-    assert inside == 9.0
-    assert mpl.rcParams["font.size"] == before
 
 
 def test_a_figure_is_written_twice_and_always_alike():
@@ -70,25 +61,10 @@ def test_numbers_stand_beside_lines_and_apart():
     assert (np.abs(shifts[1:-1, 0]) > POINTS / 2).all()  # aside of a line that goes up
 
 
-def test_words_say_what_is_typed_where_it_differs():
-    assert typed("overlap_dp") == "dynamic programming (overlap_dp)"
-    assert typed("rank_search") == in_words("rank_search") == "rank search"
-    assert typed("my_own") == "my_own"
-    assert len(set(WORDS.values())) == len(WORDS)
-
-
 def test_equal_tables_are_one_line():
     table = pd.DataFrame({"bricks": [1, 1, 2], "M": [1.0, 3.0, 2.0], "phase": list("abc")})
     other = table.assign(M=[1.0, 3.0, 2.5])
     assert _merged({"a": table, "b": other, "c": table.copy()}) == {"a": ("a", "c"), "b": ("b",)}
-
-
-def test_the_worst_step_of_every_number_of_bricks_is_drawn():
-    shown = {"bricks": [1, 1, 2], "step": [1, 2, 3], "M_sup_Nm": [1.0, 3.0, 2.0]}
-    table = pd.DataFrame(shown).assign(F_max_N=1.0, **{"D_max_1e-3mm": 1.0})
-    axes, *_ = responses_figure({"sequential": table}).axes
-    (line,) = axes.get_lines()
-    assert line.get_ydata().tolist() == [3.0, 2.0]
 
 
 def front_of(table):
@@ -118,13 +94,3 @@ def test_the_chart_of_a_pareto_set_marks_methods_and_names_them():
         "loop, its set", "sequential", "cantilever",
     ]  # fmt: skip
     assert flaws(figure) == []
-
-
-def test_rounding_does_not_look_like_a_trade_off():
-    table = pd.DataFrame(
-        {"F_largest": [100.0, 200.0], "M_sup": [3.0, 3.0 + 1e-12], "steps": [9, 9]}
-    )
-    axes, *_ = front_figure(front_of(table), {}, {}).axes
-    low, high = axes.get_ylim()
-    assert 0.01 < high - low < 0.1
-    assert axes.get_xlim()[1] - axes.get_xlim()[0] > 100
