@@ -43,9 +43,8 @@ class GripCompliance(FrozenValue):
         if self.rigid:
             return self
         moved = None if self.moved is None else self.moved[which]
-        return replace(
-            self, moved=moved, matrix=None if self.matrix is None else self.matrix[which]
-        )
+        matrix = None if self.matrix is None else self.matrix[which]
+        return replace(self, moved=moved, matrix=matrix)
 
     def offsets(self, sets: int, grips: int) -> Floats:
         """Return how far the grips are moved (S, r, 3)."""
@@ -85,7 +84,17 @@ def read_compliance(
     found = _in_place(network, np.asarray(grips))
     if moved is None:
         return found
-    offsets = _lengths(columns, moved)
+    try:
+        offsets = np.array(moved, dtype=float)
+    except (TypeError, ValueError):
+        raise GripError("moved: give lengths in meters, (sets, grips, 3)") from None
+    if offsets.shape != (*columns.shape, 3):
+        raise GripError(
+            f"moved has shape {offsets.shape}; give lengths in meters, (sets, grips, 3), here "
+            f"{(*columns.shape, 3)}"
+        )
+    if not np.isfinite(offsets).all():
+        raise GripError("moved: a length is not finite; give meters")
     _follow_bricks(network, columns, offsets, found)
     return replace(found, moved=offsets)
 
@@ -107,21 +116,16 @@ def _in_place(network: Network, grips: Ints) -> GripCompliance:
             f"robot {name} has no posture at node {node[at]}, so the compliance of its grip is "
             "not known; move its base, or leave out joint_stiffness"
         )
-    matrix = _by_kind(network)
+    scale = np.repeat([1.0, network.lever], 3)
+    matrix = known.compliance * np.outer(scale, scale)  # of each kind of grip, m/N
+    if known.transmits_moment.any():
+        turning = np.where(known.transmits_moment, 0.0, np.inf)
+        matrix[:, [3, 4, 5], [3, 4, 5]] += turning[:, None]
+    else:
+        matrix = matrix[:, :3, :3]
     one = len(matrix) == 1
     every = np.broadcast_to(matrix[0], (*grips.shape, *matrix.shape[1:])) if one else matrix[kind]
     return GripCompliance(None, every, network.lever)
-
-
-def _by_kind(network: Network) -> Floats:
-    """Return the compliance (M, w, w) of each kind of grip, m/N, as of `GripCompliance`."""
-    known, scale = network.compliances, np.repeat([1.0, network.lever], 3)
-    matrix = known.compliance * np.outer(scale, scale)
-    if not known.transmits_moment.any():
-        return matrix[:, :3, :3]
-    turning = np.where(known.transmits_moment, 0.0, np.inf)
-    matrix[:, [3, 4, 5], [3, 4, 5]] += turning[:, None]
-    return matrix
 
 
 _RIGID = 1e-9  # compliance in a direction, over the largest, that stands for none
@@ -166,22 +170,6 @@ def grip_springs(compliance: GripCompliance, grips: int) -> list[GripSpring]:
             own = invertible(matrix[grip][np.ix_(ways, ways)]) / np.outer(scale, scale)
             out.append(GripSpring(grip, ways, own, np.pad(offset[grip], (0, 3))[ways]))
     return out
-
-
-def _lengths(columns: Ints, moved: ArrayLike) -> Floats:
-    """Return offsets (S, r, 3) of grips, checked."""
-    try:
-        far = np.array(moved, dtype=float)
-    except (TypeError, ValueError):
-        raise GripError("moved: give lengths in meters, (sets, grips, 3)") from None
-    if far.shape != (*columns.shape, 3):
-        raise GripError(
-            f"moved has shape {far.shape}; give lengths in meters, (sets, grips, 3), here "
-            f"{(*columns.shape, 3)}"
-        )
-    if not np.isfinite(far).all():
-        raise GripError("moved: a length is not finite; give meters")
-    return far
 
 
 def _follow_bricks(

@@ -61,7 +61,8 @@ def _spectrum(
     scaled = sparse.diags_array(root.ravel()) @ parts.deformation @ sparse.diags_array(1 / scale)
     condition = np.inf
     if lowest:  # the largest eigenvalue is that of the unconstrained scaled stiffness
-        square, start = scaled.T @ scaled, _start(scaled)
+        start = np.random.default_rng(0).standard_normal(len(scale))
+        square = scaled.T @ scaled
         highest = eigsh(square, k=1, tol=1e-3, return_eigenvectors=False, v0=start)
         condition = float(highest[0]) / lowest
     return lowest, condition, (motion / motion[np.abs(motion).argmax()]).reshape(-1, 6)
@@ -79,12 +80,9 @@ def _lowest(system: MixedSystem, scale: Floats, before: int) -> tuple[float, Flo
         return np.asarray(scale * answer[mine])
 
     operator = LinearOperator((len(scale), len(scale)), matvec=inverse, dtype=np.float64)
-    values, vectors = eigsh(operator, k=1, tol=_EIGENVALUE_TOLERANCE, v0=_start(scale))
+    start = np.random.default_rng(0).standard_normal(len(scale))
+    values, vectors = eigsh(operator, k=1, tol=_EIGENVALUE_TOLERANCE, v0=start)
     return float(1 / values[0]), vectors[:, 0] / scale
-
-
-def _start(like: Floats | sparse.csr_array) -> Floats:
-    return np.asarray(np.random.default_rng(0).standard_normal(like.shape[-1]))
 
 
 @dataclass(frozen=True)

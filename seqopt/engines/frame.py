@@ -33,9 +33,6 @@ _KEPT = 0.5  # share of its stiffness that the softest motion keeps in the assem
 _LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
 
 
-_Examine = Callable[[], None]
-
-
 class FrameEngine(SerialEngine):
     """Solves each grip set as a frame of its own.
 
@@ -49,58 +46,53 @@ class FrameEngine(SerialEngine):
         self._contrast = contrast
 
     def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance) -> Fields:
-        return _solve_one(self.network, bricks, columns, compliance, self._contrast)
-
-
-def _solve_one(
-    network: Network, bricks: int, columns: Ints, compliance: GripCompliance, contrast: float
-) -> Fields:
-    edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
-    split, deformation, stiffness = _frame(network, bricks, contrast)
-    grips = _hold(network, columns, compliance, deformation.shape[1])
-    load = np.zeros((deformation.shape[1] // 6, 6))
-    load[network.inner[:bricks].ravel(), :3] = network.inner_weight[: 2 * bricks]
-    both, applied = network.inner[:bricks], network.applied(bricks)
-    arm = network.centroid[:bricks] - network.node_position[both].mean(axis=1)
-    applied[:, 3:] += np.cross(arm, applied[:, :3])
-    load[both] += 0.5 * applied[:, None]  # what pulls at bricks beside their weight
-    held = network.inner.ravel()[columns]
-    base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE.value)
-    free = np.ones(load.shape, dtype=bool)
-    free[base] = False
-    free.ravel()[grips.fixed] = False
-    ends, still = network.springs.support.tolist(), np.zeros(load.shape)
-    for node in base:
-        ground = network.scene.grounds[ends.index(network.node_spring[node])]
-        still[node] = ground.movement or 0.0
-    unknown, motion = np.flatnonzero(free), still.ravel()
-    motion[grips.fixed] = grips.moved
-    whole = sparse.csr_array(sparse.vstack([deformation, grips.spring]))
-    every = np.concatenate([stiffness, grips.stiffness])
-    reduced, strain = whole[:, unknown], whole @ motion
-    strain[len(stiffness) :] -= grips.stretched
-    examine = partial(require_resistance, network, bricks, columns, compliance)
-    pull = load.ravel()[unknown]
-    motion[unknown] = _solve(reduced, every, pull, strain, contrast, examine)
-    stress = stiffness * (deformation @ motion)
-    reaction = (deformation.T @ stress).reshape(load.shape) - load
-    springs, which = network.springs, network.edge_spring[split]
-    of_end = network.node_spring[base] == springs.support[:, None]  # (G, base nodes)
-    mine = network.edge_brick[split] == springs.bodies[which, 1]
-    mine &= springs.since[which] <= bricks
-    halves, own = stress[-6 * len(split) :].reshape(2, len(split), 3)[:, mine], which[mine]
-    wrench = np.zeros((len(springs.since), 6))
-    wrench[own] = -np.einsum("hsk,ski->shi", halves, springs.axes[own]).reshape(-1, 6)
-    shift = motion.reshape(load.shape)
-    return Fields(
-        edge_force=stress[None, :edges],
-        displacement=shift[None, :nodes, :3],
-        grip_force=reaction[None, held, :3],
-        grip_moment=np.where(grips.turns[:, None], reaction[held, 3:], 0.0)[None],
-        support=(of_end @ reaction[base])[None],
-        joint_wrench=wrench[None],
-        brick_twist=shift[network.inner[:bricks]].mean(axis=1)[None],
-    )
+        network, contrast = self.network, self._contrast
+        edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
+        split, deformation, stiffness = _frame(network, bricks, contrast)
+        grips = _hold(network, columns, compliance, deformation.shape[1])
+        load = np.zeros((deformation.shape[1] // 6, 6))
+        load[network.inner[:bricks].ravel(), :3] = network.inner_weight[: 2 * bricks]
+        both, applied = network.inner[:bricks], network.applied(bricks)
+        arm = network.centroid[:bricks] - network.node_position[both].mean(axis=1)
+        applied[:, 3:] += np.cross(arm, applied[:, :3])
+        load[both] += 0.5 * applied[:, None]  # what pulls at bricks beside their weight
+        held = network.inner.ravel()[columns]
+        base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE.value)
+        free = np.ones(load.shape, dtype=bool)
+        free[base] = False
+        free.ravel()[grips.fixed] = False
+        ends, still = network.springs.support.tolist(), np.zeros(load.shape)
+        for node in base:
+            ground = network.scene.grounds[ends.index(network.node_spring[node])]
+            still[node] = ground.movement or 0.0
+        unknown, motion = np.flatnonzero(free), still.ravel()
+        motion[grips.fixed] = grips.moved
+        whole = sparse.csr_array(sparse.vstack([deformation, grips.spring]))
+        every = np.concatenate([stiffness, grips.stiffness])
+        reduced, strain = whole[:, unknown], whole @ motion
+        strain[len(stiffness) :] -= grips.stretched
+        examine = partial(require_resistance, network, bricks, columns, compliance)
+        pull = load.ravel()[unknown]
+        motion[unknown] = _solve(reduced, every, pull, strain, contrast, examine)
+        stress = stiffness * (deformation @ motion)
+        reaction = (deformation.T @ stress).reshape(load.shape) - load
+        springs, which = network.springs, network.edge_spring[split]
+        of_end = network.node_spring[base] == springs.support[:, None]  # (G, base nodes)
+        mine = network.edge_brick[split] == springs.bodies[which, 1]
+        mine &= springs.since[which] <= bricks
+        halves, own = stress[-6 * len(split) :].reshape(2, len(split), 3)[:, mine], which[mine]
+        wrench = np.zeros((len(springs.since), 6))
+        wrench[own] = -np.einsum("hsk,ski->shi", halves, springs.axes[own]).reshape(-1, 6)
+        shift = motion.reshape(load.shape)
+        return Fields(
+            edge_force=stress[None, :edges],
+            displacement=shift[None, :nodes, :3],
+            grip_force=reaction[None, held, :3],
+            grip_moment=np.where(grips.turns[:, None], reaction[held, 3:], 0.0)[None],
+            support=(of_end @ reaction[base])[None],
+            joint_wrench=wrench[None],
+            brick_twist=shift[network.inner[:bricks]].mean(axis=1)[None],
+        )
 
 
 class _Holds(NamedTuple):
@@ -160,8 +152,14 @@ def _frame(network: Network, bricks: int, contrast: float) -> tuple[Ints, sparse
     ]
     kinds = springs.translational_stiffness, springs.rotational_stiffness
     own = [2 * np.maximum(k[which], _LOOSE * k.max()).ravel() for k in kinds]
-    rows = sparse.vstack([_rows(total, *part) for part in parts]).tocsr()
-    return split, rows, np.concatenate([beam_stiffness, *own])
+    rows = []
+    for nodes_of, first, second in parts:
+        blocks = np.stack([first, second], axis=2)  # (M, k, 2, 6)
+        row = np.arange(blocks.shape[0] * blocks.shape[1]).reshape(*blocks.shape[:2], 1, 1)
+        column = 6 * nodes_of[:, None, :, None] + np.arange(6)
+        index = tuple(np.broadcast_to(i, blocks.shape).ravel() for i in (row, column))
+        rows.append(sparse.coo_array((blocks.ravel(), index), shape=(row.size, 6 * total)))
+    return split, sparse.vstack(rows).tocsr(), np.concatenate([beam_stiffness, *own])
 
 
 def _beams(
@@ -187,22 +185,13 @@ def _beams(
     return modes, np.repeat([stretch, bend, 3 * bend], [edges, 3 * edges, 3 * edges])
 
 
-def _rows(nodes: int, pairs: Ints, first: Floats, second: Floats) -> sparse.coo_array:
-    """Return the rows (M k, 6 nodes) of k deformations of each of M pairs of nodes."""
-    blocks = np.stack([first, second], axis=2)  # (M, k, 2, 6)
-    row = np.arange(blocks.shape[0] * blocks.shape[1]).reshape(*blocks.shape[:2], 1, 1)
-    column = 6 * pairs[:, None, :, None] + np.arange(6)
-    index = tuple(np.broadcast_to(i, blocks.shape).ravel() for i in (row, column))
-    return sparse.coo_array((blocks.ravel(), index), shape=(row.size, 6 * nodes))
-
-
 def _solve(
     maps: sparse.csr_array,
     stiffness: Floats,
     pull: Floats,
     strain: Floats,
     contrast: float,
-    examine: _Examine,
+    examine: Callable[[], None],
 ) -> Floats:
     """Return the displacements under a pull, corrected until they no longer change.
 

@@ -25,7 +25,6 @@ from seqopt.engines.interface import (
     Level,
     LevelChoice,
     NamedEngine,
-    OpeningEngine,
     Want,
     _merge_sets,
     keep_wanted,
@@ -61,10 +60,8 @@ class AutoEngine(NamedEngine):
         return ComplianceEngine(self.network)
 
     @cached_property
-    def _discrete(self) -> OpeningEngine:
-        from seqopt.engines.discrete.engine import DiscreteEngine  # noqa: PLC0415  # few sets ask
-
-        return DiscreteEngine(self.network, self.mortar)
+    def _discrete(self) -> Engine:
+        return ENGINES["discrete"](self.network, mortar=self.mortar)
 
     @cached_property
     def _limits(self) -> tuple[ElasticLimits | None, str]:
@@ -137,21 +134,14 @@ class Recipe:
         return build_network(self.scene)
 
 
-def _version(package: str, missing: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return missing
-
-
 def recipe_of(engine: object) -> Recipe | None:
     """Return the recipe of an engine made by name, or the ``recipe`` of one of your own."""
     found = getattr(engine, "recipe", None)
     return found if isinstance(found, Recipe) else None
 
 
-def recipe_for(engine: Engine, scene: Scene) -> Recipe:
-    """Return how to make an engine of the same kind and settings for another scene.
+def engine_for(engine: Engine, scene: Scene) -> Engine:
+    """Return an engine of the same kind and settings for another scene.
 
     Arms hold in it in the postures of the engine's own scene. Raises `ProblemError` if the engine
     was not made by name.
@@ -162,12 +152,7 @@ def recipe_for(engine: Engine, scene: Scene) -> Recipe:
             f"engine {type(engine).__name__}: scenarios need engines of their own; take "
             "one of seqopt.make_engine"
         )
-    return replace(recipe, scene=hold_alike(engine.network.scene, scene))
-
-
-def engine_for(engine: Engine, scene: Scene) -> Engine:
-    """Return an engine of the same kind and settings for another scene."""
-    return recipe_for(engine, scene).make()
+    return replace(recipe, scene=hold_alike(engine.network.scene, scene)).make()
 
 
 def _frame(network: Network | Scene) -> Engine:
@@ -290,6 +275,10 @@ def provenance(engine: Engine) -> dict[str, object]:
 def versions() -> Mapping[str, str]:
     """Return the versions of Python, of seqopt and of the packages that it needs, by name."""
     lines = (line for line in requires("seqopt") or () if "extra ==" not in line)
-    names = ("seqopt", *(re.split(r"[^\w.-]", line)[0] for line in lines))
-    known = {name: _version(name, "not installed") for name in names}
-    return {"python": platform.python_version()} | known
+    known = {"python": platform.python_version()}
+    for name in ("seqopt", *(re.split(r"[^\w.-]", line)[0] for line in lines)):
+        try:
+            known[name] = version(name)
+        except PackageNotFoundError:
+            known[name] = "not installed"
+    return known

@@ -1,7 +1,6 @@
 """The loops of `seqopt.engines.rigid._extremes`, compiled by numba where it is installed.
 
-Nothing else imports this file. Grip sets are solved a few at a time, side by side, so that a
-processor works on several at once. The code is compiled when it is first called and kept in the
+Nothing else imports this file. The code is compiled when it is first called and kept in the
 folder that numba chooses: beside this file, or the user's own (``NUMBA_CACHE_DIR`` names another).
 No function touches what another call works on, and none holds Python's lock.
 """
@@ -18,7 +17,6 @@ import numpy as np
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.rigid._extremes import Edges, Ends, Grown, Motion, Part
 
-_SIDE_BY_SIDE = 16  # sets: a number that is known when loops are compiled
 _ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
@@ -48,123 +46,78 @@ def solve_grown(grown: Grown, axis: Floats, columns: Ints, force: Floats, pivot:
 
     As ``_solve_positive`` of `seqopt.engines.rigid._grip_equations`, of rigid grips.
     """
-    sets, count = force.shape
-    low, share = np.empty((count, count, _SIDE_BY_SIDE)), np.empty((count, _SIDE_BY_SIDE))
-    for start in range(0, sets, _SIDE_BY_SIDE):
-        for s in range(_SIDE_BY_SIDE):
-            mine = min(start + s, sets - 1)
-            at = columns[mine]
-            for i in range(len(at)):
-                _weigh(share, s, grown, at, i)
-                for j in range(i + 1):
-                    _gather(low, s, grown, at, (i, j))
-            _brace(low, s, axis, columns, mine)
-        _undo(low, share, start, force, pivot)
+    low = np.empty((force.shape[1], force.shape[1]))
+    for s in range(len(columns)):
+        _write_equations(low, force[s], grown, columns[s])
+        _brace(low, axis, columns[s])
+        solve_lower(low, force[s], pivot[:, s])
 
 
 @_compiled()
-def _undo(low: Floats, share: Floats, start: int, force: Floats, pivot: Floats) -> None:
-    """Find forces (S, k) and scaled pivots (k, S) of the sets from one on, which lie side by side.
-
-    ``low`` (k, k, w), ``share`` (k, w): their equations, which are used up.
-    """
-    pivots, own = np.empty((2, len(share), _SIDE_BY_SIDE))
-    for i in range(len(share)):
-        for s in range(_SIDE_BY_SIDE):
-            own[i, s] = low[i, i, s]
-    _eliminate(low, pivots)
-    _substitute(low, share)
-    for s in range(min(_SIDE_BY_SIDE, len(force) - start)):
-        for i in range(len(share)):
-            force[start + s, i] = share[i, s]
-            pivot[i, start + s] = pivots[i, s] / own[i, s]
-
-
-@_compiled()
-def _brace(low: Floats, s: int, axis: Floats, columns: Ints, mine: int) -> None:
+def _brace(low: Floats, axis: Floats, at: Ints) -> None:
     """Give the force between two grips on one brick a flexibility, so that there is one answer."""
-    width, scale = axis.shape[1], 0.0
+    scale = 0.0
     for i in range(len(low)):
-        scale += low[i, i, s]
-    for second in range(1, columns.shape[1]):
+        scale += low[i, i]
+    for second in range(1, len(at)):
         for first in range(second):
-            brick = columns[mine, first] // 2
-            if columns[mine, second] // 2 != brick:
+            brick = at[first] // 2
+            if at[second] // 2 != brick:
                 continue
-            f, g = width * first, width * second
-            for i in range(width):
-                for j in range(width):
+            f, g = 3 * first, 3 * second
+            for i in range(3):
+                for j in range(3):
                     more = scale * axis[brick, i] * axis[brick, j]
                     if j <= i:
-                        low[f + i, f + j, s] += more
-                        low[g + i, g + j, s] += more
-                    low[g + i, f + j, s] -= more
+                        low[f + i, f + j] += more
+                        low[g + i, g + j] += more
+                    low[g + i, f + j] -= more
 
 
 @_compiled()
-def _eliminate(low: Floats, pivots: Floats) -> None:
-    """Turn lower triangles (k, k, w) into their factors, with reciprocals of the pivots (k, w)."""
-    count = len(low)
-    row = np.empty((count, _SIDE_BY_SIDE))
+def _write_equations(low: Floats, share: Floats, grown: Grown, at: Ints) -> None:
+    """Write how far forces at the nodes of grips move these, and the motions by the weight."""
+    for i in range(len(at)):
+        brick, first = at[i] // 2, 3 * (at[i] % 2)
+        for a in range(3):
+            share[3 * i + a] = 0.0
+            for p in range(6):
+                much = grown.nodes[brick, first + a, p]
+                share[3 * i + a] -= much * grown.twist[0, 6 * brick + p]
+        for j in range(i + 1):
+            other, second = at[j] // 2, 3 * (at[j] % 2)
+            for a in range(3):
+                for c in range(3):
+                    total = 0.0
+                    for p in range(6):
+                        moved = 0.0
+                        for q in range(6):
+                            turn = grown.nodes[other, second + c, q]
+                            moved += grown.twist[1 + 6 * brick + p, 6 * other + q] * turn
+                        total += grown.nodes[brick, first + a, p] * moved
+                    low[3 * i + a, 3 * j + c] = total
+
+
+@_compiled()
+def solve_lower(low: Floats, share: Floats, pivot: Floats) -> None:
+    """Turn loads (k,) into answers, and a lower triangle (k, k) into its factor; scale pivots."""
+    count, row = len(low), np.empty(len(low))
     for j in range(count):
-        for k in range(j):  # a row of the factors, left of the diagonal, times the pivots
-            for s in range(_SIDE_BY_SIDE):
-                row[k, s] = low[j, k, s] * pivots[k, s]
+        own = low[j, j]
+        for k in range(j):
+            row[k] = low[j, k] * low[k, k]
         for i in range(j, count):
             for k in range(j):
-                for s in range(_SIDE_BY_SIDE):
-                    low[i, j, s] -= low[i, k, s] * row[k, s]
-        for s in range(_SIDE_BY_SIDE):
-            pivots[j, s] = low[j, j, s]
-            low[j, j, s] = 1.0 / low[j, j, s]
+                low[i, j] -= low[i, k] * row[k]
+        pivot[j] = low[j, j] / own
         for i in range(j + 1, count):
-            for s in range(_SIDE_BY_SIDE):
-                low[i, j, s] *= low[j, j, s]
-
-
-@_compiled()
-def _substitute(low: Floats, share: Floats) -> None:
-    """Turn loads (k, w) into answers."""
-    count = len(share)
-    for i in range(count):
-        for k in range(i):
-            for s in range(_SIDE_BY_SIDE):
-                share[i, s] -= low[i, k, s] * share[k, s]
-    for i in range(count - 1, -1, -1):
-        for s in range(_SIDE_BY_SIDE):
-            share[i, s] *= low[i, i, s]
-        for k in range(i + 1, count):
-            for s in range(_SIDE_BY_SIDE):
-                share[i, s] -= low[k, i, s] * share[k, s]
-
-
-@_compiled()
-def _weigh(share: Floats, s: int, grown: Grown, at: Ints, i: int) -> None:
-    """Write the grip's share that undoes its node's motion by the weight."""
-    brick, first = at[i] // 2, 3 * (at[i] % 2)
-    for a in range(3):
-        total = 0.0
-        for p in range(6):
-            total -= grown.nodes[brick, first + a, p] * grown.twist[0, 6 * brick + p]
-        share[3 * i + a, s] = total
-
-
-@_compiled()
-def _gather(low: Floats, s: int, grown: Grown, at: Ints, pair: tuple[int, int]) -> None:
-    """Write how far forces at one grip's node move that of another."""
-    i, j = pair
-    brick, first = at[i] // 2, 3 * (at[i] % 2)
-    other, second = at[j] // 2, 3 * (at[j] % 2)
-    for a in range(3):
-        for c in range(3):
-            total = 0.0
-            for p in range(6):
-                moved = 0.0
-                for q in range(6):
-                    turn = grown.nodes[other, second + c, q]
-                    moved += grown.twist[1 + 6 * brick + p, 6 * other + q] * turn
-                total += grown.nodes[brick, first + a, p] * moved
-            low[3 * i + a, 3 * j + c, s] = total
+            low[i, j] /= low[j, j]
+        for k in range(j):
+            share[j] -= low[j, k] * share[k]
+    for j in range(count - 1, -1, -1):
+        share[j] /= low[j, j]
+        for k in range(j + 1, count):
+            share[j] -= low[k, j] * share[k]
 
 
 @_compiled()

@@ -18,9 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Fields, Want
-from seqopt.engines.rigid._operator import Doubts, OperatorBuilder
+from seqopt.engines.rigid._grip_equations import _GripForces, well_conditioned
+from seqopt.engines.rigid._operator import Doubts, OperatorBuilder, load_rows
 from seqopt.engines.rigid._response_maps import SceneMaps, inner_edges
 from seqopt.work._threads import cores, in_threads, one_thread
 
@@ -134,25 +135,22 @@ class Part(NamedTuple):
 
 def maps_by_entry(scene: SceneMaps) -> tuple[Edges, Motion, Ends]:
     """Return the response maps of wrenches and twists of a whole scene, in space."""
-    spring = scene.network.edge_spring
+    network, spring = scene.network, scene.network.edge_spring
     through, outer = scene.edge[spring < 0], scene.edge[spring >= 0].tocoo()
     along = np.zeros((3, outer.shape[0]))
     along[outer.col % 6, outer.row] = outer.data
     rows = through.indptr.astype(np.int64), through.indices.astype(np.int64), through.data
     edges = Edges(6 * spring[spring >= 0], along, *rows)
-    moment = np.ascontiguousarray(scene.support[:, :, 3:])
-    return edges, _motion_of(scene), Ends(6 * scene.network.springs.support, moment)
-
-
-def _motion_of(scene: SceneMaps) -> Motion:
-    network, entries = scene.network, scene.motion.tocoo()
+    entries = scene.motion.tocoo()
     start, at = (part.astype(np.int64) for part in (scene.motion.indptr, scene.motion.indices))
     pairs = np.unique(np.stack([entries.col // 6, entries.row // 3]), axis=1)
     brick, node = pairs.astype(np.int64)
     first = np.searchsorted(brick, np.arange(len(network.inner) + 1))
     arm = np.linalg.norm(network.node_position[node] - network.centroid[brick], axis=1)
     reach = np.maximum.reduceat(arm, first[:-1])  # each has its inner nodes at least
-    return Motion(start, at, scene.motion.data, scene.since, first, node, reach)
+    motion = Motion(start, at, scene.motion.data, scene.since, first, node, reach)
+    moment = np.ascontiguousarray(scene.support[:, :, 3:])
+    return edges, motion, Ends(6 * network.springs.support, moment)
 
 
 class GrownExtremes:
@@ -187,15 +185,18 @@ class GrownExtremes:
             np.repeat(self._growth.loss[:bricks], nodes.shape[1]),
         )
 
-    def forces(self, columns: Ints) -> tuple[Floats, Floats]:
-        """Return forces (S, k) of rigid grips at nodes (S, r), and their scaled pivots (k, S)."""
+    def solve(self, columns: Ints, want: Want, most: float) -> tuple[Floats, Floats, Bools]:
+        """Return extremes (4, S) of rigid grips, forces (S, r), and which sets have others.
+
+        These are answered not well enough. Two grips on one brick share. ``most``: as of
+        `well_conditioned`.
+        """
         force = np.empty((len(columns), 3 * columns.shape[1]))
         pivot = np.empty(force.shape[::-1])
         _loops().solve_grown(self._grown, self._part.axis, columns, force, pivot)
-        return force, pivot
-
-    def extremes(self, columns: Ints, force: Floats, want: Want) -> Floats:
-        """Return extremes (4, S) as of `Extremes`; two grips on one brick share, in place."""
+        index = load_rows(columns, 0)
+        apart = ~well_conditioned(self, index, _GripForces(force, pivot), most)
+        force[apart] = 0.0
         part = self._part if want & Want.DISPLACEMENTS else self._part._replace(nodes=0)
         grown, maps, loops = self._grown, self._maps, _loops()
 
@@ -207,4 +208,5 @@ class GrownExtremes:
         parts = [slice(start, start + step) for start in range(0, max(len(columns), 1), step)]
         found = np.concatenate(in_threads(reduce, parts), axis=1)
         np.sqrt(found[2:], out=found[2:])
-        return found
+        size = np.sqrt((force.reshape(*columns.shape, 3) ** 2).sum(axis=2))
+        return found, size, apart | ~np.isfinite(found).all(axis=0)

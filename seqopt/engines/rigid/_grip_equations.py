@@ -7,13 +7,12 @@ equations; where two that are nearly rigid share a brick, digits are lost (`near
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import lapack
 
-from seqopt.arrays import Bools, Floats, Ints, frozen
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import _couples
 from seqopt.engines.rigid._operator import ComplianceOperator
@@ -42,8 +41,7 @@ class Pairs(NamedTuple):
 
     def only(self, which: Bools) -> Pairs:
         """Select pairs."""
-        sets, first, second, brick, axis = self
-        return Pairs(sets[which], first[which], second[which], brick[which], axis[which])
+        return Pairs(*(each[which] for each in self))
 
     def rigid(self, compliance: GripCompliance, sets: int, grips: int) -> Bools:
         """Return which pairs (p,) have two rigid grips, in so many sets."""
@@ -57,16 +55,10 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     one, other = columns.T.take(couples, axis=0)
     same = one ^ 1 == other  # the two nodes of a brick
     if not np.count_nonzero(same):
-        return _none()
+        return Pairs(*[np.arange(0)] * 4, np.empty((0, 3)))
     couple, sets = same.nonzero()
     node, (first, second) = one[same], couples.take(couple, axis=1)
     return Pairs(sets, first, second, node // 2, operator.across.take(node, axis=0))
-
-
-@cache
-def _none() -> Pairs:
-    none = frozen(np.empty(0, dtype=np.int64))
-    return Pairs(none, none, none, none, frozen(np.empty((0, 3))))
 
 
 def _as_rows(each: Floats) -> Floats:
@@ -191,10 +183,8 @@ def well_conditioned(
     """
     lowest, least = found.lowest, np.inf
     if compliance.moved is None:  # else forces may undo what the weight does
-        own = (
-            0.0 if compliance.rigid else 2.0
-        )  # of what compliant grips yield, that forces undo as well
-        least = len(found.pivot) * operator.doubts.worst + own
+        yielded = 0.0 if compliance.rigid else 2.0  # by compliant grips, that forces undo as well
+        least = len(found.pivot) * operator.doubts.worst + yielded
     out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
         return out

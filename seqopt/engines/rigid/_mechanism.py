@@ -67,8 +67,20 @@ class Ungripped(FrozenValue):
 
     @cached_property
     def matrix(self) -> sparse.csc_array:
-        """The system without grips, (6s + 6b,)."""
-        return frozen(_side_by_side(self.deformation, self.stiffness))
+        """The system without grips, (6s + 6b,), column by column."""
+        gap, row = self.deformation, 1 / np.maximum(1.0, self.stiffness)  # keeps them of order one
+        joints, moves = gap.shape
+        first = gap.indptr[:-1] + np.arange(joints)  # of a joint's column, the joint itself
+        others = np.arange(gap.nnz) + np.repeat(np.arange(1, joints + 1), np.diff(gap.indptr))
+        carried = gap.tocsc()
+        data, indices = np.empty(2 * gap.nnz + joints), np.empty(2 * gap.nnz + joints, np.int32)
+        data[first], indices[first] = row, np.arange(joints)
+        data[others], indices[others] = -gap.data, gap.indices + joints
+        data[joints + gap.nnz :] = (row * self.stiffness)[carried.indices] * carried.data
+        indices[joints + gap.nnz :] = carried.indices
+        starts = [gap.indptr + np.arange(joints + 1), carried.indptr[1:] + gap.nnz + joints]
+        entries = data, indices, np.concatenate(starts).astype(np.int32)
+        return frozen(sparse.csc_array(entries, shape=(joints + moves, joints + moves)))
 
     def apply(self, states: Floats) -> Floats:
         """Return the products (S, 6s + 6b) of the system without grips with states."""
@@ -139,23 +151,6 @@ def _scaled_gap(shared: Shared, acting: Ints, unit: Floats, lever: Floats) -> sp
     data = part.data[: indptr[-1]] * np.repeat(np.tile(lever, len(acting)), np.diff(indptr))
     data *= unit[indices]
     return sparse.csr_array((data, indices, indptr), shape=(rows, len(unit)))
-
-
-def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csc_array:
-    """Return the system without grips, column by column, from the scaled deformation (6s, 6b)."""
-    row = 1 / np.maximum(1.0, stiffness)  # keeps a stiff joint's equation of order one
-    joints, moves = gap.shape
-    first = gap.indptr[:-1] + np.arange(joints)  # of a joint's column, the joint itself
-    others = np.arange(gap.nnz) + np.repeat(np.arange(1, joints + 1), np.diff(gap.indptr))
-    carried = gap.tocsc()
-    data, indices = np.empty(2 * gap.nnz + joints), np.empty(2 * gap.nnz + joints, np.int32)
-    data[first], indices[first] = row, np.arange(joints)
-    data[others], indices[others] = -gap.data, gap.indices + joints
-    data[joints + gap.nnz :] = (row * stiffness)[carried.indices] * carried.data
-    indices[joints + gap.nnz :] = carried.indices
-    starts = [gap.indptr + np.arange(joints + 1), carried.indptr[1:] + gap.nnz + joints]
-    entries = data, indices, np.concatenate(starts).astype(np.int32)
-    return sparse.csc_array(entries, shape=(joints + moves, joints + moves))
 
 
 _UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import prod
 from typing import TypeVar
 
 import numpy as np
@@ -128,12 +127,6 @@ class ComplianceOperator(FrozenValue):
         return frozen(out)
 
     @cached_property
-    def _loads_at(self) -> Ints:
-        """The loads at each inner node, (2b, w): forces, and then moments on its brick."""
-        nodes = np.add.outer(2 * self.place, np.arange(2)).reshape(2 * self.bricks, 1)
-        return frozen(load_rows(nodes, self.moments))
-
-    @cached_property
     def across(self) -> Floats:
         """Unit vectors from each inner node to the other of its brick, (2b, d)."""
         return frozen(np.stack([self.axis, -self.axis], axis=1).reshape(-1, 3))
@@ -149,8 +142,7 @@ class ComplianceOperator(FrozenValue):
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions, (S, k)."""
-        each = self._loads_at.take(columns, axis=0)
-        rows = each.reshape(len(each), prod(each.shape[1:]))
+        rows = load_rows(2 * self.place.take(columns // 2) + columns % 2, self.moments)
         if self.loose:
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
@@ -167,7 +159,7 @@ class ComplianceOperator(FrozenValue):
         and mapped; else those of the loads are mapped, once, and then summed, all fields together.
         So are reactions, which few of the wrenches determine.
         """
-        few = self.few_loads(len(index))  # independent of earlier requests
+        few = are_few(self.axis.size, len(index))  # independent of earlier requests
         at_once = tuple(name for name in names if few or name == "support")
         found = {name: self._mapped(name, index, force) for name in names if name not in at_once}
         if not at_once:
@@ -193,23 +185,15 @@ class ComplianceOperator(FrozenValue):
             self.maps.apply(name, self.loads(index[part], force[part]).sum(states), out[part])
         if name == "displacement" and self.maps.ground.any():
             out += self.maps.ground
-        if name == "edge_force":
+        if name == "edge_force":  # of inner edges: the weight's and the grips' at second nodes too
             out[:, self.inner_edge] += self.at_second
-            self._add_grips(index, force, out)
+            place, at = np.divmod(self.by_grip(index)[..., 0], 6 + self.moments)
+            brick = self.held[place]
+            pull = self.by_grip(force)[..., :3]
+            along = np.einsum("snd,snd->sn", pull, self.axis[brick]) * (at // 3)
+            for i in range(brick.shape[1]):  # two may share an edge
+                out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
         return out
-
-    def few_loads(self, sets: int) -> bool:
-        """Return whether response maps of all loads pay for so many grip sets."""
-        return are_few(self.axis.size, sets)
-
-    def _add_grips(self, index: Ints, force: Floats, out: Floats) -> None:
-        """Add to edge forces (S, E) those of inner edges by forces (S, k) at second nodes."""
-        own = self.by_grip(force)
-        place, at = np.divmod(self.by_grip(index)[..., 0], 6 + self.moments)
-        brick = self.held[place]
-        along = np.einsum("snd,snd->sn", own[..., :3], self.axis[brick]) * (at // 3)
-        for i in range(brick.shape[1]):  # two may share an edge
-            out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
 
     def of_loads(self, *names: str) -> Floats:
         """Return fields under every load side by side, (l + 1, Q), made when first asked for."""

@@ -168,7 +168,13 @@ def _held_operator(
     states, pull = system.solve(right, np.eye(loads + loose, loose, -loads))
     motion = (inner @ states[:, joints:].T).T
     reach, resistance = motion[loads:], pull[loads:]
-    softness = _softness(motion[:loads], reach, resistance, parts.unit)
+    softness = 0.0  # of the springs that loose motions stand on, m/N
+    if loose:
+        # about that of the structure where they reach, so that equations keep their digits; one
+        # that reaches no node, as of bricks that turn about the line they lie on, counts as one
+        own = np.trace(motion[:loads]) / max(float((reach**2).sum()), float(loose))
+        most = _TIED / max(float(np.abs(resistance).sum()), np.finfo(float).tiny)
+        softness = min(max(float(own), 1 / parts.unit), most)
     states[:loads] += softness * (reach.T @ states[loads:])
     flexibility = np.zeros((loads + loose, loads + loose))
     flexibility[:loads, :loads] = motion[:loads] + softness * (reach.T @ reach)
@@ -176,20 +182,6 @@ def _held_operator(
     corner = np.linalg.solve(np.eye(loose) - softness * resistance, resistance)
     flexibility[loads:, loads:] = -0.5 * (corner + corner.T)
     return _operator(parts, states, flexibility, softness, loose)
-
-
-def _softness(flexibility: Floats, reach: Floats, resistance: Floats, unit: float) -> float:
-    """Return the softness of the springs that loose motions stand on, m/N.
-
-    About that of the structure where they reach, so that the grips' equations keep their digits. A
-    motion that reaches no node, as of bricks that turn about the line they lie on, counts as if it
-    took one node along: beside that, rounding stays small.
-    """
-    if not len(reach):
-        return 0.0
-    own = float(np.trace(flexibility)) / max(float((reach**2).sum()), float(len(reach)))
-    most = _TIED / max(float(np.abs(resistance).sum()), np.finfo(float).tiny)
-    return min(max(own, 1 / unit), most)
 
 
 def _operator(
@@ -398,21 +390,15 @@ class _Corrector:
         if operator.loose:
             moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
         moved = np.hstack([np.take_along_axis(moved, at, axis=1), -pull])
-        off = self._off(asked, force)
-        change = still_forces(operator, columns, asked.loads, moved, asked.compliance, off)
+        compliance, off = asked.compliance, None
+        if not compliance.rigid:  # how far grips let their nodes be
+            bears = force.reshape(*columns.shape, operator.width)
+            off = np.zeros(bears.shape)
+            if compliance.matrix is not None:
+                off += np.einsum("srij,srj->sri", compliance.transmitted, bears)
+            if compliance.moved is not None:
+                off[..., :3] -= compliance.moved
+        change = still_forces(operator, columns, asked.loads, moved, compliance, off)
         more = change[:, : at.shape[1]].copy()
         change[:, change.shape[1] - operator.loose :] += loose
         return answer + self._states(asked.loads, change, 0.0), more
-
-    def _off(self, asked: _Asked, force: Floats) -> Floats | None:
-        """Return how far grips let their nodes be, (S, r, w); None if rigid and in place."""
-        compliance, width = asked.compliance, self.operator.width
-        borne = force.reshape(*asked.columns.shape, width)
-        if compliance.rigid:
-            return None
-        out = np.zeros(borne.shape)
-        if compliance.matrix is not None:
-            out += np.einsum("srij,srj->sri", compliance.transmitted, borne)
-        if compliance.moved is not None:
-            out[..., :3] -= compliance.moved
-        return out

@@ -13,7 +13,7 @@ Brick counts are best asked in ascending order: what all of them share grows in 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from math import prod
 from typing import TYPE_CHECKING
 
@@ -36,7 +36,6 @@ from seqopt.engines.interface import (
 from seqopt.engines.rigid._extremes import Extremes, GrownExtremes, can_compile, extremes_in
 from seqopt.engines.rigid._grip_equations import (
     Pairs,
-    _GripForces,
     grip_forces,
     nearly_rigid,
     pairs_of,
@@ -44,7 +43,7 @@ from seqopt.engines.rigid._grip_equations import (
     well_conditioned,
 )
 from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few, load_rows
+from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.work._threads import one_thread
@@ -56,12 +55,6 @@ _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's ca
 ACCURACY = 1e-9  # largest error of fields over the largest of each
 _UNSEEN = 100 * np.finfo(float).eps  # largest error met, over what is read off the equations
 _CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
-
-
-@cache
-def _is_screen(want: Want) -> bool:
-    """Return whether fields are only to be compared; flags take long to meet."""
-    return Want.SCREEN in want
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -145,22 +138,6 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     return out
 
 
-def _solve_grown_extremes(
-    grown: GrownExtremes, columns: Ints, want: Want, accuracy: float
-) -> tuple[Floats, Floats, Bools]:
-    """Return extremes (4, S) of rigid grips, their forces (S, r), and which sets have others.
-
-    These are the sets that what grows with the build answers not well enough.
-    """
-    index = load_rows(columns, 0)
-    force, pivot = grown.forces(columns)
-    apart = ~well_conditioned(grown, index, _GripForces(force, pivot), accuracy / _UNSEEN)
-    force[apart] = 0.0
-    found = grown.extremes(columns, force, want)
-    size = np.sqrt((force.reshape(*columns.shape, 3) ** 2).sum(axis=2))
-    return found, size, apart | ~np.isfinite(found).all(axis=0)
-
-
 _KEPT = 32e6  # bytes of operators that may stay when another is made
 _SCREEN = 1e-6  # the same, of what is only to be compared
 _EVEN = 5e-5  # softest over stiffest joint from which on pivots bound the error
@@ -229,19 +206,23 @@ class ComplianceEngine(NamedEngine):
             return extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
-        if bricks <= min(self._uniform, len(self._tree.spring)):
-            many = are_few(3 * bricks, len(columns))  # fields take less
-            if not many and self._can_grow and self._builder.growth.bricks <= bricks:
-                if self._grown is None:
-                    self._grown = GrownExtremes(self._builder)
-                self._grown.reach(bricks)
-                accuracy = self._accepted(want)
-                found, size, apart = _solve_grown_extremes(self._grown, columns, want, accuracy)
+        if self._grows(bricks, len(columns)):
+            if self._grown is None:
+                self._grown = GrownExtremes(self._builder)
+            self._grown.reach(bricks)
+            found, size, apart = self._grown.solve(columns, want, self._accepted(want) / _UNSEEN)
         if np.count_nonzero(apart):
             fields = self._found(bricks, columns[apart], RIGID, want)
             rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
+
+    def _grows(self, bricks: int, sets: int) -> bool:
+        """Return whether compiled loops are made for a structure, and pay for so many sets."""
+        if bricks > min(self._uniform, len(self._tree.spring)) or are_few(3 * bricks, sets):
+            return False
+        moves = self._network.springs.movement.any() or self._builder.moments
+        return not moves and self._builder.growth.bricks <= bricks
 
     def _recalls(self, bricks: int) -> bool:
         """Return whether fields of a brick count come from the data grown for extremes."""
@@ -249,7 +230,7 @@ class ComplianceEngine(NamedEngine):
 
     def _accepted(self, want: Want) -> float:
         """Return the largest error of fields that is accepted, over the largest entry of each."""
-        return max(_SCREEN, self._accuracy) if _is_screen(want) else self._accuracy
+        return max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
@@ -278,12 +259,6 @@ class ComplianceEngine(NamedEngine):
         """Made when the first operator is: a scene that is loose from the start has none."""
         return OperatorBuilder(self._network, self._tree)
 
-    @property
-    def _can_grow(self) -> bool:
-        """Whether the compiled loops are made for the scene."""
-        rests = not self._network.springs.movement.any()
-        return bool(rests and not self._builder.moments)
-
     def _refined(
         self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want
     ) -> Fields:
@@ -292,7 +267,7 @@ class ComplianceEngine(NamedEngine):
         with one_thread():
             tied = operator is not None  # the tree that it grew on reaches them all
             refinement = self._refinements.of(bricks, tied=tied)
-            largest = _SCREEN if _is_screen(want) else self._refinements.largest
+            largest = _SCREEN if want & Want.SCREEN else self._refinements.largest
             answer = refinement.solve(columns, operator, largest, compliance)
         return keep_wanted(answer, want)
 
