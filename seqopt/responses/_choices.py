@@ -84,9 +84,13 @@ class Evaluation(Terse):
         some = (step for step in self.schedule.steps if not step.moves and step.bricks)
         return tuple(Step(s.number, s.kind, s.bricks, cast(Grips, s.grips)) for s in some)
 
+    @cached_property
+    def _given_table(self) -> pd.DataFrame:
+        return analyze(self.engine, self.given)
+
     def table_of_given(self, names: Iterable[str]) -> pd.DataFrame:
         """Return the table of `seqopt.analyze` of given steps, with the tolerances in ``names``."""
-        table = analyze(self.engine, self.given)
+        table = self._given_table
         for name in {*filter(is_tolerance, names)}:
             distances = tolerances_along(self.engine, self.given, name)
             table = table.assign(**{COLUMN: distances})
