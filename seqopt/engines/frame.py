@@ -50,12 +50,7 @@ class FrameEngine(SerialEngine):
         edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
         split, deformation, stiffness = _frame(network, bricks, contrast)
         grips = _hold(network, columns, compliance, deformation.shape[1])
-        load = np.zeros((deformation.shape[1] // 6, 6))
-        load[network.inner[:bricks].ravel(), :3] = network.inner_weight[: 2 * bricks]
-        both, applied = network.inner[:bricks], network.applied(bricks)
-        arm = network.centroid[:bricks] - network.node_position[both].mean(axis=1)
-        applied[:, 3:] += np.cross(arm, applied[:, :3])
-        load[both] += 0.5 * applied[:, None]  # what pulls at bricks beside their weight
+        load = _loads(network, bricks, deformation.shape[1] // 6)
         held = network.inner.ravel()[columns]
         base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE.value)
         free = np.ones(load.shape, dtype=bool)
@@ -93,6 +88,17 @@ class FrameEngine(SerialEngine):
             joint_wrench=wrench[None],
             brick_twist=shift[network.inner[:bricks]].mean(axis=1)[None],
         )
+
+
+def _loads(network: Network, bricks: int, nodes: int) -> Floats:
+    """Return the loads (n, 6) of a frame: weight, and what else pulls at bricks."""
+    load, both = np.zeros((nodes, 6)), network.inner[:bricks]
+    load[both.ravel(), :3] = network.inner_weight[: 2 * bricks]
+    applied = network.applied(bricks)
+    arm = network.centroid[:bricks] - network.node_position[both].mean(axis=1)
+    applied[:, 3:] += np.cross(arm, applied[:, :3])
+    load[both] += 0.5 * applied[:, None]
+    return load
 
 
 class _Holds(NamedTuple):

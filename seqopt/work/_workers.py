@@ -21,6 +21,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExe
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from itertools import islice
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -40,36 +41,23 @@ _GROUPS = (
 
 def free_memory() -> float:
     """Return how many bytes can still be had, infinite where the system does not say."""
-    return max(min(_free_at_all(), _free_in_group(), _free_within_limit()), 0.0)
-
-
-def _free_at_all() -> float:
-    if not _MEMORY.exists():
-        return math.inf
-    rows = (line.split() for line in _MEMORY.read_text(encoding="ascii").splitlines())
-    return next((1024.0 * int(row[1]) for row in rows if row[0] == "MemAvailable:"), math.inf)
-
-
-def _free_in_group() -> float:
-    """Return what is left of the memory that a container may have."""
+    free = math.inf
+    if _MEMORY.exists():
+        rows = (line.split() for line in _MEMORY.read_text(encoding="ascii").splitlines())
+        free = next((1024.0 * int(row[1]) for row in rows if row[0] == "MemAvailable:"), free)
     for names in _GROUPS:
         with suppress(OSError, ValueError):  # not there, or "max"
             limit, used = (Path("/sys/fs/cgroup", name).read_text("ascii") for name in names)
-            return float(limit) - float(used)
-    return math.inf
+            free = min(free, float(limit) - float(used))
+            break
+    if os.name == "posix":
+        import resource  # noqa: PLC0415  # POSIX has it alone
 
-
-def _free_within_limit() -> float:
-    """Return what is left of the addresses that this process may have."""
-    if os.name != "posix":
-        return math.inf
-    import resource  # noqa: PLC0415  # POSIX has it alone
-
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit == resource.RLIM_INFINITY:
-        return math.inf
-    own = int(_OWN.read_text("ascii").split()[0]) * resource.getpagesize() if _OWN.exists() else 0
-    return float(limit - own)
+        limit_of_own = resource.getrlimit(resource.RLIMIT_AS)[0]  # of addresses
+        if limit_of_own != resource.RLIM_INFINITY:
+            pages = int(_OWN.read_text("ascii").split()[0]) if _OWN.exists() else 0
+            free = min(free, float(limit_of_own - pages * resource.getpagesize()))
+    return max(free, 0.0)
 
 
 class Crew:
@@ -100,7 +88,7 @@ class Crew:
     def replace(self) -> bool:
         """Replace workers that died; return whether there are workers again."""
         try:
-            self.executor.submit(_nothing)  # an executor's workers are its own matter
+            self.executor.submit(int)  # an executor's workers are its own matter
         except Exception:  # a broken foreign executor may raise any error
             return False
         return True
@@ -119,15 +107,20 @@ class _Processes(Crew):
         self._started: list[BaseProcess] = []
 
     def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
-        """Submit a call."""
+        """Submit a call; a process that starts for it hears no interrupt, which is its master's."""
         if self._pool is None:
             context = multiprocessing.get_context("spawn")  # threads and fork do not go together
             end, self._leash = context.Pipe(duplex=False)
             self._pool = ProcessPoolExecutor(self.workers, context, _follow, (end,))
-        before = multiprocessing.active_children()
-        with _deaf():  # it starts a process at a time
-            future = self._pool.submit(function, *arguments)
-        self._started += [p for p in multiprocessing.active_children() if p not in before]
+        children = multiprocessing.active_children()
+        if os.name == "posix":
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            future = self._pool.submit(function, *arguments)  # it starts a process at a time
+        finally:
+            if os.name == "posix":
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        self._started += [p for p in multiprocessing.active_children() if p not in children]
         return future
 
     def drop(self, calls: Iterable[Future[Any]]) -> None:
@@ -167,32 +160,19 @@ class _Processes(Crew):
         self._started = []
 
 
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Let processes that start here hear no interrupt: it is their master's."""
-    if os.name != "posix":
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def _follow(end: Connection) -> None:
     """Let a process of ours live no longer than its leash, and leave interrupts to its master."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # errors are sent; what dies is replaced
     warnings.simplefilter("ignore", RuntimeWarning)
     np.seterr(all="ignore")  # what is not finite is an error of its own
-    threading.Thread(target=_wait_and_end, args=(end,), daemon=True).start()
 
+    def wait_and_end() -> None:
+        with suppress(EOFError, OSError):
+            end.recv()
+        os._exit(1)
 
-def _wait_and_end(end: Connection) -> None:
-    with suppress(EOFError, OSError):
-        end.recv()
-    os._exit(1)
+    threading.Thread(target=wait_and_end, daemon=True).start()
 
 
 @contextmanager
@@ -287,13 +267,13 @@ def map_ordered(
     ...     list(map_ordered(abs, [-3, 2], crew))
     [3, 2]
     """
-    done = done or _nothing
     if crew is not None:
         yield from _Course(function, crew, done).run(iter(tasks))
         return
     for task in tasks:
         result = function(task)
-        done(task, result)
+        if done is not None:
+            done(task, result)
         yield result
 
 
@@ -303,7 +283,7 @@ class _Course(Generic[_Task, _Result]):
 
     function: Callable[[_Task], _Result]
     crew: Crew
-    done: Callable[[_Task, _Result], None]
+    done: Callable[[_Task, _Result], None] | None
     waiting: dict[int, _Task] = field(default_factory=dict)  # to be dispatched
     running: dict[Future[Any], tuple[int, _Task]] = field(default_factory=dict)
     ready: dict[int, tuple[bool, Any]] = field(default_factory=dict)
@@ -315,11 +295,13 @@ class _Course(Generic[_Task, _Result]):
         more = True
         try:
             while more or taken < given:
-                while more and given - taken < _UNDER_WAY * self.crew.workers:
-                    more = self._take(given, tasks)
-                    given += more
+                room = _UNDER_WAY * self.crew.workers - (given - taken)
+                new = [*islice(tasks, room)]
+                more = more and len(new) == room
+                self.waiting |= enumerate(new, given)
+                given += len(new)
+                self._give_out()
                 if taken not in self.ready and taken < given:
-                    self._give_out()
                     self._collect()
                 while taken in self.ready:
                     fine, result = self.ready.pop(taken)
@@ -329,14 +311,6 @@ class _Course(Generic[_Task, _Result]):
                     yield result
         finally:
             self.crew.drop(self.running)
-
-    def _take(self, number: int, tasks: Iterator[_Task]) -> bool:
-        """Start the next task; return whether there was one."""
-        for task in tasks:
-            self.waiting[number] = task
-            self._give_out()
-            return True
-        return False
 
     def _give_out(self) -> None:
         for number in sorted(self.waiting):
@@ -365,7 +339,7 @@ class _Course(Generic[_Task, _Result]):
                 continue
             self.failures = 0
             self.ready[number] = fine, result
-            if fine:
+            if fine and self.done is not None:
                 self.done(task, result)
         if failure is not None:
             self._failed(failure)
@@ -393,7 +367,3 @@ def _attempt(function: Callable[[_Task], _Result], task: _Task) -> tuple[bool, _
     except Exception as error:  # raised again where the result is taken
         error.add_note(traceback.format_exc())
         return False, error
-
-
-def _nothing(*arguments: object) -> None:
-    """Do nothing."""

@@ -7,7 +7,7 @@ equations; where two that are nearly rigid share a brick, digits are lost (`near
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg import lapack
@@ -15,10 +15,7 @@ from scipy.linalg import lapack
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import _couples
-from seqopt.engines.rigid._operator import ComplianceOperator
-
-if TYPE_CHECKING:
-    from seqopt.engines.rigid._extremes import GrownExtremes
+from seqopt.engines.rigid._operator import ComplianceOperator, Doubts
 
 
 class Pairs(NamedTuple):
@@ -41,7 +38,8 @@ class Pairs(NamedTuple):
 
     def only(self, which: Bools) -> Pairs:
         """Select pairs."""
-        return Pairs(*(each[which] for each in self))
+        sets, first, second, brick, axis = self
+        return Pairs(sets[which], first[which], second[which], brick[which], axis[which])
 
     def rigid(self, compliance: GripCompliance, sets: int, grips: int) -> Bools:
         """Return which pairs (p,) have two rigid grips, in so many sets."""
@@ -55,7 +53,8 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     one, other = columns.T.take(couples, axis=0)
     same = one ^ 1 == other  # the two nodes of a brick
     if not np.count_nonzero(same):
-        return Pairs(*[np.arange(0)] * 4, np.empty((0, 3)))
+        none = np.empty(0, dtype=np.int64)
+        return Pairs(none, none, none, none, np.empty((0, 3)))
     couple, sets = same.nonzero()
     node, (first, second) = one[same], couples.take(couple, axis=1)
     return Pairs(sets, first, second, node // 2, operator.across.take(node, axis=0))
@@ -169,8 +168,16 @@ def grip_forces(
     return _GripForces(force.T, pivot)
 
 
+class _Doubted(Protocol):
+    """What finds forces: an operator or, of rigid grips, what has grown."""
+
+    @property
+    def doubts(self) -> Doubts:
+        """What rounding may leave of its answers."""
+
+
 def well_conditioned(
-    operator: ComplianceOperator | GrownExtremes,
+    operator: _Doubted,
     index: Ints,
     found: _GripForces,
     most: float,
@@ -178,8 +185,7 @@ def well_conditioned(
 ) -> Bools:
     """Return which sets' forces (S,) rounding changes little enough.
 
-    ``operator``: or, of rigid grips, what has grown; ``most``: largest of `_doubts` that is
-    accepted; ``compliance``: as of `grip_forces`.
+    ``most``: largest of `_doubts` that is accepted; ``compliance``: as of `grip_forces`.
     """
     lowest, least = found.lowest, np.inf
     if compliance.moved is None:  # else forces may undo what the weight does
@@ -197,10 +203,7 @@ def well_conditioned(
 
 
 def _doubts(
-    operator: ComplianceOperator | GrownExtremes,
-    index: Ints,
-    found: _GripForces,
-    compliance: GripCompliance = RIGID,
+    operator: _Doubted, index: Ints, found: _GripForces, compliance: GripCompliance = RIGID
 ) -> Floats:
     """Return the error (S,) of forces for rounding of one part in one, over the largest of each.
 
