@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import permutations
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
@@ -26,7 +27,7 @@ from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import Fields, _join_sets, no_sets
 from seqopt.engines.rigid._mechanism import Ungripped, require_resistance, ungripped_system
 from seqopt.errors import SolverError
-from seqopt.network._mechanics import Statics
+from seqopt.network._mechanics import Statics, point_motion
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle
 
@@ -131,6 +132,34 @@ class MixedSystem(FrozenValue):
     weight: Floats  # (c,); by which the grips' equations are multiplied
 
 
+class HeldRows(NamedTuple):
+    """What one grip set forbids, by scaled multipliers."""
+
+    rows: Floats  # (c, 6b); scaled twists
+    force: Floats  # (rw, c); forces of each grip, then its moments, for unit multipliers
+    corner: Floats  # (c, c); by how much grips give way all the same
+
+
+def held_rows(parts: Ungripped, grips: Ints, compliance: GripCompliance = RIGID) -> HeldRows:
+    """Return what one grip set, of this compliance, forbids."""
+    network, brick = parts.network, grips // 2
+    arm = network.node_position[network.inner.ravel()[grips]] - network.centroid[brick]
+    motion = np.zeros((len(grips), 3, parts.bricks, 6))
+    motion[np.arange(len(grips)), :, brick] = point_motion(arm)
+    directions = [np.eye(3)] * len(grips)
+    for i in range(len(grips)):
+        if (brick[:i] == brick[i]).any():  # it forbids nothing along the line to the other grip
+            step = np.diff(network.node_position[network.inner[brick[i]]], axis=0)
+            directions[i] = linalg.null_space(step)
+    force = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
+    rows = force.T @ motion.reshape(3 * len(grips), 6 * parts.bricks)
+    corner = np.zeros((force.shape[1], force.shape[1]))
+    if compliance.matrix is not None:
+        rows, force, flexibility = _with_flexibility(parts, grips, rows, force, compliance)
+        corner = parts.unit * flexibility
+    return HeldRows(rows * parts.twist_unit, force, corner)
+
+
 def mixed_system(
     parts: Ungripped, grips: Ints, shift: Floats | None = None, compliance: GripCompliance = RIGID
 ) -> MixedSystem:
@@ -139,32 +168,20 @@ def mixed_system(
     ``shift`` (6b,): added to the diagonal of the scaled stiffness, so that a mechanism can be
     factored; ``compliance``: of this set.
     """
-    network = parts.network
-    motion = parts.motion[(3 * network.inner.ravel()[grips, None] + np.arange(3)).ravel()]
-    directions = [np.eye(3)] * len(grips)
-    for i, brick in enumerate(grips // 2):
-        if (grips[:i] // 2 == brick).any():  # it forbids nothing along the line to the other grip
-            step = np.diff(network.node_position[network.inner[brick]], axis=0)
-            directions[i] = linalg.null_space(step)
-    force = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
-    rows = sparse.csr_array(sparse.csr_array(force.T) @ motion)
-    corner, weight = None, np.ones(force.shape[1])
-    if compliance.matrix is not None:
-        rows, force, flexibility = _with_flexibility(parts, grips, rows, force, compliance)
-        corner = parts.unit * flexibility
-        weight = 1 / np.maximum(1.0, np.diag(corner))
-        corner *= weight[:, None]
-    forbidden = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
+    rows, force, corner = held_rows(parts, grips, compliance)
+    forbidden: sparse.csr_array = sparse.csr_array(rows)
+    weight = 1 / np.maximum(1.0, np.diag(corner))
     matrix = parts.matrix
     if shift is not None:
-        below = sparse.diags_array(np.concatenate([np.zeros(len(parts.wrench_unit)), shift]))
-        matrix = sparse.csc_array(matrix + below)
-    return MixedSystem(forbidden, bordered(matrix, forbidden, corner, weight), force, weight)
+        added = sparse.diags_array(np.concatenate([np.zeros(len(parts.wrench_unit)), shift]))
+        matrix = sparse.csc_array(matrix + added)
+    below = None if compliance.matrix is None else weight[:, None] * corner
+    return MixedSystem(forbidden, bordered(matrix, forbidden, below, weight), force, weight)
 
 
 def _with_flexibility(
-    parts: Ungripped, grips: Ints, rows: sparse.csr_array, force: Floats, compliance: GripCompliance
-) -> tuple[sparse.csr_array, Floats, Floats]:
+    parts: Ungripped, grips: Ints, rows: Floats, force: Floats, compliance: GripCompliance
+) -> tuple[Floats, Floats, Floats]:
     """Return rows of motions, forces and flexibilities of a set with compliant grips.
 
     After the multipliers of rigid grips, ``rows`` (c, 6b) and ``force`` (3r, c), there is one for
@@ -193,8 +210,7 @@ def _with_flexibility(
         out[grip, 3:, shifts.shape[1] + 3 * n : shifts.shape[1] + 3 * n + 3] = np.eye(3)
     still = np.zeros((len(between), 6 * parts.bricks))
     flexibility = np.einsum("gim,gij,gjn->mn", out, own, out)
-    every = sparse.csr_array(sparse.vstack([rows, sparse.csr_array(np.vstack([still, turned]))]))
-    return every, out.reshape(count * width, out.shape[2]), flexibility
+    return np.vstack([rows, still, turned]), out.reshape(count * width, out.shape[2]), flexibility
 
 
 def bordered(

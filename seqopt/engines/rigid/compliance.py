@@ -12,6 +12,7 @@ Brick counts are best asked in ascending order: what all of them share grows in 
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -44,11 +45,13 @@ from seqopt.engines.rigid._grip_equations import (
 )
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few
+from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.work._threads import one_thread
 
 if TYPE_CHECKING:
+    from seqopt.engines.rigid._frontal import FrontalSystem
     from seqopt.engines.rigid._refinement import Refinements
 
 _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
@@ -138,6 +141,7 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     return out
 
 
+_LARGE, _EACH = 300, 75  # bricks, in all and for every set, from which on blocks are sooner
 _KEPT = 32e6  # bytes of operators that may stay when another is made
 _SCREEN = 1e-6  # the same, of what is only to be compared
 _EVEN = 5e-5  # softest over stiffest joint from which on pivots bound the error
@@ -173,6 +177,11 @@ class ComplianceEngine(NamedEngine):
 
     def _found(self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want) -> Fields:
         """Return the fields of grip sets, corrected where the operator is not accurate enough."""
+        if self._is_frontal(len(columns)):
+            with suppress(SolverError):  # of what blocks of the stiffness do not answer
+                largest = _SCREEN if Want.SCREEN in want else self._refinements.largest
+                found = self._frontal.solve(bricks, columns, compliance, largest)
+                return keep_wanted(found, want)
         fast: _FastSolution | None = None
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._uniform
@@ -258,6 +267,17 @@ class ComplianceEngine(NamedEngine):
     def _builder(self) -> OperatorBuilder:
         """Made when the first operator is: a scene that is loose from the start has none."""
         return OperatorBuilder(self._network, self._tree)
+
+    def _is_frontal(self, sets: int) -> bool:
+        """Return whether grip sets are so few that no operator is grown for them."""
+        bricks = len(self._network.inner)
+        return bricks >= max(_LARGE, _EACH * sets) and "_builder" not in vars(self)
+
+    @cached_property
+    def _frontal(self) -> FrontalSystem:
+        from seqopt.engines.rigid._frontal import FrontalSystem  # noqa: PLC0415  # large scenes only
+
+        return FrontalSystem(self._network)
 
     def _refined(
         self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want

@@ -1,0 +1,224 @@
+r"""Rigid bricks on springs for large structures: blocks eliminated as the build leaves them behind.
+
+The stiffness :math:`K = B^T C B` grows with the build. Of a brick that all of its springs and loads
+act on nothing changes any more: it is eliminated. What still changes, the *front* :math:`R`, keeps
+the Schur complement of all that was eliminated, a block :math:`E` of bricks at a time,
+
+.. math:: S_{RR} \leftarrow S_{RR} - S_{RE} W, \qquad W = S_{EE}^{-1} S_{ER}, \qquad
+   z_E = S_{EE}^{-1} f_E, \qquad f_R \leftarrow f_R - W^T f_E .
+
+Grips border the front; with rows :math:`H` of what they forbid, those on eliminated bricks as well,
+
+.. math:: S u_R - H_R^T \lambda = f_R, \qquad H_R u_R + D \lambda = o, \qquad
+   u_E = z_E + S_{EE}^{-1} H_E^T \lambda - W u_R ,
+
+so that a grip set takes one solution of the front and one pass over the blocks. Time and memory of
+the growth are those of the bricks times the square of the front. The front of a course by course
+built vault is a course, and has no more bricks when the vault is longer.
+
+Answers are corrected by the residuals of wrenches and motions side by side, as are those of
+`seqopt.engines.rigid._refinement`, until they no longer change.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.engines._grip_compliance import GripCompliance
+from seqopt.engines.interface import Fields, _join_sets, no_sets
+from seqopt.engines.rigid._mechanism import Ungripped, share, ungripped_system
+from seqopt.engines.rigid._mixed import Solution, borne, held_rows, respond, unchanged, unscaled
+from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
+from seqopt.errors import SolverError
+from seqopt.network.network import Network
+from seqopt.work._threads import one_thread
+
+AT_ONCE = 24  # bricks that are eliminated together: blocks large enough for matrix products
+MOST = 6  # corrections, after which an answer is given up
+
+
+class _Block(NamedTuple):
+    """Eliminated motions (e,), those of the front then (f,), and what connects them."""
+
+    own: Ints
+    front: Ints
+    factor: Floats  # (e, e): of the stiffness, by Cholesky
+    carried: Floats  # (e, f): how own motions follow the front's, W
+    answer: Floats  # (e,): to the loads, z
+
+
+class FrontalFactor:
+    """The scaled stiffness of a growing structure, factored brick by brick in build order.
+
+    ``whole``: the system of the whole structure, whose units it keeps.
+    """
+
+    def __init__(self, whole: Ungripped) -> None:
+        self.whole, springs = whole, whole.network.springs
+        load, since, _ = whole.network.loads
+        last = np.zeros(whole.bricks, dtype=np.int64)  # the brick count that changes a brick last
+        for side in springs.bodies.T:
+            np.maximum.at(last, side[side >= 0], springs.since[side >= 0])
+        np.maximum.at(last, load, since)
+        self._last = last
+        self._restart()
+
+    def _restart(self) -> None:
+        self.bricks, self.blocks = 0, list[_Block]()
+        self.front = np.zeros(0, dtype=np.int64)  # motions of bricks that may still change
+        self.matrix, self.load = np.zeros((0, 0)), np.zeros(0)
+
+    def reach(self, bricks: int) -> None:
+        """Let a number of bricks stand; fewer than before are begun anew."""
+        if bricks < self.bricks:
+            self._restart()
+        while self.bricks < bricks:
+            self._add()
+            done = self._last[self.front[::6] // 6] <= self.bricks
+            if done.sum() >= AT_ONCE:
+                self._eliminate(np.repeat(done, 6))
+
+    def _add(self) -> None:
+        """Add a brick, its weight, and the springs and loads that act from it on."""
+        whole, new = self.whole, self.bricks
+        network, self.bricks = whole.network, new + 1
+        self.front = np.append(self.front, 6 * new + np.arange(6))
+        self.matrix, self.load = np.pad(self.matrix, (0, 6)), np.pad(self.load, (0, 6))
+        first, end = np.searchsorted(network.springs.since, [self.bricks, self.bricks + 1])
+        rows = slice(6 * first, 6 * end)
+        gap, stiffness = whole.deformation[rows], whole.stiffness[rows]
+        touched = np.unique(gap.indices)
+        at = np.searchsorted(self.front, touched)
+        each = gap[:, touched].toarray()
+        self.matrix[np.ix_(at, at)] += each.T @ (stiffness[:, None] * each)
+        self.load[at] += each.T @ (whole.moved[rows] * np.maximum(1.0, stiffness))
+        own = slice(6 * new, 6 * new + 6)
+        weight = network.inner_weight[2 * new : 2 * new + 2].ravel()
+        self.load[-6:] += whole.inner[own, own].T @ weight / whole.unit
+        applied = network.applied(self.bricks, new).ravel()
+        loaded = np.flatnonzero(applied)
+        pull = applied[loaded] * whole.twist_unit[loaded] / whole.unit
+        self.load[np.searchsorted(self.front, loaded)] += pull
+
+    def _eliminate(self, done: Bools) -> None:
+        inside, rest = np.ix_(done, done), np.ix_(done, ~done)
+        try:
+            factor = np.asfortranarray(np.linalg.cholesky(self.matrix[inside]))
+        except np.linalg.LinAlgError as error:
+            self._restart()
+            raise SolverError("a block of the stiffness is not positive definite") from error
+        carried, answer = _solved(factor, self.matrix[rest]), _solved(factor, self.load[done])
+        self.blocks.append(_Block(self.front[done], self.front[~done], factor, carried, answer))
+        self.load = self.load[~done] - carried.T @ self.load[done]
+        self.matrix = self.matrix[np.ix_(~done, ~done)] - self.matrix[rest].T @ carried
+        self.front = self.front[~done]
+
+    def solve(
+        self, load: Floats | None, rows: Floats, corner: Floats, off: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return motions (6b,) and multipliers (c,) under a load (6b,), or under all that acts.
+
+        ``rows`` (c, 6b), ``corner`` (c, c), ``off`` (c,): of grips, as the module displays them.
+        """
+        rows, corner, off = rows.copy(), corner.copy(), off.copy()
+        right, passed = None if load is None else load.copy(), []
+        for own, front, factor, carried, z in self.blocks:
+            here, answer = rows[:, own], z
+            if right is not None:
+                answer = _solved(factor, right[own])
+                right[front] -= carried.T @ right[own]
+            by_grips = None
+            if here.any():
+                by_grips = _solved(factor, here.T)
+                corner += here @ by_grips
+                off -= here @ answer
+                rows[:, front] -= here @ carried
+            passed.append((answer, by_grips))
+        here, count = rows[:, self.front], len(rows)
+        pull = self.load if right is None else right[self.front]
+        matrix = np.block([[self.matrix, -here.T], [here, corner]])
+        found = np.linalg.solve(matrix, np.append(pull, off))
+        motion, forces = np.zeros(6 * self.bricks), found[len(found) - count :]
+        motion[self.front] = found[: len(found) - count]
+        for (own, front, *_, carried, _), (answer, by_grips) in zip(
+            reversed(self.blocks), reversed(passed), strict=True
+        ):
+            motion[own] = answer - carried @ motion[front]
+            if by_grips is not None:
+                motion[own] += by_grips @ forces
+        return motion, forces
+
+
+def _solved(factor: Floats, right: Floats) -> Floats:
+    """Return the solution of a factored block; SciPy's checks take longer."""
+    return np.asarray(linalg.lapack.dpotrs(factor, right, lower=1)[0])
+
+
+class FrontalSystem:
+    """Answers few grip sets of large structures, best by ascending brick counts."""
+
+    def __init__(self, network: Network) -> None:
+        self._network, self._shared, self._maps = network, share(network), scene_maps(network)
+        whole = ungripped_system(network, len(network.inner), self._shared)
+        self._factor = FrontalFactor(whole)
+
+    def solve(
+        self, bricks: int, columns: Ints, compliance: GripCompliance, largest: float
+    ) -> Fields:
+        """Return all fields of grip sets (S, r).
+
+        ``largest``: correction of a set after which it needs no other. Raises `SolverError` where
+        only grips or something soft hold a part, which blocks of the stiffness do not tell from
+        rounding.
+        """
+        network = self._network
+        parts = ungripped_system(network, bricks, self._shared)
+        motion = ResponseMaps(self._maps, bricks).motion
+        answers = [no_sets(network, bricks, columns.shape[1])]
+        with one_thread():
+            self._factor.reach(bricks)
+            for i, held in enumerate(columns):
+                own = compliance.select(slice(i, i + 1))
+                solution = _solve_one(parts, self._factor, held, own, largest)
+                answers.append(respond(network, parts.statics, motion, held[None], solution))
+        return _join_sets(answers)
+
+
+def _solve_one(
+    parts: Ungripped,
+    factor: FrontalFactor,
+    columns: Ints,
+    compliance: GripCompliance,
+    largest: float,
+) -> Solution:
+    """Return how a partial structure answers to all that loads it while one set holds its nodes."""
+    held, whole, gap = held_rows(parts, columns, compliance), factor.whole, parts.deformation
+    row, joints = 1 / np.maximum(1.0, parts.stiffness), len(parts.stiffness)
+    ratio = whole.twist_unit[: len(parts.twist_unit)] / parts.twist_unit  # between both scalings
+    unit = parts.unit / whole.unit
+    rows, corner, off = held.rows, held.corner, np.zeros(len(held.corner))
+    if compliance.moved is not None:
+        width = len(held.force) // max(1, len(columns))
+        off = held.force.T @ np.pad(compliance.moved[0], ((0, 0), (0, width - 3))).ravel()
+    state, forces = np.zeros(joints + len(parts.load)), np.zeros(len(off))
+    for count in range(1 + MOST):
+        missing = -parts.apply(state[None])[0]
+        given = (missing[:joints] + parts.moved) / row
+        right = missing[joints:] + parts.load + rows.T @ forces + gap.T @ given
+        left = off - rows @ state[joints:] - corner @ forces
+        asked = None if not count else right * ratio * unit
+        try:
+            moved, more = factor.solve(asked, rows * ratio, corner / unit, left)
+        except np.linalg.LinAlgError:
+            break
+        change = np.append(given - parts.stiffness * (gap @ (moved * ratio)), moved * ratio)
+        state, forces = state + change, forces + more / unit
+        if count and unchanged(parts, state[None], change[None], largest)[0]:
+            wrench, twist = unscaled(parts, state[None])
+            force = held.force @ (forces * parts.unit)
+            return Solution(twist, wrench, *borne(force[None], len(columns), compliance))
+    raise SolverError(f"{parts.bricks} bricks: blocks of the stiffness keep too few digits")

@@ -1,0 +1,90 @@
+"""Large structures by blocks that the build leaves behind, against one factorization per set."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.engines._grip_compliance import read_compliance
+from seqopt.engines.interface import _NAMES, grip_columns
+from seqopt.engines.rigid._frontal import AT_ONCE, FrontalSystem
+from seqopt.engines.rigid._mixed import LAST_CORRECTION, solve_mixed
+from seqopt.engines.rigid.compliance import _LARGE, ComplianceEngine
+from seqopt.errors import MechanismError, SolverError
+from seqopt.network.build import build_network
+from seqopt.scene.parts import Load
+from tests.builders import hinged
+
+
+def loaded(scene):
+    """Loads that begin late, on bricks passed long before, wind, and ground that sinks."""
+    last = scene.build_order[-1]
+    late = Load(brick=2, force=(3.0, 0.0, -50.0), since=last)
+    loads = (late, Load(brick=3, force=(0.0, 8.0, 0.0)))
+    sinks = replace(scene.grounds[0], movement=(1e-4, 0.0, -2e-4))
+    return replace(scene, loads=loads, wind=(0.1, 0.2, 0.0), grounds=(sinks, *scene.grounds[1:]))
+
+
+SCENES = {
+    "vault": lambda: seqopt.load_scene("vault:span=1.5,rise=0.6,columns=3"),
+    "chain": lambda: seqopt.load_scene("chain:bricks=70"),
+    "loads": lambda: loaded(seqopt.load_scene("wall:courses=8,columns=10")),
+    "soft": lambda: seqopt.load_scene("chain:bricks=70").with_grips(1e6, 1e4),
+}
+
+
+def apart(fields, others):
+    out = 0.0
+    for name in _NAMES:
+        a, b = getattr(fields, name), getattr(others, name)
+        if np.abs(b).max(initial=0.0) > 0:
+            out = max(out, np.abs(a - b).max() / np.abs(b).max())
+    return out
+
+
+def asked(network, bricks, seed, moved=None):
+    """A set at the newest bricks, one anywhere, and one that holds a brick at both of its nodes."""
+    rng, numbers = np.random.default_rng(seed), network.scene.placed_nodes[: 2 * bricks]
+    nodes = np.array([node for node in numbers if node not in network.scene.blocked_nodes])
+    sets = np.array([nodes[-3:-1], rng.choice(nodes, 2, replace=False), numbers[2:4]])
+    columns = grip_columns(network, bricks, sets)
+    return columns, read_compliance(network, columns, sets, moved)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_one_factorization_per_set_agrees(name):
+    network = build_network(SCENES[name]())
+    system, count = FrontalSystem(network), len(network.inner)
+    assert count > 2 * AT_ONCE
+    for bricks in (3, count // 2, count, count - 5):  # the last one begins anew
+        moved = np.random.default_rng(bricks).normal(size=(3, 2, 3)) * 1e-5
+        for far in (None, moved):
+            columns, compliance = asked(network, bricks, bricks, far)
+            found = system.solve(bricks, columns, compliance, LAST_CORRECTION)
+            assert apart(found, solve_mixed(network, bricks, columns, compliance)) < 1e-8
+
+
+def test_what_blocks_get_wrong_is_corrected_or_refused():
+    network = build_network(SCENES["vault"]())
+    system, count = FrontalSystem(network), len(network.inner)
+    columns, compliance = asked(network, count, 0)
+    right = system.solve(count, columns, compliance, LAST_CORRECTION)
+    blocks = system._factor.blocks
+    blocks[0] = blocks[0]._replace(answer=2 * blocks[0].answer)
+    assert apart(system.solve(count, columns, compliance, LAST_CORRECTION), right) < 1e-8
+    blocks[0] = blocks[0]._replace(carried=3 * blocks[0].carried)
+    with pytest.raises(SolverError, match="keep too few digits"):
+        system.solve(count, columns, compliance, LAST_CORRECTION)
+
+
+def test_a_mechanism_is_left_to_operators():
+    scene = hinged(seqopt.load_scene(f"chain:bricks={_LARGE}"), 4)
+    network, free = build_network(scene), np.zeros((1, 0), dtype=int)
+    compliance = read_compliance(network, free, free, None)
+    with pytest.raises(SolverError):
+        FrontalSystem(network).solve(30, free, compliance, LAST_CORRECTION)
+    with pytest.raises(MechanismError):
+        ComplianceEngine(network).solve(30, free)
