@@ -16,7 +16,7 @@ from seqopt.plan.front import FrontProblem, find_front
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.report.comparison import compare
 from seqopt.scene.library import ArchForm, DomeShape
-from seqopt.stability.steps import assess_steps
+from seqopt.stability._steps import assess_steps
 
 MOST = 300  # letters
 OURS = ("seqopt.", "formulations.")

@@ -13,7 +13,7 @@ from scipy import sparse
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import DRY, EPOXY
+from seqopt.contact.mortar import EPOXY
 from seqopt.engines._grip_compliance import RIGID, read_compliance
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete._system import build_system, settle
@@ -32,10 +32,9 @@ from seqopt.scene.arm import HeldPostures
 from seqopt.scene.boxes import _faces, boxes
 from seqopt.scene.shape import Surface
 from seqopt.sequence.methods import sequential
-from seqopt.stability._held_states import _HoldingForces, _Known
 from seqopt.stability._load_factor import load_factor
 from seqopt.stability._prover import Prover
-from seqopt.stability._step_verdicts import each_verdict
+from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import assess, bonded
 from tests.blocks import box
 
@@ -72,8 +71,6 @@ def values(arch25):
         *(load_factor(assembly, EPOXY), arch25.grip_kinds),
         HeldPostures(np.array([0]), np.array([1]), np.array([[0]]), (np.ones((1, 6, 2)),)),
         read_compliance(network, grips[None], [[2]], np.ones((1, 1, 3))),
-        *_Known(assembly, bonded(assembly, DRY)).motions_of(-np.ones((2, 6))),
-        _HoldingForces(0.0, np.zeros(1)),
         *each_verdict(network, sequential(network)[:1], EPOXY),
     )
     return {type(value).__name__: value for value in every}

@@ -32,8 +32,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.report._style import BLUE, GRAY, VERMILION, plain, styled
 from seqopt.sequence.methods import METHODS
+from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Verdict
-from seqopt.stability.steps import assess_steps
 
 RESTS, GOES, NEITHER = "rests", "goes", "neither"
 SHOWN: dict[str, dict[str, Any]] = {

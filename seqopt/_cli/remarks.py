@@ -96,7 +96,7 @@ def waits_said(build: ShownBuild) -> Iterator[str]:
 def refused(prover: BuildProver) -> tuple[str, ...]:
     """Return notes on missing verdicts, and on effects that they neglect."""
     said = (f"stability: not proven; {prover.refusal}",) if prover.refusal else ()
-    return (*said, *settlement_notes(prover.scene)) if prover.asks else said
+    return (*said, *settlement_notes(prover.network.scene)) if prover.mortars else said
 
 
 def settlement_notes(scene: Scene) -> tuple[str, ...]:

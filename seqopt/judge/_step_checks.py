@@ -19,7 +19,7 @@ from seqopt.problem.standing import Standing, slack
 from seqopt.scene.parts import Prop
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
-from seqopt.stability._step_verdicts import each_stability, step_verdicts
+from seqopt.stability._steps import each_stability, step_verdicts
 from seqopt.stability.assessment import MARGINS, Stability, Verdict
 
 SURE = 1e-3  # rad, or as a share: how far the cone program may be from what forces prove

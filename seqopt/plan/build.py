@@ -21,9 +21,8 @@ from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.quantities import _props_table
 from seqopt.responses.table import Departure, LinearRange, _Columns, analyze, grips_table
 from seqopt.sequence.steps import Site, Step, _check_part
-from seqopt.stability._step_verdicts import step_verdicts
+from seqopt.stability._steps import assess_steps, stability_table, step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
-from seqopt.stability.steps import assess_steps, stability_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -96,7 +95,7 @@ class ShownBuild(Shown):
 
         Margins take ten times as long as `verdicts` alone. Movements of the ground enter neither.
         ``mortar``: of all joints; or its name, ``dry`` or ``epoxy``. Result: as of
-        `seqopt.stability.steps.stability_table`.
+        `seqopt.stability._steps.stability_table`.
         """
         results = assess_steps(self.engine.network, self.steps, mortar, MARGINS)
         return stability_table(self.steps, results)

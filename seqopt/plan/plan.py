@@ -44,7 +44,7 @@ from seqopt.responses.table import (
 )
 from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
-from seqopt.stability.steps import stability_table
+from seqopt.stability._steps import stability_table
 
 if TYPE_CHECKING:
     from seqopt.graph._decision_search import Windows
@@ -339,7 +339,7 @@ class Plan(ShownBuild):
         """Return whether every step stands and by which margins, by the cone program.
 
         ``mortar``: of all joints; by default that which was demanded, or dry. Result: as of
-        `seqopt.stability.steps.stability_table`.
+        `seqopt.stability._steps.stability_table`.
         """
         if mortar is None and self.standing is not None:
             return stability_table(self.steps, certified(self.states, self.steps))

@@ -178,7 +178,7 @@ class StandingSets:
         """Return verdicts that known proofs imply, (S,): 1 stands, -1 falls, 0 open."""
         if not bricks:
             return np.full(len(held), STANDS)
-        found = [screen.recalled(bricks, held, payload) for screen in self._screens]
+        found = [screen.stands(bricks, held, payload, solve=False) for screen in self._screens]
         return np.asarray(np.min(found, axis=0))
 
     def _verdicts(self, bricks: int, held: Ints, payload: Floats) -> Floats:

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 
 from seqopt._later import later
 from seqopt.stability._screens import Margins, Screen
+from seqopt.stability._steps import assess_steps, stability_table
 from seqopt.stability.assessment import Stability, Verdict, assess
-from seqopt.stability.steps import assess_steps, stability_table
 
 if TYPE_CHECKING:
     from seqopt.stability._load_factor import LoadFactor, load_factor_table, load_factors

@@ -19,7 +19,7 @@ from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._step_verdicts import each_by_workers, each_verdict
+from seqopt.stability._steps import each_by_workers, each_verdict
 from seqopt.stability.assessment import Verdict
 from seqopt.work._threads import cores
 from seqopt.work._workers import Crew, hire
@@ -95,28 +95,18 @@ class BuildProver:
     def __init__(
         self, network: Network, mortars: Mapping[str, Mortar] = SHOWN, progress: Tell | None = None
     ) -> None:
-        self._network, self._mortars, self._progress = network, mortars, progress
+        self.network, self.mortars, self._progress = network, mortars, progress
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
         self._parts: PartialAssemblies | None = None  # of as many bricks as any step had so far
         self._crew: Crew | None = None
         self.refusal = ""
-
-    @property
-    def scene(self) -> Scene:
-        """What is built."""
-        return self._network.scene
-
-    @property
-    def asks(self) -> bool:
-        """Whether it is asked of any mortar what stands."""
-        return bool(self._mortars)
 
     def of_builds(
         self, builds: Mapping[str, Sequence[Step]]
     ) -> dict[str, tuple[BuildVerdicts, ...]]:
         """Return the verdicts of builds by their steps, one for every mortar."""
         return {
-            build: tuple(self._of_build(steps, name) for name in self._mortars)
+            build: tuple(self._of_build(steps, name) for name in self.mortars)
             for build, steps in builds.items()
             if self._ask(chain.from_iterable(builds.values()))
         }
@@ -124,7 +114,7 @@ class BuildProver:
     @contextmanager
     def begun(self, steps: Sequence[Step]) -> Iterator[None]:
         """Share a large build between two processes: for commands, which may start them."""
-        work = sum(step.bricks for step in steps) * len(self._mortars)
+        work = sum(step.bricks for step in steps) * len(self.mortars)
         with hire(workers=2 if work >= _SHARED and cores() > 1 else 1) as crew:
             self._crew = crew
             try:
@@ -134,34 +124,33 @@ class BuildProver:
 
     def _ask(self, steps: Iterable[Step]) -> bool:
         """Find the verdicts that are not cached; return whether there are verdicts at all."""
-        if self.refusal:
-            return False
-        distinct = [*{_state(step): step for step in steps}.values()]
-        try:
-            for name in self._mortars:
-                known = self._known[name]
-                new = [step for step in distinct if _state(step) not in known]
-                # one that fewer hold comes before others, which its forces prove
-                self._ask_all(name, sorted(new, key=lambda s: (s.bricks, len(s.held))))
-        except SceneError as error:
-            self.refusal = str(error)
-            return False
-        return bool(self._mortars)
+        # one that fewer hold comes before others, which its forces prove
+        distinct = sorted(
+            {_state(step): step for step in steps}.values(), key=lambda s: (s.bricks, len(s.held))
+        )
+        for name in () if self.refusal else self.mortars:
+            new = [step for step in distinct if _state(step) not in self._known[name]]
+            try:
+                self._ask_all(name, new)
+            except SceneError as error:
+                self.refusal = str(error)
+                return False
+        return bool(self.mortars) and not self.refusal
 
     def _ask_all(self, name: str, new: Sequence[Step]) -> None:
         """Find the verdicts of steps with a mortar, and those implied with other mortars."""
         if not new:
             return
-        what, mortar = f"proving what stands, {name}", self._mortars[name]
+        what, mortar = f"proving what stands, {name}", self.mortars[name]
         most = max(step.bricks for step in new) or 1
         if self._parts is None or self._parts.bricks < most:
-            self._parts = PartialAssemblies(self._network, most)
+            self._parts = PartialAssemblies(self.network, most)
         find = partial(each_verdict, mortar=mortar)
         each = each_by_workers(self._parts, find, new, self._crew)
         found = dict[_State, Verdict]()
         for step, one in zip(with_progress(what, new, self._progress), each, strict=True):
             self._known[name][_state(step)] = found[_state(step)] = one.verdict
-        for other, held in self._mortars.items():
+        for other, held in self.mortars.items():
             sure = {Verdict.STANDS} if _is_as_strong(held, mortar) else set()
             sure |= {Verdict.FALLS} if _is_as_strong(mortar, held) else set()
             implied = {state: verdict for state, verdict in found.items() if verdict in sure}
@@ -171,8 +160,8 @@ class BuildProver:
         verdicts = tuple(self._known[name][_state(step)] for step in steps)
         for step, verdict in zip(steps, verdicts, strict=True):
             if verdict is Verdict.FALLS:
-                parts = self._parts or self._network
-                (found,) = each_verdict(parts, [step], self._mortars[name])
+                parts = self._parts or self.network
+                (found,) = each_verdict(parts, [step], self.mortars[name])
                 first = found.first_block, found.first_contact
                 return BuildVerdicts(name, verdicts, step.number, *first, steps[0].number)
         return BuildVerdicts(name, verdicts, begins=steps[0].number if steps else 1)

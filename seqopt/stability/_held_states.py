@@ -8,11 +8,13 @@ work than the loads do in it: with all, if none of their nodes moves. Neither as
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import _applied_rows, _prop_grips, bare_assembly
 from seqopt.errors import plugins
@@ -52,21 +54,19 @@ _TIGHT = 1e-8  # largest violation of forces that prove, over the force scale an
 _IDLE = 1e-10  # a grip's force treated as zero, over the force scale
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _HoldingForces(FrozenValue):
+class _HoldingForces(NamedTuple):
     """Forces with which a structure is in equilibrium."""
 
     value: float  # their z
     needed: Floats  # (G,); what every grip exerts, over the force scale
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _FallingMotion(FrozenValue):
+class _FallingMotion(NamedTuple):
     """A motion of the blocks, and what counts for any grips.
 
     ``work``, ``growth``: of the loads, less what contacts take up, and its growth with z;
-    ``closing``: by which contacts close, weighted by the largest corner force; ``speed`` (G,): of
-    every node.
+    ``closing``: by which contacts close, weighted by the largest corner force; ``speed`` (G + 1,):
+    of every node, and of none.
     """
 
     work: float
@@ -95,74 +95,51 @@ class _Known:
         return self.tightened(np.tile(nothing, (len(places), 1)), places, payload)
 
     def learn(self, answer: Answer, held: Floats) -> _Known:
-        """Keep what an answer proves by itself; a solver's claim is not believed.
+        """Keep what an answer proves by itself; a solver's claim is not believed. Return itself.
 
         ``held`` (G,): payload of every grip for which it was found, N; zero for one not held.
-        Result: of this answer alone.
         """
-        new = _Known(self._assembly, self._case)
-        new._forces += self._proven_forces(answer, held)
-        new._motions += self.motions_of(answer.motion)
-        self._forces += new._forces
-        self._motions += new._motions
-        return new
+        self._learn_motion(answer.motion)
+        if is_finite(self._assembly, answer):  # forces hold by the assembly's own data
+            needed, value = np.linalg.norm(answer.grip_force, axis=1), max(answer.value, 0.0)
+            needed[needed <= _IDLE] = 0.0
+            grip = np.where(needed[:, None] > 0, answer.grip_force, 0.0)
+            clean = replace(answer, value=value, grip_force=grip)
+            tight = violation(self._assembly, self._case, clean, held) <= _TIGHT * max(1.0, value)
+            if tight and not grip[held <= 0].any():
+                self._forces.append(_HoldingForces(value, needed))
+        return self
 
-    def joined(self, other: _Known) -> _Known:
-        """Return what is known by either of the same structure and case."""
-        out = _Known(self._assembly, self._case)
-        out._forces = self._forces + other._forces
-        out._motions = self._motions + other._motions
-        return out
-
-    def motions_of(self, motion: Floats) -> list[_FallingMotion]:
-        """Return what counts of a motion (B, 6), at most one; none if it is not finite or none."""
+    def _learn_motion(self, motion: Floats) -> None:
+        """Keep what counts of a motion (B, 6) if it is finite and proves something."""
         assembly, case = self._assembly, self._case
         size = np.abs(motion).max(initial=0.0)
         if motion.shape != (len(assembly.centroid), 6) or not 0 < size < np.inf:
-            return []
+            return
         flat = np.ldexp(motion, -np.frexp(size)[1]).ravel()
         ((low, _), (high, _)), opening = contact_work(assembly, case, flat, (0.0, 1.0))
         by_load, by_growth = (float(load @ flat) for load in case.loads(assembly))
         work, growth = by_load - low, by_growth - (high - low)
-        closing = LARGEST_FORCE * float(np.maximum(-opening, 0).sum())
-        if not (work > ROUNDING if case.sense is Sense.SMALLEST else growth > 0):
-            return []  # with fewer grips it would prove no more
-        speed = np.linalg.norm((assembly.grip_map.T @ flat).reshape(-1, 3), axis=1)
-        return [_FallingMotion(work, growth, closing, speed)]
+        if work > ROUNDING if case.sense is Sense.SMALLEST else growth > 0:  # else fewer prove none
+            closing = LARGEST_FORCE * float(np.maximum(-opening, 0).sum())
+            speed = np.linalg.norm((assembly.grip_map.T @ flat).reshape(-1, 3), axis=1)
+            self._motions.append(_FallingMotion(work, growth, closing, np.append(speed, 0.0)))
 
     def tightened(self, bracket: Floats, places: Ints, payload: Floats) -> Floats:
         """Return brackets (S, 2) no wider than others, by what is known here; see `bracket`."""
         out, smallest = bracket.copy(), self._case.sense is Sense.SMALLEST
         forced, moved = out[:, int(smallest)], out[:, int(not smallest)]
         of_forces, of_motion = (np.minimum, np.maximum) if smallest else (np.maximum, np.minimum)
-        for known in self._forces:
-            holds = self._hold(known, places, payload)
-            forced[holds] = of_forces(forced[holds], known.value)
+        own, common = self._case.payload
+        for value, needed in self._forces:
+            most = own * payload / self._assembly.scales[0] + value * common * (payload > 0)
+            holds = np.ones(len(places), dtype=bool)  # the grips can exert these forces
+            for grip in np.flatnonzero(needed).tolist():
+                enough = most >= needed[grip] - _TIGHT * max(1.0, value)
+                holds &= ((places == grip) & (payload > 0) & enough).any(axis=1)
+            forced[holds] = of_forces(forced[holds], value)
         for motion in self._motions:
             of_motion(moved, self._proven_by(motion, places, payload), out=moved)
-        return out
-
-    def _proven_forces(self, answer: Answer, held: Floats) -> list[_HoldingForces]:
-        """Return the forces of an answer if they hold what is held, by the assembly's own data."""
-        if not is_finite(self._assembly, answer):
-            return []
-        idle = np.linalg.norm(answer.grip_force, axis=1, keepdims=True) <= _IDLE
-        grip = np.where(idle, 0.0, answer.grip_force)
-        value = max(answer.value, 0.0)
-        clean = replace(answer, value=value, grip_force=grip)
-        tight = violation(self._assembly, self._case, clean, held) <= _TIGHT * max(1.0, value)
-        if not tight or grip[held <= 0].any():
-            return []
-        return [_HoldingForces(value, np.linalg.norm(grip, axis=1))]
-
-    def _hold(self, known: _HoldingForces, places: Ints, payload: Floats) -> Floats:
-        """Return which grips can exert the forces."""
-        own, common = self._case.payload
-        most = own * payload / self._assembly.scales[0] + known.value * common * (payload > 0)
-        out = np.ones(len(places), dtype=bool)
-        for grip in np.flatnonzero(known.needed).tolist():
-            enough = most >= known.needed[grip] - _TIGHT * max(1.0, known.value)
-            out &= ((places == grip) & (payload > 0) & enough).any(axis=1)
         return out
 
     def _proven_by(self, motion: _FallingMotion, places: Ints, payload: Floats) -> Floats:
@@ -170,7 +147,7 @@ class _Known:
         own, common = self._case.payload
         force = self._assembly.scales[0]
         loads, more = self._case.amounts(self._assembly)
-        speed = np.append(motion.speed, 0.0)[places]
+        speed = motion.speed[places]
         work = motion.work - own * (payload * speed).sum(axis=1) / force
         work -= motion.closing * (loads + payload.sum(axis=1)) / force
         growth = motion.growth - common * (speed * (payload > 0)).sum(axis=1)
@@ -268,11 +245,11 @@ class HeldStates:
     def _solve(self, held: Floats, settled: _Settled) -> _Known:
         """Return what answers prove for those grips."""
         places, payload = np.flatnonzero(held)[None], held[held > 0][None]
-        new = _Known(self.assembly, self._case)
+        alone = partial(_Known, self.assembly, self._case)
+        new = alone()
 
         def enough(answer: Answer) -> bool:
-            only = _Known(self.assembly, self._case).learn(answer, held)
-            return bool(settled(only.bracket(places, payload))[0])
+            return bool(settled(alone().learn(answer, held).bracket(places, payload))[0])
 
         for i in range(len(self._asked)):
             if i == len(self._programs):
@@ -281,7 +258,7 @@ class HeldStates:
             answer = self._programs[i](held, enough)
             if self._answers is not None:
                 self._answers.append((answer, held))
-            new = new.joined(self._known.learn(answer, held))
-            if settled(new.bracket(places, payload))[0]:
+            self._known.learn(answer, held)
+            if settled(new.learn(answer, held).bracket(places, payload))[0]:
                 break
         return new

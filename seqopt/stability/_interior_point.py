@@ -20,14 +20,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Bools, Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.stability.limit_analysis import Answer, Case, Claim, limits
 
@@ -165,11 +164,6 @@ class Sought(NamedTuple):
         return Changing(blocks, corners, grips, np.zeros((len(corners), 3)))
 
 
-def numbered(counts: Sequence[int]) -> Ints:
-    """Return the number of its assembly for each of so many things of every one."""
-    return np.repeat(np.arange(len(counts)), counts)
-
-
 class Cones:
     """What corners and grips bear: cones of friction and payload, then cut-offs of tension.
 
@@ -190,7 +184,8 @@ class Cones:
         self._cut = np.flatnonzero((friction == 0) | (friction * tension < cohesion))
         self.owner = np.concatenate([np.arange(self.owners), self._cut])
         counts = [[len(each[0]) for each in borne], [len(each[2]) for each in borne]]
-        self.group = np.concatenate([numbered(count) for count in counts])[self.owner]
+        groups = [np.repeat(np.arange(len(parts)), count) for count in counts]
+        self.group = np.concatenate(groups)[self.owner]
         self._groups = len(parts)
         self.most = np.concatenate([cohesion, payload, tension[self._cut]])
         self.map = np.zeros((4, 3, len(self.owner)))
@@ -246,37 +241,10 @@ def scaling(slack: Floats, press: Floats) -> tuple[Floats, Floats]:
     return turn * size, turn * (FLIP[:, None] * FLIP) / size
 
 
-def inverse_of(matrices: Floats) -> Floats:
-    """Return the inverses of positive definite matrices (3, 3, N): a tenth of NumPy's time."""
-    (a, b, c), (_, d, e), (_, _, f) = matrices
-    first, second = b / a, c / a
-    d = d - first * b
-    third = (e - second * b) / d
-    f = f - second * c - third * third * d
-    far = first * third - second
-    out = np.empty_like(matrices)
-    out[2, 2] = 1 / f
-    out[1, 2] = out[2, 1] = -third / f
-    out[0, 2] = out[2, 0] = far / f
-    out[1, 1] = 1 / d + third * third / f
-    out[0, 1] = out[1, 0] = -first / d - far * third / f
-    out[0, 0] = 1 / a + first * first / d + far * far / f
-    return out
-
-
 def circle(first: Floats, second: Floats) -> Floats:
     """Return the Jordan products of vectors (4, C)."""
     out: Floats = first[0] * second + second[0] * first
     out[0] = product(first, second)
-    return out
-
-
-def divide(jordan: Floats, factor: Floats) -> Floats:
-    """Return the other factors of Jordan products (4, C)."""
-    turned = factor * FLIP
-    first = product(jordan, turned) / product(factor, turned)
-    out: Floats = (jordan - first * factor) / factor[0]
-    out[0] = first
     return out
 
 
@@ -299,7 +267,6 @@ ROUNDS = 25  # at most; most structures need two to eight
 _SHARE = 0.95  # of the way to the edge of the cones that is gone in a round
 _STUCK = 1e-3  # share of a step so small that further rounds lead nowhere
 _DONE = 1e-8  # t that counts as none, over the force scale
-_FEW = 0.5  # share of assemblies that are left, from which on it pays to search for them alone
 _ROOM = 0.1  # by which t starts above what the first forces need, over the force scale
 
 
@@ -314,25 +281,23 @@ class _Point:
     press: Floats
 
 
-def _cut(assembly: Assembly, part: Changing) -> list[sparse.csr_array]:
-    """Return the maps of contacts and grips, of a part alone."""
-    maps = assembly.contact_map, assembly.grip_map
-    if part.blocks.all() and part.corners.all():
-        return [*maps]
-    rows = np.flatnonzero(np.repeat(part.blocks, 6))
-    pairs = zip(maps, (part.corners, part.grips), strict=True)
-    return [sparse.csr_array(each)[rows][:, np.repeat(own, 3).nonzero()[0]] for each, own in pairs]
-
-
 class _Search:
     def __init__(self, sought: Sequence[Sought]) -> None:
-        self._sought, self._parts = sought, [each.changing() for each in sought]
-        pairs = [*zip(sought, self._parts, strict=True)]
-        self._load = np.concatenate([_load(each, part) for each, part in pairs])
-        maps = zip(*(_cut(each.assembly, part) for each, part in pairs), strict=True)
-        self._balance = Balance([apart(each) for each in maps])
+        self._parts = [each.changing() for each in sought]
+        loads, contacts, grips = [], list[sparse.csr_array](), list[sparse.csr_array]()
+        for (assembly, case, _), part in zip(sought, self._parts, strict=True):
+            rows = np.flatnonzero(np.repeat(part.blocks, 6))
+            stays = assembly.contact_map @ part.kept.ravel()  # what does not change bears
+            loads.append((case.loads(assembly)[0] + stays)[rows])
+            pairs = (assembly.contact_map, part.corners), (assembly.grip_map, part.grips)
+            for out, (whole, own) in zip((contacts, grips), pairs, strict=True):
+                all_change = part.blocks.all() and part.corners.all()
+                columns = np.flatnonzero(np.repeat(own, 3))
+                out.append(whole if all_change else sparse.csr_array(whole)[rows][:, columns])
+        self._load = np.concatenate(loads)
+        self._balance = Balance([apart(contacts), apart(grips)])
         self._cones = Cones(sought, self._parts)
-        self._bodies = numbered([6 * int(np.count_nonzero(part.blocks)) for part in self._parts])
+        self._bodies = np.repeat(np.arange(len(loads)), [len(load) for load in loads])
 
     @np.errstate(all="ignore")
     def start(self) -> tuple[_Point, Floats]:
@@ -365,27 +330,29 @@ class _Search:
         even = apply(scale, point.press)
         first = go(-even)
         reach = cones.reach(point.slack, first.slack), cones.reach(point.press, first.press)
-        center = (1 - np.minimum(1.0, np.minimum(*reach))) ** 3 / (
-            2 * cones.sums(np.ones(even.shape[1]))
-        )
-        center *= cones.sums(product(point.slack, point.press))
+        center = (1 - np.minimum(1.0, np.minimum(*reach))) ** 3 / 2
+        center *= cones.sums(product(point.slack, point.press)) / cones.sums(np.ones(len(even.T)))
         aim = -circle(even, even)
         aim -= circle(apply(inverse, first.slack), apply(scale, first.press))
         aim[0] += center[cones.group]
-        last = go(divide(aim, even))
+        turned = even * FLIP  # of the Jordan product that is aimed at, even is one factor
+        other = product(aim, turned) / product(even, turned)
+        step = (aim - other * even) / even[0]
+        step[0] = other
+        last = go(step)
         ahead = np.minimum(1.0, _SHARE * cones.reach(point.slack, last.slack))
-        turned = np.minimum(1.0, _SHARE * cones.reach(point.press, last.press))
-        goes = (np.maximum(ahead, turned) > _STUCK) & ~done
+        spun = np.minimum(1.0, _SHARE * cones.reach(point.press, last.press))
+        goes = (np.maximum(ahead, spun) > _STUCK) & ~done
         if not (goes.any() and np.isfinite(last.raised).all()):
             return None
-        ahead, turned = ahead * goes, turned * goes
+        ahead, spun = ahead * goes, spun * goes
         of_cone = ahead[cones.group]
         return _Point(
             force=point.force + of_cone[: cones.owners] * last.force,
             raised=point.raised + ahead * last.raised,
             slack=point.slack + of_cone * last.slack,
-            motion=point.motion + turned[self._bodies] * last.motion,
-            press=point.press + turned[cones.group] * last.press,
+            motion=point.motion + spun[self._bodies] * last.motion,
+            press=point.press + spun[cones.group] * last.press,
         )
 
     def _directions(self, point: _Point, inverse: Floats) -> Callable[[Floats], _Point]:
@@ -395,7 +362,7 @@ class _Search:
         """
         balance, cones, square = self._balance, self._cones, times(inverse, inverse)
         weighed = times(square, cones.map)
-        soft = inverse_of(cones.owned(times(cones.map.swapaxes(0, 1), weighed)))
+        soft = np.linalg.inv(cones.owned(times(cones.map.swapaxes(0, 1), weighed)).T).T
         solve = balance.solver(soft)
         lift, stiff = cones.owned(weighed[0]), cones.sums(square[0, 0])
         left = balance.wrench(point.force) + self._load
@@ -420,18 +387,6 @@ class _Search:
             return _Point(force, raised, slack, motion, pushed - apply(square, slack))
 
         return direction
-
-    def narrowed(self, point: _Point, which: Bools) -> tuple[_Search, _Point]:
-        """Return a search, and the point, of some assemblies (A,) alone."""
-        cones, bodies = which[self._cones.group], which[self._bodies]
-        owners = cones[: self._cones.owners]
-        return _Search([*compress(self._sought, which)]), _Point(
-            force=point.force[:, owners],
-            raised=point.raised[which],
-            slack=point.slack[:, cones],
-            motion=point.motion[bodies],
-            press=point.press[:, cones],
-        )
 
     def claims(self, point: _Point, which: Bools) -> list[Answer]:
         """Return a point as answers for some assemblies (A,).
@@ -459,14 +414,6 @@ class _Search:
         return np.asarray((point.raised <= _DONE) | (work > rest))
 
 
-def _load(sought: Sought, part: Changing) -> Floats:
-    """Return the wrenches of loads, and of what does not change, on what does."""
-    load = sought.case.loads(sought.assembly)[0]
-    if part.kept.any():
-        load = load + sought.assembly.contact_map @ part.kept.ravel()
-    return load.reshape(-1, 6)[part.blocks].ravel()
-
-
 def approach_all(sought: Sequence[Sought], done: Bools) -> Iterator[list[tuple[int, Answer]]]:
     """Yield forces and motions, each nearer to a proof, with the numbers of their assemblies.
 
@@ -487,9 +434,6 @@ def approach_all(sought: Sequence[Sought], done: Bools) -> Iterator[list[tuple[i
             left = ~done[numbers]
             if not left.any():
                 return
-            if left.mean() <= _FEW:
-                search, point = search.narrowed(point, left)
-                numbers, left = numbers[left], left[left]
             if (point := search.better(point, ~left)) is None:
                 return
             claimed, which = point, left & search.promises(point)

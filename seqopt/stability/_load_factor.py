@@ -79,11 +79,8 @@ def load_factor(assembly: Assembly, mortar: Mortar) -> LoadFactor:
     scaled = replace(assembly, applied=assembly.applied / (size or 1.0))  # so that z is no share
     prove, lacking = Prover(scaled, compile_equilibrium), bonded(assembly, mortar)
     bare = prove(replace(lacking, applied=(0.0, 0.0)))
-    unloaded, values, motion = (
-        _verdict_of(bare),
-        (np.nan, np.nan),
-        np.zeros_like(bare.answer.motion),
-    )
+    unloaded, values = _verdict_of(bare), (np.nan, np.nan)
+    motion = np.zeros_like(bare.answer.motion)
     if size:
         found = prove(replace(lacking.fixed(), sense=Sense.LARGEST, applied=(0.0, 1.0)))
         values = found.value, found.bound

@@ -69,10 +69,15 @@ class Prover:
         for attempt in range(ATTEMPTS):
             answer = self._program(case, attempt)
             self.claims[answer.claim] += 1
-            own = _held_value(self.assembly, case, answer)
+            size, own = (
+                max(1.0, abs(answer.value)),
+                np.nan,
+            )  # z, if forces alone prove that it will do
+            if is_finite(self.assembly, answer):
+                exact = violation(self.assembly, case, answer) <= EXACT * size
+                own = max(answer.value, 0.0) if exact else np.nan
             held, proven = float(best(held, own)), bound(self.assembly, case, answer)
-            near = abs(answer.value - proven) <= GAP * max(1.0, abs(answer.value))
-            value = own if near else np.nan
+            value = own if abs(answer.value - proven) <= GAP * size else np.nan
             if answer.claim is Claim.INFEASIBLE or not np.isnan(value):
                 break
         if np.isnan(value) and case.sense is Sense.SMALLEST and answer.claim is Claim.INFEASIBLE:
@@ -101,14 +106,6 @@ class Prover:
         self.claims[answer.claim] += 1
         known = is_finite(helped, answer)
         return replace(answer, value=bound(helped, strongest, answer) if known else np.nan)
-
-
-def _held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
-    """Return the z of an answer if its forces alone prove that it will do, else NaN."""
-    if not is_finite(assembly, answer):
-        return np.nan
-    proven = violation(assembly, case, answer) <= EXACT * max(1.0, abs(answer.value))
-    return max(answer.value, 0.0) if proven else np.nan
 
 
 DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread

@@ -15,9 +15,8 @@ Every margin is a bracket: what forces prove on one side, a motion on the other.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -64,32 +63,36 @@ class TiltedStates:
         """How many linear programs were solved."""
         return sum(states.solved for states in self._states.values())
 
-    def known(self, pull: float, places: Ints, payload: Floats) -> tuple[Bools, Bools]:
-        """Return which grip sets are known to survive a pull in all directions, and which to fall.
+    def survive(
+        self, pull: float, places: Ints, payload: Floats, *, solve: bool
+    ) -> tuple[Bools, Bools]:
+        """Return which grip sets survive a pull in all directions, and which fall by it.
 
-        ``pull``: over gravity; ``places``, ``payload`` (S, r): as of `HeldStates.bracket`.
+        Of sets that stand without a pull. ``pull``: over gravity; ``places``, ``payload`` (S, r):
+        as of `HeldStates.bracket`; ``solve``: whether directions that are open are solved.
         """
-        survived, least = self._brackets(places, payload)
-        return hulls(_ANGLES, survived)[0] >= pull, least < pull
-
-    def survive(self, pull: float, places: Ints, payload: Floats) -> tuple[Bools, Bools]:
-        """Return as `known` does, of sets that stand without a pull; open directions are solved."""
-        survived, least = self._brackets(places, payload)
-        asked = np.zeros(survived.shape, dtype=bool)
-        rows = np.arange(len(places))
-        while True:
+        survived, least = np.full((len(places), FINE), np.nan), np.full(len(places), np.inf)
+        for way, states in self._states.items():
+            low, high = states.known(places, payload).T
+            survived[:, way] = np.where(low >= 0, low, np.nan)
+            least = np.minimum(least, high)
+        asked, rows = np.zeros(survived.shape, dtype=bool), np.arange(len(places) if solve else 0)
+        while len(rows):
             safe, angle = hulls(_ANGLES, survived[rows])
             open_ = ~(safe >= pull) & (least[rows] >= pull)
             rows, ways = rows[open_], self._next(angle[open_], asked[rows[open_]])
             rows, ways = rows[ways >= 0], ways[ways >= 0]
-            if not len(rows):
-                return hulls(_ANGLES, survived)[0] >= pull, least < pull
             for way in np.unique(ways).tolist():
                 own = rows[ways == way]
-                found = self._ask(way, pull, places[own], payload[own])
+                if way not in self._states:
+                    self._states[way] = HeldStates(self._assembly, self._cases[way], self._compile)
+                bracket, settled = self._states[way].bracket, partial(_settled, pull)
+                low, high = bracket(places[own], payload[own], settled, pull).T
+                self._fell[way] += int((high < pull).sum())
                 asked[own, way] = True
-                survived[own, way] = np.where(found[:, 0] >= 0, found[:, 0], np.nan)
-                least[own] = np.minimum(least[own], found[:, 1])
+                survived[own, way] = np.where(low >= 0, low, np.nan)
+                least[own] = np.minimum(least[own], high)
+        return hulls(_ANGLES, survived)[0] >= pull, least < pull
 
     def _next(self, angle: Floats, asked: Bools) -> Ints:
         """Return the directions to ask next, (S,): -1 where there is none that would help.
@@ -104,24 +107,6 @@ class TiltedStates:
             out[~asked[:, way]] = way  # the one that most fell by comes last, and stays
         return out
 
-    def _ask(self, way: int, pull: float, places: Ints, payload: Floats) -> Floats:
-        """Return brackets (S, 2) of the critical pull in a direction."""
-        if way not in self._states:
-            case = self._cases[way]
-            self._states[way] = HeldStates(self._assembly, case, self._compile)
-        found = self._states[way].bracket(places, payload, partial(_settled, pull), pull)
-        self._fell[way] += int((found[:, 1] < pull).sum())
-        return found
-
-    def _brackets(self, places: Ints, payload: Floats) -> tuple[Floats, Floats]:
-        """Return what is survived by direction (S, F), NaN where unknown, and the least bound."""
-        survived, least = np.full((len(places), FINE), np.nan), np.full(len(places), np.inf)
-        for way, states in self._states.items():
-            low, high = states.known(places, payload).T
-            survived[:, way] = np.where(low >= 0, low, np.nan)
-            least = np.minimum(least, high)
-        return survived, least
-
 
 def _settled(pull: float, bracket: Floats) -> Bools:
     """Return converged brackets (S, 2) of the critical pull, and those far from a given pull."""
@@ -130,6 +115,7 @@ def _settled(pull: float, bracket: Floats) -> Bools:
     return np.asarray((high < pull) | (low >= _FAR * pull) | narrow | (low >= CAP))
 
 
+@dataclass
 class Proofs:
     """Proofs shared by the screens of one scene.
 
@@ -137,11 +123,10 @@ class Proofs:
     brick count, what the programs of all mortars found, if they are kept.
     """
 
-    def __init__(self) -> None:
-        self.upright: dict[tuple[Part, Mortar], HeldStates] = {}
-        self.tilted: dict[tuple[Part, Mortar], TiltedStates] = {}
-        self.keeps = False
-        self.answers = defaultdict[Part, list[tuple[Answer, Floats]]](list)
+    upright: dict[tuple[Part, Mortar], HeldStates] = field(default_factory=dict)
+    tilted: dict[tuple[Part, Mortar], TiltedStates] = field(default_factory=dict)
+    keeps: bool = False
+    answers: dict[Part, list[tuple[Answer, Floats]]] = field(default_factory=dict)
 
 
 class Screen:
@@ -180,7 +165,6 @@ class Screen:
         self.network, self.mortar = network_of(network), find_mortar(mortar)
         self.tilt = tilt
         self._compile, self._proofs = compiled, proofs or Proofs()
-        self._assemblies: dict[Part, Assembly] = {}
 
     @property
     def solved(self) -> int:
@@ -189,27 +173,17 @@ class Screen:
         return sum(one.solved for one in upright) + sum(one.solved for one in tilted)
 
     def stands(
-        self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None
+        self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None, *, solve: bool = True
     ) -> NDArray[np.int8]:
         """Return which grip sets stand.
 
         ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
         build order counted from 1; zero for a robot that holds none. ``payload`` (r,), (S, r):
         largest force of those that hold them, N; by default of the scene's robots, if all have the
-        same. Result (S,): 1 where it is proven that the structure stands, -1 where it is proven
-        that it falls, and 0 where neither is. Raises `GripError` as `held_places` does.
+        same. ``solve``: whether programs are solved where known proofs leave sets open. Result
+        (S,): 1 where it is proven that the structure stands, -1 where it is proven that it falls,
+        and 0 where neither is. Raises `GripError` as `held_places` does.
         """
-        return self._found(bricks, held, payload, solve=True)
-
-    def recalled(
-        self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None
-    ) -> NDArray[np.int8]:
-        """Return verdicts by known proofs alone: no program is solved."""
-        return self._found(bricks, held, payload, solve=False)
-
-    def _found(
-        self, bricks: int, held: ArrayLike, payload: ArrayLike | None, *, solve: bool
-    ) -> NDArray[np.int8]:
         out = np.zeros(len(np.asarray(held)), dtype=np.int8)
         for own, part, places, loads in held_parts(self.network, bricks, held, payload):
             states = self._upright(part)
@@ -218,33 +192,24 @@ class Screen:
             found = _of_both(bracket[:, 1] <= EXACT, bracket[:, 0] > EXACT)
             rows = np.flatnonzero(found == STANDS) if self.tilt else ()
             if len(rows):
-                tilted = self._tilted(part)
-                ask = tilted.survive if solve else tilted.known
-                found[rows] = _of_both(*ask(np.tan(self.tilt), places[rows], loads[rows]))
+                tilted, key = self._proofs.tilted, (part, self.mortar)
+                if key not in tilted:
+                    up = self.network.scene.up
+                    tilted[key] = TiltedStates(states.assembly, self.mortar, up, self._compile)
+                asked = places[rows], loads[rows]
+                both = tilted[key].survive(np.tan(self.tilt), *asked, solve=solve)
+                found[rows] = _of_both(*both)
             out[own] = found
         return out
 
     def _upright(self, part: Part) -> HeldStates:
         known, key = self._proofs.upright, (part, self.mortar)
         if key not in known:
-            answers = self._proofs.answers[part] if self._proofs.keeps else None
-            assembly = self._assembly(part)
+            assembly = node_assembly(self.network, part[0], held=part[1])
             case = bonded(assembly, self.mortar)  # of the least bond that is lacking
+            answers = self._proofs.answers.setdefault(part, []) if self._proofs.keeps else None
             known[key] = HeldStates(assembly, case, self._compile, case.fixed(), answers)
         return known[key]
-
-    def _tilted(self, part: Part) -> TiltedStates:
-        known, key = self._proofs.tilted, (part, self.mortar)
-        if key not in known:
-            up = self.network.scene.up
-            known[key] = TiltedStates(self._assembly(part), self.mortar, up, self._compile)
-        return known[key]
-
-    def _assembly(self, part: Part) -> Assembly:
-        if part not in self._assemblies:
-            bricks, propped = part
-            self._assemblies[part] = node_assembly(self.network, bricks, held=propped)
-        return self._assemblies[part]
 
 
 def _decided(bracket: Floats) -> Bools:
@@ -313,7 +278,6 @@ def held_parts(
 
 _Cases = Callable[[Assembly], list[Case]]
 _PUSHED = "the least payload is not found where props only push"
-_Grips = tuple[ArrayLike, ArrayLike | None]  # held, payload
 
 
 class Margins:
@@ -357,8 +321,8 @@ class Margins:
         infinite if none is enough.
         """
         bare = Mortar(friction=self.mortar.friction)
-        bracket = self._least("bond", lambda each: [bonded(each, bare)], bricks, (held, payload))
-        return bracket * self._bare(bricks).stress_scale
+        each, assembly = self._brackets("bond", lambda a: [bonded(a, bare)], bricks, held, payload)
+        return np.where(each[0][:, [0]] >= CAP, np.inf, each[0]) * assembly.stress_scale
 
     def grip(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the least payload, the same for all who hold, with the mortar.
@@ -372,13 +336,8 @@ class Margins:
         def cases(assembly: Assembly) -> list[Case]:
             return [replace(bonded(assembly, self.mortar).fixed(), payload=(0.0, 1.0))]
 
-        bracket = self._least("grip", cases, bricks, (held, payload))
-        return bracket * self._bare(bricks).scales[0]
-
-    def _bare(self, bricks: int) -> Assembly:
-        """Return a structure with the scales of all in which as many bricks stand."""
-        known = (level for (_, part), level in self._levels.items() if part[0] == bricks)
-        return next(known)[0].assembly
+        (bracket,), assembly = self._brackets("grip", cases, bricks, held, payload)
+        return np.where(bracket[:, [0]] >= CAP, np.inf, bracket) * assembly.scales[0]
 
     def tilt(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the tilt that grip sets survive in every direction.
@@ -389,28 +348,22 @@ class Margins:
         screen = self.screens[self.mortar.friction]
         out = np.full((len(np.asarray(held)), 2), np.nan)
         rows = np.flatnonzero(screen.stands(bricks, held, payload) == STANDS)
-        if len(rows):
-            out[rows] = self._tilts(DIRECTIONS, bricks, held, payload, rows)
+        for count in (DIRECTIONS, FINE):
+            if not len(rows):
+                break
+
+            def pulls(assembly: Assembly, count: int = count) -> list[Case]:
+                return sideways(bonded(assembly, self.mortar).fixed(), self.network.scene.up, count)
+
+            grips = np.asarray(held)[rows], _of_rows(payload, rows)
+            brackets = np.array(self._brackets(f"tilt {count}", pulls, bricks, *grips)[0])
+            low, high = brackets[..., 0], brackets[..., 1]
+            known = np.where(np.isfinite(low), np.maximum(low, 0.0), np.nan)
+            least = np.nan_to_num(hulls(2 * np.pi * np.arange(count) / count, known.T)[0])
+            most = np.maximum(high.min(axis=0), 0.0)
+            out[rows] = np.arctan(np.stack([least, most], axis=1))
             rows = rows[out[rows, 0] < (1 - NEAR) * out[rows, 1]]
-        if len(rows):
-            out[rows] = self._tilts(FINE, bricks, held, payload, rows)
         return out
-
-    def _tilts(
-        self, count: int, bricks: int, held: ArrayLike, payload: ArrayLike | None, rows: Ints
-    ) -> Floats:
-        """Return brackets (n, 2) of the tilt of some grip sets, by a number of directions."""
-
-        def pulls(assembly: Assembly) -> list[Case]:
-            return sideways(bonded(assembly, self.mortar).fixed(), self.network.scene.up, count)
-
-        grips = np.asarray(held)[rows], _of_rows(payload, rows)
-        brackets = np.array(self._brackets(f"tilt {count}", pulls, bricks, grips))
-        angles = 2 * np.pi * np.arange(count) / count
-        known = np.where(np.isfinite(brackets[..., 0]), np.maximum(brackets[..., 0], 0.0), np.nan)
-        least = np.nan_to_num(hulls(angles, known.T)[0])
-        most = np.maximum(brackets[..., 1].min(axis=0), 0.0)
-        return np.asarray(np.arctan(np.stack([least, most], axis=1)))
 
     def friction(
         self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None, step: float = 2.0**-7
@@ -447,25 +400,22 @@ class Margins:
                 narrow_by(friction, rows)
                 open_[rows] = (out[rows] != before).any(axis=1)
 
-    def _least(self, name: str, cases: _Cases, bricks: int, grips: _Grips) -> Floats:
-        """Return the brackets (S, 2) of a least z; infinite where none up to `CAP` is enough."""
-        (bracket,) = self._brackets(name, cases, bricks, grips)
-        return np.where(bracket[:, [0]] >= CAP, np.inf, bracket)
-
-    def _brackets(self, name: str, cases: _Cases, bricks: int, grips: _Grips) -> list[Floats]:
-        """Return the brackets (S, 2) of z of every case."""
+    def _brackets(
+        self, name: str, cases: _Cases, bricks: int, held: ArrayLike, payload: ArrayLike | None
+    ) -> tuple[list[Floats], Assembly]:
+        """Return the brackets (S, 2) of z of every case, and a structure with their scales."""
         out: list[Floats] = []
-        for rows, part, places, loads in held_parts(self.network, bricks, *grips):
+        for rows, part, places, loads in held_parts(self.network, bricks, held, payload):
             if (name, part) not in self._levels:
                 assembly = node_assembly(self.network, bricks, held=part[1])
                 self._levels[name, part] = tuple(
                     HeldStates(assembly, case, compile_held) for case in cases(assembly)
                 )
             states = self._levels[name, part]
-            out = out or [np.zeros((len(np.asarray(grips[0])), 2)) for _ in states]
+            out = out or [np.zeros((len(np.asarray(held)), 2)) for _ in states]
             for each, own in zip(out, states, strict=True):
                 each[rows] = own.bracket(places, loads, _narrow)
-        return out
+        return out, states[0].assembly
 
 
 def _narrow(bracket: Floats) -> Bools:

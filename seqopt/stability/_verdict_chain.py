@@ -95,7 +95,6 @@ class VerdictChain:
     ) -> None:
         self._parts, self._mortar, self._compile = parts, mortar, compiled
         self._corner_force: Floats | None = None
-        self._grip_force: dict[int, Floats] = {}
         self._motion: Floats | None = None
         self._stood = False  # the last one, by forces
         self._blocks = 0  # that stood
@@ -114,10 +113,10 @@ class VerdictChain:
         held += [-1 - i for i in range(len(assembly.payload) - len(held))]  # props
         case = bonded(assembly, self._mortar)
         with one_thread():
-            known = self._known((bricks, grips), assembly, case, held)
+            known = _first(self._known((bricks, grips), assembly, case, held))
             if known is None and before is not None:
                 before()
-                known = self._known((bricks, grips), assembly, case, held)
+                known = _first(self._known((bricks, grips), assembly, case, held))
             known = known or _first(self._sought(assembly, case))
         proven, way = known or (Prover(assembly, self._compile)(case), Way.CONES)
         self._learn(assembly, proven, held)
@@ -137,29 +136,24 @@ class VerdictChain:
 
     def _known(
         self, state: _State, assembly: Assembly, case: Case, held: Sequence[int]
-    ) -> tuple[Proven, Way] | None:
-        """Return the prefetched proof, or one by earlier forces and motions."""
-        proven = self._found.pop(state, None)
-        if proven is not None:
-            return proven, Way.MOTION if proven.bound > 0 else Way.FORCES
-        return _first(self._claimed(assembly, case, held))
-
-    def _claimed(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
-        """Yield proofs by earlier forces and motions, the latest first."""
-        none = np.zeros((len(assembly.corner), 3)), np.zeros((len(held), 3))
-        falls = list[Answer]()
+    ) -> Iterator[_Tried]:
+        """Yield the prefetched proof, or those by earlier forces and motions, the latest first."""
+        yield _labeled(self._found.pop(state, None), Way.FORCES)
+        still, force = np.zeros((len(assembly.centroid), 6)), assembly.scales[0]
+        falls, holds = list[Answer](), list[Answer]()
         if self._motion is not None:  # later blocks rest
-            motion, size = (
-                np.zeros((len(assembly.centroid), 6)),
-                np.repeat([1, assembly.scales[1]], 3),
+            motion, none = (
+                still.copy(),
+                (np.zeros((len(assembly.corner), 3)), np.zeros((len(held), 3))),
             )
             blocks = min(len(motion), len(self._motion))
-            motion[:blocks] = self._motion[:blocks] * size
+            motion[:blocks] = self._motion[:blocks] * np.repeat([1, assembly.scales[1]], 3)
             falls.append(Answer(Claim.SOLVED, 1.0, *none, motion))
-        ways = [
-            (falls, Way.EARLIER_MOTION),
-            (self._kept_forces(assembly, held), Way.EARLIER_FORCES),
-        ]
+        for corner, grip in self._kept:  # with fewer grips: one more bears nothing
+            if len(corner) == len(assembly.corner) and grip.keys() <= set(held):
+                borne = np.array([grip.get(node, np.zeros(3)) for node in held]).reshape(-1, 3)
+                holds.append(Answer(Claim.SOLVED, 0.0, corner / force, borne / force, still))
+        ways = [(falls, Way.EARLIER_MOTION), (holds, Way.EARLIER_FORCES)]
         for claims, way in reversed(ways) if self._stood else ways:
             for claim in claims:
                 yield judged(assembly, case, claim), way
@@ -212,25 +206,16 @@ class VerdictChain:
             near, changes, near[assembly.grip_block], np.zeros((len(assembly.corner), 3))
         )
 
-    def _kept_forces(self, assembly: Assembly, held: Sequence[int]) -> Iterator[Answer]:
-        """Yield forces that hold the same bricks with fewer grips: one more bears nothing."""
-        for corner, grip in self._kept:
-            if len(corner) == len(assembly.corner) and grip.keys() <= set(held):
-                borne = np.array([grip.get(node, np.zeros(3)) for node in held]).reshape(-1, 3)
-                forces = corner / assembly.scales[0], borne / assembly.scales[0]
-                yield Answer(Claim.SOLVED, 0.0, *forces, np.zeros((len(assembly.centroid), 6)))
-
     def _learn(self, assembly: Assembly, proven: Proven, held: Sequence[int]) -> None:
-        force, length = assembly.scales
-        answer = proven.answer
+        (force, length), answer = assembly.scales, proven.answer
         self._stood = proven.held <= EXACT
         if self._stood:
             self._corner_force = force * answer.contact_force
             self._blocks = len(assembly.centroid)
             self._bore = assembly.grip_block[answer.grip_force.any(axis=1)]
-            self._grip_force = dict(zip(held, force * answer.grip_force, strict=True))
+            grips = dict(zip(held, force * answer.grip_force, strict=True))
             same = [each for each in self._kept if len(each[0]) == len(self._corner_force)]
-            self._kept = [*same, (self._corner_force, self._grip_force)][-_KEPT:]
+            self._kept = [*same, (self._corner_force, grips)][-_KEPT:]
         if proven.bound > EXACT and np.isfinite(answer.motion).all():
             self._motion = answer.motion / np.repeat([1.0, length], 3)
 

@@ -156,6 +156,10 @@ def assess(
         bare = bonded(assembly, Mortar(friction=mortar.friction))
         lacking = stand if bare == growing else prove(bare)
         bond = _amount(lacking.value) * assembly.stress_scale
+    grip = np.nan  # also where a grip only pushes
+    if "payload" in margins and not assembly.grip_line.any():
+        least = replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0))
+        grip = _amount(prove(least).value) * assembly.scales[0] if len(assembly.payload) else 0.0
     return Stability(
         verdict=verdict,
         proof=CONES,
@@ -163,7 +167,7 @@ def assess(
         friction=friction,
         pull=np.array([pull.held for pull in pulls[:DIRECTIONS]] or [np.nan] * DIRECTIONS),
         tilt=float(np.arctan(worst)),
-        grip=_least_payload(prove, fixed) if "payload" in margins else np.nan,
+        grip=grip,
         motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
         first_block=block,
         first_contact=contact,
@@ -171,16 +175,6 @@ def assess(
         claims=dict(prove.claims),
         unproven=prove.unproven,
     )
-
-
-def _least_payload(prove: Prover, fixed: Case) -> float:
-    """Return the largest grip force where it is smallest, N; NaN where a grip only pushes."""
-    if prove.assembly.grip_line.any():
-        return np.nan
-    if not len(prove.assembly.payload):
-        return 0.0
-    least = prove(replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0)))
-    return _amount(least.value) * prove.assembly.scales[0]
 
 
 def verdict(assembly: Assembly, mortar: Mortar, compiled: Compile = compile_equilibrium) -> Verdict:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,11 +22,11 @@ from seqopt.contact.faces import PartialAssemblies
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
-from seqopt.network.network import GROUND, Network
+from seqopt.network.network import GROUND
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 from seqopt.stability._prover import horizontal
-from seqopt.stability._step_verdicts import each_verdict
+from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.work.progress import Tell, with_progress
 
@@ -149,39 +148,28 @@ def failure_map(
     >>> found.cases[["value", "steps", "fall"]].to_numpy().tolist()
     [[0.1, 17.0, 13.0], [0.5, 17.0, 4.0]]
     """
-    values, usual = _values(axis, values)
-    asked = [*_cases(scene, builds, holds, axis, values)]
-    told = with_progress("mapping failures", asked, progress)
-    rows = [_row(case, axis, value) for value, case in told]
-    here = [case for value, case in asked if value == usual and case.holds == holds[0]]
-    motions = dict[str, Floats]()
-    for case in here:
-        motions[case.build] = np.zeros((len(case.steps), len(scene.bricks), 6))
-        for motion, step, found in zip(motions[case.build], case.steps, case.found, strict=True):
-            if found.verdict is Verdict.FALLS:
-                motion[: step.bricks] = found.motion
-    steps = pd.concat([_of_steps(case, axis, value) for value, case in asked], ignore_index=True)
-    return FailureMap(pd.DataFrame(rows), steps, motions, usual)
-
-
-def _values(axis: str, values: Sequence[float]) -> tuple[Sequence[float], float]:
-    """Return the values on an axis, by default the usual ones, and the one of `FailureMap`."""
     if axis not in AXES:
         raise SceneError(f"axis {axis!r}: give one of {', '.join(AXES)}")
     values, least = values or AXES[axis], DRY.friction if axis == "friction" else 0.0
-    return values, min(values, key=lambda value: abs(value - least))
-
-
-def _of_steps(case: _Case, axis: str, value: float) -> pd.DataFrame:
-    """Return the verdict of every step of a case."""
-    found = {
-        "step": [step.number for step in case.steps],
-        "bricks": [step.bricks for step in case.steps],
-        "verdict": [each.verdict.value for each in case.found],
-    }
-    return pd.DataFrame(
-        {"build": case.build, "holds": case.holds, "axis": axis, "value": value, **found}
-    )
+    usual = min(values, key=lambda value: abs(value - least))
+    asked = [*_cases(scene, builds, holds, axis, values)]
+    told = with_progress("mapping failures", asked, progress)
+    rows = [_row(case, axis, value) for value, case in told]
+    steps, motions = list[pd.DataFrame](), dict[str, Floats]()
+    for value, case in asked:
+        own = {"build": case.build, "holds": case.holds, "axis": axis, "value": value}
+        found = {
+            "step": [step.number for step in case.steps],
+            "bricks": [step.bricks for step in case.steps],
+            "verdict": [each.verdict.value for each in case.found],
+        }
+        steps.append(pd.DataFrame(own | found))
+        if value == usual and case.holds == holds[0]:
+            motions[case.build] = np.zeros((len(case.steps), len(scene.bricks), 6))
+            for motion, each in zip(motions[case.build], case.found, strict=True):
+                if each.verdict is Verdict.FALLS:
+                    motion[: len(each.motion)] = each.motion
+    return FailureMap(pd.DataFrame(rows), pd.concat(steps, ignore_index=True), motions, usual)
 
 
 def _cases(
@@ -260,15 +248,6 @@ def _motion_word(assembly: Assembly, found: Stability) -> str:
     return "turns" if turned >= _HINGE * abs(opening) else "lifts off"
 
 
-def _stronger(mortar: Mortar, what: str, needed: float) -> Mortar:
-    """Return a mortar with at least a bond, Pa, or with a friction."""
-    if what == "friction":
-        return replace(mortar, friction=needed)
-    bond = bond_mortar(needed, mortar.friction)
-    tension = max(bond.tensile_strength, mortar.tensile_strength)
-    return replace(bond, tensile_strength=tension, cohesion=max(bond.cohesion, mortar.cohesion))
-
-
 def _cure(case: _Case, what: str) -> float:
     """Return the least ``bond``, Pa, or ``friction`` with which every step stands.
 
@@ -285,9 +264,13 @@ def _cure(case: _Case, what: str) -> float:
             if not np.isfinite(own):
                 return float(own)
             needed = max(needed, float(own) * (1 + _SURE))
-            mortar = _stronger(case.mortar, what, needed)
-            found = each_verdict(parts, left, mortar)
-            pairs = zip(left, [*found], strict=True)
+            mortar = replace(case.mortar, friction=needed)
+            if what == "bond":  # at least what there is
+                bond = bond_mortar(needed, case.mortar.friction)
+                tension = max(bond.tensile_strength, case.mortar.tensile_strength)
+                cohesion = max(bond.cohesion, case.mortar.cohesion)
+                mortar = replace(bond, tensile_strength=tension, cohesion=cohesion)
+            pairs = zip(left, [*each_verdict(parts, left, mortar)], strict=True)
             left = [each for each, now in pairs if now.verdict is not Verdict.STANDS]
     return needed
 
@@ -300,20 +283,16 @@ def _grip(case: _Case, step: Step, found: Stability) -> int | None:
     helped = [
         _parts(replace(parts.network.scene, robots=(*scene.robots, more))) for parts in case.turned
     ]
-    for node in islice(_fastest(case.turned[0].network, step, found), _TRIED):
+    speed = dict[int, float]()
+    for brick, motion in zip(scene.placed[: step.bricks], found.motion, strict=False):
+        for node in brick.nodes:
+            if node in scene.blocked_nodes or node in step.grips:
+                continue
+            arm = np.subtract(scene.node_position(node), brick.position)
+            speed[node] = float(np.linalg.norm(motion[:3] + np.cross(motion[3:], arm)))
+    for node in sorted(speed, key=lambda node: -speed[node])[:_TRIED]:  # the fastest ones first
         held = replace(step, grips=(*step.grips, node))
         verdicts = (next(each_verdict(parts, [held], case.mortar)).verdict for parts in helped)
         if all(verdict is Verdict.STANDS for verdict in verdicts):
             return node
     return None
-
-
-def _fastest(network: Network, step: Step, found: Stability) -> Iterator[int]:
-    """Yield the nodes that may be held in a step, the fastest ones in its motion first."""
-    scene, speed = network.scene, dict[int, float]()
-    for brick, motion in zip(scene.placed[: step.bricks], found.motion, strict=False):
-        for node in brick.nodes:
-            if node not in scene.blocked_nodes and node not in step.grips:
-                arm = np.subtract(scene.node_position(node), brick.position)
-                speed[node] = float(np.linalg.norm(motion[:3] + np.cross(motion[3:], arm)))
-    yield from sorted(speed, key=lambda node: -speed[node])

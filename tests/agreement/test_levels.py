@@ -15,8 +15,8 @@ from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import METHODS
+from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Verdict
-from seqopt.stability.steps import assess_steps
 from tests.builders import largest_difference
 from tests.strategies import arches, both_sided, states, walls
 

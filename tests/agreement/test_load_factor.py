@@ -19,7 +19,7 @@ from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability import Margins, Screen, Verdict, load_factor_table, load_factors
 from seqopt.stability._builds import BuildProver
 from seqopt.stability._load_factor import format_load_factors, load_factor
-from seqopt.stability._step_verdicts import each_verdict
+from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import CAP, EXACT, Sense, bound, compile_equilibrium, violation
 from tests.builders import block

@@ -14,7 +14,7 @@ from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import _parse_scene, dump_scene
 from seqopt.sequence.methods import METHODS
-from seqopt.stability.steps import assess_steps
+from seqopt.stability._steps import assess_steps
 from tests.blocks import with_shapes
 from tests.builders import six_bricks
 

@@ -12,7 +12,7 @@ import pytest
 import seqopt
 from seqopt._cli.main import main
 from seqopt.scene.scene_file import load_scene, save_scene
-from seqopt.stability._step_verdicts import stability_row
+from seqopt.stability._steps import stability_row
 
 ARCH = "arch:span=1,rise=0.4,pattern=VLR"
 WORDS = ["assess", ARCH, "--method", "sequential", "--mortar", "dry"]

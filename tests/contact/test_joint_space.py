@@ -17,7 +17,7 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import THICKEST
 from seqopt.scene.scene_file import _parse_scene, dump_scene
 from seqopt.sequence.methods import sequential
-from seqopt.stability.steps import assess_steps
+from seqopt.stability._steps import assess_steps
 
 WALL = running_bond(1, 2)  # two bricks 60 mm high, laid dry: nothing lies between them
 

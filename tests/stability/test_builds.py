@@ -16,9 +16,9 @@ from seqopt.report.comparison import compare
 from seqopt.report.page import Build, _build_data
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import dump_scene
-from seqopt.stability import _builds, _step_verdicts
+from seqopt.stability import _builds, _steps
 from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
-from seqopt.stability._step_verdicts import each_verdict
+from seqopt.stability._steps import each_verdict
 from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import Verdict, assess, verdict
 
@@ -124,7 +124,7 @@ def test_what_is_tried_ahead_changes_no_verdict(flat, builds, found, monkeypatch
         return real(self, bricks, grips, before)
 
     monkeypatch.setattr(VerdictChain, "__call__", counted)
-    monkeypatch.setattr(_step_verdicts, "_LARGE", 0)
+    monkeypatch.setattr(_steps, "_LARGE", 0)
     for name, steps in builds.items():
         for said in found[name]:
             each = each_verdict(flat, steps, SHOWN[said.mortar])

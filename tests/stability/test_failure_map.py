@@ -16,7 +16,7 @@ from seqopt.report._failures import cure_words, usual_builds
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._prover import Prover
 from seqopt.stability._screens import Screen
-from seqopt.stability._step_verdicts import step_verdicts
+from seqopt.stability._steps import step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.failure_map import failure_map
 

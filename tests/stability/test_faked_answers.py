@@ -23,7 +23,7 @@ from seqopt.stability import _prover as prover
 from seqopt.stability import _verdict_chain as chain
 from seqopt.stability import assessment, limit_analysis
 from seqopt.stability._prover import Proven, Prover
-from seqopt.stability._step_verdicts import each_verdict
+from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import Verdict, _verdict_of, assess, bonded, verdict
 from seqopt.stability.limit_analysis import CAP, Claim, bound
 

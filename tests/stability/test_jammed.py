@@ -8,9 +8,8 @@ import pytest
 from experiments.stability.parts.blocks import Blocks, Contact, ring, stack
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability._step_verdicts import _MARGINS, format_rows
+from seqopt.stability._steps import _MARGINS, format_rows, stability_table
 from seqopt.stability.assessment import Verdict, assess
-from seqopt.stability.steps import stability_table
 
 
 def bar(*, on_the_ground=False):

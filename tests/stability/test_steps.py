@@ -13,9 +13,8 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.errors import ProblemError, SceneError, SceneWarning
 from seqopt.stability import assess
-from seqopt.stability._step_verdicts import each_stability, stability_row
+from seqopt.stability._steps import assess_steps, each_stability, stability_row
 from seqopt.stability.assessment import MARGINS
-from seqopt.stability.steps import assess_steps
 from tests.builders import six_bricks
 
 NUMBERS = {"bond": "bond", "friction": "friction", "tilt": "tilt", "payload": "grip"}

@@ -25,7 +25,7 @@ from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability import _verdict_chain as chain
 from seqopt.stability._interior_point import Sought, approach, approach_all
-from seqopt.stability._step_verdicts import each_verdict, step_verdicts
+from seqopt.stability._steps import each_verdict, step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded, verdict
 from seqopt.stability.limit_analysis import EXACT, Answer, Claim, bound, violation
 from tests.blocks import with_shapes

@@ -36,8 +36,8 @@ from seqopt.responses.table import (
     step_fields,
 )
 from seqopt.sequence.steps import Step, _idle_note
+from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Verdict
-from seqopt.stability.steps import assess_steps
 from seqopt.work.progress import Clock, with_progress
 
 INTERRUPTED = "seqopt: interrupted; the steps are those that were computed"

@@ -21,7 +21,7 @@ from seqopt.network.network import Network
 from seqopt.problem.requirements import number_word
 from seqopt.responses.quantities import _steps_in_words
 from seqopt.sequence.steps import Step
-from seqopt.stability._step_verdicts import each_stability, find_margins, format_rows, stability_row
+from seqopt.stability._steps import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import AXES, failure_map
 from seqopt.work.progress import with_progress

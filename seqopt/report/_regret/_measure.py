@@ -56,7 +56,7 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability._step_verdicts import step_verdicts
+from seqopt.stability._steps import step_verdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.work.progress import Stage, Tell
 

@@ -1,8 +1,9 @@
-"""The steps of a build one after the other: verdicts, margins, and the rows that show them."""
+"""Whether the steps of a build stand, and by how much: as a table too."""
 
 from __future__ import annotations
 
 import pickle
+import warnings
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -13,14 +14,17 @@ from operator import attrgetter
 from typing import Any, TypeVar
 
 import numpy as np
+import pandas as pd
 
-from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import PartialAssemblies
-from seqopt.contact.mortar import Mortar
-from seqopt.errors import SceneError, did_you_mean
+from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.errors import ProblemError, SceneError, SceneWarning, did_you_mean
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
-from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._prover import DIRECTIONS, Proven
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import _find_overlapping
+from seqopt.sequence.steps import Grips, Step, require_steps
+from seqopt.stability._prover import DIRECTIONS
 from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import (
     MARGINS,
@@ -32,6 +36,86 @@ from seqopt.stability.assessment import (
 )
 from seqopt.stability.limit_analysis import Claim, Compile, compile_equilibrium
 from seqopt.work._workers import Crew, hire, map_ordered
+from seqopt.work.progress import Tell, with_progress
+
+
+def assess_steps(
+    network: Network | Scene,
+    steps: Sequence[Step],
+    mortar: Mortar | str,
+    margins: Collection[str] = (),
+    progress: Tell | None = None,
+    workers: int | Executor = 1,
+) -> tuple[Stability, ...]:
+    """Return whether every step stands, and the margins that are asked for.
+
+    Parameters
+    ----------
+    network : Network or Scene
+    steps : sequence of Step
+    mortar : Mortar or str
+        The mortar of all joints, or its name.
+    margins : collection of str, optional
+        Of ``bond``, ``friction``, ``tilt`` and ``payload``, or ``all``; others are NaN. Each takes
+        several times as long as a verdict.
+    progress : callable, optional
+        Called with a `seqopt.work.Stage`, step by step.
+    workers : int or concurrent.futures.Executor, optional
+        Processes to share the steps among, or any executor, which the caller ends.
+
+    Returns
+    -------
+    tuple of Stability
+
+    Raises
+    ------
+    SceneError
+        If bricks that share a joint do not touch, or there is no such margin.
+    ProblemError
+        If there cannot be so many workers.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> steps = seqopt.sequential(network)[:2]
+    >>> [stability.verdict.value for stability in seqopt.assess_steps(network, steps, seqopt.EPOXY)]
+    ['stands', 'stands']
+    """
+    network, steps, asked = network_of(network), require_steps(steps), find_margins(margins)
+    if "overlaps" not in network.derived:
+        network.derived["overlaps"] = found = [*_find_overlapping(network.scene)]
+        for line in found:
+            said = f"scene {network.scene.name}: {line}: no verdict sees it"
+            warnings.warn(said, SceneWarning, stacklevel=2)
+    if not (hasattr(workers, "submit") or (isinstance(workers, int) and workers > 0)):
+        raise ProblemError(f"workers is {workers!r}; give a whole number from 1, or an executor")
+    shared = (None, workers) if isinstance(workers, int) else (workers, 1)
+    each = each_stability(network, steps, find_mortar(mortar), asked, shared=shared)
+    told = with_progress("assessing steps", steps, progress)
+    return tuple(result for result, _ in zip(each, told, strict=True))
+
+
+def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:
+    """Return one row per step; an empty cell is a number that is not proven, or not asked for.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    results : sequence of Stability
+        Of the steps.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``step``, ``type``, ``bricks``, ``verdict``, ``proof``, ``bond_needed_Pa``,
+        ``friction_needed``, ``tilt_survived_deg``, ``largest_grip_force_N``, ``first_brick``,
+        ``first_joint`` and ``jammed``, as in `seqopt.stability.assessment.Stability`;
+        ``almost_solved``, ``stalled`` and ``unproven`` count cases.
+    """
+    each = zip(steps, results, strict=True)
+    return pd.DataFrame([stability_row(step, result) for step, result in each])
+
 
 _CHUNKS = 8  # for every worker, of neighboring steps, which are proven by one another
 _LARGE = 50  # bricks from which on steps are proven one by one, by the grips they have in common
@@ -68,7 +152,18 @@ def each_verdict(
             found[key] = _NOTHING
         if key not in found:
             assembly, proven, way = prove(*key, before)
-            found[key] = _without_margins(assembly, proven, way.value)
+            verdict, motion = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
+            if verdict is Verdict.FALLS:
+                motion = proven.answer.motion / np.abs(proven.answer.motion).max()
+            block, contact = _first_to_fail(assembly, motion)
+            found[key] = Stability(
+                verdict,
+                proof=way.value,
+                motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
+                first_block=block,
+                first_contact=contact,
+                unproven=int(verdict is Verdict.UNDECIDED),
+            )
         yield found[key]
 
 
@@ -103,22 +198,6 @@ def _search(prove: VerdictChain, steps: Sequence[Step], first: int) -> None:
     few = [step for step, bricks in zip(near, total, strict=True) if bricks <= _TOGETHER]
     small = (step for step in few if 0 < step.bricks <= _LARGE)
     prove.search([*dict.fromkeys((step.bricks, step.grips) for step in small)])
-
-
-def _without_margins(assembly: Assembly, proven: Proven, proof: str) -> Stability:
-    """Return what is proven of a step, and how it falls if it does."""
-    verdict, motion = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
-    if verdict is Verdict.FALLS:
-        motion = proven.answer.motion / np.abs(proven.answer.motion).max()
-    block, contact = _first_to_fail(assembly, motion)
-    return Stability(
-        verdict,
-        proof,
-        motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
-        first_block=block,
-        first_contact=contact,
-        unproven=int(verdict is Verdict.UNDECIDED),
-    )
 
 
 _NOTHING = Stability(
@@ -209,7 +288,7 @@ def _each(
 
 
 def stability_row(step: Step, result: Stability) -> dict[str, object]:
-    """Return the row of a step in `seqopt.stability.steps.stability_table`."""
+    """Return the row of a step in `seqopt.stability._steps.stability_table`."""
     return {
         "step": step.number,
         "type": step.kind.value,
@@ -235,7 +314,7 @@ _MARGINS = (
     ("friction_needed", "friction", "needs {} at most", 1.0),
     (_TILT, "tilt", "survives {}° at least", 1.0),
     ("largest_grip_force_N", "grip force", "needs {} N at most", 1.0),
-)  # in the table of `seqopt.stability.steps.stability_table`
+)  # in the table of `seqopt.stability._steps.stability_table`
 
 
 def format_rows(rows: Sequence[Mapping[str, Any]]) -> str:
