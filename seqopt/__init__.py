@@ -54,7 +54,7 @@ _HOMES = {
     "plan.build": ("GivenSequence",),
     "contact.mortar": ("DRY", "EPOXY"),
     "stability.assessment": ("Stability",),
-    "stability.steps": ("assess_steps",),
+    "stability._steps": ("assess_steps",),
     "doors": ("assess", "compare", "pareto", "replan"),
     "errors": ("SeqoptError",),
 }  # in the order in which they are met; type checkers read them in __init__.pyi
