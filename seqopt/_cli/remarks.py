@@ -8,8 +8,8 @@ from dataclasses import replace
 from seqopt._cli import options
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
-from seqopt.engines.interface import Engine, Level
-from seqopt.engines.registry import AutoEngine, _chooser_of
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import REASONS, USUAL, AutoEngine, _chooser_of
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import (
     LIFTED,
@@ -37,15 +37,14 @@ def size_line(scene: Scene) -> str:
 def level_notes(asked: options.Computed, engine: Engine) -> tuple[str, ...]:
     """Describe the levels an ``auto`` engine took, and why; if it is the default, only discrete."""
     named = asked.engine is not None
-    if (chooser := _chooser_of(engine)) is not None:
-        choice = chooser.choice
-        return (f"engine: {choice.level.value}: {choice.reason}",) if named else ()
+    if _chooser_of(engine) is not None:
+        return (f"engine: {USUAL}: {REASONS[USUAL]}",) if named else ()
     if not isinstance(engine, AutoEngine):
         return ()
     said = [
-        f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}"
-        for choice, sets in engine.tally.items()
-        if named or choice.level is Level.DISCRETE
+        f"engine: {level} for {sets} grip sets: {REASONS[level]}"
+        for level, sets in engine.tally.items()
+        if named or level == "discrete"
     ]
     return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))
 

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
-from enum import Enum, Flag, auto
-from functools import cache, wraps
-from itertools import combinations
-from math import isfinite
-from typing import ParamSpec, Protocol, TypeVar
+from enum import Flag, auto
+from functools import cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._grip_compliance import GripCompliance, read_compliance
 from seqopt.errors import GripError, SolverError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle
 from seqopt.scene.scene import Scene
-
-_Asked = ParamSpec("_Asked")
-_Answer = TypeVar("_Answer")
 
 
 class Want(Flag):
@@ -76,21 +72,6 @@ class Fields(FrozenValue):
         if self.grip_moment is None:
             settle(self, grip_moment=np.zeros_like(self.grip_force))
         super().__post_init__()
-
-
-class Level(Enum):
-    """Levels of detail of a model, cheapest first; values are the engines' names."""
-
-    RIGID = "compliance"
-    DISCRETE = "discrete"
-
-
-@dataclass(frozen=True)
-class LevelChoice:
-    """A level and why it was taken."""
-
-    level: Level
-    reason: str  # a clause that goes into a sentence
 
 
 FAR = 0.1  # motion over a brick's length beyond which a structure has gone
@@ -187,12 +168,8 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
 
 def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
     """Return fields if all of their numbers are finite; raise `SolverError` if one is not."""
-    each = [getattr(answer, name) for name in _NAMES]
-    owners = (v.base if isinstance(v.base, np.ndarray) else v for v in each)  # cut from one array
-    whole = {id(found): found for found in owners}
-    if all(isfinite(found.sum()) for found in whole.values() if found.size):
-        return answer
-    for name, values in zip(_NAMES, each, strict=True):
+    for name in _NAMES:
+        values = getattr(answer, name)
         if not np.isfinite(values).all():
             of_set = ~np.isfinite(values).reshape(len(values), -1).all(axis=1)
             nodes = ", ".join(map(str, np.asarray(grips)[int(of_set.argmax())])) or "none"
@@ -222,55 +199,36 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
         shape = numbers.shape
         raise GripError(f"grips have shape {shape}; give integer node numbers, (sets, grips)")
     numbers, _ = network.scene.grip_kinds.split(numbers)
-    before, index = network.index_from_first
-    columns = index.take(numbers.astype(np.int64, copy=False) - before, mode="clip")
-    if np.count_nonzero(columns >= 2 * bricks):  # some times as fast as ``any``
-        columns = _searched(network, bricks, numbers)
-    first, second = columns.T.take(_couples(columns.shape[1]), axis=0)
-    twice = first == second
-    if np.count_nonzero(twice):
-        named = numbers[twice.any(axis=0)][0].tolist()
-        raise GripError(f"grip set {named}: a node is held twice; name it once")
-    return np.asarray(columns, dtype=np.int64)
-
-
-def _searched(network: Network, bricks: int, numbers: Ints) -> Ints:
-    """Return columns by a search: some numbers are wrong or far from all others."""
     known, index = network.index_of_grip
     at = np.searchsorted(known, numbers)
-    columns = index.take(at, mode="clip")
+    columns = index.take(at, mode="clip").astype(np.int64, copy=False)
     wrong = (known.take(at, mode="clip") != numbers) | (columns >= 2 * bricks)
     if wrong.any():
         raise GripError(
             f"grip on node {numbers[wrong][0]}: with {bricks} bricks the free nodes are "
             f"{known[index < 2 * bricks].tolist()}"
         )
+    ordered = np.sort(columns, axis=1)
+    twice = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    if twice.any():
+        named = numbers[twice][0].tolist()
+        raise GripError(f"grip set {named}: a node is held twice; name it once")
     return columns
 
 
-@cache
-def _couples(grips: int) -> Ints:
-    """Return all couples (2, c) of a number of grips."""
-    return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
-
-
-def _failing_in_a_line(function: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
+@contextmanager
+def _failing_in_a_line() -> Iterator[None]:
     """Let numerical failures of a function be a `SolverError`."""
-
-    @wraps(function)
-    def guarded(*args: _Asked.args, **named: _Asked.kwargs) -> _Answer:
-        try:
-            return function(*args, **named)
-        except (np.linalg.LinAlgError, ValueError) as error:
-            # SciPy says so of arrays that it does not take
-            if not isinstance(error, np.linalg.LinAlgError) and "infs or NaNs" not in str(error):
-                raise
-            raise SolverError(
-                f"the equations have no answer in numbers ({error}); correct lengths, masses or "
-                "stiffnesses beyond all bounds in the scene"
-            ) from error
-
-    return guarded
+    try:
+        yield
+    except (np.linalg.LinAlgError, ValueError) as error:
+        # SciPy says so of arrays that it does not take
+        if not isinstance(error, np.linalg.LinAlgError) and "infs or NaNs" not in str(error):
+            raise
+        raise SolverError(
+            f"the equations have no answer in numbers ({error}); correct lengths, masses or "
+            "stiffnesses beyond all bounds in the scene"
+        ) from error
 
 
 def no_sets(network: Network, bricks: int, held: int) -> Fields:
@@ -331,7 +289,7 @@ class SerialEngine(NamedEngine, ABC):
     All fields are evaluated for every request: the solution dominates the cost.
     """
 
-    @_failing_in_a_line
+    @_failing_in_a_line()
     def solve(
         self,
         bricks: int,

@@ -22,8 +22,6 @@ from seqopt.contact.mortar import EPOXY, Mortar, find_mortar
 from seqopt.engines.interface import (
     Engine,
     Fields,
-    Level,
-    LevelChoice,
     NamedEngine,
     Want,
     _merge_sets,
@@ -37,22 +35,21 @@ from seqopt.network.network import Network
 from seqopt.scene._armed import hold_alike
 from seqopt.scene.scene import Scene
 
-_SIMPLEST = LevelChoice(Level.RIGID, "the simplest, until a joint leaves its elastic limits")
-_BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
+REASONS = {
+    "compliance": "the simplest, until a joint leaves its elastic limits",
+    "discrete": "a joint would leave its elastic limits",
+}  # for levels of detail, by engine, cheapest first
 
 
 class AutoEngine(NamedEngine):
     """Computes every grip set at the cheapest level whose condition it meets.
 
-    ``mortar``: of joints; ``tally``: how many grip sets of all calls were answered at which level,
-    and why.
+    ``mortar``: of joints; ``tally``: how many grip sets of all calls each engine answered.
     """
 
     def __init__(self, network: Network | Scene, mortar: Mortar = EPOXY) -> None:
         super().__init__(network)
-        self.mortar, self.tally = mortar, Counter[LevelChoice]()
-
-    choice = _SIMPLEST  # of the level that alone answers all grip sets of a problem
+        self.mortar, self.tally = mortar, Counter[str]()
 
     @cached_property
     def rigid(self) -> ComplianceEngine:
@@ -98,7 +95,7 @@ class AutoEngine(NamedEngine):
             far = None if moved is None else np.asarray(moved, dtype=float)[beyond]
             found = self._discrete.solve(bricks, sets, asked, far)
             fields = _merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
-        levels = (_SIMPLEST, ~beyond), (_BEYOND, beyond)
+        levels = zip(REASONS, (~beyond, beyond), strict=True)
         self.tally.update({level: int(mine.sum()) for level, mine in levels if mine.any()})
         return keep_wanted(fields, want)
 
@@ -173,7 +170,7 @@ ENGINES: dict[str, Callable[..., Engine]] = {
     "frame": _frame,
     "discrete": _discrete,
 }
-USUAL = "compliance"  # the engine of what is only drawn, or compared with itself
+USUAL = "compliance"  # the engine of what is only drawn, or compared with itself; the simplest
 DEFAULT = "auto"  # the engine where none is asked for
 LIMITED = ("auto", "discrete")  # engines whose joints hold what mortar does
 
@@ -232,7 +229,7 @@ def simplest(engine: Engine) -> Engine:
     """
     if not isinstance(engine, AutoEngine):
         return engine
-    found: Any = make_engine(engine.choice.level.value, engine.network)
+    found: Any = make_engine(USUAL, engine.network)
     found.chooser, recipe = engine, recipe_of(engine)
     if recipe is not None:
         found.recipe = replace(recipe, simplest=True)
@@ -259,13 +256,12 @@ def provenance(engine: Engine) -> dict[str, object]:
         why = "the default" if recipe.engine == DEFAULT else "asked for by name"
         said = {"name": recipe.engine, "reason": why}
         said |= {name: asdict(value) for name, value in recipe.options.items()}  # type: ignore[call-overload]
-    if (chooser := _chooser_of(engine)) is not None:
-        choice = chooser.choice
-        said["level"] = {"engine": choice.level.value, "reason": choice.reason}
+    if _chooser_of(engine) is not None:
+        said["level"] = {"engine": USUAL, "reason": REASONS[USUAL]}
     elif isinstance(engine, AutoEngine):
         said["levels"] = [
-            {"engine": choice.level.value, "sets": sets, "reason": choice.reason}
-            for choice, sets in engine.tally.items()
+            {"engine": level, "sets": sets, "reason": REASONS[level]}
+            for level, sets in engine.tally.items()
         ]
         said["unchecked"] = engine.unchecked or None
     return {"engine": said, "versions": dict(versions())}

@@ -320,19 +320,6 @@ class Network(Shown, FrozenValue):
         blocked = np.isin(numbers[order], self.scene.blocked_nodes)
         return frozen((numbers[order], np.where(blocked, len(numbers), order)))
 
-    @cached_property
-    def index_from_first(self) -> tuple[int, Ints]:
-        """Offset of the numbers of inner nodes, and a table of their indices.
-
-        As `index_of_grip`; unknown numbers, and those beyond large gaps, have an index after all
-        others.
-        """
-        known, index = self.index_of_grip
-        near = known - known[0] < 2 * len(known)
-        out = np.full(2 * len(known) + 2, len(known))  # the first and the last stand for others
-        out[1 + known[near] - known[0]] = index[near]
-        return int(known[0]) - 1, frozen(out)
-
     def count_nodes(self, bricks: int) -> int:
         """Return the number of nodes of a partial structure."""
         return int(np.searchsorted(self.node_since, bricks, side="right"))

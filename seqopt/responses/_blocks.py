@@ -43,7 +43,7 @@ from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.work._threads import one_thread
 from seqopt.work._workers import free_memory
 
-_Tally = tuple[tuple[object, int], ...]
+_Tally = tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -76,7 +76,7 @@ class Answers(FrozenValue):
     """The responses of a block.
 
     ``values`` (S,): the requested responses, SI units; ``forces`` (S, r): sizes of the forces of
-    the grips, N; ``tally`` (object, int): what the engine counted meanwhile, if it counts:
+    the grips, N; ``tally`` (str, int): what the engine counted meanwhile, if it counts:
     `seqopt.engines.registry.AutoEngine`.
     """
 
@@ -88,7 +88,7 @@ class Answers(FrozenValue):
 def join_answers(parts: Sequence[Answers]) -> Answers:
     """Concatenate the answers to blocks, at least one."""
     values = {name: np.concatenate([a.values[name] for a in parts]) for name in parts[0].values}
-    tally = sum((Counter(dict(part.tally)) for part in parts), Counter[object]())
+    tally = sum((Counter(dict(part.tally)) for part in parts), Counter[str]())
     return Answers(values, np.concatenate([part.forces for part in parts]), tuple(tally.items()))
 
 
@@ -117,7 +117,7 @@ def answer(engine: Engine, block: Block) -> Answers:
     return Answers(values, forces, tuple((Counter(tally_of(engine)) - before).items()))
 
 
-def tally_of(engine: Engine) -> dict[object, int]:
+def tally_of(engine: Engine) -> dict[str, int]:
     """Return the counts of an engine, to update in place; an empty mapping if it has none."""
     found = getattr(engine, "tally", None)
     return found if isinstance(found, dict) else {}
@@ -309,19 +309,9 @@ def for_arms(scene: Scene, step: OpenStep, rows: Ints) -> Bools:
 
 
 def distinct(rows: Ints) -> tuple[Ints, Ints]:
-    """Return the distinct rows, ascending, and the index of each row among them.
-
-    Four times as fast as ``numpy.unique``, which sorts rows as if they were text.
-
-    ``rows`` (P, r). Results: ``rows`` (S, r); ``which`` (P,).
-    """
-    order = np.lexsort(rows.T[::-1])
-    ranked = rows[order]
-    first = np.ones(len(rows), dtype=bool)
-    first[1:] = (ranked[1:] != ranked[:-1]).any(axis=1)
-    back = np.empty(len(rows), dtype=np.int64)
-    back[order] = np.cumsum(first) - 1
-    return ranked[first], back
+    """Return the distinct rows (S, r), ascending, and the index (P,) of each row among them."""
+    found, which = np.unique(rows, axis=0, return_inverse=True)
+    return found, which.ravel()  # NumPy 2.0 has it as a column
 
 
 def _robots_holding(step: OpenStep) -> list[int]:

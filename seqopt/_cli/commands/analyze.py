@@ -19,7 +19,7 @@ from seqopt.arms._kept import arm_faults
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.diagnosis import Finding, diagnose
-from seqopt.engines.interface import Engine, Fields, Level, OpeningEngine, Want
+from seqopt.engines.interface import Engine, Fields, OpeningEngine, Want
 from seqopt.engines.registry import AutoEngine, provenance, recipe_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
@@ -267,8 +267,7 @@ def _late(
     if computed == steps:
         return (), Status.DONE
     so_far = f"{computed} of {steps} steps computed" if computed else "no step computed"
-    levels = engine.tally if isinstance(engine, AutoEngine) else {}
-    dear = sum(sets for choice, sets in levels.items() if choice.level is Level.DISCRETE)
+    dear = engine.tally["discrete"] if isinstance(engine, AutoEngine) else 0
     if dear:
         so_far += f", {dear} by discrete elements, which are what takes long"
     if clock.interrupted:

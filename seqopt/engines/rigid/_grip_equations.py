@@ -14,7 +14,6 @@ from scipy.linalg import lapack
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
-from seqopt.engines.interface import _couples
 from seqopt.engines.rigid._operator import ComplianceOperator, Doubts
 
 
@@ -49,7 +48,7 @@ class Pairs(NamedTuple):
 
 def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     """Return all pairs of grips of the sets that share a brick."""
-    couples = _couples(columns.shape[1])
+    couples = np.array(np.triu_indices(columns.shape[1], 1))
     one, other = columns.T.take(couples, axis=0)
     same = one ^ 1 == other  # the two nodes of a brick
     if not np.count_nonzero(same):
@@ -187,19 +186,8 @@ def well_conditioned(
 
     ``most``: largest of `_doubts` that is accepted; ``compliance``: as of `grip_forces`.
     """
-    lowest, least = found.lowest, np.inf
-    if compliance.moved is None:  # else forces may undo what the weight does
-        yielded = 0.0 if compliance.rigid else 2.0  # by compliant grips, that forces undo as well
-        least = len(found.pivot) * operator.doubts.worst + yielded
-    out = np.asarray(most * lowest >= least)
-    if np.count_nonzero(out) == len(out):
-        return out
-    rest = slice(None) if len(out) <= _MANY else np.flatnonzero(~out & (lowest > 0))
-    part = _GripForces(found.force[rest], found.pivot[:, rest])
-    own_compliance = compliance.select(rest)
-    sure = _doubts(operator, index[rest], part, own_compliance) <= most
-    out[rest] |= sure & (lowest[rest] > 0)
-    return out
+    sure = _doubts(operator, index, found, compliance) <= most
+    return np.asarray(sure & (found.lowest > 0))
 
 
 def _doubts(

@@ -51,17 +51,6 @@ class Doubts(FrozenValue):
         root = np.sqrt(own * self.loss)
         return frozen(np.stack([root, np.abs(self.dead) * self.loss / root, root / own]))
 
-    @cached_property
-    def worst(self) -> float:
-        """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
-
-        As `_doubts` of `seqopt.engines.rigid._grip_equations`: forces undo the displacements, so
-        these are no more in doubt than what the forces add up to.
-        """
-        most = np.abs(self.flexibility).max(initial=0.0)
-        own = np.sqrt(most * self.loss.max(initial=1.0))
-        return float(2 * own * self.shares[2].max(initial=0.0))
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ComplianceOperator(FrozenValue):

@@ -161,7 +161,7 @@ class ComplianceEngine(NamedEngine):
         self._kept: dict[int, ComplianceOperator] = {}  # the one that was asked last comes last
         self._grown: GrownExtremes | None = None  # what answers few grip sets of large structures
 
-    @_failing_in_a_line
+    @_failing_in_a_line()
     def solve(
         self,
         bricks: int,
@@ -199,7 +199,7 @@ class ComplianceEngine(NamedEngine):
                 values[wrong] = getattr(better, name)
         return Fields(**found)
 
-    @_failing_in_a_line
+    @_failing_in_a_line()
     def _extremes(
         self, bricks: int, grips: ArrayLike, want: Want, *, compiled: bool = False
     ) -> Extremes:
