@@ -43,8 +43,8 @@ from seqopt.sequence.schedule_file import read_plan as read_plan
 from seqopt.sequence.schedule_file import read_schedule as read_schedule
 from seqopt.sequence.steps import Site as Site
 from seqopt.sequence.steps import Step as Step
-from seqopt.stability.assessment import Stability as Stability
 from seqopt.stability._steps import assess_steps as assess_steps
+from seqopt.stability.assessment import Stability as Stability
 from seqopt.study.published import CRITERIA as CRITERIA
 from seqopt.workflow import Robust as Robust
 from seqopt.workflow import Search as Search

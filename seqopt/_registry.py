@@ -106,24 +106,24 @@ class Command(Part):
 
 
 COMMANDS = {
-    name: Command(name, f"seqopt._cli.commands.{home}:run", about)
+    name: Command(name, f"seqopt._cli.commands.{home}", about)
     for name, home, about in (
-        ("compare", "compare", "show all ways to build a scene side by side"),
-        ("optimize", "optimize", "choose where robots hold, and write the plan"),
-        ("replan", "replan", "plan the rest of a build after a change"),
-        ("pareto", "pareto", "find all plans that no other one beats in every aim"),
-        ("sweep", "sweep", "plan many designs, robots or payloads, and compare them"),
-        ("analyze", "analyze", "compute forces and displacements in every step"),
-        ("times", "times", "say how long a build takes, and who does what when"),
-        ("assess", "assess", "prove which steps stand, and with what margins"),
-        ("report", "report", "make a page that shows plans step by step"),
-        ("reach", "reach", "say which arms reach which nodes, and how"),
-        ("scene", "scene", "check, describe, export or list scenes"),
-        ("import", "importing", "make a scene of an assembly of COMPAS, a mesh or a table"),
-        ("export", "exporting", "write a plan in a format of others"),
-        ("instance", "instance", "write the graph of a problem, for any solver"),
-        ("judge", "judge", "check a bare solution of an instance, and a bound"),
-        ("completion", "completion", "let the shell complete words of seqopt"),
+        ("compare", "compare:compare", "show all ways to build a scene side by side"),
+        ("optimize", "optimize:run", "choose where robots hold, and write the plan"),
+        ("replan", "replan:replan", "plan the rest of a build after a change"),
+        ("pareto", "pareto:pareto", "find all plans that no other one beats in every aim"),
+        ("sweep", "sweep:run", "plan many designs, robots or payloads, and compare them"),
+        ("analyze", "analyze:analyze", "compute forces and displacements in every step"),
+        ("times", "times:times", "say how long a build takes, and who does what when"),
+        ("assess", "assess:assess", "prove which steps stand, and with what margins"),
+        ("report", "report:report", "make a page that shows plans step by step"),
+        ("reach", "reach:reach", "say which arms reach which nodes, and how"),
+        ("scene", "scene:run", "check, describe, export or list scenes"),
+        ("import", "importing:run", "make a scene of an assembly of COMPAS, a mesh or a table"),
+        ("export", "exporting:export", "write a plan in a format of others"),
+        ("instance", "instance:instance", "write the graph of a problem, for any solver"),
+        ("judge", "judge:run", "check a bare solution of an instance, and a bound"),
+        ("completion", "completion:run", "let the shell complete words of seqopt"),
     )
 }
 """The commands that are always there, by name."""

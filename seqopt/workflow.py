@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
@@ -10,20 +11,21 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from seqopt._files import read_text
+from seqopt._registry import offered
 from seqopt.contact.mortar import Mortar
-from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, make_engine
-from seqopt.errors import ProblemError
-from seqopt.graph.formulation import find_formulation
+from seqopt.errors import ProblemError, StepError, did_you_mean
+from seqopt.graph.formulation import Formulation, Run, as_formulation, find_formulation
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import in_layers, pose
-from seqopt.plan.solve import solve
-from seqopt.problem.criteria import WORST_OVER_METHODS
+from seqopt.plan.pose import graph_of, in_layers, pose
+from seqopt.plan.solve import _solve_run
+from seqopt.problem.criteria import WORST_OVER_METHODS, Ranked, RankSum
 from seqopt.problem.filters import Filter, parse_limits
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
-from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.requirements import LARGEST, Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
 from seqopt.scene._armed import find_postures
@@ -32,13 +34,16 @@ from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scenarios import scenarios as sample
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.rules import FREE, FreeRules, parse_rules, with_robots
+from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules, with_robots
 from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.schedule_file import find_schedule
+from seqopt.sequence.schedule_file import _what_is_left, find_schedule, read_plan, read_site
+from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.study.published import EQUATIONS, find_criterion
-from seqopt.work.progress import Tell
+from seqopt.work.progress import Clock, Tell, within
 
 SEARCH = "search"  # the order that is sought
+FORMS = "PLAN:STEP (a plan's folder or CSV file), a STATE.json, or a number of bricks"
+SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -60,16 +65,30 @@ class Search:
 
     Parameters
     ----------
-    proof, lazy : bool, optional
-        As of `seqopt.solve`.
+    options : mapping or sequence of str, optional
+        Options of the formulation, as ``{"width": 10}``, or in words, as width=10.
+    proof : bool, optional
+        False with cascade or rank_search: compute only the responses that the search meets, about a
+        fifth; how far the choice is from the optimum stays unknown.
+    lazy : bool, optional
+        With an exact formulation: compute only the responses that the proof needs; stopped before
+        it is done, it leaves its best choice and a bound; with an aim, and of a free schedule it is
+        done at any rate.
     time_limit : float, optional
-        Seconds of choosing; the best choice by then has a lower bound.
-    workers, executor, max_memory : optional
-        As of `seqopt.responses.Resources`.
+        Seconds of choosing; the best choice by then has a lower bound. On the command line of the
+        whole command, with proof, verdicts and page: what there was no time for is named; with
+        ``proof=False``, where choosing and computing are one, the moves that were chosen by then.
+    workers : int, optional
+        Processes to share the work among; pays from about ten seconds (default: {default}).
+    executor : concurrent.futures.Executor, optional
+        Who does the work in place of workers, as ``client.get_executor()`` of dask.
     cache : str or pathlib.Path, optional
-        A folder that keeps the postures of arms.
-    options : mapping of str to object, optional
-        What the formulation has options for, as ``{"width": 10}``.
+        Where robots have arms: keep their postures there, and use what is there.
+    max_memory : float or str, optional
+        What responses and costs may take, bytes, or as 500MB or 2GB (default: four fifths of what
+        is free); of a free schedule states and moves, with a bound where it ends.
+    clock : Clock, optional
+        One that runs already, in place of ``time_limit``.
 
     Examples
     --------
@@ -77,14 +96,60 @@ class Search:
     2
     """
 
+    options: Mapping[str, Any] | Sequence[str] = field(default_factory=dict)
     proof: bool = True
     lazy: bool = False
     time_limit: float = math.inf
     workers: int = 1
     executor: Executor | None = None
     cache: Path | str | None = None
-    max_memory: float | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
+    max_memory: float | str | None = None
+    clock: Clock | None = None
+
+    def parse_options(self, formulation: Formulation) -> dict[str, Any]:
+        """Return the options of a formulation; words are typed by those of its ``solve``."""
+        known, given = formulation.options, self.options
+        pairs = given.items() if isinstance(given, Mapping) else (_pair(each) for each in given)
+        out = dict[str, Any](pairs)
+        for name, value in out.items():
+            where = f"option {name}={value}"
+            if isinstance(value, str) and name not in known:
+                hint, names = did_you_mean(name, known), ", ".join(known) or "no options"
+                raise ProblemError(f"{where}: {formulation.name} has {names}{hint}")
+            if isinstance(value, str) and not isinstance(known[name], str):
+                kind = type(known[name])
+                try:
+                    out[name] = kind(value)
+                except ValueError:
+                    said = f"{name} is {value!r}; give an {kind.__name__}"
+                    raise ProblemError(f"{where}: {said}") from None
+        if self.max_memory is not None and "max_memory" in known:
+            out["max_memory"] = self.memory
+        return out
+
+    @property
+    def memory(self) -> float | None:
+        """The memory that it may take, bytes."""
+        return _parse_size(self.max_memory) if isinstance(self.max_memory, str) else self.max_memory
+
+
+def _pair(text: str) -> tuple[str, str]:
+    name, _, value = text.partition("=")
+    return name, value
+
+
+def _parse_size(text: str) -> float:
+    """Parse a size, as ``2GB``, ``500 MB`` or ``1.5GiB``, into bytes.
+
+    >>> _parse_size("1.5GB")
+    1500000000.0
+    """
+    found = SIZE.fullmatch(text.strip())
+    if found is None or not 0 < float(found[1]) < LARGEST:
+        raise ProblemError(f"--max-memory {text}: give a size, as 500MB or 2GB")
+    unit = found[2].upper()
+    power = "BKMGT".find(unit[:1] or "B")
+    return float(found[1]) * float(1024 if "I" in unit else 1000) ** power
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,10 +196,46 @@ class Robust:
         return drawn if grips == 1 else drawn.with_grips((1 / grips, grips))
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class _Place:
+    """Where a build begins or ends, and the steps that led there, if known."""
+
+    site: Site | None = None
+    done: tuple[Step, ...] | None = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """Which steps a build may have, between which states.
+
+    Parameters
+    ----------
+    schedule : Schedule, pathlib.Path or str, optional
+        free: any robot may release, hold or place next, or a sequence with open grips, by name (of
+        all robots), or a CSV file of steps; open grips are marked ? in it (default: the loop of
+        three robots, or of two where there is no third).
+    begin : _Place, int or str, optional
+        Where the build begins: after a step of a plan (its folder or CSV file); in a state of a
+        JSON file (bricks that stand, by names or how many, grips by robot, ages of bricks in s
+        where mortar cures, else just placed); or with so many bricks that nobody holds.
+    to : _Place, int or str, optional
+        Where it ends, said in the same ways; a number of bricks, of a take-down those that stay,
+        leaves grips to the rule ending.
+    direction : str, optional
+        Of a free schedule: take-down removes bricks, the newest first, from the whole structure to
+        the empty site, if nothing else is said.
+    """
+
+    schedule: Schedule | Path | str | None = None
+    begin: _Place | int | str | None = None
+    to: _Place | int | str | None = None
+    direction: str | None = None
+
+
 def optimize(  # noqa: PLR0913  # every question is a word of its own
     scene: Scene | str | Path,
-    schedule: Schedule | Path | str | None = None,
-    criterion: Criterion | str | None = None,
+    schedule: Schedule | Part | Path | str | None = None,
+    criterion: Criterion | Ranked | str | None = None,
     formulation: str | None = None,
     engine: str = DEFAULT,
     *,
@@ -148,7 +249,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     mortar: Mortar | str | None = None,
     robots: int | Sequence[str] | None = None,
     candidates: str | None = None,
-    rules: FreeRules | Sequence[str] | str | None = None,
+    rules: FreeRules | Sequence[str] | str = (),
     search: Search = Search(),  # it is frozen
     progress: Tell | None = None,
 ) -> Plan:
@@ -158,33 +259,64 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     ----------
     scene : Scene, str or pathlib.Path
         The scene, the name of a built-in scene, a few words, or a scene file.
-    schedule : Schedule, pathlib.Path or str, optional
-        The schedule, its file, a name in `seqopt.sequence.methods.SCHEDULES`, or ``"free"``.
-    criterion : Criterion or str, optional
-        What a step costs, or a name in `seqopt.CRITERIA`.
+    schedule : Schedule, Part, pathlib.Path or str, optional
+        The schedule, its file, a name in `seqopt.sequence.methods.SCHEDULES`, or ``"free"``; a
+        `Part` says where the build begins and ends.
+    criterion : Criterion, Ranked or str, optional
+        What a step costs, a name in `seqopt.CRITERIA`, or how the usual one ranks.
     formulation : str, optional
-        A name in `seqopt.formulations`; here and above, `DEFAULTS` say what is taken otherwise.
+        Which mathematical program chooses (default: overlap_dp, which is exact and the fastest,
+        labels with budgets, minimax with worst-peak over scenarios, scenario_search with other
+        aims over scenarios; schedule_search with an aim, ``stands`` or a free schedule,
+        makespan_labels where a makespan counts, order_search where the order is sought).
     engine : str
-        A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest level (`pose`).
+        What computes responses (default: {default}): compliance: exactly rigid bricks, fast; frame:
+        stiff bars, a slow independent check; discrete: joints that open and slip; auto: compliance,
+        and discrete where that is not enough.
     aim : str, optional
-        Minimized goals, the most important first: ``"minmax,steps"``.
+        What is to be as small as possible, the most important first: minmax (the worst step), sum,
+        steps, regrips, travel, makespan (time), a response, as T_max, and others; these are bond,
+        friction, tilt, and sum(RESPONSE); the worst step is by the criterion, by default
+        worst-ratio, and a makespan needs durations (default: minmax of a free schedule; of others
+        the total of what their moves cost); with ``order="search"`` the best order of the bricks is
+        found too.
     limits : sequence of Limit, Filter or str
-        Bounds that no step may exceed: ``"payload"``, ``"F_largest=300"``, ``"linear_range=any"``;
-        and filters, by the names by which they were registered.
-    budgets, stands, also : optional
-        As of `seqopt.pose`: ``"travel=3.5m"``, ``"dry"``.
+        What no step may exceed: payload (of every robot), or RESPONSE=VALUE in SI units, as
+        F_largest=300; also where no grip is open. Plans keep the linear range wherever one does:
+        linear_range=any lifts that, 0.5 asks for half of it in every step.
+    budgets : sequence of str
+        Cap on a total over the build, with the formulations labels, lagrangian, overlap_mip and
+        overlap_lp: travel=0.8 (of what the optimum without budgets travels), travel=3.5m,
+        steps_over:F_largest=250:10 (at most 10 steps over 250 N), robot_use:rob1=100:5 (at most 5
+        in which rob1 carries over 100 N); with an aim or a free schedule: steps=N, regrips=N,
+        travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE.
+    stands : Standing, Mortar or str, optional
+        What every state must be proven to stand with: ``"dry"``, ``"epoxy"``, a strength.
+    also : sequence of str
+        Further responses to compute, besides those that are needed.
     robust : Robust, optional
         Over which scenarios, and what counts of them.
     order : str or sequence of int, optional
-        In which order bricks are placed: ``"ends"``, all names, or ``"search"``.
+        In which order bricks are placed, if not in the scene's own: reversed, ends (from all ground
+        ends at once), sides (course by course, from both ends of each to its middle), the names
+        of all bricks, as 1..12,25..13, or search for the best.
     mortar : Mortar or str, optional
-        What holds the joints, for engines that ask.
+        What holds the joints, in verdicts and in the engines auto and discrete: epoxy, that of
+        Bruun et al. (default), dry, nothing, or bond=STRENGTH (Pa).
     robots : int or sequence of str, optional
-        Who takes part; of a free schedule also how many.
+        How many robots there are (those of the scene first, further ones reach every node), or the
+        names of those that take part where the steps leave that open; in the order in which they
+        place their first bricks (default: the first of the scene whose reach allows the build).
     candidates : str, optional
-        Nodes to look at: ``"near:12"``.
+        Look at fewer nodes per move: near:12 for those at most 12 joints from the newest bricks,
+        within:1.5 for those at most 1.5 m from them; makes any formulation a heuristic (free: of
+        grips on bricks that stand; what is proven holds among these).
     rules : FreeRules, str or sequence of str, optional
-        Of a free schedule: ``"least_grips=1"``.
+        What robots of a free schedule may do: least_grips=N (2, or 1 of two robots, from the second
+        brick on), newest=either|placing|free (where the newest brick is held), regrips=N|any
+        (between two bricks), placers=NAME,NAME|any, payload=kept|ignored,
+        ending=held|released|one-by-one (how robots leave the finished structure),
+        candidates=near:JOINTS|within:METERS|all.
     search : Search, optional
         How it is searched, and what that may use.
     progress : callable, optional
@@ -205,97 +337,214 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     Plan('arch25', 'free', by schedule_search: 50 steps, minmax 0.840088, steps 50, optimal)
     """
     start = time.perf_counter()
-    found = load_scene(scene) if isinstance(scene, str | Path) else scene
-    sought = isinstance(order, str) and order == SEARCH
-    found = in_order(found, None if sought else order)
-    free = isinstance(schedule, str) and schedule == FREE
-    if free and isinstance(robots, int):
-        found, robots = with_robots(found, robots), None
-    find_postures(found, search.cache, progress)
-    own = make_engine(engine, build_network(found), mortar)
-    moves = _find_moves(own.network, schedule, robots, candidates, rules)
-    shared = Resources(search.workers, search.executor)
-    options, tell = dict(search.options), progress
-    asked = parse_limits(limits, own.network.scene)
-    states = _chooses_states(moves, formulation, asked, (aim, stands, sought))
-    if not states:
-        shared, tell = replace(shared, max_memory=search.max_memory, progress=progress), None
-    elif search.max_memory is not None:
-        options["max_memory"] = search.max_memory
-    words: dict[str, Any] = {"limits": asked, "budgets": budgets, "stands": stands, "also": also}
-    words |= {"sought": sought, "resources": shared}
-    if robust is not None:
-        words |= {"scenarios": robust.scenes or robust.draw(found), "over": robust.aim}
-    problem = _pose_words(own, moves, criterion, aim, states=states, **words)
+    clock = search.clock or Clock()
+    limit = search.time_limit if search.clock is None else math.inf
+    with clock.needed("posing the problem"):
+        problem = _pose_build(
+            *(scene, schedule, criterion, formulation, engine),
+            aim=aim,
+            limits=limits,
+            budgets=budgets,
+            stands=stands,
+            also=also,
+            robust=robust,
+            order=order,
+            mortar=mortar,
+            robots=robots,
+            candidates=candidates,
+            rules=rules,
+            search=search,
+            progress=progress,
+        )
+        found = as_formulation(formulation or graph_of(problem).default_formulation)
+        options = search.parse_options(found)
+    tell = within(progress, clock.left) if progress and not found.of_states else progress
+    run = Run(limit, tell, search.proof, search.lazy, options, clock=clock)
     assemble = time.perf_counter() - start
-    plan = solve(
-        problem,
-        formulation,
-        proof=search.proof,
-        lazy=search.lazy,
-        time_limit=search.time_limit,
-        progress=tell,
-        **options,
-    )
+    try:
+        plan = _solve_run(problem, found, run)
+    except KeyboardInterrupt:
+        clock.interrupted = True
+        raise
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
 
 
-def _pose_words(
-    engine: Engine,
-    moves: Schedule | FreeRules,
-    criterion: Criterion | str | None,
-    aim: str | None,
+def _pose_build(  # noqa: PLR0913  # as of `optimize`
+    scene: Scene | str | Path,
+    schedule: Schedule | Part | Path | str | None = None,
+    criterion: Criterion | Ranked | str | None = None,
+    formulation: str | None = None,
+    engine: str = DEFAULT,
     *,
-    states: bool,
-    sought: bool,
-    over: RobustAim | str = WORST_PEAK,
-    **words: Any,
+    aim: str | None = None,
+    limits: Sequence[Limit | Filter | str] | str = (),
+    budgets: Sequence[str] | str = (),
+    stands: Standing | Mortar | str | None = None,
+    also: Sequence[str] = (),
+    robust: Robust | None = None,
+    order: str | Sequence[int] | None = None,
+    mortar: Mortar | str | None = None,
+    robots: int | Sequence[str] | None = None,
+    candidates: str | None = None,
+    rules: FreeRules | Sequence[str] | str = (),
+    search: Search = Search(),  # it is frozen
+    progress: Tell | None = None,
 ) -> Problem:
-    """Pose a problem, by default with the usual criterion and aims of states or of candidates.
+    """Return the problem that `optimize` solves.
 
-    ``sought``: whether the best order of the bricks is; ``words``: as of `pose`.
+    Parameters
+    ----------
+    scene, schedule, criterion, formulation, engine, aim, limits, budgets, stands, also, robust
+        As of `optimize`.
+    order, mortar, robots, candidates, rules, search, progress
+        As of `optimize`.
     """
-    usual = DEFAULTS[FREE if states else "any other"]
-    of_totals = str(over) != str(WORST_PEAK)  # they are of sums
-    goals = aim or (not of_totals and usual.aim) or ()
-    orders = Orders.TIED if sought else None
-    found = find_criterion(criterion or usual.criterion)
-    return pose(engine, moves, found, goals, over=over, orders=orders, **words)
+    part = schedule if isinstance(schedule, Part) else Part(schedule=schedule)
+    free, sought = part.schedule == FREE, isinstance(order, str) and order == SEARCH
+    found = load_scene(scene) if isinstance(scene, str | Path) else scene
+    found = in_order(found, None if sought else order)
+    if isinstance(robots, int) and free:
+        found, robots = with_robots(found, robots), None
+    if part.direction == Direction.TAKE_DOWN.value and not free:
+        raise ProblemError(f"direction {part.direction}: it goes with schedule={FREE!r}")
+    found, begin = _find_start(found, part.begin, stands)
+    if (turned := _find_place(part.to, "to", found))[0] != found:
+        raise StepError(f"to {part.to}: its bricks are not those that follow in this order")
+    find_postures(found, search.cache, progress)
+    own = make_engine(engine, build_network(found), mortar)
+    moves = _find_moves(own.network, part, robots, candidates, rules)
+    moves = _between(moves, begin, turned[1])
+    asked: Sequence[Any] = parse_limits(limits, found)
+    states = _chooses_states(moves, formulation, asked, (aim, stands, sought))
+    over: RobustAim | str = WORST_PEAK if robust is None else robust.aim
+    usual, totals = DEFAULTS[FREE if states else "any other"], str(over) != str(WORST_PEAK)
+    return pose(
+        own,
+        moves,
+        _choose_criterion(criterion, usual.criterion),
+        aim or (not totals and usual.aim) or (),  # totals are of sums
+        asked,
+        budgets=budgets,
+        stands=stands,
+        scenarios=() if robust is None else robust.scenes or robust.draw(found),
+        over=over,
+        orders=Orders.TIED if sought else None,
+        also=also,
+        resources=Resources(
+            search.workers, search.executor, search.memory, None if states else progress
+        ),
+    )
+
+
+def _choose_criterion(given: Criterion | Ranked | str | None, usual: Criterion | str) -> Criterion:
+    """Return a criterion, or the usual one, also with ranks that are taken in a given way."""
+    found = find_criterion(usual if given is None or isinstance(given, Ranked) else given)
+    if not isinstance(given, Ranked):
+        return found
+    if not isinstance(found, RankSum):
+        raise ProblemError(f"--ranked {given.value}: {found.name} has no ranks; leave it out")
+    return replace(found, ranked=given)
 
 
 def _chooses_states(
     moves: Any, formulation: str | None, limits: Sequence[object], others: Sequence[object]
 ) -> bool:
-    """Return whether states are chosen, not candidates.
-
-    ``moves``: a schedule or rules, or their name; ``others``: options that need states.
-    """
+    """Return whether states are chosen, not candidates; ``others``: options that need states."""
     filtered = any(isinstance(each, Filter) for each in limits)
-    if any(others) or filtered or moves == FREE or not in_layers(moves):
+    if any(others) or filtered or not in_layers(moves):
         return True
     return formulation is not None and find_formulation(formulation).of_states
 
 
 def _find_moves(
     network: Network,
-    schedule: Schedule | Path | str | None,
+    part: Part,
     robots: int | Sequence[str] | None,
     candidates: str | None,
-    rules: FreeRules | Sequence[str] | str | None,
-    where: str = "rules",
+    rules: FreeRules | Sequence[str] | str,
 ) -> Schedule | FreeRules:
-    """Return a schedule with open grips, or the rules of the free one, from words or values.
-
-    ``where``: rules, for messages.
-    """
-    if isinstance(schedule, str) and schedule == FREE:
-        found = parse_rules(() if rules is None else rules, where=where)
-        given: dict[str, Any] = {"robots": robots, "candidates": candidates}
-        return replace(found, **{name: each for name, each in given.items() if each is not None})
-    if rules is not None:
-        give = f"--schedule {FREE}" if where.startswith("-") else f"schedule={FREE!r}"
-        raise ProblemError(f"{where}: only the free schedule has them; give {give}")
+    """Return a schedule with open grips, or the rules of the free one, from words or values."""
+    if isinstance(part.schedule, str) and part.schedule == FREE:
+        given = {"robots": robots, "candidates": candidates, "direction": part.direction}
+        given = {name: each for name, each in given.items() if each is not None}
+        return replace(parse_rules(rules), **dict[str, Any](given))
+    if rules:
+        raise ProblemError(f"rules: only the free schedule has them; give schedule={FREE!r}")
     if isinstance(robots, str) or not isinstance(robots, Sequence | None):
         raise ProblemError(f"robots {short(robots)}: give names, as ['rob1', 'rob2']")
-    opened = find_schedule(network, schedule, robots or ())
+    opened = find_schedule(network, part.schedule, robots or ())
     return opened if candidates is None else thin(opened, candidates)
+
+
+def _find_place(given: _Place | int | str | None, name: str, scene: Scene) -> tuple[Scene, _Place]:
+    """Return where a build begins or ends, and the scene in an order that begins with its bricks.
+
+    A number of bricks with which it begins is a state without grips.
+    """
+    text = str(given)
+    try:
+        if given is None or isinstance(given, _Place):
+            return scene, given or _Place()
+        if text.isdecimal():
+            site = Site(int(text), (None,) * len(scene.robots) if name == "begin" else None)
+            site.holds(scene)
+            return scene, _Place(site, None if site.bricks else ())
+        file, _, step = text.rpartition(":")
+        if file and step.isdecimal():
+            return scene, _of_plan(scene, Path(file), int(step))
+        if not text.endswith(".json"):
+            raise StepError(f"give {FORMS}")
+        found, site = read_site(scene, Path(text))
+        return found, _Place(site, None)
+    except StepError as error:
+        raise StepError(f"{name} {text}: {error}") from None
+
+
+def _of_plan(scene: Scene, path: Path, step: int) -> _Place:
+    """Return the place of a plan after a step; robots that it does not list hold nothing."""
+    file = path / "plan.csv" if path.is_dir() else path
+    columns = read_text(file).partition("\n")[0].split(",")
+    known = [robot for robot in scene.robots if f"{robot.name}_node" in columns]
+    steps = read_plan(scene.with_robots(*known) if known else scene, file)
+    where = [known.index(robot) if robot in known else None for robot in scene.robots]
+    if known != [*scene.robots]:
+        steps = tuple(
+            replace(s, grips=tuple(None if k is None else s.grips[k] for k in where)) for s in steps
+        )
+    done = tuple(each for each in steps if each.number <= step)
+    return _Place(Site.after(steps, step), done if steps[0].number == 1 else None)
+
+
+def _find_start(
+    scene: Scene, given: _Place | int | str | None, stands: Standing | Mortar | str | None
+) -> tuple[Scene, _Place]:
+    """Return where a build begins, and the scene in an order that begins with its bricks.
+
+    With curing mortar it has the ages of bricks in the plan.
+    """
+    scene, begin = _find_place(given, "begin", scene)
+    cures = isinstance(stands, Standing) and stands.curing is not None
+    if begin.site is None or not begin.done or not cures:
+        return scene, begin
+    waits = offered("mortar_waits")(build_network(scene), stands)
+    try:
+        times = offered("step_times")(scene, begin.done, waits)
+    except StepError as error:
+        raise StepError(f"{error}; or give a STATE.json with the ages of its bricks") from None
+    ends = [t.end for t, s in zip(times, begin.done, strict=True) if s.kind is StepKind.PLACE]
+    ages = tuple(times[-1].end - end for end in ends)
+    return scene, replace(begin, site=replace(begin.site, ages=ages))
+
+
+def _between(moves: Schedule | FreeRules, begin: _Place, end: _Place) -> Schedule | FreeRules:
+    """Return the moves between two places."""
+    if begin.site is None and end.site is None:
+        return moves
+    if isinstance(moves, FreeRules):
+        return replace(moves, begin=begin.site, finish=end.site)
+    if begin.done is None or end.done is None:
+        raise StepError(
+            f"schedule {moves.method}: it goes on, and ends, at a step of a plan of its own; give "
+            "PLAN:STEP, or --schedule free"
+        )
+    return _what_is_left(moves, begin.done, end.site)

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt._cli.grammar import parse_options
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.registry import AutoEngine

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from seqopt._cli.terminal import complain, show, show_text
 from seqopt.errors import (
@@ -27,6 +27,9 @@ NOT_IN_JSON = {"NaN": None, "Infinity": "inf", "-Infinity": "-inf"}  # and what 
 LESS = "take fewer bricks, robots that reach less, or a computer with more memory"
 
 
+_Value = TypeVar("_Value")
+
+
 class Status(IntEnum):
     """Exit status of a command."""
 
@@ -39,8 +42,11 @@ class Status(IntEnum):
     INTERRUPTED = 130
 
 
-def status_of(error: BaseException) -> Status:
-    """Print an error as one line on standard error, and return the exit status."""
+def status_of(error: BaseException, said: Callable[[str], str] = str) -> Status:
+    """Print an error as one line on standard error, and return the exit status.
+
+    ``said``: returns a message in words of the command line.
+    """
     if isinstance(error, KeyboardInterrupt):
         complain(f"seqopt: interrupted{f'; {error}' if str(error) else ''}")
         return Status.INTERRUPTED
@@ -50,12 +56,12 @@ def status_of(error: BaseException) -> Status:
         return Status.FAILED
     if isinstance(error, SolverError):
         ends = {TimeUpError: "time is over", NothingFoundError: "nothing found"}
-        complain(f"seqopt: {ends.get(type(error), 'solver failed')}: {error}")
+        complain(f"seqopt: {ends.get(type(error), 'solver failed')}: {said(str(error))}")
         return Status.FAILED
     if isinstance(error, OSError) and not isinstance(error, SeqoptError):
         complain(f"seqopt: error: cannot write standard output: {error.strerror or error}")
         return Status.BAD_INPUT
-    complain(f"seqopt: error: {error}")
+    complain(f"seqopt: error: {said(str(error))}")
     if isinstance(error, WorkerError):
         return Status.FAILED
     none = isinstance(error, MechanismError | InfeasibleError)
@@ -63,7 +69,7 @@ def status_of(error: BaseException) -> Status:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Answer:
+class Answer(Generic[_Value]):
     """The answer of a command: facts for scripts and text for people."""
 
     facts: Mapping[str, object]  # values, mappings, sequences, tables, and what makes them if asked
@@ -74,10 +80,10 @@ class Answer:
     failures: tuple[str, ...] = ()  # what went wrong although there is an answer: as notes
     status: Status = Status.DONE
     faults: tuple[str, ...] = ()  # what --strict makes failures
-    value: Any = None  # what Python gets
+    value: _Value = None  # type: ignore[assignment]  # what Python gets
     scene: Any = None  # of which it is
 
-    def strictly(self) -> Answer:
+    def strictly(self) -> Answer[_Value]:
         """Return the answer of --strict: its violations set the exit status."""
         if not self.faults or self.status not in (Status.DONE, Status.DOES_NOT_HOLD):
             return self
@@ -100,14 +106,14 @@ class Answer:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result:
+class Result(Generic[_Value]):
     """What a command found, for Python, and its answer, made and written where it is asked for."""
 
-    value: Any
-    answer: Callable[[], Answer]
+    value: _Value
+    answer: Callable[[], Answer[Any]]
 
 
-def answer_of(result: Any) -> Answer:
+def answer_of(result: Any) -> Answer[Any]:
     """Return the answer of what a command returns: an answer, a result, a table or a text."""
     if isinstance(result, Result):
         return result.answer()
@@ -132,7 +138,7 @@ def scene_facts(scene: Any) -> dict[str, object]:
     }
 
 
-def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) -> Status:
+def print_answer(answer: Answer[Any], command: str, *, quiet: bool, as_json: bool) -> Status:
     """Print an answer as text, paths or JSON; a closed output is no error if files are written."""
     if as_json:
         show(json.dumps(answer.document(command), indent=2, allow_nan=False) + "\n")

@@ -38,6 +38,17 @@ LINES = 40  # of a screen
 ALL = "--help-all"
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
+LEADS = {
+    "begin": ("begin",),
+    "criterion": ("criterion",),
+    "direction": ("direction",),
+    "engine": ("engine",),
+    "limits": ("limit",),
+    "options": ("option",),
+    "rules": ("rules",),
+    "to": ("to",),
+}  # first words of messages that name a parameter
+GIVEN = re.compile(r"\b(\w+)='([\w-]+)'")
 PRINTED = ("quiet", "json", "strict")  # what concerns the printed answer alone
 GONE = {
     "--crown": "in Python dataclasses.replace(seqopt.CRITERIA[...], crown=...) has it",
@@ -104,10 +115,11 @@ class _Show(argparse.Action):
         parser.exit()
 
 
-def parser(asked: str | None = None) -> argparse.ArgumentParser:
+def parser(asked: str | None = None, *, helps: bool = True) -> argparse.ArgumentParser:
     """Return the parser of the command line, or of one command.
 
-    ``command``: the only one to parse. A wrong word ends the program with `Status.BAD_INPUT`.
+    ``asked``: the only one to parse; ``helps``: whether its help is read. A wrong word ends the
+    program with `Status.BAD_INPUT`.
     """
     whole = _Parser(
         prog="seqopt",
@@ -131,7 +143,7 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
         if asked in (None, name):
             all_help = "show every option of the command, and exit"
             added.add_argument(ALL, const=_Parser.format_help, help=all_help, **how)
-            SIGNATURES.signature_of(command.load()).fill(added)
+            SIGNATURES.signature_of(command.load()).fill(added, helps=helps)
         if asked == name:
             whole.asked, whole.spoken = name, tuple(added._option_string_actions)
     return whole
@@ -152,12 +164,30 @@ class Request:
         function = find_command(self.name).load()
         return SIGNATURES.signature_of(function).call({**self.values, "progress": progress})
 
+    def spoken(self, message: str) -> str:
+        """Return a message about parameters of Python as one about options."""
+        options = SIGNATURES.signature_of(find_command(self.name).load()).options
+        lead, space, rest = message.partition(" ")
+        known = {key: option for option in options.values() for key in LEADS.get(option.name, ())}
+        if lead in known:
+            message = known[lead].flag + space + rest
+        return GIVEN.sub(lambda found: self._option(options, found), message)
+
+    @staticmethod
+    def _option(options: Mapping[str, Any], found: re.Match[str]) -> str:
+        known = options.get(found[1])
+        return found[0] if known is None else f"{known.flag} {found[2]}"
+
 
 def request(words: Sequence[str]) -> Request:
     """Parse words into a command and its options; a wrong word ends the program."""
-    values = vars(parser(named_command(words)).parse_args(words))
+    helps = bool({ALL, "-h", "--help"} & {*words})
+    values = vars(parser(named_command(words), helps=helps).parse_args(words))
     printed = {name: values.pop(name) for name in PRINTED if name in values}
-    return Request(values.pop("command"), {**values, "made_by": words}, **printed)
+    name = values.pop("command")
+    if name == "instance":
+        values["made_by"] = words
+    return Request(name, values, **printed)
 
 
 def first_screen(command: argparse.ArgumentParser) -> str:
@@ -182,7 +212,7 @@ def first_screen(command: argparse.ArgumentParser) -> str:
     lines.start_section("what a first use needs")
     brief = [*map(copy, first)]
     for action in brief:
-        action.help = (action.help or "").partition("; ")[0]
+        action.help = re.split(r"; |\. ", action.help or "")[0]
     lines.add_arguments(brief)
     lines.end_section()
     lines.add_text(command.epilog)

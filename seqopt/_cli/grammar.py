@@ -1,26 +1,17 @@
-"""Parsers of words of the command line: limits, criteria, mortars, props, numbers."""
+"""Parsers of words of the command line: payloads, grips, mortars, props, numbers."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
-from math import radians
-from typing import Any
 
-from seqopt._cli.options import Cured, Number, Numbers, Ranks, Stands, Words
-from seqopt.contact.mortar import MORTARS, Mortar, _find_curing, find_mortar
+from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
-from seqopt.graph.formulation import Formulation, as_formulation
-from seqopt.problem.criteria import Ranked, RankSum
-from seqopt.problem.requirements import LARGEST, Criterion, number_word, split_word
-from seqopt.problem.standing import Standing
+from seqopt.problem.requirements import number_word, split_word
 from seqopt.scene._checks import short
 from seqopt.scene.parts import Prop
 from seqopt.scene.scene import Scene
-from seqopt.study.published import find_criterion
 
-SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 PROPS = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma push, capacity=300"
 
 
@@ -30,13 +21,6 @@ def parse_count(number: int | str, where: str, most: int, least: int = 1) -> int
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
         raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
     return int(text)
-
-
-def parse_robots(robots: int | Words | None) -> tuple[str, ...]:
-    """Parse comma-separated names of robots; empty for None or a number."""
-    text = "" if robots is None else str(robots)
-    named = text and not text.isdecimal()
-    return tuple(name.strip() for name in text.split(",")) if named else ()
 
 
 def with_payload(text: str, scene: Scene) -> Scene:
@@ -51,7 +35,7 @@ def with_payload(text: str, scene: Scene) -> Scene:
     return scene.with_robots(*said)
 
 
-def with_grips(grips: Number, scene: Scene) -> Scene:
+def with_grips(grips: float | str, scene: Scene) -> Scene:
     """Return a scene with grip stiffness from a word: ``rigid``, ``1e6`` or ``1e6x1e6x5e5``, N/m.
 
     ``turning=1e4`` after a comma is the rotational stiffness.
@@ -80,7 +64,7 @@ def with_grips(grips: Number, scene: Scene) -> Scene:
 
 def parse_numbers(
     where: str,
-    texts: Numbers,
+    texts: Iterable[str],
     known: Collection[str] | None = None,
     *,
     zero: bool = False,
@@ -97,28 +81,6 @@ def parse_numbers(
     return out
 
 
-def parse_options(formulation: Formulation | str, texts: Words) -> dict[str, Any]:
-    """Parse options of a formulation, typed by the signature of its ``solve``."""
-    formulation = as_formulation(formulation)
-    known = formulation.options
-    out: dict[str, Any] = {}
-    for text in texts:
-        name, _, value = text.partition("=")
-        if name not in known:
-            hint = did_you_mean(name, known)
-            raise ProblemError(
-                f"--option {text}: {formulation.name} has {', '.join(known) or 'no options'}{hint}"
-            )
-        kind = type(known[name])
-        try:
-            out[name] = kind(value)
-        except ValueError as error:
-            raise ProblemError(
-                f"--option {text}: {name} is {value!r}; give an {kind.__name__}"
-            ) from error
-    return out
-
-
 def parse_mortar(text: str | Mortar, where: str) -> Mortar:
     """Parse a mortar; ``where``: argument, for messages."""
     if isinstance(text, Mortar):  # of Python
@@ -129,52 +91,6 @@ def parse_mortar(text: str | Mortar, where: str) -> Mortar:
         hint = did_you_mean(text.partition("=")[0], (*MORTARS, "bond"))
         known = f"give {', '.join(MORTARS)}, or bond=STRENGTH (Pa), zero or more"
         raise ProblemError(f"{where} {text}{hint}: {known}") from error
-
-
-def parse_standing(asked: Stands) -> Standing | None:
-    """Return the stability requirement of the options, None if there is none."""
-    if isinstance(asked.stands, Standing):  # of Python
-        return asked.stands
-    curing = asked.curing if isinstance(asked, Cured) else ()
-    said = {"tilt": asked.tilt, "friction": asked.friction, "curing": curing}
-    if asked.stands is None:
-        names = [name for name, value in said.items() if value not in (None, ())]
-        if names:
-            raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands dry, say")
-        return None
-    mortar = parse_mortar(asked.stands, "--stands")
-    mortar = mortar if asked.friction is None else replace(mortar, friction=asked.friction)
-    try:
-        cures = _find_curing(" ".join(curing)) if curing else None
-    except SceneError as error:
-        raise ProblemError(f"--{error}") from error
-    return Standing(mortar, radians(asked.tilt or 0.0), cures)
-
-
-def parse_criterion(asked: Ranks, usual: Criterion) -> Criterion | None:
-    """Return the criterion of the options; ``usual``: the default that options of ranks modify."""
-    named, ranked = asked.criterion, asked.ranked
-    criterion = None if named is None else find_criterion(named, "--criteria")
-    if ranked is None:
-        return criterion
-    criterion = criterion or usual
-    if not isinstance(criterion, RankSum):
-        raise ProblemError(f"--ranked {ranked}: {criterion.name} has no ranks; leave it out")
-    return replace(criterion, ranked=Ranked(ranked))
-
-
-def parse_size(text: str) -> float:
-    """Parse a size, as ``2GB``, ``500 MB`` or ``1.5GiB``, into bytes.
-
-    >>> parse_size("1.5GB")
-    1500000000.0
-    """
-    found = SIZE.fullmatch(text.strip())
-    if found is None or not 0 < float(found[1]) < LARGEST:
-        raise ProblemError(f"--max-memory {text}: give a size, as 500MB or 2GB")
-    unit = found[2].upper()
-    power = "BKMGT".find(unit[:1] or "B")
-    return float(found[1]) * float(1024 if "I" in unit else 1000) ** power
 
 
 def parse_props(text: str, scene: Scene) -> tuple[Prop, ...]:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from importlib import import_module
 
 from seqopt._cli.answer import Status, answer_of, print_answer, status_of
-from seqopt._cli.arguments import EXAMPLES, named_command, request
+from seqopt._cli.arguments import EXAMPLES, Request, named_command, request
 from seqopt._cli.terminal import flush, quiet_numbers, show, silence
 from seqopt._later import Later
 from seqopt._registry import COMMANDS
@@ -24,14 +24,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     An error is one line on standard error.
     """
+    said: list[Request] = []
     try:
-        status = _run(sys.argv[1:] if arguments is None else arguments)
+        status = _run(sys.argv[1:] if arguments is None else arguments, said)
         flush()
     except BrokenPipeError:  # the reader of our output has gone: not an error of ours
         silence(sys.stdout)
         return Status.DONE
     except (SeqoptError, KeyboardInterrupt, MemoryError, OSError) as error:
-        status = status_of(error)
+        status = status_of(error, said[0].spoken if said else str)
         with suppress(OSError):
             flush()
     return status
@@ -60,7 +61,7 @@ def load(words: Sequence[str]) -> None:
     gc.enable()
 
 
-def _run(words: Sequence[str]) -> int:
+def _run(words: Sequence[str], said: list[Request]) -> int:
     if not words:
         show(EXAMPLES)
         return Status.DONE
@@ -68,6 +69,7 @@ def _run(words: Sequence[str]) -> int:
         asked = request(words)
     except SystemExit as stop:  # the parser has said why, or printed its help
         return int(stop.code or 0)
+    said.append(asked)  # whose words an error is about
     with quiet_numbers(quiet=asked.quiet), WATCHER.Watcher(shows=not asked.quiet) as tell:
         answer = answer_of(asked.result(tell))
     answer = answer.strictly() if asked.strict else answer

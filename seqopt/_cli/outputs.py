@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from seqopt._cli import inputs, options
+from seqopt._cli.words import Built, is_folder
 from seqopt._files import (
     csv_text,
     require_apart,
@@ -24,6 +25,7 @@ from seqopt._showing import PAGE
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
+from seqopt.work.progress import Tell
 
 CHARTS = Later("seqopt.report.charts")  # matplotlib is an extra
 TASKS = Later("seqopt.exchange._tasks")  # 13 ms, where files are written
@@ -123,41 +125,48 @@ def written_to(
     return f"written to {folder}" + f"; {folder / PAGE} shows {what}" * page
 
 
-def write_outputs(
-    asked: options.Written, files: Callable[[], Mapping[str, bytes | str]]
-) -> tuple[Path, ...]:
-    """Write the requested output folder atomically, if there is one; return the paths.
+@dataclass(frozen=True)
+class Output:
+    """Where a command writes, if it does, and what it reads, which it never overwrites.
 
-    Raises `FileError` if a file would overwrite what the command reads, or cannot be written.
+    ``given``: values in place of a scene, a plan, a schedule; those that are paths count.
     """
-    if asked.path is None:
-        return ()
-    asked.tell("writing the plan")
-    made = files()
-    require_apart([asked.path / name for name in made], _inputs(asked))
-    write_folder(asked.path, made)
-    return (asked.path,)
 
+    path: Path | None
+    given: tuple[object, ...]
 
-def require_out(asked: options.Written, *names: str) -> None:
-    """Raise `FileError`, before anything is computed, if the output folder cannot be created.
+    @classmethod
+    def of(cls, out: Path | str | None, *given: object) -> Output:
+        """Return where a command writes, by its options."""
+        read = (each.scene if isinstance(each, Built) else each for each in given)
+        return cls(None if out is None else Path(out), tuple(read))
 
-    Files that will be written there under given names must not be inputs.
-    """
-    if asked.path is not None:
-        require_folder(asked.path)
-        keep_apart(asked, *(asked.path / name for name in names))
+    def keep_apart(self, *outputs: Path | None) -> None:
+        """Raise `FileError` if two outputs are the same file, or one is an input."""
+        named = [Path(each) for each in self.given if isinstance(each, str | Path)]
+        folders = [path for path in named if is_folder(path)]
+        inside = [path / name for path in folders for name in ("scene.json", "plan.csv")]
+        read = [path for path in (*named, *inside) if str(path) not in builtin_scenes()]
+        require_apart([path for path in outputs if path is not None], read)
 
+    def require(self, *names: str) -> None:
+        """Raise `FileError`, before anything is computed, if the folder cannot be created.
 
-def keep_apart(asked: options.Asked, *outputs: Path | None) -> None:
-    """Raise `FileError` if two outputs are the same file, or one is an input."""
-    require_apart([path for path in outputs if path is not None], _inputs(asked))
+        Files that will be written there under given names must not be inputs.
+        """
+        if self.path is not None:
+            require_folder(self.path)
+            self.keep_apart(*(self.path / name for name in names))
 
+    def write(self, tell: Tell, files: Callable[[], Mapping[str, bytes | str]]) -> tuple[Path, ...]:
+        """Write the files to the folder, all or none, if there is one; return the paths.
 
-def _inputs(asked: options.Asked) -> list[Path]:
-    """Return the input files of a command, including those in the folder of a plan."""
-    given = (getattr(asked, name, None) for name in ("scene", "plan", "schedule"))
-    named = [Path(name) for name in given if isinstance(name, str | Path)]
-    folders = [path for path in named if inputs.is_folder(path)]
-    inside = [path / name for path in folders for name in ("scene.json", "plan.csv")]
-    return [path for path in (*named, *inside) if str(path) not in builtin_scenes()]
+        Raises `FileError` if a file would overwrite what the command reads, or cannot be written.
+        """
+        if self.path is None:
+            return ()
+        tell("writing the plan")
+        made = files()
+        self.keep_apart(*(self.path / name for name in made))
+        write_folder(self.path, made)
+        return (self.path,)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
-from seqopt._cli import options
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
 from seqopt.engines.interface import Engine
@@ -27,6 +27,8 @@ from seqopt.stability._builds import BuildProver, BuildVerdicts, _settlement_sai
 from seqopt.stability.assessment import Verdict
 from seqopt.work.progress import INTERRUPT, TIME, Clock
 
+_Value = TypeVar("_Value")
+
 
 def size_line(scene: Scene) -> str:
     """Describe name and size of a scene."""
@@ -34,9 +36,8 @@ def size_line(scene: Scene) -> str:
     return f"{scene.name}: {size}, {len(scene.grounds)} ground ends"
 
 
-def level_notes(asked: options.Computed, engine: Engine) -> tuple[str, ...]:
-    """Describe the levels an ``auto`` engine took, and why; if it is the default, only discrete."""
-    named = asked.engine is not None
+def level_notes(named: str | None, engine: Engine) -> tuple[str, ...]:
+    """Describe the levels an ``auto`` engine took, and why; of one not named only discrete."""
     if _chooser_of(engine) is not None:
         return (f"engine: {USUAL}: {REASONS[USUAL]}",) if named else ()
     if not isinstance(engine, AutoEngine):
@@ -107,7 +108,7 @@ def settlement_notes(scene: Scene) -> tuple[str, ...]:
 WHY = {TIME: "time is over", INTERRUPT: "interrupted"}
 
 
-def in_time(answer: Answer, clock: Clock, interrupted: str) -> Answer:
+def in_time(answer: Answer[_Value], clock: Clock, interrupted: str) -> Answer[_Value]:
     """Return an answer with the parts skipped by the time limit, or its interrupt."""
     left = clock.left_out.values()
     each = {why: [what for what, own in clock.left_out.items() if own == why] for why in left}
@@ -119,7 +120,7 @@ def in_time(answer: Answer, clock: Clock, interrupted: str) -> Answer:
     return replace(answer, failures=failures, status=Status.INTERRUPTED)
 
 
-def marked(answer: Answer, outside: Sequence[object]) -> Answer:
+def marked(answer: Answer[_Value], outside: Sequence[object]) -> Answer[_Value]:
     """Return an answer preceded by exceeded limits of the linear range, and the remedy."""
     left = [str(departure) for departure in outside]
     answer = replace(answer, facts={**answer.facts, "outside_linear_range": left})
@@ -131,7 +132,7 @@ def marked(answer: Answer, outside: Sequence[object]) -> Answer:
     return replace(answer, text="\n".join([*map(wrapped, lines), answer.text]))
 
 
-def kept_range(answer: Answer, beyond: str | None) -> Answer:
+def kept_range(answer: Answer[_Value], beyond: str | None) -> Answer[_Value]:
     """Return an answer whose status reports a plan beyond the limit on the linear range."""
     if beyond is None or answer.status is not Status.DONE:
         return answer
@@ -140,12 +141,12 @@ def kept_range(answer: Answer, beyond: str | None) -> Answer:
 
 
 def held_to(
-    answer: Answer,
+    answer: Answer[_Value],
     over: Sequence[str],
     outside: Sequence[object] = (),
     verdicts: Mapping[str, Sequence[BuildVerdicts]] | None = None,
     unreached: Sequence[str] = (),
-) -> Answer:
+) -> Answer[_Value]:
     """Return a `marked` answer with `exceeded` payloads, which --strict turns into its status.
 
     ``verdicts``: by build, the decisive mortar last; ``unreached``: steps infeasible for arms.

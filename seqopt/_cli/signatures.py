@@ -1,8 +1,8 @@
-"""Options of commands, derived from the signatures and docstrings of their functions.
+"""Options of commands, derived from the signatures and docstrings of functions.
 
-A command is a function. Its parameters are its options: of a type and a default, with a help text
-in the docstring, under the question that it answers. A parameter that takes a subclass of `Asked`,
-a frozen value of options that belong together, is spread into the fields of that class.
+A command is a function. Its parameters are its options: of a type and a default, with the help text
+that its docstring has for them. A parameter that takes a value made of several words is spread: the
+fields of the value are options (`seqopt._cli.words`). So the command line is made from Python.
 """
 
 from __future__ import annotations
@@ -11,54 +11,69 @@ import argparse
 import inspect
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, replace
-from functools import cache
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, replace
+from functools import cache, wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
 
+import pandas as pd
+
+from seqopt._cli.answer import Answer, Result
 from seqopt._cli.grammar import parse_count
-from seqopt._cli.options import MOST_WORKERS, NAMES, Asked
 from seqopt._cli.terminal import columns, wrapped
+from seqopt._cli.watcher import Watcher
+from seqopt._cli.words import FLAGS, HIDDEN, HOW, MOST_WORKERS, NAMES, QUESTIONS, SPREAD, VALUES
+from seqopt._registry import COMMANDS
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.problem.requirements import number_word
 
-QUESTIONS = (
-    "What is built, and by whom?",
-    "Which steps may a build have?",
-    "What counts as best?",
-    "What must hold?",
-    "What is asked beside verdicts?",
-    "In which scenarios is it good?",
-    "Who chooses and proves, and how long?",
-    "How are responses computed?",
-    "What is written and printed?",
-)  # in the order in which help asks them, after those of one command
 OWN = "What is it about?"  # of options under no question
+PRINTED = {
+    "strict": "end with exit status 1 if a robot would exceed its payload in a step, or results "
+    "leave the linear range",
+    "quiet": "print errors and the paths of what is written, nothing else",
+    "json": "print one JSON document, for scripts",
+}  # what concerns the printed answer alone
+STRICT = ("optimize", "compare", "analyze", "replan", "instance", "sweep")
 TOGETHER = ({"quiet", "json"}, {"method", "plan"}, {"list", "export", "view"})  # one of each
 PATHS = ("FILE", "DIR", "FOLDER", "PLAN_DIR", "INSTANCE", "SOLUTION")
-PATH = re.compile(r"(?:pathlib\.)?Path|.*\bFile\b")  # what is annotated so is a path
-OPTION = re.compile(r"(\w+) :(?: (\S.*))?")
-PLAIN = ("Usage", "Examples", "Parameters", "Returns", "Raises")
+NAMED = re.compile(r"(\w+(?:, \w+)*) :(?: (\S.*))?")  # begins what a docstring says of parameters
+SECTIONS = ("Parameters", "Returns", "Raises", "Examples", "Usage", "Notes", "Yields")
+SAME = re.compile(r"As of `(\w+)`\.")
+WORD = re.compile(r"``(\w+)(?:=\"?([^`\"]*)\"?)?``")  # a parameter in a docstring, with its value
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
 class Option:
-    """An option: its type as text, its default, what a parser knows of it, and its help."""
+    """An option: the types that it takes, its default, and what a parser knows of it.
+
+    ``more``: ``choices``, ``const`` (what it is where no value follows), ``zero`` (whether a number
+    may be zero), ``least`` and ``most`` (of a whole number), ``advice``, ``parse``.
+    """
 
     name: str
-    kind: str = "bool"
+    kinds: frozenset[Any] = frozenset({bool})
     default: Any = False
+    place: bool = False  # whether it stands without dashes
     more: Mapping[str, Any] = field(default_factory=dict)
-    question: str = ""
-    value: str = ""  # the word for its value; a switch has none
-    help: str = ""
 
     @property
     def flag(self) -> str:
         """Its word on the command line."""
-        name = f"no-{self.name}" if self.default is True else self.name
-        return str(self.more.get("flag", f"--{name.replace('_', '-')}"))
+        word = FLAGS.get(self.name, self.name).replace("_", "-")
+        return f"--no-{word}" if self.default is True else f"--{word}"
+
+    @property
+    def value(self) -> str:
+        """The word for its value; a switch has none."""
+        if self.kinds == {bool}:
+            return ""
+        return str(self.more.get("value") or VALUES.get(self.name, self.name.upper()))
 
     @property
     def choices(self) -> tuple[str, ...]:
@@ -66,22 +81,22 @@ class Option:
         choices = self.more.get("choices", ())
         return tuple(choices() if callable(choices) else choices)
 
-    def add_to(self, parser: Any) -> None:
+    def add_to(self, parser: Any, text: str) -> None:
         """Add it to a parser: as a switch if it has no value, repeated if it is a tuple."""
-        more, default = self.more, self.default
-        text = self.help.replace("{choices}", ", ".join(self.choices))
-        how: dict[str, Any] = {"help": text, "default": None if default is MISSING else default}
-        if not self.value:
-            how["action"] = "store_false" if default is True else "store_true"
+        default, value = self.default, self.value
+        how: dict[str, Any] = {"help": text}
+        if not value:
+            how |= {"action": "store_false" if default is True else "store_true"}
         else:
-            how["metavar"] = None if self.value == "CHOICE" else self.value
+            named = "value" in self.more or self.name in VALUES or not self.choices
             how |= {"choices": self.choices} if self.choices else {}
-            how |= {"type": Path} if self.value in PATHS else {}
+            how |= {"metavar": value} if named else {}
+            how |= {"type": Path} if value in PATHS else {}
         if isinstance(default, tuple):
             how |= {"action": "append", "default": [], "help": f"{text}; may be repeated"}
-        if "const" in more:
-            how |= {"nargs": "?", "const": more["const"]}
-        if "place" in more:
+        if "const" in self.more:
+            how |= {"nargs": "?", "const": self.more["const"]}
+        if self.place:
             how |= {} if default is MISSING else {"nargs": "?"}
             parser.add_argument(self.name, **how)
         else:
@@ -96,19 +111,22 @@ class Option:
                 value = [f"{name}={_text(each)}" for name, each in value.items()]
             several = isinstance(value, Sequence) and not isinstance(value, str)
             return tuple(map(_text, value if several else [value]))
-        if self.kind in ("float", "float | None"):
+        if self.kinds <= {float, type(None)}:
             try:
                 return number_word(str(value), self.flag, zero=self.more.get("zero", False))
             except ProblemError as error:
                 raise ProblemError(f"{error}{self.more.get('advice', '')}") from None
-        if self.kind in ("int", "int | None"):
+        if self.kinds <= {int, type(None)}:
             least, most = self.more.get("least", 1), self.more.get("most", MOST_WORKERS)
             return parse_count(value, self.flag, most, least)
         text, choices = _text(value), self.choices
         if choices and text not in choices:
             hint, known = did_you_mean(text, choices), ", ".join(choices)
             raise ProblemError(f"{self.name} {text!r} does not exist{hint}; give {known}")
-        return Path(text) if PATH.match(self.kind) and isinstance(text, str) else text
+        if "parse" in self.more and isinstance(text, str):
+            return self.more["parse"](text)
+        path = self.value in PATHS or (Path in self.kinds and str not in self.kinds)
+        return Path(text) if path and isinstance(text, str) else text
 
 
 def _text(value: Any) -> Any:
@@ -121,106 +139,241 @@ def _text(value: Any) -> Any:
 
 
 @dataclass(frozen=True)
+class Call:
+    """A function with words for its parameters, also of those that are spread."""
+
+    function: Callable[..., Any]
+    words: Mapping[str, Any]
+
+    def __call__(self, **more: Any) -> Any:
+        """Call it with further words, which take the place of those that it has."""
+        return signature_of(self.function).call({**self.words, **more})
+
+
+@dataclass(frozen=True)
 class Signature:
-    """What a function is asked: options by name, lines of help by heading, and spread values."""
+    """What a function is asked: its options by name, and those that make a spread parameter."""
 
     function: Callable[..., Any]
     options: Mapping[str, Option]
-    lines: Mapping[str, Sequence[str]]
-    spread: Mapping[str, type[Asked]]
+    spread: Mapping[str, tuple[Callable[..., Any], Sequence[str], Any]]  # and its default
 
     def call(self, given: Mapping[str, Any]) -> Any:
         """Call the function with values, or words for them; None means the default.
 
         Raises `ProblemError` for words that are no choice.
         """
-        known, values = self.options, {n: each for n, each in given.items() if each is not None}
-        values |= {n: known[n].parse(each) for n, each in values.items() if n in known}
-        taken = inspect.signature(self.function).parameters.keys()
-        arguments = {name: values.pop(name) for name in taken & values.keys()}
-        for name, kind in self.spread.items():
-            own = {each.name for each in fields(kind)}
-            arguments[name] = kind(**{n: each for n, each in values.items() if n in own})
-        return self.function(**arguments)
+        values = {name: each for name, each in given.items() if each is not None}
+        values |= {
+            n: self.options[n].parse(each) for n, each in values.items() if n in self.options
+        }
+        for name, (kind, names, default) in self.spread.items():
+            words = {each: values.pop(each) for each in names if each in values}
+            if not isinstance(kind, type):  # in place of its words Python gives the first of them
+                first = {names[0]: values[name]} if name in values else {}
+                values[name] = Call(kind, {**first, **words})
+            elif len(words) == 1 and isinstance(words.get(name), kind):
+                values[name] = words[name]
+            elif words or default is MISSING:
+                first = {name: default} if name in names and default is not MISSING else {}
+                made = kind(**{**first, **words})
+                values[name] = made.parse() if hasattr(made, "parse") else made
+        taken = inspect.signature(self.function).parameters  # not all tell how far they are
+        return self.function(**{name: each for name, each in values.items() if name in taken})
 
-    def fill(self, command: argparse.ArgumentParser) -> None:
-        """Add the options, by question, and the help to a parser."""
-        command.description = wrapped(" ".join(self.lines.get("", ())))
-        if usages := self.lines.get("Usage"):
+    def texts(self) -> dict[str, tuple[str, str, str]]:
+        """Return question, word for the value, and help by option, as docstrings say them."""
+        own, out = dict[str, tuple[str, str, str]](), dict[str, tuple[str, str, str]]()
+        for part in [*getattr(self.function, "__mro__", ())[-2:0:-1], self.function]:
+            own |= _read(part.__doc__)[1]
+        for kind, names, _ in self.spread.values():
+            said = signature_of(kind).texts()
+            own |= {name: said[name] for name in names if name in said}
+        for name, (question, value, text) in own.items():
+            same = SAME.match(text)
+            told = signature_of(COMMANDS[same[1]].load()).texts()[name][2] if same else text
+            out[name] = question, value, told
+        return out
+
+    @property
+    def examples(self) -> list[str]:
+        """The command lines that its docstring shows."""
+        lines = _read(self.function.__doc__)[0].get("Examples", [])
+        shell = [each[2:] for each in lines if each.startswith("$ ")]
+        return lines if self._foreign and not shell else shell
+
+    def fill(self, command: argparse.ArgumentParser, *, helps: bool = True) -> None:
+        """Add the options, by question, and the help, which is read where it ``helps`` alone."""
+        lines = _read(self.function.__doc__)[0]
+        texts = self.texts() if helps or self._foreign else {}
+        command.description = wrapped(self._spoken(" ".join(lines.get("", ()))))
+        if usages := lines.get("Usage"):
             command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
-        if examples := self.lines.get("Examples"):
+        elif self._foreign or self.options:
+            places = (each for each in self.options.values() if each.place)
+            shown = (e.value if e.default is MISSING else f"[{e.value}]" for e in places)
+            command.usage = " ".join([command.prog, *shown, "[options]"])
+        if examples := self.examples:
             listed = "\n".join(f"  {example}" for example in examples)
             command.epilog = f"example{'s' * (len(examples) > 1)}:\n{listed}"
-        asked = dict.fromkeys(option.question for option in self.options.values())
-        for title in sorted(asked, key=lambda e: QUESTIONS.index(e) if e in QUESTIONS else -1):
-            about = wrapped(" ".join(self.lines.get(title, ())), columns() - 2)
+        strict = command.prog.split()[-1] in STRICT
+        beside = {name: Option(name) for name in PRINTED if name != "strict" or strict}
+        groups: dict[str, list[Option]] = {}
+        for name, option in {**self.options, **beside}.items():
+            if name in HIDDEN:
+                continue
+            question, value, _ = texts.get(name, ("", "", ""))
+            asked = (title for title, names in QUESTIONS.items() if name in names.split())
+            title = question if question[-1:] == "?" else next(asked, OWN)
+            upper = value if value == value.upper() and value != "CHOICE" else ""
+            known = replace(option, more={"value": upper, **option.more}) if upper else option
+            groups.setdefault(title, []).append(known)
+        order = [*QUESTIONS]
+        for title in sorted(groups, key=lambda e: order.index(e) if e in order else -1):
+            about = wrapped(" ".join(lines.get(title, ())), columns() - 2)
             group = command.add_argument_group(title, about or None)
-            own = [option for option in self.options.values() if option.question == title]
             takes: dict[str, Any] = {}
             for names in TOGETHER:
-                if names <= {option.name for option in own}:
+                if names <= {option.name for option in groups[title]}:
                     takes |= dict.fromkeys(names, group.add_mutually_exclusive_group())
-            for option in own:
-                option.add_to(takes.get(option.name, group))
+            for option in groups[title]:
+                said = texts.get(option.name, ("", "", PRINTED.get(option.name, "")))[2]
+                option.add_to(takes.get(option.name, group), self._help(option, said))
+
+    @property
+    def _foreign(self) -> bool:
+        return not self.function.__module__.startswith("seqopt.")
+
+    def _spoken(self, text: str) -> str:
+        """Return a text of a docstring as the command line says it: parameters are options."""
+
+        def word(found: re.Match[str]) -> str:
+            option = self.options.get(found[1])
+            if option is None:
+                return found[0].strip("`")
+            return option.flag + (f" {found[2]}" if found[2] else "")
+
+        return WORD.sub(word, text).replace("`", "")
+
+    def _help(self, option: Option, text: str) -> str:
+        """Return the help of an option, with its names and default."""
+        text = self._spoken(text).replace("{choices}", ", ".join(option.choices))
+        text = text.replace("{default}", str(option.default)).removesuffix(".")
+        if text[1:2].islower() or text[1:2] == " ":
+            text = text[:1].lower() + text[1:]
+        if names := NAMES.get(option.name):
+            text += f"; names: {', '.join(names())}"
+        return text.replace("%", "%%")
 
 
 @cache
 def signature_of(function: Callable[..., Any]) -> Signature:
-    """Return what a function is asked, by its parameters and docstrings.
+    """Return what a function, or the class of a value, is asked, by its parameters."""
+    function = inspect.unwrap(function)
+    own, home = inspect.signature(function).parameters, vars(sys.modules[function.__module__])
+    options, spread = dict[str, Option](), dict[str, tuple[Any, Sequence[str], Any]]()
+    for each in own.values():
+        default = MISSING if each.default is each.empty else each.default
+        kind = each.annotation  # evaluated alone: what is returned may load pandas
+        kind = eval(kind, home) if isinstance(kind, str) else kind
+        option, more = _option(each.replace(annotation=kind), default)
+        kind = more.get("call") or SPREAD.get((function.__name__, each.name), SPREAD.get(each.name))
+        if kind is None or kind is function:
+            if each.name != "progress":
+                options[each.name] = option
+            continue
+        known = signature_of(kind).options
+        names = [name for name in known if name == each.name or name not in own]
+        whole = not isinstance(kind, type)  # of a function the scene alone has no dashes
+        options |= {n: replace(known[n], place=whole and n == "scene") for n in names}
+        if each.name in known:
+            first = known[each.name].default if default is MISSING else default
+            options[each.name] = replace(known[each.name], default=first, place=option.place)
+        spread[each.name] = kind, names, default
+    return Signature(function, options, spread)
 
-    Help texts of values that are spread come first, a later text takes the place of one before.
-    """
-    options, spread = dict[str, Option](), dict[str, type[Asked]]()
-    for each in inspect.signature(function, eval_str=True).parameters.values():
-        if inspect.isclass(each.annotation) and issubclass(each.annotation, Asked):
-            spread[each.name] = each.annotation
-            own = fields(each.annotation)
-            options |= {f.name: Option(f.name, str(f.type), f.default, f.metadata) for f in own}
+
+def _option(parameter: inspect.Parameter, default: Any) -> tuple[Option, dict[str, Any]]:
+    """Return the option of a parameter, and what its annotation says beside its types."""
+    more, kinds, left = dict(HOW.get(parameter.name, {})), set[Any](), [parameter.annotation]
+    while left:
+        kind = left.pop()
+        if get_origin(kind) is Annotated:
+            kind, *said = get_args(kind)
+            for each in said:
+                more |= each if isinstance(each, dict) else dict([each])
+            left.append(kind)
+        elif get_origin(kind) is Literal:
+            more |= {"choices": get_args(kind)}
+            kinds.add(str)
+        elif get_origin(kind) in (Union, UnionType):
+            left += get_args(kind)
         else:
-            options[each.name] = _of_parameter(each)
-    kinds = [part for kind in spread.values() for part in kind.__mro__[-3::-1]]
-    texts, lines = dict[str, tuple[str, str, str]](), dict[str, list[str]]()
-    for part in dict.fromkeys([*kinds, function, Asked]):
-        for title, said in _read(inspect.cleandoc(part.__doc__ or ""), texts).items():
-            if title[-1:] == "?" or part is function:
-                lines.setdefault(title, []).extend(said)
-    known = {name: ", ".join(names()) for name, names in NAMES.items()}
-    for name, (question, value, text) in texts.items():
-        found, told = options.get(name) or Option(name), text
-        for key, names in (known | {"default": str(found.default)}).items():
-            told = told.replace(f"{{{key}}}", names)
-        options[name] = replace(found, question=question, value=value, help=told)
-    return Signature(function, {name: options[name] for name in texts}, lines, spread)
+            kinds.add(get_origin(kind) or kind)
+    if repr(default) == "<factory>" or isinstance(default, list | dict):
+        default = ()
+    place = parameter.kind is not parameter.KEYWORD_ONLY
+    return Option(parameter.name, frozenset(kinds), default, place, more), more
 
 
-def _of_parameter(parameter: inspect.Parameter) -> Option:
-    """Return the option of a parameter, whose annotation may say its choices."""
-    kind, more = parameter.annotation, dict[str, Any]()
-    if get_origin(kind) is Annotated:
-        kind, more = get_args(kind)
-    literal = next((k for k in (kind, *get_args(kind)) if get_origin(k) is Literal), None)
-    if literal is not None:
-        more = {**more, "choices": get_args(literal)}
-    if parameter.kind is not parameter.KEYWORD_ONLY:
-        more = {**more, "place": True}
-    default = MISSING if parameter.default is parameter.empty else parameter.default
-    return Option(parameter.name, inspect.formatannotation(kind), default, more)
+def _read(page: str | None) -> tuple[dict[str, list[str]], dict[str, tuple[str, str, str]]]:
+    """Return the lines of a docstring by section, and what it says of parameters.
 
-
-def _read(page: str, texts: dict[str, tuple[str, str, str]]) -> dict[str, list[str]]:
-    """Return the lines of a docstring by heading; add question, value and help of options."""
-    lines, title, name = {"": list[str]()}, "", ""
-    for line in page.splitlines():
+    A heading that is a question is a group of options.
+    """
+    lines, texts, title = {"": list[str]()}, dict[str, tuple[str, str, str]](), ""
+    names: Sequence[str] = ()
+    for line in inspect.cleandoc(page or "").splitlines():
         if not line or line.startswith("---"):
             continue
-        if line.endswith("?") or line in PLAIN:
-            title = OWN if line == "Parameters" else line
-        elif title[-1:] == "?" and (found := OPTION.fullmatch(line)):
-            name = found[1]
-            texts[name] = title, found[2] or "", ""
-        elif title[-1:] == "?" and line.startswith("    "):
-            question, value, text = texts[name]
-            texts[name] = question, value, f"{text} {line.strip()}".lstrip()
+        of_options = title == "Parameters" or title[-1:] == "?"
+        if line.endswith("?") or line in SECTIONS:
+            title = line
+        elif of_options and (found := NAMED.fullmatch(line)):
+            names = found[1].split(", ")
+            texts |= dict.fromkeys(names, (title, found[2] or "", ""))
+        elif of_options and line.startswith("    "):
+            question, value, text = texts[names[0]]
+            said = f"{text} {line.strip()}".lstrip()
+            texts |= dict.fromkeys(names, (question, value, said))
         else:
             lines.setdefault(title, []).append(line)
-    return lines
+    return lines, texts
+
+
+def door(function: Callable[_P, Answer[_T] | Result[_T]]) -> Callable[_P, _T]:
+    """Return a command as a function of Python, which gives its value.
+
+    Words of the command line stand for values. Progress is shown in a notebook and at a terminal.
+    """
+    places = [
+        each.name
+        for each in inspect.signature(function).parameters.values()
+        if each.kind is not each.KEYWORD_ONLY
+    ]
+
+    @wraps(function)
+    def call(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        asked, name = signature_of(function), function.__name__
+        known = {*asked.options, *asked.spread, "progress"}
+        if wrong := [each for each in kwargs if each not in known]:
+            raise TypeError(f"{name}() got an unexpected keyword argument {wrong[0]!r}")
+        if len(args) > len(places):
+            raise TypeError(f"{name}() takes {len(places)} values without names; name the others")
+        values = {**dict(zip(places, args, strict=False)), **kwargs}
+        with Watcher(shows=values.get("progress") is None) as watcher:
+            result = asked.call({"progress": watcher} | values)
+            if isinstance(result, Result) and values.get("out") is not None:
+                result.answer()
+        found: Any = pd.DataFrame(result.value) if isinstance(result.value, list) else result.value
+        if isinstance(found, pd.DataFrame) and isinstance(result, Answer):
+            found.attrs |= {"notes": [*result.notes], "failures": [*result.failures]}
+        value: _T = found
+        return value
+
+    return call
+
+
+def names_of(options: Iterable[Option]) -> dict[str, Option]:
+    """Return options that have a value, by their words without dashes."""
+    return {option.flag.removeprefix("--"): option for option in options if option.value}

@@ -13,11 +13,11 @@ from functools import partial
 
 import pytest
 
-from seqopt._cli.grammar import parse_size
 from seqopt._cli.main import main
 from seqopt.errors import ProblemError
 from seqopt.plan import _answers as paths
 from seqopt.scene.scene_file import save_scene
+from seqopt.workflow import _parse_size
 from tests.builders import ROOT, small_arch
 from tests.commands import beside_models
 
@@ -71,13 +71,13 @@ def test_results_do_not_depend_on_workers_and_memory(tmp_path):
     ("text", "size"), [("500 MB", 5e8), ("1.5GiB", 1.5 * 2**30), ("2e9", 2e9), ("1k", 1000)]
 )
 def test_sizes(text, size):
-    assert parse_size(text) == size
+    assert _parse_size(text) == size
 
 
 @pytest.mark.parametrize("text", ["", "GB", "-1GB", "1XB", "nan", "1GBs", "1e999"])
 def test_what_is_no_size(text):
     with pytest.raises(ProblemError, match="give a size"):
-        parse_size(text)
+        _parse_size(text)
 
 
 def test_what_does_not_fit_is_refused_before(capsys, tmp_path):
@@ -180,7 +180,7 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
         if len(came) == 1:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("seqopt._cli.commands.optimize.within", lambda tell, seconds: interrupt)
+    monkeypatch.setattr("seqopt.workflow.within", lambda tell, seconds: interrupt)
     words = [*WORDS, "labels", "--budget", "travel=0.8"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 130
     out, err = capsys.readouterr()

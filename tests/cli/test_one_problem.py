@@ -5,16 +5,8 @@ from __future__ import annotations
 import pytest
 
 import seqopt
-from seqopt._cli import posing
-from seqopt._cli.commands.optimize import Optimize
-from seqopt._cli.posing import pose_problem
 from seqopt._cli.signatures import signature_of
-
-
-def posed(asked: Optimize):
-    """Return the problem of the options of optimize."""
-    return pose_problem(asked).problem
-
+from seqopt.workflow import _pose_build
 
 FREE, SCENE = {"schedule": "free"}, "chain:bricks=6"
 QUESTIONS = [
@@ -29,7 +21,7 @@ QUESTIONS = [
 
 @pytest.mark.parametrize("words", QUESTIONS, ids=str)
 def test_both_pose_the_same_problem(words):
-    asked = signature_of(posed).call({"scene": SCENE, **words})
+    asked = signature_of(_pose_build).call({"scene": SCENE, **words})
     values = {**words, "robots": words["robots"].split(",")} if "robots" in words else words
     found = seqopt.optimize(SCENE, **values).problem
     assert repr(asked) == repr(found)
@@ -38,11 +30,6 @@ def test_both_pose_the_same_problem(words):
 
 
 def test_another_question_is_another_problem():
-    asked = [signature_of(posed).call({"scene": SCENE, **each}) for each in (FREE, {})]
+    asked = [signature_of(_pose_build).call({"scene": SCENE, **each}) for each in (FREE, {})]
     assert asked[0].criterion != asked[1].criterion
     assert asked[0].goals != asked[1].goals
-
-
-def test_the_command_line_leaves_posing_to_what_python_calls():
-    """Which words ask for states, and what is usual then, is said once."""
-    assert not {"pose", "Orders", "Filter", "find_formulation"} & {*vars(posing)}

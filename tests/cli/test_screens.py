@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from seqopt._cli.arguments import LINES, parser
 from seqopt._cli.main import main
-from seqopt._cli.options import Asked, word
 from seqopt._cli.signatures import signature_of
+from seqopt._cli.words import SPREAD
 from seqopt._registry import COMMANDS
 from seqopt.errors import ProblemError
 
@@ -56,7 +58,7 @@ def test_help_fits_one_screen_and_shows_what_is_needed_first(printed, name):
     assert all(text.count("(") == text.count(")") for text in out.split("\n\n"))
     if not name:
         return
-    command, examples = command_of(name), signature_of(COMMANDS[name].load()).lines["Examples"]
+    command, examples = command_of(name), signature_of(COMMANDS[name].load()).examples
     assert [example for example in examples if f"\n  {example}\n" not in out] == []
     shown = defined(out.partition("\nexample")[0])
     assert len(shown) == len({*shown})
@@ -83,11 +85,11 @@ def test_all_help_has_every_option_once(printed, name):
         assert body.count(flag) == 1, flag
 
 
-class Reasoned(Asked):
-    """Why?
+@dataclass(frozen=True, kw_only=True)
+class Reasoned:
+    """A reason.
 
-    One or the other.
-
+    Why?
     reason : WORD
         what for; and more
     needed : CHOICE
@@ -97,31 +99,34 @@ class Reasoned(Asked):
     """
 
     reason: str | None = None
-    needed: str = word(choices=("a", "b"))
+    needed: Literal["a", "b"]
     often: tuple[str, ...] = ()
 
 
-def excuse(reasoned: Reasoned, *, loud: bool = False, excuse: Path | None = None):
+def excuse(*, reasoned: Reasoned, loud: bool = False, excuse: Path | None = None):
     """Give an excuse.
+
+    Why?
+    One or the other.
+    excuse : FILE
+        where it is
 
     How?
     loud :
         louder
 
-    Why?
-    excuse : FILE
-        where it is
-
     Examples
     --------
-    seqopt excuse --loud
+    $ seqopt excuse --loud
     """
     return reasoned, loud, excuse
 
 
 @pytest.fixture
-def excused():
+def excused(monkeypatch):
     """The parser of a command that takes values spread, and others."""
+    monkeypatch.setitem(SPREAD, "reasoned", Reasoned)
+    signature_of.cache_clear()
     command = argparse.ArgumentParser()
     signature_of(excuse).fill(command)
     return command

@@ -68,7 +68,7 @@ def test_an_option_that_is_gone_is_told_what_takes_its_place(capsys):
 
 def test_every_example_of_help_can_be_parsed():
     for name, command in COMMANDS.items():
-        examples = signature_of(command.load()).lines["Examples"]
+        examples = signature_of(command.load()).examples
         assert len(examples) >= 1
         for example in examples:
             if name != "completion":  # whose examples are lines of a shell

@@ -8,11 +8,16 @@ from dataclasses import replace
 from functools import partial
 from math import inf
 from pathlib import Path
+from typing import Annotated
 
 import pandas as pd
 
-from seqopt._cli import inputs, options, outputs, remarks
+from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
+from seqopt._cli.inputs import find_engine, find_steps
+from seqopt._cli.outputs import Output
+from seqopt._cli.signatures import door
+from seqopt._cli.words import BuiltFrom, File, Words, as_built, shown
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
 from seqopt.arms._kept import arm_faults
@@ -23,8 +28,9 @@ from seqopt.engines.interface import Engine, Fields, OpeningEngine, Want
 from seqopt.engines.registry import AutoEngine, provenance, recipe_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
+from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import _prop_faults, length_word, overloads
-from seqopt.responses._enough import Enough, what_was_enough
+from seqopt.responses._enough import what_was_enough
 from seqopt.responses._tolerance import COLUMN, stiffness_for, tolerances_along
 from seqopt.responses.quantities import _plain, _steps_in_words, length_text
 from seqopt.responses.table import (
@@ -38,93 +44,117 @@ from seqopt.responses.table import (
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Verdict
-from seqopt.work.progress import Clock, with_progress
+from seqopt.work.progress import Clock, Tell, with_progress
 
 INTERRUPTED = "seqopt: interrupted; the steps are those that were computed"
 RANGE = "whether they are in the linear range"
 UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 
-class Analyze(options.Strict, options.Computed, options.Fixed):
-    """How are responses computed?
-
-    tolerance : LENGTH
-        also find how far every grip may be from where it should be before a robot carries more than
-        its payload, in the worst direction: a column tolerance_mm; of a length, such as 0.4mm, also
-        how soft grips must be to be so far off
-
-    What is written and printed?
-    out : FILE
-        CSV file to write (default: standard output)
-    fields : FILE
-        also write every edge force, node displacement and reaction, as a NumPy archive (.npz)
-    time_limit : SECONDS
-        limit of the whole command, with what is said of the steps: those that were computed by then
-        are written, and what there was no time for is named
-    """
-
-    tolerance: str | None = options.word(None, const="")
-    fields: options.File | None = None
-    time_limit: float = options.word(inf, zero=True)
-
-
-def run(asked: Analyze) -> Answer:
+@door
+def analyze(  # noqa: PLR0913  # every option is a parameter
+    scene: BuiltFrom = "arch25",
+    *,
+    robots: Words | None = None,
+    method: str | None = None,
+    plan: ShownBuild | Path | str | None = None,
+    engine: str | None = None,
+    mortar: Mortar | str | None = None,
+    tolerance: Annotated[str | None, ("value", "LENGTH"), ("const", "")] = None,
+    cache: Path | str | None = None,
+    fields: File | None = None,
+    time_limit: float = inf,
+    out: File | None = None,
+    progress: Tell = shown,
+) -> Answer[pd.DataFrame]:
     """Compute how the structure responds in every step of one sequence, and write a table.
 
     It has the columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in
     0.001 mm.
 
-    Usage
-    [SCENE] [--method NAME] [--out FILE] [other options]
-    [SCENE] --plan FILE [--out FILE] [other options]
-    PLAN_DIR [--out FILE] [other options]
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str, optional
+        What is built; of a plan its steps too.
+    robots : str or sequence of str, optional
+        As of `optimize`.
+    method : str, optional
+        How it is built: by two robots, or published, the three-robot plan that Bruun et al. print
+        for arch25 (default: the first of sequential, cantilever that fits, or the steps of a plan's
+        folder).
+    plan : ShownBuild, pathlib.Path or str, optional
+        A plan's folder, or a CSV file of steps: step, type, bricks, NAME_node of each robot.
+    engine, mortar : optional
+        As of `optimize`.
+    tolerance : str, optional
+        Also find how far every grip may be from where it should be before a robot carries more than
+        its payload, in the worst direction: a column tolerance_mm; of a length, such as 0.4mm, also
+        how soft grips must be to be so far off.
+    cache : pathlib.Path or str, optional
+        As of `optimize`.
+    fields : pathlib.Path or str, optional
+        Also write every edge force, node displacement and reaction, as a NumPy archive (.npz).
+    time_limit : float, optional
+        Limit of the whole command, with what is said of the steps: those that were computed by then
+        are written, and what there was no time for is named.
+    out : pathlib.Path or str, optional
+        CSV file to write (default: standard output).
+    progress : callable, optional
+        Called with the progress.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per step, units in the names of columns. ``attrs['notes']`` says what is worth
+        knowing, ``attrs['failures']`` which steps are mechanisms, or were not solved.
 
     Examples
     --------
-    seqopt analyze arch25 --method cantilever --out cantilever.csv
-    seqopt analyze my.json --plan plan.csv --out responses.csv
-    seqopt analyze arch25 --method sequential --json
+    $ seqopt analyze arch25 --method cantilever --out cantilever.csv
+    $ seqopt analyze my.json --plan plan.csv --out responses.csv
+    $ seqopt analyze arch25 --method sequential --json
     """
-    archived = None if asked.fields is None else Path(asked.fields)
-    outputs.keep_apart(asked, asked.path, archived)
-    clock, faults = Clock(asked.time_limit), dict[int, SeqoptError]()
+    output, archived = Output.of(out, scene, plan), None if fields is None else Path(fields)
+    output.keep_apart(output.path, archived)
+    clock, faults = Clock(time_limit), dict[int, SeqoptError]()
     with clock.needed("reading scene and steps"):
-        scene = inputs.find_scene(asked)
-        find_postures(scene, asked.cache, asked.tell)
-        network = build_network(scene)
-        engine, named = inputs.find_engine(asked, network), inputs.find_steps(asked, network)
-    within, steps = LinearRange(engine), named.steps
-    solved = _solved(within, steps, asked, clock, faults)
+        built = as_built(scene).read(robots)
+        find_postures(built, cache, progress)
+        network = build_network(built)
+        computed = find_engine(network, engine, mortar)
+        named = find_steps(network, scene, plan, method, robots, progress, cache)
+    within, steps = LinearRange(computed), named.steps
+    solved = _solved(within, with_progress("steps", steps, progress), clock, faults)
     answers = solved if archived is None else list(solved)
-    table = response_table(engine.network, answers)
+    table = response_table(network, answers)
     reached = len(table) + len(faults)
-    late, ended = _late(asked, reached, len(steps), engine, clock)
+    late, ended = _late(time_limit, reached, len(steps), computed, clock)
     failures, status = (*_describe_faults(faults, reached), *late), _status_of(faults, ended)
-    computed, off = [s for s in steps[:reached] if s.number not in faults], tuple[str, ...]()
-    if computed and asked.tolerance is not None:
-        tolerances = partial(_with_tolerances, asked.tolerance, engine, computed, table)
+    solved_steps, off = [s for s in steps[:reached] if s.number not in faults], tuple[str, ...]()
+    if solved_steps and tolerance is not None:
+        tolerances = partial(_with_tolerances, tolerance, computed, solved_steps, table)
         table, off = clock.spare("tolerances", tolerances, (table, off))
-    whole = _with_faults(scene, table, steps, faults) if faults or table.empty else table
-    said = outputs.put_table(asked.path, whole, _counted(whole, faults)) if len(whole) else {}
-    answer = Answer({"steps": whole}, scene=scene, value=whole, **said)
+    whole = _with_faults(built, table, steps, faults) if faults or table.empty else table
+    said = outputs.put_table(output.path, whole, _counted(whole, faults)) if len(whole) else {}
+    answer = Answer({"steps": whole}, scene=built, value=whole, **said)
     notes = (*named.notes, *off)
     answer = replace(answer, notes=notes, failures=failures, status=status)
     if table.empty:
         return answer
     if archived is not None:
-        write_bytes(archived, archive(engine.network, answers))
+        write_bytes(archived, archive(network, answers))
         answer = replace(answer, written=(*answer.written, archived))
-    return _explained(asked, answer, within, steps, table, clock)
+    return _explained(engine, answer, within, steps, table, clock)
 
 
 def _explained(
-    asked: Analyze,
-    answer: Answer,
+    named: str | None,
+    answer: Answer[pd.DataFrame],
     within: LinearRange,
     steps: Sequence[Step],
     table: pd.DataFrame,
     clock: Clock,
-) -> Answer:
+) -> Answer[pd.DataFrame]:
     """Return an answer with what there is time to say of the steps that were computed."""
     engine, scene = within.engine, answer.scene
     departures = partial(within.departures, table)
@@ -133,48 +163,32 @@ def _explained(
     enough = clock.spare("which model is enough", found, None)
     facts = {"units": UNITS, **answer.facts, **provenance(engine)}
     facts |= {"enough": None if enough is None else enough.facts()}
-    notes = (*answer.notes, *_notes(asked, within, steps, table, enough))
-    answer = remarks.in_time(replace(answer, facts=facts, notes=notes), clock, INTERRUPTED)
-    over, cannot = (
-        remarks.exceeded(scene, table),
-        arm_faults(scene, [s for s in steps if s.number in {*table["step"]}]),
+    notes = (
+        *answer.notes,
+        *remarks.level_notes(named, engine),
+        *within.unchecked,
+        *(() if enough is None else enough.lines),
+        *(f"payload exceeded: {excess}" for excess in overloads(scene, table)),
+        *(f"props: {fault}" for fault in _prop_faults(scene, table)),
+        *_idle_note(scene, "robots", steps),
     )
+    answer = remarks.in_time(replace(answer, facts=facts, notes=notes), clock, INTERRUPTED)
+    over = remarks.exceeded(scene, table)
+    cannot = arm_faults(scene, [s for s in steps if s.number in {*table["step"]}])
     return remarks.held_to(answer, over, outside, unreached=cannot)
 
 
-def _notes(
-    asked: Analyze,
-    within: LinearRange,
-    steps: Sequence[Step],
-    table: pd.DataFrame,
-    enough: Enough | None,
-) -> Iterator[str]:
-    """Yield notes on levels, unchecked limits, sufficient models, payloads, idle robots."""
-    scene = within.engine.network.scene
-    yield from remarks.level_notes(asked, within.engine)
-    yield from within.unchecked
-    yield from () if enough is None else enough.lines
-    yield from (f"payload exceeded: {excess}" for excess in overloads(scene, table))
-    yield from (f"props: {fault}" for fault in _prop_faults(scene, table))
-    yield from _idle_note(scene, "robots", steps)
-
-
 def _solved(
-    within: LinearRange,
-    steps: Sequence[Step],
-    asked: Analyze,
-    clock: Clock,
-    faults: dict[int, SeqoptError],
+    within: LinearRange, steps: Iterator[Step], clock: Clock, faults: dict[int, SeqoptError]
 ) -> Iterator[tuple[Step, Fields]]:
     """Yield solved steps with fields until the time limit or an interrupt.
 
     Errors of the others go to ``faults``, by step number.
     """
-    told = with_progress("steps", steps, asked.tell)
     while True:
         try:
             with ending(clock.left):
-                step = next(told, None)
+                step = next(steps, None)
                 if step is None:
                     return
                 fields = within.seen(step, step_fields(within.engine, step, Want.ALL))
@@ -261,7 +275,7 @@ def _with_tolerances(
 
 
 def _late(
-    asked: Analyze, computed: int, steps: int, engine: Engine, clock: Clock
+    limit: float, computed: int, steps: int, engine: Engine, clock: Clock
 ) -> tuple[tuple[str, ...], Status]:
     """Return notes and status of an analysis that ended before the last step."""
     if computed == steps:
@@ -272,5 +286,5 @@ def _late(
         so_far += f", {dear} by discrete elements, which are what takes long"
     if clock.interrupted:
         return (f"seqopt: interrupted; {so_far}",), Status.INTERRUPTED
-    said = f"seqopt: error: --time-limit {asked.time_limit:g}: {so_far}; give more seconds"
+    said = f"seqopt: error: --time-limit {limit:g}: {so_far}; give more seconds"
     return (said,), Status.FAILED

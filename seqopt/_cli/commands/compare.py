@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import pandas as pd
 
-from seqopt._cli import grammar, inputs, options, outputs, remarks
+from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Result
+from seqopt._cli.inputs import find_engine, find_prover, names_of_robots
+from seqopt._cli.outputs import Output
+from seqopt._cli.signatures import door
 from seqopt._cli.terminal import columns, wrapped
+from seqopt._cli.words import BuiltFrom, Folder, Words, as_built, shown
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.arms.reach import find_postures
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance, simplest
 from seqopt.errors import ProblemError
@@ -20,104 +27,133 @@ from seqopt.network.build import build_network
 from seqopt.problem.requirements import Criterion
 from seqopt.report._pages import comparison_page
 from seqopt.report._regret._measure import check_reference
-from seqopt.report.comparison import Comparison, _printed_largest, compare, format_comparison
+from seqopt.report.comparison import Comparison, _printed_largest, format_comparison
+from seqopt.report.comparison import compare as compare_builds
 from seqopt.responses.table import builds_in_words
 from seqopt.stability._builds import BuildProver
-from seqopt.workflow import DEFAULTS
+from seqopt.work.progress import Tell
+from seqopt.workflow import DEFAULTS, _choose_criterion
 
 SPEED = "Speed against regret"
 
 
-class Compare(
-    options.Written,
-    options.Strict,
-    options.Postures,
-    options.Judged,
-    options.Ranks,
-    options.Team,
-    options.Built,
-):
-    """What is built, and by whom?
-
-    out : DIR
-        write tables, figures and a page with all builds
-    speed : SECONDS
-        also chart speed against regret: every engine, schedule and formulation, all within so many
-        seconds together (60), each plan valued in the most detailed model that there is data for
-    reference : ENGINE
-        with --speed: the engine that values plans (compliance; with --mortar every step has to
-        stand, too; discrete lets joints open; staged adds what earlier steps lock in)
-    """
-
-    speed: float = options.word(0.0, const="60", advice="; give seconds, and the scene before it")
-    reference: str = ""
-
-
-def run(asked: Compare) -> Result:
+@door
+def compare(  # noqa: PLR0913  # every option is a parameter
+    scene: BuiltFrom = "arch25",
+    *,
+    robots: int | Words | None = None,
+    criterion: Criterion | str | None = None,
+    speed: Annotated[
+        float,
+        ("value", "SECONDS"),
+        ("const", "60"),
+        ("advice", "; give seconds, and the scene before it"),
+    ] = 0.0,
+    reference: Annotated[str, ("value", "ENGINE")] = "",
+    engine: str | None = None,
+    mortar: Mortar | str | None = None,
+    stability: bool = True,
+    cache: Path | str | None = None,
+    out: Folder | None = None,
+    progress: Tell = shown,
+) -> Result[Comparison]:
     """Build a scene in every way that seqopt knows, on paper, and show all side by side.
 
     These are the fixed sequences, a loop of robots whose grips each formulation chooses, and the
     free schedule. Show the largest forces, moments and displacements; for the arch of Bruun et al.
     beside the figures that they print, with a list of the inconsistencies in print.
 
-    Usage
-    [SCENE] [--out DIR] [other options]
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str, optional
+        What is built.
+    robots : int, str or sequence of str, optional
+        As of `optimize`.
+    criterion : Criterion or str, optional
+        What a step costs.
+    speed : float, optional
+        Also chart speed against regret: every engine, schedule and formulation, all within so many
+        seconds together (60), each plan valued in the most detailed model that there is data for.
+    reference : str, optional
+        With ``speed``: the engine that values plans (compliance; with ``mortar`` every step has to
+        stand, too; discrete lets joints open; staged adds what earlier steps lock in).
+    engine, mortar : optional
+        As of `optimize`.
+    stability : bool, optional
+        As of `optimize`.
+    cache : pathlib.Path or str, optional
+        As of `optimize`.
+    out : pathlib.Path or str, optional
+        Write tables, figures and a page with all builds.
+    progress : callable, optional
+        Called with the progress.
+
+    Returns
+    -------
+    Comparison
+        All ways to build it, side by side.
 
     Examples
     --------
-    seqopt compare
-    seqopt compare wall:columns=6,courses=4 --out wall
-    seqopt compare arch25 --criteria worst-ratio --json
-    seqopt compare arch25 --grips 1e6
-    seqopt compare arch25 --grips 1e6 --speed 60 --out speed
+    >>> found = compare("wall:columns=2,courses=2", criterion="worst-ratio", stability=False)
+    >>> float(found.table.loc["sequential", "F_rob"].round(1))
+    37.3
+
+    $ seqopt compare
+    $ seqopt compare wall:columns=6,courses=4 --out wall
+    $ seqopt compare arch25 --criteria worst-ratio --json
+    $ seqopt compare arch25 --grips 1e6
+    $ seqopt compare arch25 --grips 1e6 --speed 60 --out speed
     """
-    if asked.reference and not asked.speed:
+    if reference and not speed:
         raise ProblemError("--reference: it values the plans of --speed; give --speed 60 with it")
-    check_reference(asked.reference)
-    scene = inputs.find_scene(asked)
-    find_postures(scene, asked.cache, asked.tell)
-    engine = inputs.find_engine(asked, build_network(scene))
-    usual = DEFAULTS["any other"].criterion
-    criterion = grammar.parse_criterion(asked, usual) or usual
-    outputs.require_out(asked)
-    prover = inputs.find_prover(asked, engine.network)
-    robots = grammar.parse_robots(asked.robots)
-    result = compare(engine, criterion, asked.tell, robots, prover, asked.speed, asked.reference)
-    return Result(result, lambda: _answer(asked, engine, criterion, prover, result))
+    check_reference(reference)
+    built, output = as_built(scene).read(robots), Output.of(out, scene)
+    find_postures(built, cache, progress)
+    computed = find_engine(build_network(built), engine, mortar, verdicts=stability)
+    costs = _choose_criterion(criterion, DEFAULTS["any other"].criterion)
+    output.require()
+    prover = find_prover(computed.network, mortar, progress, asks=stability)
+    named = names_of_robots(robots)
+    result = compare_builds(computed, costs, progress, named, prover, speed, reference)
+    levels = remarks.level_notes(engine, simplest(computed))
+
+    def answer() -> Answer[Comparison]:
+        return _answer(output, levels, computed, costs, prover, result, progress)
+
+    return Result(result, answer)
 
 
 def _answer(
-    asked: Compare, engine: Engine, criterion: Criterion, prover: BuildProver, result: Comparison
-) -> Answer:
+    output: Output,
+    levels: Sequence[str],
+    engine: Engine,
+    criterion: Criterion,
+    prover: BuildProver,
+    result: Comparison,
+    tell: Tell,
+) -> Answer[Comparison]:
     """Write a comparison, and return its answer."""
     scene = engine.network.scene
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
     about = {"criteria": criteria, **provenance(engine)}
     blocks = [format_comparison(result, scene, criterion, columns())]
+    facts = about | {"criterion": criterion.name, **_facts(result)}
     if result.speed is not None:
         blocks.append("\n".join([SPEED, str(result.speed)]))
+        facts |= {"speed": result.speed.facts()}
     written: tuple[Path, ...] = ()
-    if asked.path is not None:
-        asked.tell("drawing figures")
+    if output.path is not None:
+        tell("drawing figures")
         files = _files(result) | {PAGE: comparison_page(engine, result)}
         files["summary.json"] = json.dumps({"scene": scene.name, **about}, indent=2) + "\n"
-        written = outputs.write_outputs(asked, lambda: files)
-        blocks.append(_where(asked.path, speed=result.speed is not None))
+        written = output.write(tell, lambda: files)
+        blocks.append(_where(output.path, speed=result.speed is not None))
     else:
         blocks.append(wrapped("--out DIR writes tables, figures and a step viewer."))
+    said = (*levels, *result.enough.lines, *remarks.refused(prover), *outputs.figure_notes(written))
     answer = Answer(
-        facts=about
-        | {"criterion": criterion.name, **_facts(result)}
-        | ({} if result.speed is None else {"speed": result.speed.facts()}),
-        text="\n\n".join(blocks),
-        written=written,
-        scene=scene,
-        notes=(
-            *remarks.level_notes(asked, simplest(engine)),
-            *result.enough.lines,
-            *remarks.refused(prover),
-            *outputs.figure_notes(written),
-        ),
+        facts, "\n\n".join(blocks), written=written, scene=scene, notes=said, value=result
     )
     over = remarks.exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)

@@ -29,21 +29,26 @@ AIMS = ("minmax", "sum", "steps", "regrips", "travel", "bond", "friction", "tilt
 SHORT = re.compile(r"[:;(]|, (?:as|if|or) ")  # where what matters of a help text ends
 
 
-def run(shell: Literal["bash", "zsh", "fish"]) -> Answer:
+def run(shell: Literal["bash", "zsh", "fish"]) -> Answer[None]:
     """Print a script with which the shell completes words of seqopt.
 
     It completes commands, options, files, and the names of scenes, formulations, criteria, engines,
     schedules and aims. Print it again once a formulation of your own is installed.
 
-    For which shell?
-    shell : CHOICE
-        which shell reads it
+    Parameters
+    ----------
+    shell : str
+        Which shell reads it.
+
+    Returns
+    -------
+    Answer
 
     Examples
     --------
-    eval "$(seqopt completion bash)"      in ~/.bashrc, or for this shell alone
-    eval "$(seqopt completion zsh)"       in ~/.zshrc, after compinit
-    seqopt completion fish > ~/.config/fish/completions/seqopt.fish
+    $ eval "$(seqopt completion bash)"      in ~/.bashrc, or for this shell alone
+    $ eval "$(seqopt completion zsh)"       in ~/.zshrc, after compinit
+    $ seqopt completion fish > ~/.config/fish/completions/seqopt.fish
     """
     script = shtab.complete(_completed(parser()), shell)
     return Answer(facts={"shell": shell, "script": script}, data=script + "\n")

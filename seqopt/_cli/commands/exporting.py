@@ -2,73 +2,86 @@
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
-from seqopt._cli import inputs, options
+from seqopt._cli import inputs
 from seqopt._cli.answer import Answer
+from seqopt._cli.signatures import door
+from seqopt._cli.words import BuiltFrom, File, shown
 from seqopt._files import require_apart, write_text
 from seqopt.arms._kept import arm_faults
 from seqopt.exchange._formats import formats, writable
 from seqopt.exchange.exports import export_plan, read_folder
+from seqopt.work.progress import Tell
 
 
-class Export(options.Postures, options.Written):
-    """Which plan, and in which format?
-
-    folder : PLAN_DIR|SCENE
-        folder of a plan; of a scene, in its place, the usual steps are taken
-    format : NAME
-        what to write (default: {default}): {choices}
-    source : FILE
-        with compas_assembly: the assembly that was imported, to write the plan into
-    distance : M
-        with tasks or tasks_csv: from a grip to where the tool comes from and goes to, m (default:
-        the longest side of each block)
-
-    What is written and printed?
-    out : FILE
-        file to write (default: standard output)
-    """
-
-    folder: options.BuiltFrom = field(kw_only=False, metadata={"place": True})
-    format: str = field(default="csv", kw_only=False, metadata={"choices": writable})
-    source: options.File | None = None
-    distance: float | None = None
-
-
-def run(asked: Export) -> Answer:
+@door
+def export(
+    folder: Annotated[BuiltFrom, ("value", "PLAN_DIR|SCENE")],
+    *,
+    format: Annotated[str, ("choices", writable)] = "csv",  # noqa: A002  # the option's name
+    source: Path | str | None = None,
+    distance: Annotated[float | None, ("value", "M")] = None,
+    cache: Path | str | None = None,
+    out: File | None = None,
+    progress: Tell = shown,
+) -> Answer[str]:
     """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
 
     It says which block is absent, placed or held in which step, what each robot does and where, or
     is the assembly with its plan.
 
+    Parameters
+    ----------
+    folder : pathlib.Path, ShownBuild, Scene or str
+        Folder of a plan; of a scene, in its place, the usual steps are taken.
+    format : str, optional
+        What to write (default: {default}): {choices}.
+    source : pathlib.Path or str, optional
+        With compas_assembly: the assembly that was imported, to write the plan into.
+    distance : float, optional
+        With tasks or tasks_csv: from a grip to where the tool comes from and goes to, m (default:
+        the longest side of each block).
+    cache : pathlib.Path or str, optional
+        As of `optimize`.
+    out : pathlib.Path or str, optional
+        File to write (default: standard output).
+    progress : callable, optional
+        Called with the progress.
+
+    Returns
+    -------
+    str
+        The text of the file.
+
     Examples
     --------
-    seqopt export best --format csv --out blocks.csv
-    seqopt export best --format tasks --distance 0.15 --out tasks.json
+    $ seqopt export best --format csv --out blocks.csv
+    $ seqopt export best --format tasks --distance 0.15 --out tasks.json
     """
-    folder, taken = inputs.plan_folder(asked, asked.folder)
-    read = [folder / name for name in ("scene.json", "plan.csv")]
-    source = None if asked.source is None else Path(asked.source)
-    require_apart([*filter(None, [asked.path])], [*read, *filter(None, [source])])
-    scene, steps = read_folder(folder)
+    place, taken = inputs.plan_folder(folder, cache, progress)
+    read = [place / name for name in ("scene.json", "plan.csv")]
+    path, given = (None if each is None else Path(each) for each in (out, source))
+    require_apart([*filter(None, [path])], [*read, *filter(None, [given])])
+    scene, steps = read_folder(place)
     notes: tuple[str, ...] = ()
-    form = formats()[asked.format]
+    form = formats()[format]
     if "distance" in form.takes and scene.has_arms:
-        if trouble := inputs.posture_trouble(asked, scene):
+        if trouble := inputs.posture_trouble(scene, cache, progress):
             notes = (f"arms: grips are proposals without postures; {trouble}",)
         else:
             notes = tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps))
-    text = export_plan(scene, steps, asked.format, source, asked.distance)
+    text = export_plan(scene, steps, format, given, distance)
     said, lost = f"{len(steps)} steps", form.lost
     if lost:
         plan = "" if "steps" in lost else f" and {said}"
         said = f"{len(scene.bricks)} blocks{plan}, without {', '.join(lost)},"
-    facts = {"steps": len(steps), "format": asked.format}
+    facts = {"steps": len(steps), "format": format}
     notes = (*taken, *notes)
     answer = Answer(facts, notes=notes, value=text, scene=scene)
-    if asked.path is None:
+    if path is None:
         return replace(answer, facts=facts | {"text": text}, data=text)
-    write_text(asked.path, text)
-    return replace(answer, text=f"{said} written to {asked.path}", written=(asked.path,))
+    write_text(path, text)
+    return replace(answer, text=f"{said} written to {path}", written=(path,))

@@ -6,86 +6,98 @@ import shlex
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
+from typing import Annotated
 
-from seqopt._cli import inputs, outputs
+from seqopt._cli import inputs
 from seqopt._cli.answer import Answer, Result
-from seqopt._cli.commands.optimize import Optimize
-from seqopt._cli.posing import pose_problem
+from seqopt._cli.commands.optimize import posed
+from seqopt._cli.outputs import Output
+from seqopt._cli.signatures import Call, door
+from seqopt._cli.words import File, shown
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import find_formulation
-from seqopt.graph.instance import Instance as Graph
+from seqopt.graph.instance import Instance
 from seqopt.instances._files import WRITERS, save_instance
 from seqopt.instances.compiled import compile_instance
 from seqopt.judge.arithmetic import first_stage
-from seqopt.work.progress import Clock
+from seqopt.problem.problem import Problem
+from seqopt.work.progress import Clock, Tell
+from seqopt.workflow import _pose_build, optimize
 
 SAID = ("--quiet", "--json")
 
 
-class Instance(Optimize):
-    """What is written and printed?
-
-    out : FILE
-        file to write: .npz (the instance) or .mps (a program);
-        without an end a folder with both
-    name : NAME
-        what it is called (default: as the file)
-    below : VALUE
-        leave out states of which the first aim, a worst step, takes more; plans that are better
-        than this stay
-    """
-
-    name: str | None = None
-    below: float = inf
-    made_by: Sequence[str] = ()  # words of the shell
-
-
-def run(asked: Instance) -> Result:
+@door
+def instance(
+    asked: Annotated[Call, ("call", optimize)],
+    *,
+    name: str | None = None,
+    below: Annotated[float, ("value", "VALUE")] = inf,
+    out: File | None = None,
+    made_by: Sequence[str] = (),
+    progress: Tell = shown,
+) -> Result[Instance]:
     """Write the graph of a problem: its nodes and arcs, what they take, what is small and capped.
 
     Reading it needs no scene. The options are those of optimize; what concerns the search
     alone has no effect.
 
-    Usage
-    [SCENE] [--out FILE] [options of optimize]
+    Parameters
+    ----------
+    asked : Problem, Scene, ShownBuild, pathlib.Path or str
+        The problem; or in place of it a scene, and other arguments as of `optimize`.
+    name : str, optional
+        What it is called (default: as the file).
+    below : float, optional
+        Leave out states of which the first aim, a worst step, takes more; plans that are better
+        than this stay.
+    out : pathlib.Path or str, optional
+        File to write: .npz (the instance) or .mps (a program); without an end a folder with both.
+    made_by : sequence of str, optional
+        The words of the shell that say so.
+    progress : callable, optional
+        Called with the progress.
+
+    Returns
+    -------
+    Instance
+        The graph of the problem, for any solver.
 
     Examples
     --------
-    seqopt instance arch25 --out arch25.npz
-    seqopt instance arch25 --budget travel=0.8 --out arch25.mps
-    seqopt instance chain:bricks=7 --schedule free --aim minmax,steps --out chain7
+    $ seqopt instance arch25 --out arch25.npz
+    $ seqopt instance arch25 --budget travel=0.8 --out arch25.mps
+    $ seqopt instance chain:bricks=7 --schedule free --aim minmax,steps --out chain7
     """
-    path = asked.path
+    path, words = None if out is None else Path(out), asked.words
     if path and path.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
-    clock = Clock(asked.time_limit)
+    clock, formulation = Clock(words.get("time_limit", inf)), words.get("formulation")
     with clock.needed("posing the problem"):
-        problem = pose_problem(asked).problem
-    named = None if asked.formulation is None else find_formulation(asked.formulation)
-    asked.tell("computing all that arcs take")
-    aim = None if named is None else named.aim
-    facts = {"made_by": _command_line(asked.made_by)} if asked.made_by else {}
+        given = words.get("scene")
+        call = Call(_pose_build, {**words, "progress": progress})
+        problem: Problem = given if isinstance(given, Problem) else posed(call, verdicts=True)()
+    aim = None if formulation is None else find_formulation(formulation).aim
+    progress("computing all that arcs take")
     usual = inputs.file_name(problem.scene.name, ".npz")
-    name = asked.name or (
-        path.stem if path else usual.stem if asked.made_by else problem.scene.name
-    )
+    called = path.stem if path else usual.stem if made_by else problem.scene.name
+    facts = {"made_by": _command_line(made_by)} if made_by else {}
     with clock.needed("writing down the graph"):
-        found = compile_instance(problem, name=name, aim=aim, below=asked.below, facts=facts)
-    return Result(found, lambda: _answer(asked, found, path or usual))
+        found = compile_instance(problem, name=name or called, aim=aim, below=below, facts=facts)
 
+    def answer() -> Answer[Instance]:
+        progress("writing the instance")
+        to = path or usual
+        Output.of(out, words.get("scene"), words.get("schedule")).keep_apart(to)
+        save_instance(found, to)
+        limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(found).limited)
+        lines = [f"{found!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]
+        lines += [f"written to {to}; seqopt judge {to} SOLUTION checks an answer"]
+        said = f"file: {to}; --out names another, or a folder for every format"
+        notes = () if path else (said,)
+        return Answer(found.facts_of(), "\n".join(lines), written=(to,), notes=notes, value=found)
 
-def _answer(asked: Instance, found: Graph, path: Path) -> Answer:
-    """Write an instance, to a path that is no input, and return its answer."""
-    asked.tell("writing the instance")
-    outputs.keep_apart(asked, path)
-    save_instance(found, path)
-    limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(found).limited)
-    lines = [f"{found!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]
-    lines += [f"written to {path}; seqopt judge {path} SOLUTION checks an answer"]
-    notes = (
-        () if asked.path else (f"file: {path}; --out names another, or a folder for every format",)
-    )
-    return Answer(facts=found.facts_of(), text="\n".join(lines), written=(path,), notes=notes)
+    return Result(found, answer)
 
 
 def _command_line(words: Sequence[str]) -> str:

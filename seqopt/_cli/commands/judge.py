@@ -14,26 +14,31 @@ from seqopt.instances.answers import judge_instance
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 
-def run(instance: Path, solution: Path, *, bound: Path | None = None) -> Answer:
+def run(instance: Path, solution: Path, *, bound: Path | None = None) -> Answer[None]:
     """Check a path through an instance, and bounds on all others, with arithmetic alone.
 
     No scene is needed. What is claimed without proof is called claimed. The exit status is 1 if
     something does not hold.
 
-    What is judged?
-    instance : INSTANCE
-        file of seqopt instance
-    solution : SOLUTION
-        file with the nodes of a path, or after the word arcs its arcs, after acts its acts: text,
-        CSV or JSON
-    bound : FILE
+    Parameters
+    ----------
+    instance : pathlib.Path
+        File of seqopt instance.
+    solution : pathlib.Path
+        File with the nodes of a path, or after the word arcs its arcs, after acts its acts: text,
+        CSV or JSON.
+    bound : pathlib.Path, optional
         JSON file with a bound for every goal and what proves it: potentials, a cut, multipliers,
-        weights, shares, labels (default: the judge looks for a proof itself)
+        weights, shares, labels (default: the judge looks for a proof itself).
+
+    Returns
+    -------
+    Answer
 
     Examples
     --------
-    seqopt judge arch25.npz mine.txt
-    seqopt judge arch25.npz mine.json --bound potentials.json
+    $ seqopt judge arch25.npz mine.txt
+    $ seqopt judge arch25.npz mine.json --bound potentials.json
     """
     graph = read_instance(instance)
     try:

@@ -2,35 +2,38 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import isfinite
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import pandas as pd
 
-from seqopt._cli import grammar, inputs, options, outputs, remarks
+from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Result
-from seqopt._cli.posing import Change, PosedProblem, pose_problem
+from seqopt._cli.inputs import find_prover, mortar_of_engine
+from seqopt._cli.outputs import ALWAYS, Output
+from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
+from seqopt._cli.words import Built, Folder, Sampled, Timed, shown, split_words
 from seqopt._files import csv_text
 from seqopt._later import Later
 from seqopt._showing import PAGE
-from seqopt.graph.formulation import End, Run, as_formulation, trace_rows
+from seqopt.graph.formulation import End, trace_rows
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import graph_of
-from seqopt.plan.solve import _solve_run
+from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.steps import _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
-from seqopt.work.progress import Clock, within
+from seqopt.work.progress import Clock, Tell
+from seqopt.workflow import SEARCH, Robust, Search, optimize
 
 PAGES = Later("seqopt.report._pages")  # 200 ms, where files are written
 TEXT = Later("seqopt.report.text")  # 40 ms, where there is a plan
@@ -39,48 +42,17 @@ INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 VERDICTS = "which steps stand"
 
 
-class Optimize(options.Written, options.Strict, options.Limited, options.Cured, options.Chosen):
-    """What counts as best?
-
-    With --aim, --stands, --order search or --schedule free states of the build are chosen:
-    --ranked and criteria of ranks do not go with these.
-
-    What must hold?
-    --friction, --tilt and --curing go with --stands. Budgets on steps, regrips, makespan and sums
-    go with --aim or --schedule free, those on steps_over and robot_use without.
-
-    Who chooses and proves, and how long?
-    --no-proof goes with cascade and rank_search, --lazy with exact formulations.
-
-    option : NAME=VALUE
-        option of the formulation, as horizon=2 or width=10
-    proof :
-        with cascade or rank_search: compute only the responses that the search meets, about a
-        fifth; how far the choice is from the optimum stays unknown
-    lazy :
-        with an exact formulation: compute only the responses that the proof needs; stopped before
-        it is done, it leaves its best choice and a bound; with --aim or --schedule free it is done
-        at any rate
-
-    What is written and printed?
-    out : DIR
-        folder to write plan, tables, summary and page to
-    """
-
-    option: options.Words = options.word((), shell=True)
-    proof: bool = options.word(default=True, shell=True)
-    lazy: bool = options.word(default=False, shell=True)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Found:
     """A plan with its request, and the evaluations that the time limit allows."""
 
-    posed: PosedProblem
     plan: Plan
-    assemble: float
     prover: BuildProver
-    clock: Clock = field(default_factory=Clock)
+    clock: Clock
+    out: Output
+    tell: Tell
+    engine: str | None = None  # that is named
+    robust: Robust | None = None
 
     @cached_property
     def analyzed(self) -> bool:
@@ -116,75 +88,104 @@ class Found:
         loop = plan.method == "three-robot" and plan.graph.candidates
         counts = paper_models(plan.decisions.schedule) if loop else ()
         out = self.summary | {
-            "seconds": {"assemble": self.assemble, **plan.seconds},
+            "seconds": dict(plan.seconds),
             "models_paper_count": dict(zip(("cascading", "overlap"), counts, strict=False)) or None,
             "stability": {v.mortar: v.facts() for v in self.verdicts.get(plan.title, ())},
         }
         out |= {"left_out": dict(self.clock.left_out)} if self.clock.left_out else {}
-        if self.posed.known is None:
+        if self.robust is None:
             return out
-        assert self.posed.robust is not None
-        return out | {"robust": str(self.posed.robust.aim), "scenarios": self.posed.known.settings}
+        drawn = self.robust.draw(plan.engine.network.scene)
+        return out | {"robust": str(self.robust.aim), "scenarios": drawn.settings}
 
 
-def run(asked: Optimize) -> Result:
+def run(
+    asked: Annotated[Call, ("call", optimize)],
+    *,
+    stability: bool = True,
+    out: Folder | None = None,
+    progress: Tell = shown,
+) -> Result[Plan]:
     """Choose where robots hold, over all steps of a sequence, by one formulation.
 
     With --schedule free, choose every step. The answer is checked from the problem's own data, and
     plan, selection, responses, summary and a page for the browser are written.
 
-    Usage
-    [SCENE] [--formulation NAME] [--out DIR] [other options]
-    [SCENE] --schedule free [--out DIR] [other options]
-    [SCENE] --robust AIM [--out DIR] [other options]
+    With --aim, --stands, --order search or --schedule free states of the build are chosen: --ranked
+    and criteria of ranks do not go with these. --no-proof goes with cascade and rank_search, --lazy
+    with exact formulations.
+
+    Parameters
+    ----------
+    stability : bool
+        Do not prove which steps stand, dry and with epoxy (or the mortar of --stands or --mortar):
+        quicker.
+    out : pathlib.Path or str
+        Folder to write plan, tables, summary and page to.
 
     Examples
     --------
-    seqopt optimize arch25 --out best
-    seqopt optimize arch25 --schedule free --aim minmax,steps --out free
-    seqopt optimize wall:columns=4,courses=3 --schedule free --stands dry
-    seqopt optimize my.json --criteria worst-ratio --limit payload --out mine
+    $ seqopt optimize arch25 --out best
+    $ seqopt optimize arch25 --schedule free --aim minmax,steps --out free
+    $ seqopt optimize wall:columns=4,courses=3 --schedule free --stands dry
+    $ seqopt optimize my.json --criteria worst-ratio --limit payload --out mine
     """
-    found = find(asked)
-    return Result(found.plan, lambda: answered(asked, found))
+    found = find(asked, progress, stability=stability, out=out)
+    return Result(found.plan, lambda: answered(found))
 
 
-def find(asked: Optimize, change: Change | None = None) -> Found:
-    """Choose every open grip of a build, or every step; ``change``: applied to scene and start."""
-    clock = Clock(asked.time_limit)
-    outputs.require_out(asked, *outputs.ALWAYS)
-    start = time.perf_counter()
+def posed(asked: Call, *, verdicts: bool) -> Call:
+    """Return a call with its scene read, which may get further robots.
+
+    ``verdicts``: whether the mortar may be theirs alone.
+    """
+    built, words = split_words(asked.words, Timed)
+    if isinstance(built.scene, Built):  # with an order beside it
+        whole, order = built.scene, built.order
+        built = Timed(**{**vars(whole), "order": order or whole.order})
+    sought = {"order": SEARCH} if built.order == SEARCH else {}
+    robots = words.get("robots")
+    scene = replace(built, order=None if sought else built.order).read(robots)
+    mortar = mortar_of_engine(words.get("engine"), words.get("mortar"), verdicts=verdicts)
+    words |= {"scene": scene, "mortar": mortar, **sought}
+    words |= {"robots": None} if isinstance(robots, int) else {}
+    return Call(asked.function, words)
+
+
+def find(
+    asked: Call,
+    tell: Tell = shown,
+    *,
+    stability: bool = True,
+    out: Path | str | None = None,
+    more: Callable[[], Mapping[str, Any]] = dict,
+) -> Found:
+    """Choose every open grip of a build, or every step; ``more``: returns further words."""
+    search, words = split_words(asked.words, Search)
+    search = words.pop("search", search)
+    clock = Clock(search.time_limit)
+    output = Output.of(out, words.get("scene"), words.get("schedule"))
+    output.require(*ALWAYS)
     with clock.needed("posing the problem"):
-        posed = pose_problem(asked, change)
-        usual = graph_of(posed.problem).default_formulation
-        formulation = as_formulation(asked.formulation or usual)
-    how: dict[str, Any] = grammar.parse_options(formulation, asked.option)
-    if asked.max_memory is not None and "max_memory" in formulation.options:
-        how["max_memory"] = grammar.parse_size(str(asked.max_memory))
-    tell = asked.tell if formulation.of_states else within(asked.tell, clock.left)
-    run = Run(proof=asked.proof, lazy=asked.lazy, options=how, progress=tell, clock=clock)
-    assemble = time.perf_counter() - start
-
-    try:
-        plan = _solve_run(posed.problem, formulation, run)
-    except KeyboardInterrupt:
-        clock.interrupted = True
-        raise
+        call = posed(Call(asked.function, {**words, **more()}), verdicts=stability)
+    robust = split_words(words, Sampled)[0].parse()
+    plan = call(search=replace(search, clock=clock), progress=tell)
     clock.interrupted |= plan.ended is End.INTERRUPTED
-    prover = inputs.find_prover(asked, plan.engine.network)
-    return Found(posed, plan, assemble, prover, clock)
+    network, mortar = plan.engine.network, words.get("mortar")
+    prover = find_prover(network, mortar, tell, asks=stability, stands=plan.standing)
+    return Found(plan, prover, clock, output, tell, words.get("engine"), robust)
 
 
-def answered(asked: Optimize, found: Found) -> Answer:
+def answered(found: Found) -> Answer[Plan]:
     """Write a plan, and return its answer, without the parts that exceed the time limit."""
     made: dict[str, bytes | str] = {}
     proving = found.prover.begun(found.plan.steps) if found.clock.left else nullcontext()
     with proving:  # in another process, as commands may, unlike scripts
-        if asked.path is not None and found.analyzed and found.summary:  # what says most is first
+        if found.out.path is not None and found.analyzed and found.summary:  # says most: first
             tables = partial(outputs.plan_files, found.plan)
             made = found.clock.spare("its tables", tables, made)
         _ = found.verdicts
-        return _answer(asked, found, outputs.write_outputs(asked, lambda: _files(found, made)))
+        return _answer(found, found.out.write(found.tell, lambda: _files(found, made)))
 
 
 def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes | str]:
@@ -201,7 +202,7 @@ def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes |
     return {**outputs.bare_files(plan, table, found.report), **made, **tables}
 
 
-def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
+def _answer(found: Found, written: tuple[Any, ...]) -> Answer[Plan]:
     """Build the answer of a written plan."""
     plan = found.plan
     scene, early = plan.engine.network.scene, plan.ended is End.INTERRUPTED
@@ -212,22 +213,23 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
         **({"order": plan.order} if plan.order else {}),
     }
     ended = INTERRUPTED if early else "seqopt: interrupted; the plan was chosen by then"
-    answer = Answer(
+    answer: Answer[Plan] = Answer(
         scene=scene,
         facts={**facts, "plan": plan.responses if found.analyzed else outputs.steps_table(plan)},
-        text="\n".join(_lines(asked, found, over)),
+        text="\n".join(_lines(found, over)),
         written=written,
-        notes=tuple(_notes(asked, found)),
+        notes=tuple(_notes(found)),
+        value=plan,
     )
     answer = remarks.in_time(answer, found.clock, ended)
     unreached = () if plan.arms is None else plan.arms.faults
     left = plan.departures if found.analyzed else ()
     answer = remarks.held_to(answer, over, left, found.verdicts, unreached)
-    far = plan.is_far and not found.posed.problem.lifts_range
+    far = plan.is_far and not _problem(plan).lifts_range
     return remarks.kept_range(answer, plan.beyond if far else None)
 
 
-def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
+def _lines(found: Found, over: Sequence[str]) -> Iterator[str]:
     """Yield lines on grips, objective, search and stability of a plan."""
     plan, scene = found.plan, found.plan.engine.network.scene
     held = ""
@@ -240,7 +242,7 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
     counts.append(f"{plan.models:,} models")
     search = f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"
     page = found.analyzed and PAGE not in found.clock.left_out
-    yield f"{search}; {outputs.written_to(asked.path, page=page)}"
+    yield f"{search}; {outputs.written_to(found.out.path, page=page)}"
     yield from map(wrapped, remarks.waits_said(plan) if plan.certificate is not None else ())
     yield from (f"stability, {each}" for each in found.verdicts.get(plan.title, ()))
     if plan.order:
@@ -250,11 +252,11 @@ def _lines(asked: Optimize, found: Found, over: Sequence[str]) -> Iterator[str]:
         yield ADVICE.payload_advice(plan.engine, plan.steps, loads)
 
 
-def _notes(asked: Optimize, found: Found) -> Iterator[str]:
+def _notes(found: Found) -> Iterator[str]:
     """Yield notes on levels, rules, scales, proof, idle robots and time."""
-    plan, problem = found.plan, found.posed.problem
+    plan, problem = found.plan, _problem(found.plan)
     scene, criterion = plan.engine.network.scene, problem.criterion.name
-    yield from remarks.level_notes(asked, plan.engine)
+    yield from remarks.level_notes(found.engine, plan.engine)
     if criterion.endswith(OWN):
         yield f"criterion: {criterion}: no fixed method builds this scene to take scales from"
     yield from remarks.rule_notes(problem.moves, scene)
@@ -275,10 +277,15 @@ def _value(found: Found) -> str:
     plan = found.plan
     if plan.order:
         return f"{values_text(plan.objective)}, {plan.status}, {plan.order_bound_said}"
-    known = found.posed.known
-    if known is None or not plan.graph.candidates:
+    scenarios = _problem(plan).scenarios
+    if not scenarios or not plan.graph.candidates:
         return plan._value
-    return f"{plan._value} over {len(known.scenes)} scenarios ({plan.title})"
+    return f"{plan._value} over {len(scenarios)} scenarios ({plan.title})"
+
+
+def _problem(plan: Plan) -> Problem:
+    assert isinstance(plan.problem, Problem)  # as the command poses it
+    return plan.problem
 
 
 def _counted(count: int, what: str) -> str:

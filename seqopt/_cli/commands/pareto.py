@@ -7,35 +7,47 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from math import inf
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
-from seqopt._cli import grammar, inputs, options, outputs, remarks
+from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Result
-from seqopt._cli.posing import pose_problem
+from seqopt._cli.commands.optimize import posed
+from seqopt._cli.grammar import parse_numbers
+from seqopt._cli.inputs import find_prover
+from seqopt._cli.outputs import Output
+from seqopt._cli.signatures import Call, door
+from seqopt._cli.words import Bricks, BuiltFrom, Folder, Numbers, Words, shown
 from seqopt._files import csv_text, write_folder
 from seqopt._showing import PAGE
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence
-from seqopt.plan.front import Front, find_front, pick
+from seqopt.plan.front import Front, find_front
+from seqopt.plan.front import pick as pick_point
 from seqopt.plan.pose import states_of
 from seqopt.problem.amounts import judged_by
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import _said_limits
+from seqopt.problem.requirements import Limit, _said_limits
+from seqopt.problem.standing import Standing
 from seqopt.report._pages import front_page, plan_page
 from seqopt.report.comparison import method_tables, shown_table
 from seqopt.report.page import task_texts
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import Departure, LinearRange, _analyze_builds, builds_in_words
 from seqopt.scene.scene_file import dump_scene
-from seqopt.sequence.rules import FREE
+from seqopt.sequence.rules import FREE, FreeRules
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.work.progress import INTERRUPT, Clock, within
+from seqopt.work.progress import INTERRUPT, Clock, Tell, within
+from seqopt.workflow import Part, _pose_build
 
 DETAILS = "responses, verdicts and the page"
 INTERRUPTED = "seqopt: interrupted; the points are those that were found"
@@ -43,68 +55,11 @@ MOST_ROWS = 30  # of a table on the terminal
 FOUR = "F_largest,M_sup,T_max,D_max"
 
 
-class Pareto(options.Written, options.Limited, options.Moves):
-    """Which steps may a build have?
-
-    schedule : NAME|FILE
-        free (default): any robot may place, hold or release next; or a sequence with open grips:
-        {schedules}, or a CSV file
-
-    What counts as best?
-    --under goes with --pick.
-
-    pick : NAME
-        also write a folder, pick, of the plan with the least of a column
-    under : BOUND
-        for --pick: only plans below it, as F_largest=250 (SI units)
-
-    aim : NAME,NAME
-        what is to be small: responses and, of the free schedule, steps or regrips (default:
-        {default})
-    rounding : NAME=STEP
-        round a number up to multiples of a step (SI units)
-
-    Who chooses and proves, and how long?
-    time_limit : SECONDS
-        limit of the whole command, with its proof, verdicts and page: what it has no time for is
-        left out and named; the points that were found by then are there
-
-    What must hold?
-    --friction and --tilt go with --stands.
-    """
-
-    schedule: str | Path | None = FREE
-    aim: options.Words | None = FOUR
-    rounding: options.Numbers = options.word((), flag="--round")
-    pick: str | None = options.word(None, shell=True)
-    under: options.Words = options.word((), shell=True)
-
-
 @dataclass(frozen=True, repr=False)
 class _Picked(GivenSequence):
     """A plan of a Pareto set."""
 
     result: str = ""
-
-
-def run(asked: Pareto) -> Result:
-    """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
-
-    No other plan beats it in all aims at once (the Pareto set). Check each, and write a table, the
-    plans, a chart and a page for the browser.
-
-    Usage
-    [SCENE] [--out DIR] [--aim NAME,NAME] [other options]
-
-    Examples
-    --------
-    seqopt pareto arch25 --out front
-    seqopt pareto arch25 --pick D_max --under F_largest=250 --out front
-    seqopt pareto arch25 --aim D_max,steps --time-limit 60 --out front
-    seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front
-    """
-    found = _find(asked)
-    return Result(found.value, lambda: _answer(asked, found))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,6 +70,10 @@ class Found:
     value: Front
     clock: Clock
     prover: Callable[[Network], BuildProver]
+    out: Output
+    tell: Tell
+    engine: str | None  # that is named
+    schedule: str
 
     @cached_property
     def provers(self) -> dict[Engine, BuildProver]:
@@ -148,53 +107,137 @@ class Found:
         return {**counts, "seconds": dict(front.seconds)}
 
 
-def _find(asked: Pareto) -> Found:
-    """Find all non-dominated plans."""
-    outputs.require_out(asked)
-    clock = Clock(asked.time_limit)
+@door
+def pareto(  # noqa: PLR0913  # every option is a parameter
+    scene: BuiltFrom = "arch25",
+    *,
+    schedule: Schedule | Part | Path | str = FREE,
+    aim: Words = FOUR,
+    rounding: Numbers = (),
+    pick: str | None = None,
+    under: Words = (),
+    order: Bricks | None = None,
+    robots: int | Words | None = None,
+    rules: FreeRules | Words = (),
+    limits: Sequence[Limit | str] | Limit | str = (),
+    stands: Standing | Mortar | str | None = None,
+    time_limit: float = inf,
+    engine: str | None = None,
+    mortar: Mortar | str | None = None,
+    stability: bool = True,
+    out: Folder | None = None,
+    progress: Tell = shown,
+) -> Result[Front]:
+    """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
+
+    No other plan beats it in all aims at once (the Pareto set). Check each, and write a table, the
+    plans, a chart and a page for the browser.
+
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str, optional
+        What is built.
+    schedule : Schedule, Part, pathlib.Path or str, optional
+        Which steps a build may have; by default any.
+    aim : str or sequence of str, optional
+        What is to be small: responses and, of the free schedule, steps or regrips (default:
+        {default}).
+    rounding : mapping or sequence of str, optional
+        Round a number up to multiples of a step (SI units).
+    pick : str, optional
+        Also write a folder, pick, of the plan with the least of a column.
+    under : str or sequence of str, optional
+        For ``pick``: only plans below it, as F_largest=250 (SI units).
+    order, robots, rules, limits : optional
+        As of `optimize`.
+    stands : Standing, Mortar or str, optional
+        What every state must stand with.
+    time_limit : float, optional
+        Limit of the whole command, with its proof, verdicts and page: what it has no time for is
+        left out and named; the points that were found by then are there.
+    engine, mortar : optional
+        As of `optimize`.
+    stability : bool, optional
+        As of `optimize`.
+    out : pathlib.Path or str, optional
+        Folder to write.
+    progress : callable, optional
+        Called with the progress.
+
+    Returns
+    -------
+    Front
+        Its points and plans, and whether they are all.
+
+    Examples
+    --------
+    >>> pareto("wall:columns=2,courses=2", aim="F_largest,steps")
+    <Front: 1 plans, complete; F_largest, steps, regrips>
+
+    $ seqopt pareto arch25 --out front
+    $ seqopt pareto arch25 --pick D_max --under F_largest=250 --out front
+    $ seqopt pareto arch25 --aim D_max,steps --time-limit 60 --out front
+    $ seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front
+    """
+    output = Output.of(out, scene, schedule)
+    output.require()
+    clock = Clock(time_limit)
+    words: dict[str, Any] = {
+        "scene": scene,
+        "schedule": schedule,
+        "aim": str(aim),
+        "robots": robots,
+    }
+    words |= {"engine": engine, "mortar": mortar, "order": order, "stands": stands}
+    words |= {"rules": rules or None, "limits": limits, "progress": progress}
     with clock.needed("posing the problem"):
-        problem = pose_problem(asked).problem
+        problem: Problem = posed(Call(_pose_build, words), verdicts=stability)()
         free = states_of(problem)
-    rounding = grammar.parse_numbers("--round", asked.rounding, [str(goal) for goal in free.goals])
-    tell = within(asked.tell, clock.left)
-    front = find_front(problem, rounding=rounding, progress=tell, clock=clock)
+    steps = parse_numbers("--round", rounding, [str(goal) for goal in free.goals])
+    tell = within(progress, clock.left)
+    front = find_front(problem, rounding=steps, progress=tell, clock=clock)
     clock.interrupted |= front.stopped == INTERRUPT
-    return Found(problem, front, clock, partial(inputs.find_prover, asked))
+    required = stands if isinstance(stands, Standing) else None
+    prover = partial(find_prover, mortar=mortar, tell=progress, asks=stability, stands=required)
+    named = str(schedule.schedule if isinstance(schedule, Part) else schedule)
+    found = Found(problem, front, clock, prover, output, progress, engine, named)
+    return Result(front, lambda: _answer(found, pick, under))
 
 
-def _answer(asked: Pareto, found: Found) -> Answer:
+def _answer(found: Found, pick: str | None, under: Words) -> Answer[Front]:
     """Write a Pareto set, and return its answer, without the parts that exceed the time limit."""
     front, free, clock = found.value, states_of(found.problem), found.clock
     scene = free.engine.network.scene
     files: Mapping[str, bytes | str] = {}
-    if asked.path is not None:
+    path = found.out.path
+    if path is not None:
         _ = found.methods
     _ = found.departures
-    if asked.path is not None:
+    if path is not None:
         pairs = zip(front.engines, front.steps, strict=True)
         bare = _files(found, [outputs.steps_table(_Picked(own, steps)) for own, steps in pairs], {})
-        files = clock.spare(DETAILS, partial(_front_files, asked, found), bare)
+        files = clock.spare(DETAILS, partial(_front_files, found), bare)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
-    if asked.path and not asked.pick:
+    if path and not pick:
         said += "; --pick D_max also writes a folder of the plan with the least"
-    if asked.pick:
-        chosen, picked, row = _chosen(asked, asked.pick, found)
+    if pick:
+        chosen, picked, row = _chosen(pick, under, found)
         scene = front.engines[chosen].network.scene  # in the order of what is picked
         said += f"; picked row {chosen + 1}: {row}"
-    written = outputs.write_outputs(asked, lambda: {**files, "scene.json": dump_scene(scene)})
+    written = found.out.write(found.tell, lambda: {**files, "scene.json": dump_scene(scene)})
     shown = "" if written else f"{_numbered(front).to_string(max_rows=MOST_ROWS)}\n"
-    if asked.path is not None and asked.pick and picked is not None:
-        write = partial(_write_picked, asked.path / "pick", asked.pick, found, chosen, picked)
+    if path is not None and pick and picked is not None:
+        write = partial(_write_picked, path / "pick", pick, found, chosen, picked)
         clock.spare("the folder of the plan that is picked", write, None)
     points = {"points": shown_table(front.table), "picked": picked}
-    answer = Answer(
+    answer: Answer[Front] = Answer(
         facts={**found.counts, **points},
         scene=scene,
-        text=f"{shown}{said}; {outputs.written_to(asked.path, page=DETAILS not in clock.left_out)}",
+        text=f"{shown}{said}; {outputs.written_to(path, page=DETAILS not in clock.left_out)}",
         written=written,
         notes=(
-            *remarks.level_notes(asked, free.engine),
+            *remarks.level_notes(found.engine, free.engine),
             *remarks.rule_notes(free.rules, scene),
             *remarks.refused(next(iter(found.provers.values()))),
             *outputs.figure_notes(written),
@@ -205,11 +248,11 @@ def _answer(asked: Pareto, found: Found) -> Answer:
     return remarks.kept_range(answer, front.beyond or None)
 
 
-def _chosen(asked: Pareto, name: str, found: Found) -> tuple[int, dict[str, object], str]:
+def _chosen(name: str, under: Words, found: Found) -> tuple[int, dict[str, object], str]:
     """Return the index of the picked plan, its point, and its description."""
     known = [str(column) for column in found.value.table.columns]
-    bounds = grammar.parse_numbers("--under", asked.under, known)
-    chosen = pick(found.value.table, name, bounds)
+    bounds = parse_numbers("--under", under, known)
+    chosen = pick_point(found.value.table, name, bounds)
     row = shown_table(found.value.table).iloc[chosen]
     values = {str(name): value for name, value in row.items()}
     return chosen, {"point": chosen + 1, **values}, values_text(values)
@@ -249,23 +292,23 @@ def _write_picked(
     write_folder(folder, files)
 
 
-def _front_files(asked: Pareto, found: Found) -> dict[str, bytes | str]:
+def _front_files(found: Found) -> dict[str, bytes | str]:
     """Return the files of a Pareto set by name."""
     front, problem = found.value, found.problem
     engine, free = problem.engine, states_of(problem)
-    asked.tell("analyzing plans")
+    found.tell("analyzing plans")
     each: dict[str, pd.DataFrame] = {}
     verdicts: dict[str, tuple[BuildVerdicts, ...]] = {}
     for own, builds in _by_engine(front).items():
         each |= zip(builds, _analyze_builds(own, [*builds.values()]), strict=True)
         verdicts |= found.provers[own].of_builds(builds)
-    asked.tell("drawing and writing the page")
+    found.tell("drawing and writing the page")
     tables = {name: each[name] for name in _names(front)}
     left = found.departures
     summary = {
         "outside_linear_range": list(builds_in_words(left)),
         "scene": engine.network.scene.name,
-        "schedule": str(asked.schedule),
+        "schedule": found.schedule,
         "aims": [str(goal) for goal in free.goals],
         **judged_by(free.goals, free.criterion),
         "limits": _said_limits(problem.limits),

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pandas as pd
 
-from seqopt._cli import inputs, options, outputs
 from seqopt._cli.answer import Answer
+from seqopt._cli.outputs import Output
+from seqopt._cli.signatures import door
 from seqopt._cli.terminal import wrapped
+from seqopt._cli.words import BuiltFrom, Folder, as_built, shown
 from seqopt._files import csv_text
 from seqopt.arms._permits import (
     find_table,
@@ -16,51 +20,58 @@ from seqopt.arms._permits import (
     reach_without_arms,
 )
 from seqopt.arms.reach import find_postures
-from seqopt.scene.scene import Scene
+from seqopt.work.progress import Tell
 
 
-class Reach(options.Written, options.Postures, options.Built):
-    """What is written and printed?
-
-    out : DIR
-        folder to write reach.csv, postures.csv and a picture to
-    """
-
-
-def run(asked: Reach) -> Answer:
+@door
+def reach(
+    scene: BuiltFrom = "arch25",
+    *,
+    cache: Path | str | None = None,
+    out: Folder | None = None,
+    progress: Tell = shown,
+) -> Answer[pd.DataFrame]:
     """Say which robots reach which nodes.
 
     Of those with arms, with how many postures, and up to how many bricks. Robots have arms in the
     scene file; the extra arms computes postures.
 
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str, optional
+        What is built.
+    cache : pathlib.Path or str, optional
+        As of `optimize`.
+    out : pathlib.Path or str, optional
+        Folder to write reach.csv, postures.csv and a picture to.
+    progress : callable, optional
+        Called with the progress.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per robot and node.
+
     Examples
     --------
-    seqopt reach my.json --out reach
-    seqopt reach my.json --cache postures --json
+    $ seqopt reach my.json --out reach
+    $ seqopt reach my.json --cache postures --json
     """
-    scene = inputs.find_scene(asked)
-    outputs.require_out(asked)
-    find_postures(scene, asked.cache, asked.tell)
-    table = reach_table(scene) if scene.has_arms else reach_without_arms(scene)
-    written = outputs.write_outputs(asked, lambda: _files(scene, table))
-    lines = [*(reach_described if scene.has_arms else reach_covered)(scene, table)]
+    found, output = as_built(scene).read(), Output.of(out, scene)
+    output.require()
+    find_postures(found, cache, progress)
+    table = reach_table(found) if found.has_arms else reach_without_arms(found)
+
+    def files() -> dict[str, bytes | str]:
+        postures = {"postures.csv": csv_text(find_table(found).table())} if found.has_arms else {}
+        return {"reach.csv": csv_text(table), **postures}
+
+    written = output.write(progress, files)
+    lines = [*(reach_described if found.has_arms else reach_covered)(found, table)]
     if written:
-        names = "reach.csv, postures.csv" if scene.has_arms else "reach.csv"
-        lines.append(f"written to {asked.path}: {names}")
+        names = "reach.csv, postures.csv" if found.has_arms else "reach.csv"
+        lines.append(f"written to {out}: {names}")
     else:
         lines.append("--out DIR writes a row for every robot and node, and postures of arms")
-    return Answer(
-        {"reach": table},
-        scene=scene,
-        text="\n".join(map(wrapped, lines)),
-        written=written,
-        value=table,
-    )
-
-
-def _files(scene: Scene, table: pd.DataFrame) -> dict[str, bytes | str]:
-    """Return the tables by file name."""
-    files: dict[str, bytes | str] = {"reach.csv": csv_text(table)}
-    if scene.has_arms:
-        files["postures.csv"] = csv_text(find_table(scene).table())
-    return files
+    text = "\n".join(map(wrapped, lines))
+    return Answer({"reach": table}, text, scene=found, written=written, value=table)

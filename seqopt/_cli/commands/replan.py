@@ -5,135 +5,206 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import field, fields, replace
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from seqopt._cli import inputs, options, outputs
 from seqopt._cli.answer import Answer, Result
 from seqopt._cli.commands import optimize
+from seqopt._cli.commands.optimize import Found
+from seqopt._cli.inputs import plan_folder
+from seqopt._cli.outputs import ALWAYS, Output
+from seqopt._cli.signatures import Call, door
 from seqopt._cli.terminal import wrapped
+from seqopt._cli.words import Bricks, BuiltFrom, Changed, Folder, Timed, Words, listed, shown
 from seqopt._files import parse_json, read_text
+from seqopt.contact.mortar import Mortar
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
 from seqopt.exchange.exports import read_folder
 from seqopt.exchange.imports import read_measured
+from seqopt.plan.plan import Plan
 from seqopt.plan.replan import compared, without
+from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance, values_text
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
 from seqopt.scene.scenarios import SAME, as_built
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.rules import FREE, _usual_grips, with_robots
+from seqopt.sequence.rules import FREE, FreeRules, _usual_grips, with_robots
 from seqopt.study.published import CRITERIA
+from seqopt.work.progress import Tell
+from seqopt.workflow import Part, Search, _find_start, _Place
+from seqopt.workflow import optimize as plan_build
+
+NOTHING, USUAL = Changed(), Search()
 
 
-class Replan(
-    options.Strict,
-    options.Written,
-    options.Postures,
-    options.Judged,
-    options.Limited,
-    options.Ranks,
-    options.Cured,
-    options.Timed,
-    options.Aimed,
-):
-    """Which plan, and where does it stand?
-
-    plan : PLAN_DIR|SCENE
-        folder that optimize wrote: its plan, scene and summary; in place of it a scene, for which
-        the best free schedule is planned first
-    at : STEP
-        number of the last step that was done (default: {default})
-
-    What has changed?
-    lost : ROBOT
-        robot that lets go and takes no further part
-    payload : NEWTON
-        what every robot may carry from now on, or as rob1=250 one
-    grips : STIFFNESS
-        how stiff grips are, as of optimize
-    robots : N
-        how many robots there are from now on; new ones reach every node
-    missing : BRICK
-        brick that is not there: one that stood is placed again next, one that was still to come
-        waits until all are placed that do not hang on it
-    measured : FILE
-        where bricks that stand were measured, m: a CSV file (brick, x, y, z), or an assembly of
-        COMPAS
-    to : PLAN:STEP|STATE|N
-        where the build ends, as of optimize
-
-    What counts as best?
-    As before, by default.
-
-    What is written and printed?
-    out : DIR
-        folder to write the new plan to
-
-    What must hold?
-    --friction, --tilt and --curing go with --stands.
-    """
-
-    plan: options.BuiltFrom = field(default="arch25", kw_only=False, metadata={"place": True})
-    at: int | str = field(default=1, kw_only=False)
-    lost: options.Words = ()
-    payload: float | options.Numbers = ()
-    grips: options.Number | None = None
-    robots: int | str | None = None
-    missing: options.Bricks = ()
-    measured: options.File | None = None
-    to: int | str | None = None
-
-
-def run(asked: Replan) -> Result:
+@door
+def replan(  # noqa: PLR0913  # every option is a parameter
+    plan: Annotated[BuiltFrom, ("value", "PLAN_DIR|SCENE")] = "arch25",
+    *,
+    at: int | str = 1,
+    lost: Words = (),
+    missing: Bricks = (),
+    changed: Changed = NOTHING,
+    to: _Place | int | str | None = None,
+    robots: Annotated[int | str | None, ("value", "N"), ("parse", str)] = None,
+    criterion: Criterion | str | None = None,
+    aim: Words | None = None,
+    limits: Sequence[Limit | str] | Limit | str = (),
+    rules: FreeRules | Words = (),
+    stands: Standing | Mortar | str | None = None,
+    engine: str | None = None,
+    mortar: Mortar | str | None = None,
+    stability: bool = True,
+    search: Search = USUAL,
+    out: Folder | None = None,
+    progress: Tell = shown,
+) -> Result[Plan]:
     """Plan the rest of a build from one of its steps, after something has changed.
 
     A robot is lost, carries less or is new, a brick is missing. Any robot may release, hold or
     place next; aims, criterion and rules are by default those of the plan.
 
-    Usage
-    PLAN_DIR [--at STEP] [changes] [--out DIR] [other options]
+    Parameters
+    ----------
+    plan : pathlib.Path, Plan, Scene or str, optional
+        Folder that optimize wrote: its plan, scene and summary; in place of it a scene, for which
+        the best free schedule is planned first.
+    at : int, optional
+        Number of the last step that was done (default: {default}).
+    lost : str or sequence of str, optional
+        Robot that lets go and takes no further part.
+    missing : int or sequence of int, optional
+        Brick that is not there: one that stood is placed again next, one that was still to come
+        waits until all are placed that do not hang on it.
+    changed : Changed, optional
+        What else is other than planned: ``payload``, ``grips``, ``durations``, ``measured``, which
+        may be given in its place.
+    to : int or str, optional
+        Where the build ends, as of optimize.
+    robots : int, optional
+        How many robots there are from now on; new ones reach every node.
+    criterion : Criterion or str, optional
+        What a step costs.
+    aim, limits, rules : optional
+        As of `optimize`.
+    stands : Standing, Mortar or str, optional
+        What every state must stand with.
+    engine, mortar : optional
+        As of `optimize`.
+    stability : bool, optional
+        As of `optimize`.
+    search : Search, optional
+        How it is searched, and what that may use.
+    out : pathlib.Path or str, optional
+        Folder to write the new plan to.
+    progress : callable, optional
+        Called with the progress.
+
+    Returns
+    -------
+    Plan
+        The plan of the rest.
 
     Examples
     --------
-    seqopt replan free --at 12 --lost rob3 --rule least_grips=1
-    seqopt replan free --at 12 --payload rob1=250 --out weaker
-    seqopt replan free --at 12 --robots 4 --missing 9
+    >>> import seqopt
+    >>> plan = seqopt.optimize("wall:columns=2,courses=2", "free")
+    >>> replan(plan, at=2, lost=["rob3"], rules="least_grips=1").steps[0].number
+    3
+
+    $ seqopt replan free --at 12 --lost rob3 --rule least_grips=1
+    $ seqopt replan free --at 12 --payload rob1=250 --out weaker
+    $ seqopt replan free --at 12 --robots 4 --missing 9
     """
-    for name, text in (("at", asked.at), ("robots", asked.robots or "0")):
+    for name, text in (("at", at), ("robots", robots or "0")):
         if not str(text).isdecimal():
             raise StepError(f"--{name} {text}: give a number")
-    outputs.require_out(asked, *outputs.ALWAYS)
-    folder, notes = inputs.plan_folder(asked, asked.plan, free=True)
-    base, change = _as_optimize(asked, folder), partial(_changed, asked)
+    Output.of(out).require(*ALWAYS)
+    folder, notes = plan_folder(plan, search.cache, progress, free=True)
+    measured = None if changed.measured is None else Path(changed.measured)
+    change = Change([*lost], listed(missing), measured, int(at))
+    told = _told(folder, lost=bool(lost))
+    if told.get("direction") and missing:
+        raise StepError("--missing: bricks are missing in a build; a take-down removes them anyway")
+    words: dict[str, Any] = {"engine": engine, "mortar": mortar, "stands": stands, "search": search}
+    words |= {"aim": aim or told.get("aim"), "criterion": criterion or told.get("criterion")}
+    words |= {"limits": limits or told.get("limits", ())}
+    words |= {
+        "rules": rules if isinstance(rules, FreeRules) else (*told.get("rules", ()), *[*rules])
+    }
+
+    scene = folder / "scene.json"
+    other: dict[str, Any] = {**vars(changed)}
+    del other["measured"]
+    built = Timed(scene=scene, **other)
+
+    def find(count: int | str | None) -> Found:
+        def start() -> dict[str, Any]:
+            found, begin, left = change.start(folder, built.read(count), stands)
+            part = Part(schedule=FREE, begin=begin, to=to, direction=told.get("direction"))
+            return {"scene": found, "schedule": part, "robots": left or None}
+
+        call = Call(plan_build, words)
+        return optimize.find(call, progress, stability=stability, out=out, more=start)
+
     try:
-        new = optimize.find(base, change)
+        new = find(robots)
     except InfeasibleError as error:
-        more, scene = "", load_scene(folder / "scene.json")
-        count = max(len(scene.robots), int(asked.robots or 0)) + 1
+        more, own = "", load_scene(scene)
+        count = max(len(own.robots), int(robots or 0)) + 1
         with suppress(InfeasibleError, NothingFoundError, StepError):
-            with_robots(scene, count)
-            another = optimize.find(replace(base, robots=str(count)), change).plan
+            with_robots(own, count)
+            another = find(count).plan
             more = f"; or with one more robot that reaches every node: {another.result}"
         raise InfeasibleError(f"{error}{more}") from None
 
-    def answer() -> Answer:
-        found = _answer(asked, folder, base, new)
+    def answer() -> Answer[Plan]:
+        found = _answer(folder, change, new)
         return replace(found, notes=(*notes, *found.notes))
 
     return Result(new.plan, answer)
 
 
-def _answer(asked: Replan, folder: Path, base: optimize.Optimize, new: optimize.Found) -> Answer:
+@dataclass(frozen=True)
+class Change:
+    """What changed when a build had come to a step."""
+
+    lost: Sequence[str]
+    missing: Sequence[str | int]
+    measured: Path | None
+    at: int
+
+    def start(
+        self, folder: Path, scene: Scene, stands: Standing | Mortar | str | None
+    ) -> tuple[Scene, _Place, tuple[str, ...]]:
+        """Return scene and place after the changes, and the names of participating robots."""
+        scene, begin = _find_start(scene, f"{folder}:{self.at}", stands)
+        assert begin.site is not None
+        if wrong := [text for text in self.missing if not str(text).isdecimal()]:
+            raise StepError(f"--missing {wrong[0]}: give the number of a brick")
+        if self.measured is not None:
+            found = read_measured(scene, self.measured)
+            stand = scene.build_order[: begin.site.bricks]
+            if early := [name for name in found if name in scene.build_order and name not in stand]:
+                why = f"brick {early[0]} does not stand yet; leave it out"
+                raise StepError(f"--measured {self.measured}: {why}")
+            scene = as_built(scene, found)
+        scene, site = without(scene, begin.site, self.lost, [*map(int, self.missing)])
+        left = tuple(robot.name for robot in scene.robots if robot.name not in self.lost)
+        return scene, _Place(site, None), left if self.lost else ()
+
+
+def _answer(folder: Path, change: Change, new: Found) -> Answer[Plan]:
     """Write the new plan, and return its changes."""
     scene, steps = read_folder(folder)
-    old = [step for step in steps if step.number > int(asked.at)]
+    old = [step for step in steps if step.number > change.at]
 
     def differs() -> dict[str, object]:
         changes = compared(new.plan, old)
-        if asked.measured is None:
+        if change.measured is None:
             return changes
         planned = {brick.name: brick.position for brick in scene.bricks}
         built = new.plan.engine.network.scene.bricks
@@ -142,7 +213,7 @@ def _answer(asked: Replan, folder: Path, base: optimize.Optimize, new: optimize.
         return changes | {"off_m": off, "off_brick": brick, "tolerance_left_m": left}
 
     facts = new.clock.spare("what the new plan changes", differs, None)
-    answer = optimize.answered(base, new)
+    answer = optimize.answered(new)
     if facts is None:
         return answer
     return replace(
@@ -150,21 +221,6 @@ def _answer(asked: Replan, folder: Path, base: optimize.Optimize, new: optimize.
         facts={**answer.facts, "replanned": facts},
         text="\n".join([*map(wrapped, _in_words(facts)), answer.text]),
     )
-
-
-def _as_optimize(asked: Replan, folder: Path) -> optimize.Optimize:
-    """Return the request to ``optimize`` that continues from the step."""
-    shared = {each.name for each in fields(asked)} & {e.name for e in fields(optimize.Optimize)}
-    given = {name: getattr(asked, name) for name in shared}
-    told = _told(folder, lost=bool(asked.lost))
-    kept = ("aim", "criterion", "limits")
-    given |= {name: told[name] for name in kept if told and not given[name]}
-    given |= {"scene": str(folder / "scene.json"), "schedule": FREE}
-    given |= {"begin": f"{folder}:{asked.at}", "direction": told.get("direction")}
-    given["rules"] = (*told.get("rules", ()), *options.listed(asked.rules))
-    if given["direction"] and asked.missing:
-        raise StepError("--missing: bricks are missing in a build; a take-down removes them anyway")
-    return optimize.Optimize(**given)
 
 
 def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
@@ -196,24 +252,6 @@ def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
             if name != PROP_EXCESS  # which the scene says
         ),
     }
-
-
-def _changed(asked: Replan, scene: Scene, begin: inputs.Place) -> tuple[Scene, inputs.Place, str]:
-    """Return scene and place after the changes, and the names of participating robots."""
-    assert begin.site is not None
-    missing = options.listed(asked.missing)
-    if wrong := [text for text in missing if not text.isdecimal()]:
-        raise StepError(f"--missing {wrong[0]}: give the number of a brick")
-    if asked.measured is not None:
-        found = read_measured(scene, Path(asked.measured))
-        stand = scene.build_order[: begin.site.bricks]
-        if early := [name for name in found if name in scene.build_order and name not in stand]:
-            why = f"brick {early[0]} does not stand yet; leave it out"
-            raise StepError(f"--measured {asked.measured}: {why}")
-        scene = as_built(scene, found)
-    scene, site = without(scene, begin.site, asked.lost, [*map(int, missing)])
-    left = [robot.name for robot in scene.robots if robot.name not in asked.lost]
-    return scene, inputs.Place(site, None), ",".join(left) if asked.lost else ""
 
 
 def _in_words(facts: Mapping[str, Any]) -> Sequence[str]:

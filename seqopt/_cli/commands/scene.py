@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from seqopt._cli import inputs, options, outputs, remarks
+from seqopt._cli import inputs, remarks
 from seqopt._cli.answer import Answer, scene_facts
+from seqopt._cli.outputs import Output
+from seqopt._cli.words import BuiltFrom, as_built, shown
 from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -17,55 +19,67 @@ from seqopt.report._scene_page import scene_page
 from seqopt.scene.parts import Prop, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
-from seqopt.work.progress import with_progress
+from seqopt.work.progress import Tell, with_progress
 
 
-class SceneAsked(options.Postures, options.Built):
-    """What is built, and by whom?
-
-    list :
-        name all built-in scenes, and the words that make others
-    export : FILE
-        JSON file to write
-    view :
-        write a page for the browser: bricks by name in their order, nodes at which robots can hold,
-        ground, bases and reaches
-    """
-
-    list: bool = False
-    export: Path | None = None
-    view: bool = False
-
-
-def run(asked: SceneAsked) -> Answer:
+def run(
+    scene: BuiltFrom = "arch25",
+    *,
+    list: bool = False,  # noqa: A002  # the option's name
+    export: Annotated[Path | None, ("value", "FILE")] = None,
+    view: bool = False,
+    cache: Path | str | None = None,
+    progress: Tell = shown,
+) -> Answer[None]:
     """Check a scene, say what is in it, and write it as a JSON file if asked.
 
     Or list all built-in scenes and the words that make others.
 
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str, optional
+        What is built.
+    list : bool, optional
+        Name all built-in scenes, and the words that make others.
+    export : pathlib.Path, optional
+        JSON file to write.
+    view : bool, optional
+        Write a page for the browser: bricks by name in their order, nodes at which robots can hold,
+        ground, bases and reaches.
+    cache : pathlib.Path or str, optional
+        As of `optimize`.
+    progress : callable, optional
+        Called with the progress.
+
+    Returns
+    -------
+    Answer
+
     Examples
     --------
-    seqopt scene --list
-    seqopt scene arch:span=2,rise=0.8
-    seqopt scene arch25 --export my.json
-    seqopt scene my.json --view
+    $ seqopt scene --list
+    $ seqopt scene arch:span=2,rise=0.8
+    $ seqopt scene arch25 --export my.json
+    $ seqopt scene my.json --view
     """
-    if asked.list:
-        return _list(asked)
-    outputs.keep_apart(asked, asked.export)
-    scene = inputs.find_scene(asked)
-    facts = {**scene_facts(scene), **_network_facts(build_network(scene))}
-    lines = [*_described(scene, facts)]
-    if asked.export is not None:
-        save_scene(scene, asked.export)
-        lines.append(f"written to {asked.export}")
-    written = () if asked.export is None else (asked.export,)
-    if asked.view:
-        page = inputs.file_name(scene.name, ".html")
-        outputs.keep_apart(asked, page)
-        trouble = inputs.posture_trouble(asked, scene)
+    if list:
+        return _list(progress)
+    output = Output.of(export, scene)
+    output.keep_apart(export)
+    found = as_built(scene).read()
+    facts = {**scene_facts(found), **_network_facts(build_network(found))}
+    lines = [*_described(found, facts)]
+    if export is not None:
+        save_scene(found, export)
+        lines.append(f"written to {export}")
+    written = () if export is None else (export,)
+    if view:
+        page = inputs.file_name(found.name, ".html")
+        output.keep_apart(page)
+        trouble = inputs.posture_trouble(found, cache, progress)
         lines += [f"arms: their reach is not known; {trouble}"] if trouble else []
-        asked.tell("writing the page")
-        write_text(page, scene_page(scene))
+        progress("writing the page")
+        write_text(page, scene_page(found))
         lines.append(f"written to {page}; open it in a browser")
         written = (page,)
     return Answer(facts={"scene": facts}, text="\n".join(lines), written=written)
@@ -90,10 +104,10 @@ def _network_facts(network: Network) -> dict[str, object]:
     }
 
 
-def _list(asked: SceneAsked) -> Answer:
+def _list(tell: Tell) -> Answer[None]:
     found = {
         name: load_scene(name)
-        for name in with_progress("reading built-in scenes", builtin_scenes(), asked.tell)
+        for name in with_progress("reading built-in scenes", builtin_scenes(), tell)
     }
     lines = [
         f"{name}: {len(scene.bricks)} bricks, {len(scene.joints)} joints; {ABOUT[name]}"

@@ -1,0 +1,401 @@
+"""Words of the command line: those for options, and values that several options make.
+
+`SPREAD` says which parameters are made of several words. An option that a table names has one
+meaning in all commands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from math import radians
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias, TypeVar
+
+from seqopt._cli import grammar
+from seqopt.contact.mortar import Mortar, _find_curing
+from seqopt.engines.registry import ENGINES
+from seqopt.errors import ProblemError, SceneError
+from seqopt.graph.formulation import formulation_names
+from seqopt.plan.build import ShownBuild
+from seqopt.problem.criteria import Ranked
+from seqopt.problem.problem import parse_robust
+from seqopt.problem.requirements import Criterion
+from seqopt.problem.standing import Standing
+from seqopt.scene.scenarios import MOST
+from seqopt.scene.scene import Scene, in_order
+from seqopt.scene.scene_file import builtin_scenes, load_scene
+from seqopt.sequence.methods import METHODS, SCHEDULES
+from seqopt.sequence.rules import with_robots
+from seqopt.stability.assessment import MARGINS
+from seqopt.study.published import CRITERIA, PUBLISHED
+from seqopt.workflow import SEARCH, Part, Robust, Search, _choose_criterion
+
+File: TypeAlias = Annotated[Path | str, ("value", "FILE")]
+Folder: TypeAlias = Annotated[Path | str, ("value", "DIR")]
+BuiltFrom: TypeAlias = Scene | ShownBuild | Path | str
+Words: TypeAlias = Sequence[str] | str
+Numbers: TypeAlias = Mapping[str, float] | Sequence[str] | str
+Bricks: TypeAlias = Sequence[int | str] | int | str
+
+_Kind = TypeVar("_Kind")
+MOST_WORKERS = 1024
+SPREADS = ("stiffness", "density", "position", "grips")
+QUESTIONS = {
+    "What is built, and by whom?": "scene folder list export view order grips props payload "
+    "durations robots",
+    "Which steps may a build have?": "schedule method plan begin to direction rules reassign",
+    "What has changed?": "at lost missing measured",
+    "What counts as best?": "criterion ranked aim rounding pick under speed reference",
+    "What must hold?": "stands friction tilt curing limits budgets tensile_strength cohesion",
+    "What is asked beside verdicts?": "margins steps map holds",
+    "In which scenarios is it good?": "robust scenarios seed vary",
+    "Who chooses and proves, and how long?": "formulation candidates options proof lazy time_limit "
+    "workers max_memory",
+    "How are responses computed?": "engine mortar tolerance cache",
+    "What does the file not say?": "unit up density supports",
+    "Which joints are made?": "stiffness gap detect accept_overlaps",
+    "What is written and printed?": "out name below fields figures stability strict quiet json",
+}
+"""Options by the question that they answer, in the order in which help asks them."""
+FLAGS = {
+    "begin": "from",
+    "budgets": "budget",
+    "criterion": "criteria",
+    "limits": "limit",
+    "options": "option",
+    "rounding": "round",
+    "rules": "rule",
+}  # words for options that are not their names
+METAVARS = {
+    "SCENE": "scene",
+    "ORDER": "order",
+    "STIFFNESS": "grips",
+    "NODES": "props",
+    "NEWTON": "payload",
+    "N|NAME,NAME": "robots",
+    "WORDS": "durations curing",
+    "NAME": "criterion formulation pick name format",
+    "NAME,NAME": "aim",
+    "NAMES": "margins holds",
+    "NAME=VALUE": "rules vary options",
+    "NAME=VALUES": "over",
+    "NAME=STEP": "rounding",
+    "BOUND": "under",
+    "LIMIT": "limits",
+    "BUDGET": "budgets",
+    "MORTAR": "stands mortar",
+    "F": "friction",
+    "DEG": "tilt",
+    "PA": "tensile_strength cohesion",
+    "NAME|FILE": "schedule",
+    "PLAN:STEP|STATE|N": "begin to",
+    "build|take-down": "direction",
+    "AIM": "robust",
+    "N": "scenarios seed workers",
+    "RULE": "candidates",
+    "SECONDS": "time_limit",
+    "SIZE": "max_memory",
+    "FILE": "plan source bound file",
+    "DIR": "cache",
+    "STEP": "at",
+    "ROBOT": "lost",
+    "BRICK": "missing",
+}
+VALUES = {name: value for value, names in METAVARS.items() for name in names.split()}
+HOW: dict[str, dict[str, Any]] = {
+    "engine": {"choices": lambda: ENGINES},
+    "method": {"choices": (*METHODS, PUBLISHED)},
+    "ranked": {"choices": [each.value for each in Ranked]},
+    "friction": {"zero": True},
+    "tilt": {"zero": True},
+    "robots": {"parse": lambda text: int(text) if text.isdecimal() else named(text)},
+    "time_limit": {"zero": True},
+    "scenarios": {"most": MOST},
+    "seed": {"least": 0, "most": MOST},
+}  # what a parser knows of options beside their types
+HIDDEN = ("also", "executor", "clock", "made_by")  # that Python alone says
+NAMES: dict[str, Callable[[], Iterable[str]]] = {
+    "scene": builtin_scenes,
+    "schedule": lambda: SCHEDULES,
+    "criterion": lambda: CRITERIA,
+    "formulation": formulation_names,
+    "margins": lambda: MARGINS,
+}  # what help lists
+
+
+@dataclass(frozen=True, kw_only=True)
+class Built:
+    """A scene, and what is other than it says.
+
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str
+        A built-in scene, a JSON file, a plan's folder, or words as arch:span=2,rise=0.8 (default:
+        arch25); seqopt scene --list shows all.
+    order : str
+        In which order bricks are placed, if not in the scene's own: reversed, ends (from all ground
+        ends at once), sides (course by course, from both ends of each to its middle), or the names
+        of all bricks, as 1..12,25..13.
+    grips : float or str
+        How stiff the grips of all robots are, if not as the scene says: rigid, or N/m, as 1e6, or
+        three along its axes, as 1e6x1e6x5e5; turning=N m/rad after a comma keeps held bricks from
+        turning.
+    props : str
+        Nodes that props hold beside the robots, if not as the scene says, until the finished
+        structure is let go: as 13,27, or every, one at each brick as centering has; N/m after a
+        colon if they are not rigid, as every:1e6; then push for such as only push up, and
+        capacity=N.
+    payload : float or str
+        What every robot may carry, N, if not as the scene says; of one robot with its name before,
+        as rob1=250.
+    """
+
+    scene: Any = "arch25"
+    order: Bricks | None = None
+    grips: float | str | None = None
+    props: Bricks | None = None
+    payload: float | Numbers = ()
+
+    @property
+    def own(self) -> Scene:
+        """The scene as it is, of a plan or its folder too."""
+        if isinstance(self.scene, ShownBuild):
+            return self.scene.engine.network.scene
+        if isinstance(self.scene, Scene):
+            return self.scene
+        path = Path(self.scene)
+        return load_scene(path / "scene.json" if is_folder(path) else self.scene)
+
+    def read(self, robots: int | Words | None = None) -> Scene:
+        """Return the scene; ``robots``: how many there are, or names, which change nothing."""
+        if self.order == SEARCH:
+            raise ProblemError(
+                "--order search: only the free schedule has it; give optimize --schedule free"
+            )
+        scene = in_order(self.own, None if self.order is None else str(self.order))
+        for text in listed(self.payload):
+            scene = grammar.with_payload(text, scene)
+        if (count := str(robots)).isdecimal():
+            scene = with_robots(scene, int(count))
+        if self.props is not None:
+            scene = scene.with_props(*grammar.parse_props(str(self.props), scene))
+        return scene if self.grips is None else grammar.with_grips(self.grips, scene)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timed(Built):
+    """A scene, and what is other than it says.
+
+    Parameters
+    ----------
+    durations : str or sequence of str
+        How long robots take, s: fetch=30,place=10,approach=10,grip=5,release=5 or speed=0.2 (m/s,
+        of ways between grips); that is to bring the next brick, to place it, to come to one that
+        stands, to grip it, to let go; who is free fetches and approaches while others act; of one
+        robot with its name before, as rob3:fetch=75 or rob3:slower=2.5 (default: as the scene
+        says).
+    """
+
+    durations: Words = ()
+
+    def read(self, robots: int | Words | None = None) -> Scene:
+        """Return the scene; as of `Built`."""
+        return in_seconds(super().read(robots), self.durations)
+
+    def parse(self) -> Scene:
+        """Return the scene, as Python takes it."""
+        return self.read()
+
+
+def listed(values: Any) -> list[Any]:
+    """Return the words of an option that may be repeated."""
+    return [values] if isinstance(values, str) else [*values]
+
+
+def named(text: str) -> tuple[str, ...]:
+    """Return names with commas between them."""
+    return tuple(name.strip() for name in text.split(","))
+
+
+def split_words(
+    words: Mapping[str, Any], kind: Callable[..., _Kind]
+) -> tuple[_Kind, dict[str, Any]]:
+    """Return the value that some words make, and the other words."""
+    own = {each.name for each in fields(kind)}  # type: ignore[arg-type]
+    made = kind(**{name: each for name, each in words.items() if name in own})
+    return made, {name: each for name, each in words.items() if name not in own}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Changed:
+    """What is other than it was planned.
+
+    Parameters
+    ----------
+    payload : float or str
+        What every robot may carry from now on, or as rob1=250 one.
+    grips : float or str
+        How stiff grips are, as of optimize.
+    durations : str or sequence of str
+        As of `optimize`.
+    measured : pathlib.Path or str
+        Where bricks that stand were measured, m: a CSV file (brick, x, y, z), or an assembly of
+        COMPAS.
+    """
+
+    payload: float | Numbers = ()
+    grips: float | str | None = None
+    durations: Words = ()
+    measured: File | None = None
+
+
+def shown(_: object) -> None:
+    """Show the progress, by default, where somebody looks: who calls a command does that."""
+
+
+def in_seconds(scene: Scene, durations: Words) -> Scene:
+    """Return a scene with durations, if any."""
+    try:
+        return scene.with_durations(*durations) if durations else scene
+    except SceneError as error:
+        raise SceneError(f"--{error}") from None
+
+
+def as_built(scene: BuiltFrom | Built) -> Built:
+    """Return what a command is given in place of a scene."""
+    return scene if isinstance(scene, Built) else Built(scene=scene)
+
+
+def is_folder(path: Path) -> bool:
+    """Return whether a path is the folder of a plan."""
+    return (path / "scene.json").is_file() and (path / "plan.csv").is_file()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stands:
+    """The demand that every state stands.
+
+    Parameters
+    ----------
+    stands : Standing, Mortar or str
+        Every state must be proven to stand, robots within payload: dry, epoxy or bond=STRENGTH
+        (Pa).
+    friction : float
+        With ``stands``: coefficient of friction.
+    tilt : float
+        With ``stands``: tilt that every state must survive.
+    curing : str or sequence of str
+        With ``stands``: which share of its bond mortar has at an age: 15min (in proportion, full
+        then), 0s=0.005,5min=0.4,15min=1 (what is reached when), never; of one joint with its name
+        before, as 5-6:30min. What is let go waits for it (default: full at once).
+    """
+
+    stands: Standing | Mortar | str | None = None
+    friction: float | None = None
+    tilt: float | None = None
+    curing: Words = ()
+
+    def parse(self) -> Standing | None:
+        """Return the requirement of stability, None if there is none."""
+        if isinstance(self.stands, Standing):  # of Python
+            return self.stands
+        said = {"tilt": self.tilt, "friction": self.friction, "curing": self.curing}
+        names = [name for name, value in said.items() if value not in (None, ())]
+        if self.stands is None:
+            if names:
+                raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands dry, say")
+            return None
+        mortar = grammar.parse_mortar(self.stands, "--stands")
+        mortar = mortar if self.friction is None else replace(mortar, friction=self.friction)
+        try:
+            cures = _find_curing(" ".join(self.curing)) if self.curing else None
+        except SceneError as error:
+            raise ProblemError(f"--{error}") from error
+        return Standing(mortar, radians(self.tilt or 0.0), cures)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ranking:
+    """What a step costs.
+
+    Parameters
+    ----------
+    criterion : Criterion or str
+        What a step costs: equations-2-3 (of Bruun et al.), worst-ratio (over the least worst of
+        fixed methods), or responses to rank with weights, as T_max,M_sup=2,F_move; by default
+        equations-2-3, with --aim, --stands or --schedule free worst-ratio.
+    ranked : str
+        For criteria of ranks: where two open grips meet in a step, rank all pairs of their nodes
+        together, or only the pairs with the node chosen before (default: pairs).
+    """
+
+    criterion: Criterion | str | None = None
+    ranked: str | None = None
+
+    def parse(self) -> Criterion | Ranked | None:
+        """Return the criterion, or how ranks are taken of the usual one."""
+        ranked = None if self.ranked is None else Ranked(self.ranked)
+        return ranked if self.criterion is None else _choose_criterion(ranked, self.criterion)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampled:
+    """Scenarios that are drawn.
+
+    Parameters
+    ----------
+    robust : Robust or str
+        What is to be as small as possible over all scenarios, in place of ``formulation``:
+        worst-peak (the largest cost of any step), worst-total (the largest total), or cvar=0.9 (the
+        mean total of the worst tenth).
+    scenarios : int
+        With ``robust``: how many samples of the scene (default: 30).
+    seed : int
+        With ``robust``: which samples are drawn (default: 0).
+    vary : mapping or sequence of str
+        With ``robust``: how far samples are from the scene: stiffness=3 (of each joint, by a factor
+        up to it, up or down), density=0.1 (of each brick, up to this share), position=0.002 (of
+        each brick and joint, up to so many m); these are the defaults; grips=2 (of grips that are
+        not rigid, by a factor up to it).
+    """
+
+    robust: Robust | str | None = None
+    scenarios: int | None = None
+    seed: int = 0
+    vary: Numbers = ()
+
+    def parse(self) -> Robust | None:
+        """Return aim and samples, None where there are none."""
+        if isinstance(self.robust, Robust):  # of Python
+            return self.robust
+        for name in ("scenarios", "seed", "vary"):
+            if self.robust is None and getattr(self, name):
+                raise ProblemError(
+                    f"--{name}: plans over scenarios alone have it; give --robust worst-peak, "
+                    "worst-total or as cvar=0.9"
+                )
+        if self.robust is None:
+            return None
+        vary = grammar.parse_numbers(
+            "--vary", self.vary, SPREADS, zero=True, advice=", as stiffness=3"
+        )
+        try:
+            aim = parse_robust(self.robust)
+        except ProblemError as error:
+            raise ProblemError(f"--robust: {error}") from error
+        return Robust(aim=aim, vary=vary, count=self.scenarios or Robust.count, seed=self.seed)
+
+
+SPREAD: dict[Any, type] = {
+    "scene": Built,
+    ("optimize", "scene"): Timed,
+    ("_pose_build", "scene"): Timed,
+    "schedule": Part,
+    "stands": Stands,
+    "criterion": Ranking,
+    "robust": Sampled,
+    "search": Search,
+    "changed": Changed,
+}
+"""By parameter, alone or of a function, the class of a value that several words make."""
