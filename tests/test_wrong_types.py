@@ -42,6 +42,9 @@ def test_methods_take_a_scene(method):
     assert method(SCENE) == method(NETWORK)
 
 
+WIDE = seqopt.Search(options={"width": 3})
+
+
 def test_what_is_meant_is_taken(tmp_path):
     assert Robot(name="r", payload=1.0, reach="anywhere").reach == Anywhere()
     assert seqopt.make_engine("discrete", SCENE, "dry").network.scene == SCENE
@@ -57,7 +60,8 @@ def test_what_is_meant_is_taken(tmp_path):
         seqopt.solve(PROBLEM, "beam", width=3).choice
         == seqopt.solve(PROBLEM, "beam", width=np.int64(3)).choice
     )
-    assert parse_options("beam", ["width=3"]) == {"width": 3}
+    worded = seqopt.optimize(SCENE, formulation="beam", search=seqopt.Search(options=["width=3"]))
+    assert worded.choice == seqopt.optimize(SCENE, formulation="beam", search=WIDE).choice
     path = tmp_path / "scene.json"
     seqopt.save_scene(SCENE, str(path))  # type: ignore[arg-type]
     assert seqopt.load_scene(path) == SCENE

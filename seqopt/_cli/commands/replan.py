@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -136,10 +136,9 @@ def replan(  # noqa: PLR0913  # every option is a parameter
         "rules": rules if isinstance(rules, FreeRules) else (*told.get("rules", ()), *[*rules])
     }
 
-    scene = folder / "scene.json"
     other: dict[str, Any] = {**vars(changed)}
     del other["measured"]
-    built = Timed(scene=scene, **other)
+    built = Timed(scene=folder / "scene.json", **other)
 
     def find(count: int | str | None) -> Found:
         def start() -> dict[str, Any]:
@@ -150,22 +149,29 @@ def replan(  # noqa: PLR0913  # every option is a parameter
         call = Call(plan_build, words)
         return optimize.find(call, progress, stability=stability, out=out, more=start)
 
-    try:
-        new = find(robots)
-    except InfeasibleError as error:
-        more, own = "", load_scene(scene)
-        count = max(len(own.robots), int(robots or 0)) + 1
-        with suppress(InfeasibleError, NothingFoundError, StepError):
-            with_robots(own, count)
-            another = find(count).plan
-            more = f"; or with one more robot that reaches every node: {another.result}"
-        raise InfeasibleError(f"{error}{more}") from None
+    new = _find_or_say(find, robots, folder)
 
     def answer() -> Answer[Plan]:
         found = _answer(folder, change, new)
         return replace(found, notes=(*notes, *found.notes))
 
     return Result(new.plan, answer)
+
+
+def _find_or_say(
+    find: Callable[[int | str | None], Found], robots: int | str | None, folder: Path
+) -> Found:
+    """Return the rest of a build; if there is none, say whether one more robot finds it."""
+    try:
+        return find(robots)
+    except InfeasibleError as error:
+        more, scene = "", load_scene(folder / "scene.json")
+        count = max(len(scene.robots), int(robots or 0)) + 1
+        with suppress(InfeasibleError, NothingFoundError, StepError):
+            with_robots(scene, count)
+            another = find(count).plan
+            more = f"; or with one more robot that reaches every node: {another.result}"
+        raise InfeasibleError(f"{error}{more}") from None
 
 
 @dataclass(frozen=True)
