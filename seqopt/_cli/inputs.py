@@ -195,9 +195,9 @@ def find_prover(
 ) -> BuildProver:
     """Return the prover of stability, with the mortars that a command shows.
 
-    ``stands``: what a plan has to keep, whose mortar comes before another one.
+    ``stands``: what a plan has to keep, whose mortar it is then.
     """
     own = parse_mortar(mortar or "epoxy", "--mortar") if stands is None else stands.mortar
-    name = mortar if isinstance(mortar, str) and stands is None else _mortar_name(own)
+    name = mortar if isinstance(mortar, str) else _mortar_name(own)
     shown = {"dry": Mortar(friction=own.friction), name: own}
     return BuildProver(network, shown if asks else {}, tell)

@@ -171,7 +171,7 @@ def find(
     robust = split_words(words, Sampled)[0].parse()
     plan = call(search=replace(search, clock=clock), progress=tell)
     clock.interrupted |= plan.ended is End.INTERRUPTED
-    network, mortar = plan.engine.network, words.get("mortar")
+    network, mortar = plan.engine.network, words.get("stands", words.get("mortar"))
     prover = find_prover(network, mortar, tell, asks=stability, stands=plan.standing)
     return Found(plan, prover, clock, output, tell, words.get("engine"), robust)
 
