@@ -198,9 +198,11 @@ def pareto(  # noqa: PLR0913  # every option is a parameter
     front = find_front(problem, rounding=steps, progress=tell, clock=clock)
     clock.interrupted |= front.stopped == INTERRUPT
     required = stands if isinstance(stands, Standing) else None
-    shown_with = mortar if required is None else None
-    more = {"tell": progress, "asks": stability, "stands": required}
-    prover = partial(find_prover, mortar=shown_with, **more)
+    own = mortar if required is None else None
+
+    def prover(network: Network) -> BuildProver:
+        return find_prover(network, own, progress, asks=stability, stands=required)
+
     named = str(schedule.schedule if isinstance(schedule, Part) else schedule)
     found = Found(problem, front, clock, prover, output, progress, engine, named)
     return Result(front, lambda: _answer(found, pick, under))
