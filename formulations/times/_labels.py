@@ -104,16 +104,6 @@ class Caps:
     time: float = np.inf
     sums: tuple[tuple[int, float], ...] = ()
 
-    @property
-    def columns(self) -> list[int]:
-        """The columns of the graph that are summed."""
-        return [column for column, _ in self.sums]
-
-    @property
-    def limits(self) -> Floats:
-        """All of them, (1 + q,)."""
-        return np.array([self.time, *(cap for _, cap in self.sums)])
-
 
 class InTime(Carried):
     """The readiness of robots, and ages of mortar where it cures, over the acts of some moves.
@@ -229,10 +219,11 @@ class Carrying:
         else:
             own.append(Sums(np.ones((len(moves), 1)), np.array([caps.time]), prices.left.T))
         if caps.sums:
-            amounts = np.column_stack([graph.amounts, np.ones(len(graph.source))])[:, caps.columns]
+            columns, most = zip(*caps.sums, strict=True)
+            amounts = np.column_stack([graph.amounts, np.ones(len(graph.source))])[:, columns]
             some = graph.only(kept)
             left = [distances(some, each, back=True) for each in amounts[kept].T]
-            own.append(Sums(amounts[moves], caps.limits[1:], np.column_stack(left)))
+            own.append(Sums(amounts[moves], np.array(most), np.column_stack(left)))
         if self.steps is not None:
             own += [Asked(each, self.steps.only(moves)) for each in self.asked]
         arcs = graph.source[moves].astype(np.int64), graph.target[moves].astype(np.int64)

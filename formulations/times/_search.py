@@ -47,16 +47,13 @@ from seqopt.work.progress import Tell
 class Soonest(NamedTuple):
     """Who acts in a plan so that it takes least, and when.
 
-    ``grips``: places held by robots after every step; ``makespan``: s; ``starts``: of steps, s,
-    where mortar cures.
+    ``grips``: places held by robots after every step; ``makespan``: s, NaN where time does not
+    count; ``starts``: of steps, s, where mortar cures.
     """
 
-    grips: tuple[tuple[int, ...], ...]
-    makespan: float
-    starts: tuple[float, ...]
-
-
-NEVER = Soonest((), np.nan, ())  # where time does not count
+    grips: tuple[tuple[int, ...], ...] = ()
+    makespan: float = np.nan
+    starts: tuple[float, ...] = ()
 
 
 class Waits:
@@ -80,11 +77,16 @@ class Waits:
             return False
         return sum(map(self.cuts.add, self._builds.motions)) > 0
 
-    def soonest(self, problem: States, states: Sequence[Sequence[int]]) -> Soonest:
-        """Return who of a kind acts so that a plan takes least, and when.
+    def soonest(self, problem: States, states: Sequence[Sequence[int]]) -> Soonest | None:
+        """Return who of a kind acts so that a plan takes least; None if no wait is enough."""
+        try:
+            return self._soonest(problem, states)
+        except StepError:
+            if self.cuts is None:
+                raise
+            return None
 
-        Raises `StepError` if no wait is enough for a step.
-        """
+    def _soonest(self, problem: States, states: Sequence[Sequence[int]]) -> Soonest:
         space, scene = problem.space, problem.network.scene
         waits = None if self._builds is None else self._builds.waits
         kind = {robot: k for k, each in enumerate(space.kinds) for robot in each.robots}
@@ -98,15 +100,6 @@ class Waits:
         times: tuple[StepTime, ...] = step_times(scene, steps, waits, problem.rules.begin)
         starts = () if waits is None else tuple(time.start for time in times)
         return Soonest(grips, times[-1].end, starts)
-
-    def try_soonest(self, problem: States, states: Sequence[Sequence[int]]) -> Soonest | None:
-        """Return the assignment of least makespan; None if no wait is enough."""
-        try:
-            return self.soonest(problem, states)
-        except StepError:
-            if self.cuts is None:
-                raise
-            return None
 
 
 def of_instance(instance: Instance, choose: Choose, watch: Watch) -> Solution:
@@ -185,7 +178,11 @@ def _searched(
     try:
         first = narrow(problem, WIDTH, tell)
         wide = Explorer(build_space(problem), tell=tell)
-        wide.rise(_ceiling(problem, first, waits))
+        capped = any(g.in_time for g in problem.goals[len(problem.aims) :])
+        # budgets of time, or mortar, may make the first plan infeasible
+        open_ = first is None or capped or waits.cuts is not None or bool(problem.paths)
+        known = None if open_ or not problem.goals[0].is_peak else first
+        wide.rise(np.inf if known is None else known.objective[0])
         while wide.whole:
             wide.refine()
             progress("makespan")
@@ -195,8 +192,8 @@ def _searched(
             plan = _plan(problem, visited, stages, found, waits)
             best += [] if plan is None else [plan]
             if plan is not None:
-                known = found.late or waits.cuts is None or not problem.is_timed
-                if known or plan.ends <= stages.least(found.path) * (1 + ALMOST):
+                sure = found.late or waits.cuts is None or not problem.is_timed
+                if sure or plan.ends <= stages.least(found.path) * (1 + ALMOST):
                     return _least_of(best, plan.bound, plan.stopped)
             if not waits.learn():
                 break
@@ -210,18 +207,6 @@ def _searched(
     if wide.whole:
         raise NothingFoundError("no wait for mortar is enough for the plans that were looked at")
     raise wide.without_plan("no plan is allowed")
-
-
-def _ceiling(problem: States, first: Solution | None, waits: Waits) -> float:
-    """Return the upper bound of the first goal, a peak, from a first plan.
-
-    Infinite where budgets of time, or mortar, may make that plan infeasible.
-    """
-    capped = any(g.in_time for g in problem.goals[len(problem.aims) :])
-    forbidden = capped or waits.cuts is not None or bool(problem.paths)
-    if first is None or forbidden or not problem.goals[0].is_peak:
-        return np.inf
-    return first.objective[0]
 
 
 def _staged(
@@ -261,7 +246,7 @@ def _plan(
 ) -> Solution | None:
     """Return a path as a plan, by the robots that are soonest done; None if mortar forbids it."""
     states = tuple((level, *state.tolist()) for level, _, state in visited.of(found.path))
-    soonest = waits.try_soonest(problem, states) if problem.is_timed else NEVER
+    soonest = waits.soonest(problem, states) if problem.is_timed else Soonest()
     if soonest is None:
         return None
     values = _timed_values(problem.goals, stages.values(found.path), soonest.makespan)
@@ -286,7 +271,7 @@ def _by_then(
     if problem.paths:
         raise TimeUpError("no plan within all resources was found yet; give more") from None
     found = plan_by_then(first, stop)
-    soonest = waits.try_soonest(problem, found.states)
+    soonest = waits.soonest(problem, found.states)
     if soonest is None:
         raise TimeUpError("no plan that stands while mortar cures was found yet; give more")
     values = _timed_values(problem.goals, found.objective, soonest.makespan)

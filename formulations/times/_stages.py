@@ -205,7 +205,11 @@ class Stages:
             while low < high:
                 middle = (low + high) // 2
                 kept = self._on_paths(stage.kept & (amounts <= levels[middle]))
-                swept = self._reach(kept, prices)
+                swept = Swept()
+                if kept.any():
+                    swept = beams(self._carrying, kept, stage.caps, prices, self._watch)
+                if kept.any() and not swept.path:  # the labels that show that there is none
+                    swept = self._carrying.sweep(kept, stage.caps, prices, self._watch)
                 if swept.path:
                     stage.path = swept.path
                     high = int(np.searchsorted(levels, self._taken(swept.path, k)))
@@ -217,15 +221,6 @@ class Stages:
         stage.bounds.append(float(levels[min(low, high)]))
         stage.proofs.append(self._proof(labels, prices))
         stage.kept = stage.kept & (amounts <= tied(float(levels[high])))
-
-    def _reach(self, kept: Bools, prices: Prices) -> Swept:
-        """Return a path within caps, or none and the labels that show that there is none."""
-        if not kept.any():
-            return Swept()
-        found = beams(self._carrying, kept, self._stage.caps, prices, self._watch)
-        if found.path:
-            return found
-        return self._carrying.sweep(kept, self._stage.caps, prices, self._watch)
 
     def _sum(self, k: int) -> None:
         """Find the least sum of paths within caps; from then on it is a cap."""

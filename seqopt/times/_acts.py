@@ -65,16 +65,7 @@ class Acts:
         ends, origin = begins + self.lasts[act], self.origin[act]
         passed = np.take_along_axis(since, origin.clip(min=0).astype(np.int64), axis=1)
         passed = np.where(origin == NOW, ends[:, None], np.where(origin == HELD, 0.0, passed))
-        return ends, self.sorted(self.entries[to], passed), placed
-
-    def sorted(self, entries: Ints, since: Floats) -> Floats:
-        """Return readiness (k, c) of entries (k, c), in order where robots are alike."""
-        out = np.where(entries > 0, 0.0, since)
-        for group in self.groups:
-            own, times = entries[:, group], out[:, group]
-            order = np.lexsort((times, -own), axis=1)
-            out[:, group] = np.take_along_axis(times, order, axis=1)
-        return out
+        return ends, alike_in_order(self.groups, self.entries[to], passed), placed
 
     def counted(self, state: Ints, values: Floats) -> Floats:
         """Return labels with the readiness and then the ages of mortar that count."""
@@ -87,6 +78,16 @@ class Acts:
             stands = np.arange(older.shape[1]) < self.cured.bricks[state][:, None]
             out[:, last:] = np.where(stands, older, 0.0)
         return out
+
+
+def alike_in_order(groups: Groups, entries: Ints, since: Floats) -> Floats:
+    """Return readiness (k, c) of entries (k, c), in order where robots are alike."""
+    out = np.where(entries > 0, 0.0, since)
+    for group in groups:
+        own, times = entries[:, group], out[:, group]
+        order = np.lexsort((times, -own), axis=1)
+        out[:, group] = np.take_along_axis(times, order, axis=1)
+    return out
 
 
 @dataclass(frozen=True, eq=False)

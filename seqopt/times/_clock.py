@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.contact.mortar import Curing
 from seqopt.errors import SolverError
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import Graph, TimedGraph
+from seqopt.graph.instance import Instance
 from seqopt.graph.paths import _to_go
-from seqopt.judge._bounds import Book, is_beyond_limits
+from seqopt.judge._bounds import Book, Closed, SumBook, is_beyond_limits, limit_below
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
+from seqopt.judge.arithmetic import Claim, Labels, Stage, _sum
+from seqopt.network.network import Network
+from seqopt.problem.standing import Standing
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.times._acts import Acts, Team, acts_of_rows
-from seqopt.times._durations import require_durations
-from seqopt.times._mortar_floors import cured_rows
+from seqopt.times._acts import Acts, Team, acts_of_instance, acts_of_rows, alike_in_order
+from seqopt.times._curing import JointsInTime
+from seqopt.times._fall_cuts import CuringStates, FallCuts
+from seqopt.times._steps import require_durations
 
 
 class Clock(Book):
@@ -29,8 +36,12 @@ class Clock(Book):
 
     def __init__(self, acts: Acts, multipliers: Floats, most: float, *, strict: bool) -> None:
         self._acts, self._limit, columns = acts, (np.array([most]), np.array([strict])), acts.count
-        self._multipliers = np.array([_valid(each, acts) for each in multipliers])
-        self._multipliers = self._multipliers.reshape(-1, 1 + columns)
+        valid = np.where(np.isfinite(multipliers), multipliers, 0.0).clip(min=0.0)
+        valid = valid.reshape(-1, 1 + columns)  # from 0, at most one together, alike of alike ones
+        for group in acts.groups:
+            alike = [1 + column for column in group]
+            valid[:, alike] = valid[:, alike].mean(axis=1, keepdims=True)
+        self._multipliers = valid / np.maximum(1.0, valid.sum(axis=1, keepdims=True))
         self._left = [_to_go(acts.graph, acts.work @ each) for each in self._multipliers]
         placed = np.zeros(0) if acts.cured is None else acts.cured.placed
         self.first = np.concatenate([np.zeros(1 + columns), placed])
@@ -61,18 +72,6 @@ class Clock(Book):
         again acts no sooner, and who does not is done.
         """
         return self._acts.counted(state, values)
-
-
-def _valid(multipliers: Floats, acts: Acts) -> Floats:
-    """Return multipliers that prove a bound, near some: from 0, at most one together.
-
-    Robots that are alike have the same.
-    """
-    out = np.where(np.isfinite(multipliers), multipliers, 0.0).clip(min=0.0)
-    for group in acts.groups:
-        columns = [1 + column for column in group]
-        out[columns] = out[columns].mean()
-    return np.asarray(out / max(1.0, float(out.sum())))
 
 
 class TimedRows:
@@ -117,10 +116,160 @@ class TimedRows:
 
     def in_order(self, entries: Ints, values: Floats) -> Floats:
         """Return labels with readiness in the order of entries (N, c), as robots are alike."""
-        out = values.copy()
-        out[:, 1 : 1 + self._team_columns] *= entries <= 0
-        for group in self._team.groups:
-            columns = [1 + c for c in group]
-            order = np.lexsort((out[:, columns], -entries[:, group]), axis=1)
-            out[:, columns] = np.take_along_axis(out[:, columns], order, axis=1)
+        out, free = values.copy(), slice(1, 1 + self._team_columns)
+        out[:, free] = alike_in_order(self._team.groups, entries, out[:, free])
         return out
+
+
+Grips = tuple[Ints, Floats]
+CLOSE = 1e-9  # of a time: what rounding may take from an age
+
+
+class Floors:
+    """Lower bounds of waits for mortar, by motions in which states fall; each is checked.
+
+    ``motions``: that are claimed, (b, 6) in m and rad.
+    """
+
+    def __init__(self, network: Network, standing: Standing, motions: Sequence[Floats]) -> None:
+        curing = standing.curing or Curing()
+        joints = JointsInTime(network, curing)
+        self._cuts = FallCuts(network, standing.mortar, joints)
+        for motion in motions:
+            if len(motion) <= len(network.inner):
+                self._cuts.add(motion)
+        self._brick, self._points = joints.closing, [curing.points_of(n) for n in joints.names]
+        ages = np.array([points[-1][0] if points else 0.0 for points in self._points])
+        self.full = np.zeros(len(network.inner))  # age at which all joints of a brick are cured, s
+        np.maximum.at(self.full, self._brick, ages)
+
+    def starts(self, bricks: int, grips: Grips, placed: Floats, start: Floats) -> Floats:
+        """Return from when on, no sooner than times (k,), s, states are not proven to fall.
+
+        ``grips``: nodes held, ascending, as places in build order from 1, and largest forces, N,
+        (k, r); ``placed`` (k, b): when bricks were in their places, infinite for the one that is
+        placed. Result: infinite where no wait is enough.
+        """
+        out, rows = start.copy(), np.arange(len(start))
+        joints = [j for j, brick in enumerate(self._brick.tolist()) if brick < bricks]
+        while len(rows):
+            now, bond = out[rows], np.zeros((len(rows), len(joints)))
+            later = np.full(len(rows), np.inf)  # when the next joint has more of its bond
+            for j in joints:
+                since = placed[rows, self._brick[j]]
+                age = np.maximum(now - since, 0.0) + CLOSE * np.abs(now)
+                for at, share in self._points[j]:
+                    bond[age >= at, j] = share
+                    ahead = since + at > now + 2 * CLOSE * np.abs(now)
+                    later = np.where(ahead & (since + at < later), since + at, later)
+            falls = self._cuts.fall(bricks, (grips[0][rows], grips[1][rows]), bond)
+            rows, later = rows[falls], later[falls]
+            out[rows] = later
+            rows = rows[np.isfinite(later)]
+        return out
+
+
+def cured_rows(
+    evaluator: StateEvaluator, rebuilt: Rebuilt, motions: Sequence[Floats]
+) -> CuringStates | None:
+    """Return the bond that rebuilt states need; None where no mortar cures.
+
+    ``motions``: that are claimed, (b, 6) in m and rad.
+    """
+    problem = evaluator.problem
+    standing, begin = problem.standing, problem.rules.begin
+    if standing is None or standing.curing is None:
+        return None
+    bricks = np.array(
+        [evaluator.tables.bricks_at(level) if level else 0 for level in rebuilt.parts]
+    )
+    grips = [evaluator.held_to_stand(rows) for rows in rebuilt.states]
+    held, payload = (np.concatenate([each[k] for each in grips]) for k in (0, 1))
+    floors = Floors(problem.network, standing, motions)
+    placed = np.zeros(len(floors.full))
+    ages = () if begin is None else begin.ages
+    placed[: len(ages)] = [-age for age in ages]
+    return CuringStates(
+        floors.starts, bricks[rebuilt.part_of()], held, payload, floors.full, placed
+    )
+
+
+def claimed_time(
+    instance: Instance, stage: Stage, claim: Claim, limited: Sequence[tuple[float, int, float]]
+) -> float:
+    """Return when the last act ends at the earliest, by shares of the time of robots."""
+    timed = instance.timed
+    assert timed is not None  # an instance that asks for a time has it
+    every, some = (
+        graph.source.astype(np.int64) * graph.states + graph.target
+        for graph in (instance.graph, stage.graph)
+    )
+    kept = np.isin(every, some)
+    if claim.shares is None and claim.potentials is not None:
+        raise SolverError("potentials of a time: give the shares that they are for as well")
+    shares = _shares(timed.sizes.astype(float), claim.shares)
+    if claim.labels is not None and claim.value is not None:
+        columns = np.array([c for _, c, _ in stage.limited], dtype=np.int64)
+        most = np.array([most for *_, most in stage.limited])
+        _require_labels(instance, claim.labels, len(columns))
+        acts = acts_of_instance(timed, stage.graph, kept)
+        multipliers = np.column_stack([shares[:, 0], shares[:, 1:][:, timed.kinds]])
+        clock = Clock(acts, multipliers, limit_below(claim.value), strict=True)
+        books: list[Book] = [clock]
+        if len(columns):
+            limits = most, np.zeros(len(columns), dtype=bool)
+            amounts = stage.graph.amounts[:, columns]
+            books.append(SumBook(stage.graph, acts.move, amounts, limits))
+        closed = Closed(stage.graph, acts.move, books)
+        state, values = claim.labels
+        own = values[:, 1 : 1 + acts.count]
+        since = alike_in_order(acts.groups, acts.entries[state], own)
+        values = np.column_stack([values[:, 0], since, values[:, 1 + acts.count :]])
+        if closed.is_proof((state, values), lambda states: np.zeros(len(states), dtype=bool)):
+            return claim.value
+        raise SolverError(f"labels do not prove that no path ends before {claim.value:.9g}")
+    bounds = [_sum(stage, timed.work[kept] @ own, claim, limited) for own in shares]
+    return max(bounds) * (1 - 1e-12)
+
+
+def _require_labels(instance: Instance, labels: Labels, sums: int) -> None:
+    """Raise an error unless labels are of nodes, with as many numbers as there should be."""
+    assert instance.timed is not None  # labels are asked of times alone
+    nodes, values = labels
+    width = 1 + len(instance.timed.kinds) + sums
+    named = len(nodes) == 0 or (nodes.min() >= 0 and nodes.max() < instance.nodes)
+    if values.shape != (len(nodes), width) or not named or not np.isfinite(values).all():
+        raise SolverError(f"labels: give nodes, and for each a row of {width} numbers")
+
+
+def _shares(sizes: Floats, given: Floats | None) -> Floats:
+    """Return shares (L, 1 + k) that prove a bound; those of one kind each if none are given."""
+    if given is None:
+        return np.asarray(np.eye(len(sizes)) / sizes)
+    shares = np.atleast_2d(given)
+    wrong = shares.shape[1] != len(sizes) or not (shares >= 0).all()
+    if wrong or (shares @ sizes > 1 + 1e-9).any():
+        raise SolverError(
+            f"shares: give {len(sizes)} numbers from 0, that of all and one for a robot of every "
+            f"kind; with {', '.join(f'{s:g}' for s in sizes)} of each they add up to 1 at most"
+        )
+    return shares
+
+
+def path_makespan(timed: TimedGraph, arcs: Ints, acts: Ints | None = None) -> float:
+    """Return the makespan of a path, s, under the given or the best assignment of robots.
+
+    ``acts`` (k,): given ones.
+    """
+    every = acts_of_instance(timed, timed.graph, np.ones(len(timed.prepares), dtype=bool))
+    every = replace(every, groups=())  # acts name columns: robots that are alike stay apart
+    first = np.searchsorted(timed.move, np.arange(len(timed.prepares) + 1))
+    labels = np.zeros((1, 1 + len(timed.kinds)))
+    for step, arc in enumerate(arcs.tolist()):
+        own = np.arange(first[arc], first[arc + 1]) if acts is None else acts[[step]]
+        act, label = np.repeat(own, len(labels)), np.tile(labels, (len(own), 1))
+        end, since, _ = every.follow(act, label[:, 0], label[:, 1:], label[:, :0])
+        labels = np.unique(np.column_stack([end, since]), axis=0)
+        dominated = (labels[:, None] <= labels).all(axis=2)
+        labels = labels[dominated.sum(axis=0) == 1]  # by itself alone
+    return float(labels[:, 0].min())

@@ -23,7 +23,7 @@ from seqopt.network.network import Network
 from seqopt.scene.arm import Durations
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
-from seqopt.times._durations import require_durations
+from seqopt.times._steps import require_durations
 
 _Counts = tuple[int, tuple[int, ...]]  # bricks that stand, and grips by kind
 
@@ -49,21 +49,18 @@ class _Counted:
         every = product(range(first, last + 1), product(*(range(n + 1) for _, n in self.kinds)))
         for here in [(first, self.held), *every]:
             bricks, grips = here
+            spare = sum(grips) - self.least  # grips that rules do not ask for, from two bricks on
             for k, (own, size) in enumerate(self.kinds):
                 up, down = ((*grips[:k], grips[k] + more, *grips[k + 1 :]) for more in (1, -1))
-                if grips[k] < size and bricks < last and self._holds(bricks + 1, up):
+                if grips[k] < size and bricks < last and (not bricks or spare >= -1):
                     yield here, (bricks + 1, up), _work(grips, own.place, own.fetch, k)
                 if grips[k] < size and bricks:
                     yield here, (bricks, up), _work(grips, own.grip, own.approach, k)
-                if grips[k] and (self._holds(bricks, down) or (self.bare and bricks == last)):
+                if grips[k] and (bricks < 2 or spare >= 1 or (self.bare and bricks == last)):
                     yield here, (bricks, down), _work(grips, own.release)
             if self.bare and bricks == last and any(grips):
                 acts = max(d.release for (d, _), n in zip(self.kinds, grips, strict=True) if n)
                 yield here, (last, (0,) * len(grips)), _work(grips, acts)
-
-    def _holds(self, bricks: int, grips: tuple[int, ...]) -> bool:
-        """Return whether rules may be kept with so many grips."""
-        return bricks < 2 or sum(grips) >= self.least
 
 
 def _work(
@@ -81,29 +78,24 @@ def least_by_counts(network: Network, rules: FreeRules | Schedule) -> float:
     """
     if isinstance(rules, Schedule):
         return -np.inf
-    counted = _counted(network, rules)
-    sources, targets, work = zip(*counted.arcs(), strict=True)
-    start = (counted.span[0], counted.held)
-    nodes = {each: i for i, each in enumerate(dict.fromkeys([start, *sources, *targets]))}
-    source, target = (np.array([nodes[n] for n in own], np.int32) for own in (sources, targets))
-    bare, last = counted.bare, counted.span[1]
-    ends = [b == last and n > 0 and not (bare and any(held)) for n, (b, held) in enumerate(nodes)]
-    peaks = (False,) * (1 + len(counted.kinds))
-    graph = Graph(source, target, np.array(work), peaks, np.array(ends))
-    sizes = np.array([1.0, *(size for _, size in counted.kinds)])
-    return max(least_sum(graph, graph.amounts @ each) for each in _multipliers(graph, sizes))
-
-
-def _counted(network: Network, rules: FreeRules) -> _Counted:
-    """Return a build by counts: robots are of one kind if they take as long."""
     scene, team = network.scene, rules.team(network.scene)
     every = require_durations(scene, team)
     kinds = tuple((own, every.count(own)) for own in dict.fromkeys(every))
     holds = () if rules.begin is None else rules.begin.holds(scene)
     holding = [own for own, r in zip(every, team, strict=True) if holds and holds[r] is not None]
     held = tuple(holding.count(own) for own, _ in kinds)
-    least = rules.fewest_grips(scene) - len(scene.props)
-    return _Counted(kinds, least, rules.span(scene), held, rules.how_it_ends is not Ending.HELD)
+    least, bare = rules.fewest_grips(scene) - len(scene.props), rules.how_it_ends is not Ending.HELD
+    counted = _Counted(kinds, least, rules.span(scene), held, bare)
+    sources, targets, work = zip(*counted.arcs(), strict=True)
+    start = (counted.span[0], counted.held)
+    nodes = {each: i for i, each in enumerate(dict.fromkeys([start, *sources, *targets]))}
+    source, target = (np.array([nodes[n] for n in own], np.int32) for own in (sources, targets))
+    last = counted.span[1]
+    ends = [b == last and n > 0 and not (bare and any(held)) for n, (b, held) in enumerate(nodes)]
+    peaks = (False,) * (1 + len(counted.kinds))
+    graph = Graph(source, target, np.array(work), peaks, np.array(ends))
+    sizes = np.array([1.0, *(size for _, size in counted.kinds)])
+    return max(least_sum(graph, graph.amounts @ each) for each in _multipliers(graph, sizes))
 
 
 def _multipliers(graph: Graph, sizes: Floats) -> Iterator[Floats]:

@@ -7,7 +7,8 @@ bricks at once. A set of motions gives a lower bound of every wait.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -131,25 +132,16 @@ class FallCuts:
         return self.fall(bricks, grips, self.joints.at(bricks, times, placed))
 
 
-class _Floor(Protocol):
-    """What says how long states wait for mortar at least."""
-
-    def starts(
-        self, bricks: int, grips: tuple[Ints, Floats], placed: Floats, start: Floats
-    ) -> Floats:
-        """Return since when states are not known to fall; as of `FallCuts.starts`."""
-
-
 class CuringStates(NamedTuple):
     """What states of a build in time ask of mortar that cures.
 
-    ``floor``: lower bound of waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): the
-    grips, as of `FallCuts`; ``full`` (b,): at which age all joints that a brick closes have their
-    full bond, s; ``placed`` (b,): when bricks that stand at first were in their places, s, zero of
-    others.
+    ``floor``: lower bound of waits, as of `FallCuts.starts`; ``bricks`` (n,): that stand; ``held``,
+    ``payload`` (n, r): the grips, as of `FallCuts`; ``full`` (b,): at which age all joints that a
+    brick closes have their full bond, s; ``placed`` (b,): when bricks that stand at first were in
+    their places, s, zero of others.
     """
 
-    floor: _Floor
+    floor: Callable[[int, tuple[Ints, Floats], Floats, Floats], Floats]
     bricks: Ints
     held: Ints
     payload: Floats
@@ -166,5 +158,5 @@ class CuringStates(NamedTuple):
             rows = np.flatnonzero(self.bricks[state] == bricks)
             if bricks:
                 grips = self.held[state[rows]], self.payload[state[rows]]
-                out[rows] = self.floor.starts(bricks, grips, placed[rows], start[rows])
+                out[rows] = self.floor(bricks, grips, placed[rows], start[rows])
         return out

@@ -10,8 +10,8 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._explore import Visited
 from seqopt.graph.graph import HELD, NOW, Graph, TimedGraph
 from seqopt.graph.states.states import States
-from seqopt.times._durations import require_durations
 from seqopt.times._fall_cuts import CuringStates, FallCuts
+from seqopt.times._steps import require_durations
 
 
 class _Moves(NamedTuple):
@@ -35,7 +35,7 @@ def timed_graph(problem: States, visited: Visited, cuts: FallCuts | None = None)
     levels = np.repeat([key for key, *_ in visited.states], [len(s) for *_, s in visited.states])
     kinds = np.repeat(np.arange(len(space.slots)), [end - first for first, end in space.slots])
     found = _moves(problem, graph, rows.astype(np.int64), levels)
-    prepares, acts = _times(problem, found)
+    prepares, acts, longest = _times(problem, found)
     move, column = np.nonzero(found.able)
     others = np.flatnonzero(~found.taken.any(axis=1))
     move, column = np.append(move, others), np.append(column, np.full(len(others), -1))
@@ -44,10 +44,15 @@ def timed_graph(problem: States, visited: Visited, cuts: FallCuts | None = None)
     free = rows <= 0
     alike = np.asarray(free[:, 1:] & (rows[:, 1:] == rows[:, :-1]) & (kinds[1:] == kinds[:-1]))
     origin = _origins(space.slots, found, move, column, parks=space.parks)
-    work = _work(space.slots, found, prepares, acts)
-    states, longest = (graph, levels, free, alike, kinds), _longest(problem)
+    work = [acts]  # of the time of all, and of robots of every kind
+    for first, end in space.slots:
+        takes = found.taken[:, first:end].any(axis=1)
+        work.append(
+            acts * ((found.before[:, first:end] > 0).sum(axis=1) + takes) + prepares * takes
+        )
+    states, taken = (graph, levels, free, alike, kinds), np.column_stack(work)
     curing = None if cuts is None else _curing(problem, visited, cuts)
-    return TimedGraph(*states, move, column, origin, prepares, acts, work, longest, curing)
+    return TimedGraph(*states, move, column, origin, prepares, acts, taken, longest, curing)
 
 
 def _curing(problem: States, visited: Visited, cuts: FallCuts) -> CuringStates:
@@ -58,7 +63,7 @@ def _curing(problem: States, visited: Visited, cuts: FallCuts) -> CuringStates:
     full, begin = cuts.joints.full, problem.rules.begin
     placed = np.zeros(len(full))
     placed[: 0 if begin is None else begin.bricks] = () if begin is None else begin.placed
-    return CuringStates(cuts, np.concatenate(bricks), held, payload, full, placed)
+    return CuringStates(cuts.starts, np.concatenate(bricks), held, payload, full, placed)
 
 
 def _moves(problem: States, graph: Graph, rows: Ints, levels: Ints) -> _Moves:
@@ -76,18 +81,15 @@ def _moves(problem: States, graph: Graph, rows: Ints, levels: Ints) -> _Moves:
     return _Moves(before, after, taken, dropped, able, places)
 
 
-def _longest(problem: States) -> Floats:
-    """Return how long robots of columns take at most to be prepared, wherever they go, (c,), s."""
-    network, kinds = problem.network, problem.space.kinds
-    own = require_durations(network.scene, [robot for kind in kinds for robot in kind.robots])
-    across = float(np.linalg.norm(np.ptp(network.node_position[network.inner.ravel()], axis=0)))
-    return np.array([max(d.fetch, d.approach) + across / (d.speed or np.inf) for d in own])
+def _times(problem: States, found: _Moves) -> tuple[Floats, Floats, Floats]:
+    """Return how long moves take to be prepared, and to be done, (m,), s.
 
-
-def _times(problem: States, found: _Moves) -> tuple[Floats, Floats]:
-    """Return how long moves take to be prepared, and to be done, (m,), s."""
-    space, scene = problem.space, problem.network.scene
-    own = require_durations(scene, [robot for kind in space.kinds for robot in kind.robots])
+    And how long robots of columns take at most to be prepared, wherever they go, (c,), s.
+    """
+    space, network = problem.space, problem.network
+    robots = [robot for kind in space.kinds for robot in kind.robots]
+    own, at = require_durations(network.scene, robots), network.node_position[network.inner.ravel()]
+    slow = np.array([0.0 if d.speed is None else 1 / d.speed for d in own])
     times = np.array([[d.fetch, d.place, d.approach, d.grip, d.release] for d in own])
     prepares, acts = np.zeros(len(found.places)), np.zeros(len(found.places))
     move, column = np.nonzero(found.taken)
@@ -96,15 +98,15 @@ def _times(problem: States, found: _Moves) -> tuple[Floats, Floats]:
     acts[move] = np.where(placing, times[column, 1], times[column, 3])
     move, column = np.nonzero(found.dropped)
     np.maximum.at(acts, move, times[column, 4])
+    longest = times[:, [0, 2]].max(axis=1) + np.linalg.norm(np.ptp(at, axis=0)) * slow
     if not space.parks:
-        return prepares, acts
-    at = np.pad(problem.network.node_position[problem.network.inner.ravel()], ((1, 0), (0, 0)))
+        return prepares, acts, longest
+    at = np.pad(at, ((1, 0), (0, 0)))
     move = np.flatnonzero(found.able.any(axis=1))
     column = found.able[move].argmax(axis=1)
     last, node = -found.before[move, column], (found.after * found.taken)[move].max(axis=1)
-    slow = np.array([0.0 if d.speed is None else 1 / d.speed for d in own])
     prepares[move] += np.linalg.norm(at[node] - at[last], axis=1) * (last > 0) * slow[column]
-    return prepares, acts
+    return prepares, acts, longest
 
 
 def _origins(
@@ -130,15 +132,3 @@ def _origins(
         sought = np.take_along_axis(source, place.clip(min=0), axis=1)
         out[:, first:end] = np.where(place >= 0, sought, HELD)
     return out
-
-
-def _work(
-    slots: tuple[tuple[int, int], ...], found: _Moves, prepares: Floats, acts: Floats
-) -> Floats:
-    """Return how long moves take of the time of all, and of robots of every kind, (m, 1 + k), s."""
-    columns = [acts]
-    for first, end in slots:
-        takes = found.taken[:, first:end].any(axis=1)
-        busy = (found.before[:, first:end] > 0).sum(axis=1) + takes
-        columns.append(acts * busy + prepares * takes)
-    return np.column_stack(columns)

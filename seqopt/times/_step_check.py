@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import Curing
 from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
 from seqopt.judge._bounds import BETTER
@@ -38,7 +37,12 @@ def step_ends(
     Raises `SolverError` if one starts before the one before it ends, or its robot is ready.
     """
     ends, let_go = [0.0], dict[int, int]()
-    grips, held = _at_first(scene, begin)
+    grips: Sequence[int | None] = (None,) * len(scene.robots)
+    held = dict[int, int]()  # where robots hold, or held last
+    if begin is not None:
+        grips = begin.holds(scene)
+        for nodes in (begin.stays or (), grips):
+            held |= {r: n for r, n in enumerate(nodes) if n is not None}
     for i, step in enumerate(steps, start=1):
         waits, acts = [ends[-1]], 0.0
         for r, (robot, old, new) in enumerate(zip(scene.robots, grips, step.grips, strict=True)):
@@ -67,15 +71,6 @@ def step_ends(
     return tuple(ends[1:])
 
 
-def _at_first(scene: Scene, begin: Site | None) -> tuple[Sequence[int | None], dict[int, int]]:
-    """Return what robots hold where a build begins, and where they hold or held last."""
-    if begin is None:
-        return (None,) * len(scene.robots), {}
-    grips = begin.holds(scene)
-    lasts = (begin.stays or (None,) * len(grips), grips)
-    return grips, {r: n for nodes in lasts for r, n in enumerate(nodes) if n is not None}
-
-
 def check_cured(
     network: Network,
     steps: Sequence[Step],
@@ -101,11 +96,12 @@ def check_cured(
     placed |= {k: -age for k, age in enumerate(() if begin is None else begin.ages)}
     for step, start, end in zip(steps, starts, ends, strict=True):
         whole = step_assembly(network, step.bricks, step.grips)
-        bond = tuple(
-            _share(curing, name, start, [placed.get(int(body)) for body in bodies if body >= 0])
-            for name, bodies in zip(whole.contact_name, whole.bodies, strict=True)
-        )
-        key = step.bricks, step.grips, bond
+        bond = []
+        for joint, bodies in zip(whole.contact_name, whole.bodies.tolist(), strict=True):
+            since = max(placed.get(body, start) for body in bodies if body >= 0)
+            age = start - since + CLOSE * abs(start)
+            bond.append(max((s for at, s in curing.points_of(joint) if at <= age), default=0.0))
+        key = step.bricks, step.grips, tuple(bond)
         if key not in found:
             found[key] = verdict(whole.with_bond(np.array(bond)), standing.mortar)
         if found[key] is not Verdict.STANDS:
@@ -116,10 +112,3 @@ def check_cured(
         if step.kind is StepKind.PLACE:
             placed[step.bricks - 1] = end
     return ends
-
-
-def _share(curing: Curing, joint: str, now: float, placed: Sequence[float | None]) -> float:
-    """Return the share of bond of a joint, whose bricks were in their places at some times."""
-    since = [now if time is None else time for time in placed]
-    age = now - max(since) + CLOSE * abs(now)
-    return max((share for at, share in curing.points_of(joint) if at <= age), default=0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
@@ -105,7 +105,8 @@ def reassign(
     }
     kinds = scene.grip_kinds.compliance[scene.grip_kinds.of_robot]
     turns = scene.grip_kinds.turns[scene.grip_kinds.of_robot]
-    carries = _who_carries(scene, steps)
+    bricks = {(each.robot, each.step): each.brick for each in carried(scene, steps)}
+    able = [can_carry((scene,), robot) for robot in range(len(scene.robots))]
 
     def may(robot: int, hold: Hold) -> bool:
         had = hold.robot
@@ -119,28 +120,13 @@ def reassign(
         if waits is not None and scene.robots[robot].payload < scene.robots[had].payload:
             return False
         alike = bool((kinds[robot] == kinds[had]).all() and turns[robot] == turns[had])
-        alike &= carries(robot, hold)
+        both = (bricks.get((had, number)) for number in (hold.first, hold.last + 1))
+        alike &= all(able[robot][scene.since[brick] - 1] for brick in both if brick is not None)
         return alike and force <= most and scene.robots[robot].reach.covers(position)
 
-    idle = idle_robots(scene, steps)
-    known = [
-        r
-        for r, robot in enumerate(scene.robots)
-        if robot.durations is not None or robot.name not in idle
-    ]
+    idle, every = idle_robots(scene, steps), enumerate(scene.robots)
+    known = [r for r, robot in every if robot.durations is not None or robot.name not in idle]
     return reassigned_steps(scene, steps, may, known, waits, begin)
-
-
-def _who_carries(scene: Scene, steps: Sequence[Step]) -> Callable[[int, Hold], bool]:
-    """Return the test of whether a robot bears the bricks placed or removed in a hold."""
-    bricks = {(each.robot, each.step): each.brick for each in carried(scene, steps)}
-    able = [can_carry((scene,), robot) for robot in range(len(scene.robots))]
-
-    def carries(robot: int, hold: Hold) -> bool:
-        both = (bricks.get((hold.robot, number)) for number in (hold.first, hold.last + 1))
-        return all(able[robot][scene.since[brick] - 1] for brick in both if brick is not None)
-
-    return carries
 
 
 def spent_lines(busy: pd.DataFrame) -> Iterator[str]:

@@ -6,11 +6,10 @@ from seqopt.errors import ProblemError, StepError
 from seqopt.judge._twin import PathTwin
 from seqopt.problem.amounts import Amount
 from seqopt.sequence.rules import FreeRules
-from seqopt.times._clock import TimedRows
+from seqopt.times._clock import TimedRows, claimed_time, path_makespan
 from seqopt.times._counts import least_by_counts
-from seqopt.times._durations import have_speeds, require_durations
-from seqopt.times._instances import claimed_time, path_makespan
 from seqopt.times._step_check import makespan_of_steps
+from seqopt.times._steps import have_speeds, require_durations
 
 TWIN = PathTwin(makespan_of_steps, least_by_counts, TimedRows, path_makespan, claimed_time)
 

@@ -25,8 +25,8 @@ from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence, ShownBuild
 from seqopt.problem.standing import Standing
 from seqopt.sequence.steps import Step, _idle_note
-from seqopt.times._durations import has_durations
 from seqopt.times._step_check import check_cured
+from seqopt.times._steps import has_durations
 from seqopt.times._tables import busy_table, spent_lines, total_lines
 from seqopt.work.progress import Tell
 
