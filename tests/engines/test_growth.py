@@ -7,11 +7,11 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.harness.scenes import grip_sets, half_circle, running_bond
-from seqopt.engines.interface import _NAMES, Want, grip_columns
+from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import _growth as growth
 from seqopt.engines.rigid import _refinement as refinement
 from seqopt.engines.rigid import compliance
@@ -40,6 +40,7 @@ def error(fields, exact):
 # order of asking
 
 
+@settings(max_examples=8)
 @given(scene=st.one_of(arches(), walls(), both_sided()), data=st.data())
 def test_answers_do_not_depend_on_what_was_asked_before(scene, data):
     net = build_network(scene)
@@ -82,7 +83,7 @@ def test_a_chain_without_loops_only_leaves_bricks_out(monkeypatch):
 # accuracy
 
 
-@pytest.mark.parametrize("count", [60, 120])
+@pytest.mark.parametrize("count", [60])
 def test_an_arch_that_closes_keeps_its_digits(count, monkeypatch):
     """What a loop takes away is a million times what it leaves; summed again it does not show."""
 
@@ -99,7 +100,7 @@ def test_an_arch_that_closes_keeps_its_digits(count, monkeypatch):
     assert worst(net) > 3 * better  # negative control
 
 
-@pytest.mark.parametrize(("columns", "courses"), [(2, 30), (9, 9), (30, 2)])
+@pytest.mark.parametrize(("columns", "courses"), [(2, 30), (9, 9)])
 def test_walls_agree_with_the_mixed_system(columns, courses):
     net = build_network(running_bond(columns, courses))
     total = columns * courses
@@ -126,11 +127,7 @@ def hard_sets(bricks, rng, count=150):
     return rows[(np.diff(np.sort(rows // 2, axis=1), axis=1) > 0).all(axis=1)]
 
 
-CASES = [
-    *((half_circle(n), n) for n in (25, 80, 160)),
-    *((half_circle(n), n - 1) for n in (25, 80, 160)),
-    (build_network(running_bond(6, 8)), 45),
-]
+CASES = [(half_circle(80), 80), (half_circle(160), 159), (build_network(running_bond(6, 8)), 45)]
 
 
 @pytest.mark.parametrize(("net", "bricks"), CASES)
@@ -186,7 +183,7 @@ def kept_bytes(net, most=compliance._KEPT):
 
 @pytest.mark.parametrize("make", [half_circle, lambda n: build_network(running_bond(n // 8, 8))])
 def test_memory_grows_as_the_square_of_the_bricks(make):
-    for count in (16, 32, 64):
+    for count in (16, 48):
         assert kept_bytes(make(count), most=0) <= PER_PAIR * count**2 + 2e5
 
 
@@ -211,29 +208,3 @@ def test_the_last_brick_count_but_one_is_recalled():
             assert np.abs(a - b).max() <= 1e-11 * np.abs(b).max(), name
     assert builder.operator(total - 2, held).bricks == total - 2
     assert builder.growth.bricks == total - 2
-
-
-def test_rows_of_gripped_bricks_alone():
-    net = half_circle(50)
-    some, every = (OperatorBuilder(net, grow_tree(net)).operator(50, h) for h in ([7, 30], None))
-    some_rows = [6 * 7 + i for i in range(6)] + [6 * 30 + i for i in range(6)]
-    assert some.flexibility.shape == (12, 12)
-    pairs = [(some.flexibility, every.flexibility[np.ix_(some_rows, some_rows)])]
-    for name in ("edge_force", "displacement", "support", "joint_wrench", "brick_twist"):
-        pairs.append((some.of_loads(name), every.of_loads(name)[[*some_rows, -1]]))
-    for mine, whole in pairs:
-        np.testing.assert_allclose(mine, whole, rtol=0, atol=1e-12 * np.abs(whole).max())
-
-
-def test_mapped_before_or_after_they_are_summed():
-    """A few sets of many loads and many sets of few take other ways to the same fields."""
-    net = half_circle(50)
-    columns = np.array([[14, 61, 99], [0, 1, 50], [15, 60, 98]])
-    few, _ = solve_batch(OperatorBuilder(net, grow_tree(net)).operator(50), columns, Want.ALL)
-    many, _ = solve_batch(
-        OperatorBuilder(net, grow_tree(net)).operator(50), np.tile(columns, (120, 1)), Want.ALL
-    )
-    for name in _NAMES:
-        a, b = getattr(few, name), getattr(many, name)[:3]
-        assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
-    assert not (few.edge_force == many.edge_force[:3]).all()  # they were other ways

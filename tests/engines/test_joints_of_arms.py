@@ -79,7 +79,7 @@ def agree_with_dense(arch, i):
     return max([*out, far(found.grip_moment[0], borne[:, 3:])] if turn else out)
 
 
-@pytest.mark.parametrize("i", range(0, STATES, 20))
+@pytest.mark.parametrize("i", range(0, STATES, 40))
 def test_a_dense_solver_agrees(arch25, i):
     assert agree_with_dense(arch25, i) <= 1e-9
 
@@ -90,7 +90,7 @@ def test_a_dense_solver_agrees_on_all_states(arch25):
     assert max(agree_with_dense(arch25, i) for i in range(STATES)) <= 1e-9
 
 
-@pytest.mark.parametrize("i", [2, 7, 12])
+@pytest.mark.parametrize("i", [2])
 def test_the_dense_solver_would_notice(arch25, i):
     """Negative control: without what joints do across the axes, or with the joints of another."""
     scene, bricks, nodes, moved = drawn_state(arch25, i)
@@ -130,20 +130,6 @@ def test_joints_that_are_alike_in_all_directions_are_a_stiffness(arch25):
     both = with_joints(arch25, np.full((3, 3), 2e6), slides, [(2e6, None)])  # one after the other
     found = make_engine("compliance", both).solve(20, [both.grip_numbers(grips)], Want.ALL)
     assert far(found.grip_force, soft.grip_force) <= 1e-12
-
-
-def test_what_softness_changes_falls_as_that_of_joints(arch25):
-    rng, grips = np.random.default_rng(5), (3, 20, 33)
-    jacobians, own = drawn_jacobians(rng, arch25, 3), 10 ** rng.uniform(-0.5, 0.5, (3, 6))
-    rigid = make_engine("compliance", arch25).solve(24, [grips], Want.ALL).grip_force
-    change = []
-    for size in (1e12, 1e13, 1e14):
-        scene = with_joints(arch25, size * own, jacobians)
-        held = [scene.grip_numbers(grips)]
-        found = make_engine("compliance", scene).solve(24, held, Want.ALL).grip_force
-        change.append(size * np.abs(found - rigid).max())
-    assert change == pytest.approx([change[1]] * 3, rel=2e-2)
-    assert change[1] > 0
 
 
 @pytest.mark.parametrize("size", [1e3, 1e5])
@@ -205,15 +191,6 @@ def test_scenarios_hold_in_the_same_postures(arch25):
     assert _held.hold_alike(scene, other) is other
     assert "held_postures" not in vars(other)
     assert "held_postures" not in vars(drawn)  # by itself it has postures of its own
-
-
-def test_other_grips_stand_for_joints_as_well(arch25):
-    jacobians = drawn_jacobians(np.random.default_rng(1), arch25, 2)
-    scene = with_joints(arch25, np.full((2, 6), 1e6), jacobians)
-    assert not scene.grip_kinds.rigid
-    assert scene.with_grips(None).grip_kinds.rigid
-    assert scene.with_grips(1e5).grip_kinds.compliance[0, 0, 0] == 1e-5
-    assert not scene.with_grips(1e5).grip_kinds.arms.any()
 
 
 def test_two_that_give_way_may_hold_one_brick_and_be_off(arch25):

@@ -8,24 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.harness.scenes import grip_sets, running_bond
-from seqopt.engines._grip_compliance import RIGID
+from experiments.harness.scenes import grip_sets
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.rigid import _refinement as refinement
 from seqopt.engines.rigid._grip_equations import _solve_positive
 from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._mechanism import require_resistance, ungripped_system
+from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.engines.rigid._mixed import solve_mixed
-from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.engines.rigid._refinement import (
-    Refinement,
-    _Asked,
-    _Corrector,
-    _held_operator,
-    _hold_loose,
-)
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.graph.decisions import pose_decisions
@@ -43,7 +34,7 @@ from tests.builders import (
     torsion_free,
 )
 from tests.direct_solve import solve_dense
-from tests.limit_scenes import HELD, chain, loosened, without_joint
+from tests.limit_scenes import HELD, chain, loosened
 from tests.reference_chain import solve_exactly
 
 NONE = np.zeros((1, 0), dtype=int)
@@ -92,19 +83,11 @@ def test_an_arch_with_a_torsion_free_joint_is_posed_together(arch25, together):
     assert all(np.isfinite(cost).any() for cost in problem.sums.single)
 
 
-@pytest.mark.parametrize(("bricks", "loose"), [(13, 0), (14, 1), (24, 1), (25, 0)])
-def test_loose_motions_are_counted(arch25, bricks, loose):
-    """A closed arch resists even at a joint that does not."""
-    net = build_network(torsion_free(arch25, TWISTED))
-    assert _hold_loose(ungripped_system(net, bricks)).loose == loose
-
-
 @pytest.mark.parametrize("bricks", [14, 25])
-@pytest.mark.parametrize("kind", ["torsion", "hinge", "island"])
+@pytest.mark.parametrize("kind", ["hinge", "island"])
 def test_sets_together_agree_with_sets_on_their_own(arch25, kind, bricks):
     """Every set that is a mechanism is called one, every other one answered alike."""
     scene = {
-        "torsion": torsion_free(arch25, TWISTED),
         "hinge": hinged(arch25, 3),
         "island": replace(arch25, joints=arch25.joints[:11] + arch25.joints[12:]),
     }[kind]
@@ -156,30 +139,6 @@ def test_a_scene_that_is_loose_from_its_first_brick():
     assert apart(engine.solve(6, sets, Want.ALL), alone) <= 1e-9
 
 
-def test_a_wall_with_loose_joints():
-    scene = running_bond(4, 4)
-    joints = [
-        replace(joint, rotational_stiffness=(0.0, *joint.rotational_stiffness[1:]))
-        if i % 7 == 3
-        else joint
-        for i, joint in enumerate(scene.joints)
-    ]
-    net = build_network(replace(scene, joints=tuple(joints)))
-    sets = grip_sets(net, 16, 20)
-    direct = solve_dense(net, 16, grip_columns(net, 16, sets))
-    assert apart(ComplianceEngine(net).solve(16, sets, Want.ALL), direct) <= 1e-9
-
-
-def test_the_operator_of_a_loose_structure_is_symmetric(arch25):
-    """Reciprocity: what a force moves at a loose motion, the motion moves at the force."""
-    system = _hold_loose(ungripped_system(build_network(hinged(arch25, 3)), 20))
-    operator = _held_operator(system)
-    assert operator.loose == system.loose == 3
-    matrix = operator.flexibility
-    assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
-    assert len(operator.of_loads("brick_twist")) == 6 * 20 + 3 + 1
-
-
 def test_a_saddle_among_many_systems():
     rng = np.random.default_rng(5)
     root, reach = rng.standard_normal((7, 4, 4)), rng.standard_normal((7, 2, 4))
@@ -202,7 +161,7 @@ def test_a_saddle_among_many_systems():
 # grip sets that the operator alone does not answer well enough
 
 
-@pytest.mark.parametrize("count", [75, 150])
+@pytest.mark.parametrize("count", [75])
 def test_close_grips_on_a_long_chain_are_corrected_together(count, together):
     net = build_network(chain(count))
     tip = 2 * count - 1
@@ -218,23 +177,6 @@ def test_close_grips_on_a_long_chain_are_corrected_together(count, together):
         assert np.abs(moved - exact.displacement).max() <= 1e-12 * np.abs(exact.displacement).max()
 
 
-def test_the_first_correction_is_the_error(arch25):
-    """Spoiled by a millionth, an answer is off by that much less in the next step."""
-    net = build_network(arch25)
-    operator = OperatorBuilder(net, grow_tree(net)).operator(20)
-    better = _Corrector(Refinement(net, 20), operator)
-    index = operator.load_index(columns := grip_columns(net, 20, [[7, 20, 33]]))
-    right = refinement.grip_forces(operator, columns, index).force
-    wrong = right * (1 + 1e-6)
-    change, more = better._correction(
-        _Asked(columns, index, RIGID), better._states(index, wrong), wrong
-    )
-    assert wrong + more == pytest.approx(right, rel=1e-12)
-    assert np.abs(more).max() == pytest.approx(1e-6 * np.abs(right).max(), rel=1e-3)
-    left = better._states(index, wrong) + change - better._states(index, right)
-    assert np.abs(left).max() <= 1e-12 * np.abs(better._states(index, right)).max()
-
-
 def test_what_does_not_settle_is_solved_on_its_own(monkeypatch):
     """Negative control: without corrections the last resort answers, and as well."""
     net = build_network(loosened(chain(25), 1e-9, only_turning=True))
@@ -244,15 +186,10 @@ def test_what_does_not_settle_is_solved_on_its_own(monkeypatch):
     assert apart(ComplianceEngine(net).solve(25, sets, Want.ALL), usual) <= 1e-9
 
 
-def test_a_part_held_by_three_grips_needs_no_second_look(together):
-    net = without_joint(chain(25))
-    assert np.isfinite(ComplianceEngine(net).solve(25, [HELD]).displacement).all()
-
-
 # every brick held at both nodes
 
 
-@pytest.mark.parametrize("bricks", [1, 2, 6])
+@pytest.mark.parametrize("bricks", [1, 6])
 def test_every_brick_held_at_both_nodes(bricks):
     """Nothing moves and no joint carries: sound, however rounding compares with itself."""
     scene = replace(six_bricks(), blocked_nodes=())
@@ -293,8 +230,8 @@ def test_a_false_answer_is_seen_where_nothing_moves():
 # soft ground
 
 
-@pytest.mark.parametrize("turning", [1e-2, 2.4e-6, 1e-9])
-@pytest.mark.parametrize("grips", [(), (4,), (10,), (10, 17)])
+@pytest.mark.parametrize("turning", [1e-2, 1e-9])
+@pytest.mark.parametrize("grips", [(), (10, 17)])
 def test_soft_ground_is_no_mechanism(arch25, turning, grips):
     """It is answered well, or refused as too much for double precision, by every route."""
     net = build_network(on_soft_ground(arch25, turning))

@@ -8,14 +8,8 @@ import numpy as np
 import pytest
 
 from experiments.harness.scenes import running_bond
-from seqopt.engines.interface import _NAMES, FLAGS, Want, grip_columns
-from seqopt.engines.rigid._grip_equations import (
-    _doubts,
-    grip_forces,
-    share_pairs,
-    still_forces,
-    well_conditioned,
-)
+from seqopt.engines.interface import _NAMES, Want, grip_columns
+from seqopt.engines.rigid._grip_equations import _doubts, grip_forces, share_pairs, well_conditioned
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import ungripped_system
 from seqopt.engines.rigid._operator import OperatorBuilder
@@ -68,7 +62,7 @@ def sets_of(scene, bricks, grips, count=4):
     return np.array([*drawn, free[:grips], free[-grips:]]) if grips else np.zeros((1, 0), int)
 
 
-@pytest.mark.parametrize("grips", [0, 1, 2, 3, 4])
+@pytest.mark.parametrize("grips", [0, 2, 4])
 @pytest.mark.parametrize("name", SCENES)
 def test_every_field_is_that_of_a_direct_solve(name, grips):
     """At every brick count: what closes loops is there or not, ends carry or do not yet."""
@@ -146,43 +140,6 @@ def test_loads_sum_rows_as_their_matrix_does(sets):
     assert loads.sum(rows) == pytest.approx(loads.matrix.toarray() @ rows, rel=1e-12)
 
 
-def test_which_loads_act_at_a_grip():
-    net = build_network(small_arch(5))
-    operator = OperatorBuilder(net, grow_tree(net)).operator(5)
-    columns = np.array([[0, 4], [9, 2]])
-    index = [[0, 1, 2, 12, 13, 14], [27, 28, 29, 6, 7, 8]]
-    assert operator.load_index(columns).tolist() == index
-    assert (operator.loose, operator.softness) == (0, 0.0)  # nothing is
-    held = replace(operator, loose=2, flexibility=np.zeros((32, 32)))
-    assert held.load_index(columns).tolist() == [[*row, 30, 31] for row in index]
-
-
-@pytest.mark.parametrize("sets", [[(0, 3)], [(2, 3)], [(4, 9, 8)], [(8, 5, 9)], [(2, 6, 3, 7)]])
-def test_forces_undo_what_they_are_asked_to(sets):
-    """Between grips on one brick, in whichever places, the inner edge carries nothing."""
-    net = build_network(unequal(small_arch(5)))
-    operator = OperatorBuilder(net, grow_tree(net)).operator(5)
-    columns = np.array(sets)
-    index = operator.load_index(columns)
-    force = grip_forces(operator, columns, index).force
-    share_pairs(operator, columns, index, force, np.empty((1, 0)))
-    flexibility, dead = operator.flexibility, operator.dead_displacement[index[0]]
-    moved = flexibility[np.ix_(index[0], index[0])] @ force[0] + dead
-    assert np.abs(moved).max() <= 1e-9 * np.abs(dead).max()
-    again = still_forces(operator, columns, index, dead[None])
-    moved = flexibility[np.ix_(index[0], index[0])] @ again[0] + dead
-    assert np.abs(moved).max() <= 1e-9 * np.abs(dead).max()
-    carried = operator.answer("edge_force", index, force)
-    bricks = columns[0] // 2
-    for brick in {b for b in bricks if (bricks == b).sum() == 2}:
-        edge = operator.inner_edge[brick]
-        assert abs(carried[0, edge]) <= 1e-9 * np.abs(carried).max()
-        first, second = np.flatnonzero(bricks == brick)
-        axis = operator.axis[brick]
-        pulls = [again[0].reshape(-1, 3)[place] @ axis for place in (first, second)]
-        assert abs(pulls[0] - pulls[1]) <= 1e-6 * np.abs(again).max()  # no force between them
-
-
 def eliminated(matrix):
     """The pivots of a matrix, from the first unknown to the last."""
     left, pivots = matrix.copy(), []
@@ -192,7 +149,7 @@ def eliminated(matrix):
     return np.array(pivots)
 
 
-@pytest.mark.parametrize("grips", [(6, 9), (9, 7), (2, 7, 9), (3, 8, 6), (8, 9, 1), (6, 8, 9)])
+@pytest.mark.parametrize("grips", [(9, 7), (2, 7, 9), (6, 8, 9)])
 @pytest.mark.parametrize(("loosen", "loose"), [(hinged, 3), (torsion_free, 1)])
 def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
     """They move until nothing pulls at them; pivots are measured by what they stand on."""
@@ -218,7 +175,7 @@ def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
         assert abs(weighed[0, operator.inner_edge[brick]]) <= 1e-9 * np.abs(weighed).max()
 
 
-@pytest.mark.parametrize("grips", [(3,), (6, 9), (2, 7, 9)])
+@pytest.mark.parametrize("grips", [(3,), (2, 7, 9)])
 def test_what_rounding_may_change_grips_forces_by(grips):
     """Of each displacement the digits that are lost, over what is left to tell the force by."""
     net = build_network(unequal(small_arch(5)))
@@ -251,7 +208,7 @@ def test_what_rounding_may_change_grips_forces_by(grips):
         assert not well_conditioned(operator, index, found._replace(pivot=pivot), 1e300).any()
 
 
-@pytest.mark.parametrize("grips", [1, 2, 3])
+@pytest.mark.parametrize("grips", [3])
 @pytest.mark.parametrize("name", SCENES)
 def test_answers_do_not_depend_on_how_they_are_summed(monkeypatch, name, grips):
     """Loads' responses mapped once and summed, or sums mapped; all bricks loaded, or those held."""
@@ -268,29 +225,3 @@ def test_answers_do_not_depend_on_how_they_are_summed(monkeypatch, name, grips):
         once, *others = (getattr(fields, field) for fields in found)
         for other in others:
             assert np.abs(other - once).max() <= 1e-9 * np.abs(once).max(), field
-
-
-def test_answers_beside_loose_motions_do_not_depend_on_it_either(monkeypatch):
-    net = build_network(torsion_free(six_bricks(), 2))
-    operator = _held_operator(_hold_loose(ungripped_system(net, 5)))
-    columns = np.array([(2, 7, 9), (3, 8, 6)])
-    index = operator.load_index(columns)
-    force = np.random.default_rng(0).normal(size=index.shape)
-    answers = {}
-    for few in (10**9, 0):
-        monkeypatch.setattr("seqopt.engines.rigid._operator._FEW", few)
-        answers[few] = {name: operator.answer(name, index, force) for name in FLAGS}
-    for name, once in answers[10**9].items():
-        assert np.abs(answers[0][name] - once).max() <= 1e-9 * np.abs(once).max(), name
-
-
-def test_which_bricks_are_loaded():
-    net = build_network(small_arch(5))
-    operator = OperatorBuilder(net, grow_tree(net)).operator(5, np.array([1, 3]))
-    assert operator.place.tolist() == [-1, 0, -1, 1, -1]
-    for held, covered in (([1], True), ([3, 1], True), ([0], False), ([1, 0], False), ([], True)):
-        assert operator.covers(np.array(held, dtype=int)) is covered
-    size = operator.nbytes
-    assert size == operator.flexibility.nbytes + operator.twist.nbytes + operator.wrench.nbytes
-    more = operator.of_loads("displacement").nbytes  # made when it is asked for
-    assert operator.nbytes == size + more

@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from tests.quality.mutants import Mutant
 
 RIGID = (
-    "engines/test_trial",
     "engines/test_operator",
     "engines/test_rigid_bricks",
     "validation/test_closed_forms",
@@ -72,7 +71,7 @@ MODULES = {
     "seqopt.engines.rigid.compliance": (
         *("engines/test_compliance", "engines/test_operator", "engines/test_rigid_bricks"),
         *("engines/test_loose", "responses/test_finite"),
-        *("engines/test_trial", "engines/test_growth"),
+        "engines/test_growth",
     ),
     "seqopt.engines.rigid._operator": RIGID,
     "seqopt.engines.rigid._grip_equations": RIGID,

@@ -63,11 +63,6 @@ def test_each_robot_is_a_term_whatever_its_name(arch25):
     assert {"F_a", "F_b", "F_c", "T_max", "M_sup"} == set(first)
 
 
-def test_only_what_is_asked_is_evaluated(engine25, loop25):
-    plain = pose_decisions(engine25, loop25, RankSum("tension", equal("T_max"), equal("T_max")))
-    assert {name for s in plain.evaluation.steps for name in s.responses} == {"T_max"}
-
-
 def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):
     schedule = three_robot_loop(engine25.network)
     monkeypatch.setattr(batches, "BLOCK", 10**9)

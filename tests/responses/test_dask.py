@@ -18,6 +18,7 @@ from seqopt.workflow import Search, optimize
 distributed = pytest.importorskip("distributed", reason="extra dask")
 
 pytestmark = [
+    pytest.mark.slow,  # a cluster takes seconds to begin
     pytest.mark.filterwarnings("ignore"),  # what a cluster says as it starts, ends, loses workers
     pytest.mark.xdist_group("dask"),
 ]

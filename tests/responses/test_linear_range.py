@@ -19,7 +19,6 @@ from seqopt.responses._staged import staged_fields
 from seqopt.responses.table import _STRAIN, LinearRange, analyze, response_table
 from seqopt.scene.scene_file import _scene_by_words, save_scene
 from seqopt.sequence.methods import cantilever, sequential
-from seqopt.stability._builds import BuildProver
 from seqopt.study.published import published_plan
 from seqopt.workflow import optimize
 from tests.builders import small_arch
@@ -89,16 +88,6 @@ def test_bricks_that_turn_about_their_own_axis_are_seen(arch25):
     turned[0, 0, 3:] = 0.2
     (left,) = LinearRange(made).departures(table, [replace(fields, brick_twist=turned)])
     assert (left.what, left.steps) == ("rotation", (1,))
-
-
-@pytest.mark.parametrize("engine", ["auto", "discrete"])
-def test_engines_whose_joints_break_are_asked_for_displacements_alone(arch25, engine):
-    heavy = changed(arch25, density=20.0)
-    made = make_engine(engine, build_network(heavy))
-    table = analyze(made, sequential(made.network)[:3])
-    table.loc[1, "D_max_1e-3mm"] = 6e3
-    (left,) = LinearRange(made).departures(table)
-    assert (left.what, left.steps) == ("displacement", (2,))
 
 
 def test_what_is_not_a_number_is_not_within(arch25):
@@ -180,7 +169,7 @@ def reached(engine, steps):
         yield np.linalg.norm(fields.displacement[0], axis=1).max(), twist
 
 
-@pytest.mark.parametrize("share", [0.2, 1.0, 5.0])
+@pytest.mark.parametrize("share", [0.2, 5.0])
 def test_at_the_limit_the_displaced_shape_changes_displacements_by_a_tenth(share):
     """What an analysis of second order would add grows with the displacement, as it should."""
     scene, limit = _scene_by_words(WORDS), 0.1 * 0.06
@@ -218,7 +207,7 @@ FREE = ("optimize", "--schedule", "free", "--aim", "steps")
     [
         ("analyze", "--method", "sequential"),
         pytest.param(("compare",), marks=pytest.mark.slow),
-        LOOP,
+        pytest.param(LOOP, marks=pytest.mark.slow),
         FREE,
         pytest.param(("pareto", "--aim", "steps,D_max"), marks=pytest.mark.slow),
     ],
@@ -253,34 +242,6 @@ def test_commands_say_it_first_and_tell_scripts(capsys, tmp_path, small_soft, wo
 def small_soft(tmp_path):
     save_scene(changed(small_arch(5), stiffness=1e-6), tmp_path / "soft.json")
     return str(tmp_path / "soft.json")
-
-
-def test_a_set_that_is_printed_makes_neither_page_nor_verdicts(
-    capsys, small_soft, tmp_path, monkeypatch
-):
-    asked = ["pareto", small_soft, "--aim", "steps,D_max", "--json", "--rule", "regrips=0"]
-    assert main([*asked, "--out", str(tmp_path / "out")]) == 1
-    written = json.loads(capsys.readouterr().out)
-    home = "seqopt._cli.commands.pareto"
-    for name in ("front_page", "method_tables", "csv_text"):
-        monkeypatch.setattr(f"{home}.{name}", lambda *_, name=name: pytest.fail(name))
-    monkeypatch.setattr(BuildProver, "_ask", lambda *_: pytest.fail("what stands"))
-    assert main(asked) == 1
-    printed = json.loads(capsys.readouterr().out)
-    assert written["outside_linear_range"]
-    same = ("outside_linear_range", "points")
-    assert [printed[name] for name in same] == [written[name] for name in same]
-
-
-def test_what_builds_leave_is_said_by_their_steps_alone(soft):
-    made = make_engine("compliance", build_network(soft))
-    names = {"one": sequential(made.network), "two": cantilever(made.network)}
-    names["short"] = names["one"][:3]
-    tables = {name: analyze(made, steps) for name, steps in names.items()}
-    own, other = LinearRange(made).of_steps(names), LinearRange(made).of_builds(tables)
-    assert [*own] == [*other] == ["one"]
-    for name, left in own.items():
-        assert [(d.what, d.steps) for d in left] == [(d.what, d.steps) for d in other[name]]
 
 
 def test_a_table_on_standard_output_stays_a_table(capsys, small_soft):

@@ -6,7 +6,6 @@ import itertools
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -148,29 +147,6 @@ def test_the_scene_is_sent_and_no_operators(loop25):
     assert evaluation(engine, loop25).models == 8642  # operators of all brick counts
     assert len(packed(engine)) == before < 2 * len(pickle.dumps(loop25.scene))
     assert len(pickle.dumps(engine)) > 20 * before
-
-
-def test_an_engine_is_made_once_for_a_worker(small_blocks, loop25, monkeypatch):
-    made = []
-    engine = make_engine("compliance", loop25.scene)
-    send = partial(division._answer_all, packed(engine), loose=False)
-    monkeypatch.setattr(
-        "seqopt.engines.registry.make_engine",
-        lambda *given, **named: made.append(given) or make_engine(*given, **named),
-    )
-    with ThreadPoolExecutor(1) as executor:
-        for block in blocks()[:3]:
-            asked = [Block(1, np.array([[1]]), block.names)]
-            sent = executor.submit(send, asked).result()
-            assert len(sent) == 1
-    assert len(made) == 1
-
-
-@pytest.mark.slow
-def test_an_engine_of_ones_own_is_sent_itself(loop25):
-    expected = evaluation(ComplianceEngine(loop25.scene), loop25)
-    found = evaluation(ComplianceEngine(loop25.scene), loop25, workers=2)
-    assert found.steps == expected.steps
 
 
 def test_an_engine_that_cannot_be_sent_is_refused_in_a_line(loop25):

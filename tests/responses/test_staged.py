@@ -10,13 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg
 
-from seqopt.engines.interface import _NAMES, Want
+from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import MechanismError, StepError
 from seqopt.network._mechanics import node_motion, spring_maps
 from seqopt.network.build import build_network
 from seqopt.responses._staged import Placing, analyze_staged, staged_fields
-from seqopt.responses.table import analyze
 from seqopt.scene.parts import Joint
 from seqopt.sequence.methods import cantilever, sequential
 from seqopt.sequence.steps import Step, StepKind
@@ -121,35 +120,6 @@ def test_two_bricks_by_hand():
         np.testing.assert_allclose(fields[3].joint_wrench[0, :, 2], [2 * w, w], rtol=1e-6)
 
 
-def test_a_grip_closes_without_force_where_it_finds_its_node():
-    """The first brick sags freely; held then, it takes nothing of its own weight."""
-    network = build_network(tower(2))
-    steps = numbered(
-        (PLACE, 1, (1, None, None)),
-        (RELEASE, 1, (None, None, None)),
-        (HOLD, 1, (2, None, None)),
-        (PLACE, 2, (2, 3, None)),
-        (RELEASE, 2, (2, None, None)),
-    )
-    w = float(np.linalg.norm(network.weight[0]))
-    fields = list(staged_fields(network, steps))
-    for name in _NAMES:
-        if name not in ("grip_force", "grip_moment"):
-            np.testing.assert_array_equal(getattr(fields[1], name), getattr(fields[2], name))
-    assert not fields[2].grip_force.any()
-    assert fields[3].grip_force[0, :, 2] == pytest.approx([0.0, w], abs=1e-4 * w)
-    assert fields[4].grip_force[0, :, 2] == pytest.approx([w], rel=1e-4)
-
-
-def test_grips_that_are_never_let_go_add_up():
-    """Every brick held at once by its own robot: none carries another's weight."""
-    network = build_network(tower(3))
-    steps = numbered((PLACE, 1, (1, None, None)), (PLACE, 2, (1, 3, None)), (PLACE, 3, (1, 3, 5)))
-    w = float(np.linalg.norm(network.weight[0]))
-    *_, last = staged_fields(network, steps)
-    assert last.grip_force[0, :, 2] == pytest.approx([w, w, w], rel=1e-4)
-
-
 # laws
 
 
@@ -163,7 +133,7 @@ def released_in_between(scene):
     return network, numbered(*steps)
 
 
-@settings(max_examples=15)
+@settings(max_examples=6)
 @given(arches(max_bricks=5))
 def test_without_loops_nothing_is_locked_in_once_all_let_go(scene):
     """Statically determinate: forces follow from weight alone; fitted bricks follow the joints."""
@@ -188,7 +158,7 @@ def test_a_closed_arch_remembers_how_it_was_built(arch25):
     assert all(np.abs(moments[i] - moments[j]).max() > 1.0 for i, j in ((0, 1), (0, 2)))
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(st.floats(-1, 1), st.floats(-2, 2), st.floats(-2, 2))
 def test_units_change_nothing(length, force, soft):
     """Forces grow with the weight, moments with it and the length, displacements with all."""
@@ -243,7 +213,6 @@ def by_method(method, scene):
 
 
 BUILDS = {
-    "sequential": lambda: by_method(sequential, small_arch(7)),
     "cantilever": lambda: by_method(cantilever, small_arch(8)),
     "from both sides": lambda: released_in_between(from_both_sides(6, "VL")),
 }
@@ -281,21 +250,6 @@ def test_every_step_of_the_published_plan_is_in_equilibrium(arch25):
         total = total + fields.grip_force[0].sum(axis=0) + fields.support[0, :, :3].sum(axis=0)
         assert np.abs(total).max() < 1e-6
         assert len(fields.grip_force[0]) == len(step.held)
-
-
-def test_the_table_has_the_columns_of_an_analysis(arch25):
-    network = build_network(arch25)
-    steps = sequential(network)
-    staged, once = (
-        analyze_staged(network, steps),
-        analyze(make_engine("compliance", network), steps),
-    )
-    assert [*staged.columns] == [*once.columns]
-    assert (staged["step"] == once["step"]).all()
-    first = [*once.columns[once.columns.get_loc("F_rob1_N") :]]
-    np.testing.assert_allclose(
-        staged.loc[0, first].astype(float), once.loc[0, first].astype(float), rtol=1e-9, atol=1e-9
-    )
 
 
 def test_wrong_questions_get_a_line(arch25):

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.harness.scenes import running_bond
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.decisions import pose_decisions
@@ -19,7 +18,7 @@ from seqopt.responses.quantities import RESPONSES, responses_of, support_forces,
 from seqopt.responses.table import analyze, support_columns
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Step, StepKind
-from tests.builders import from_both_sides, small_arch
+from tests.builders import from_both_sides
 
 MOMENT = WeightedSum("moment", (("M_sup", 1.0, 1.0),))
 
@@ -60,7 +59,7 @@ def test_an_arch_built_from_both_sides_reports_its_worse_support(arch25):
     assert (seen == each.max(axis=1)).all()
 
 
-@pytest.mark.parametrize("bricks", [2, 6, 9])
+@pytest.mark.parametrize("bricks", [6])
 def test_criteria_see_the_largest(arch, bricks):
     schedule = one_move(arch, bricks)
     each = moments(arch, schedule)
@@ -79,13 +78,6 @@ def test_limits_see_the_largest(arch):
     allowed = np.isfinite(problem.sums.single[0])
     assert (allowed == (each[:, 1] <= bound)).all()
     assert 0 < allowed.sum() < len(allowed)
-
-
-def test_the_order_of_the_ends_changes_no_criterion(arch):
-    scene = arch.network.scene
-    turned = ComplianceEngine(build_network(replace(scene, grounds=scene.grounds[::-1])))
-    one, other = (pose_decisions(e, one_move(e, 6), MOMENT).sums.single[0] for e in (arch, turned))
-    assert other == pytest.approx(one, rel=1e-9)
 
 
 def test_the_largest_force_keeps_its_sign():
@@ -122,25 +114,3 @@ def test_tables_have_columns_per_end(arch):
     assert table.loc[0, "M_sup_Nm"] == table.loc[0, "M_sup_1_Nm"] > 0
     assert table.loc[1, "M_sup_Nm"] == max(table.loc[1, ["M_sup_1_Nm", "M_sup_9_Nm"]])
     assert abs(table.loc[1, "F_sup_N"]) == table.loc[1, ["F_sup_1_N", "F_sup_9_N"]].abs().max()
-
-
-def test_one_end_needs_no_columns_of_its_own():
-    arch = small_arch(3)
-    free = replace(arch, grounds=arch.grounds[:1])
-    table = analyze(
-        ComplianceEngine(build_network(free)), [Step(1, StepKind.PLACE, 1, (1, None, None))]
-    )
-    assert list(table)[-1] == "D_std_1e-3mm"
-
-
-def test_ends_of_one_brick_are_counted():
-    wall = running_bond(2, 1)
-    twice = replace(wall, grounds=(wall.grounds[0], *wall.grounds))
-    assert [moment for _, moment in support_columns(twice)] == [
-        "M_sup_1_Nm",
-        "M_sup_1_2_Nm",
-        "M_sup_2_Nm",
-    ]
-    support = ComplianceEngine(build_network(twice)).solve(2, [[2]], Want.SUPPORT).support[0]
-    assert support[0] == pytest.approx(support[1], rel=1e-9)  # one spring, given twice
-    assert np.abs(support[2] - support[0]).max() > 1
