@@ -28,11 +28,6 @@ def test_a_wrong_assembly_is_named(change, message):
         replace(stack([0.1]).assembly(2000.0), **change)
 
 
-def test_a_wrong_mortar_is_named():
-    with pytest.raises(SceneError, match=r"mortar: friction is -1.0; give a number"):
-        Mortar(friction=-1.0)
-
-
 def carries(mortar, press, slide):
     """Where a corner bears stresses: pressure, negative where it is pulled, and shear."""
     sticks = slide <= mortar.cohesion + mortar.friction * press

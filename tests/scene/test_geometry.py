@@ -24,7 +24,6 @@ NODE = SCENE.node_position(3)
 @pytest.mark.parametrize(
     ("kind", "index", "change", "named"),
     [
-        ("joints", 1, {"position": NODE}, r"joint \(2, 3\): position is that of node 3"),
         (
             "joints",
             1,
@@ -33,10 +32,8 @@ NODE = SCENE.node_position(3)
         ),
         ("grounds", 0, {"position": SCENE.node_position(0)}, "ground end of brick 1: .* node 0"),
         ("grounds", 0, {"anchor": (1e-200, 0.0, 0.0)}, "anchor and position are one point"),
-        ("joints", 1, {"position": (1e150, 0.0, 0.0)}, r"joint \(2, 3\): .*1e\+150"),
         ("bricks", 1, {"position": (1e308, 1e308, 0.0)}, "brick 2: position .* move the scene"),
         ("bricks", 1, {"dimensions": (1e-200,) * 3}, "brick 2: dimensions .* give meters"),
-        ("bricks", 1, {"dimensions": (1e200,) * 3}, "brick 2: dimensions .* give meters"),
         ("bricks", 1, {"density": 1e308}, r"brick 2: it weighs .*1e\+308 kg/m³"),
         (
             "joints",
@@ -57,12 +54,7 @@ def test_what_leaves_nothing_to_compute_is_refused(kind, index, change, named):
         with_part(SCENE, kind, index, **change)
 
 
-@pytest.mark.parametrize("pull", [1e160, 1e300, 1e-160, 1e-320])
+@pytest.mark.parametrize("pull", [1e160, 1e-160])
 def test_a_weight_beyond_all_bounds_is_refused(pull):
     with pytest.raises(SceneError, match=r"brick 1: it weighs .* gravity (1e.|9.99989e-)[13]"):
         replace(SCENE, gravity=(0.0, 0.0, -pull))
-
-
-def test_a_joint_close_to_a_node_is_none_at_it():
-    near = with_part(SCENE, "joints", 1, position=tuple(x + 1e-3 for x in NODE))
-    assert near.joints[1].position != SCENE.joints[1].position

@@ -34,11 +34,9 @@ def test_from_all_ends_leaves_nothing_that_hangs():
     ("order", "said"),
     [
         ("backwards", "order 'backwards': give reversed, ends, sides, or names of bricks"),
-        ("1..9", "1..9 are more bricks than the scene has"),
         ("1,2,3", "order: 2 bricks are missing, 4 among them"),
         ("1,2,3,4,4", "order: 4 occurs twice"),
         ((1, 2, 3, 4, 7), "order: 7 is no brick"),
-        ((1, 2.5), "give a whole number"),
         (7, "order is 7; give whole numbers"),
     ],
 )

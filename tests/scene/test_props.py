@@ -38,11 +38,9 @@ def test_props_that_do_not_fit_a_scene(props, said):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ({}, "give the node that it holds, or a position"),
         ({"node": 3, "position": (0, 0, 0)}, "give the node that it holds, or a position"),
         ({"node": 3, "direction": (0, 0, 0)}, "direction is .* give one that is not zero"),
         ({"node": 3, "stiffness": -1}, "prop at node 3: stiffness is -1; give one number or three"),
-        ({"node": 3, "capacity": 0}, "capacity is 0; give a positive number of N"),
     ],
 )
 def test_wrong_props_get_one_line(words, said):

@@ -13,7 +13,6 @@ from seqopt.scene import Load
 from seqopt.scene.arch import ArchShape
 from seqopt.scene.library import ArchForm, DomeShape, JointLaw, WallShape
 from seqopt.scene.parts import Robot, Side, Sphere
-from seqopt.scene.scene import Scene
 from seqopt.scene.shape import Polyhedron
 from tests.builders import six_bricks
 
@@ -70,12 +69,8 @@ def test_the_field_is_named(make, said):
     ("given", "said"),
     [
         ({"unit": []}, r"two: unit is \[\]; give one of m, cm"),
-        ({"up": []}, r"two: up is \[\]; give one of z, y"),
         ({"supports": 3}, "two: supports is 3; give keys of blocks"),
-        ({"supports": [[]]}, r"two: there is no block \[\]; known are '1, 2'"),
         ({"law": 3}, "two: law is 3; give a JointLaw"),
-        ({"gap": "x"}, "two: gap is 'x'; give a positive number of m"),
-        ({"robots": "x"}, "two: robots is 'x'; give a whole number"),
         ({"name": 3}, "scene: its name is 3; give text"),
     ],
 )
@@ -84,8 +79,3 @@ def test_what_is_given_beside_a_file_is_named(tmp_path, given, said):
     path.write_text("x,y,z,length,width,height\n0,0,1,2,1,2\n0,0,2.5,2,1,1\n", "utf-8")
     with pytest.raises(SceneError, match=said):
         import_scene(path, given=Given(**{"unit": "m", "density": 2000.0, **given}))
-
-
-def test_a_scene_of_no_parts_is_none():
-    with pytest.raises(SceneError, match="bricks: give each as Brick"):
-        Scene(name="x", bricks=3, joints=(), grounds=(), build_order=(), robots=())

@@ -77,7 +77,7 @@ def test_every_formulation_of_states_refuses_what_nobody_carries(name):
     assert seqopt.solve(posed(wall(212.0, 212.0)), name).steps
 
 
-@pytest.mark.parametrize("goals", ["steps", "sum(D_max)", "travel", "regrips,minmax"])
+@pytest.mark.parametrize("goals", ["steps", "regrips,minmax"])
 @pytest.mark.parametrize("rules", [ANYHOW, DOWN])
 def test_whatever_is_aimed_at(goals, rules):
     done = "removed" if rules is DOWN else "placed"
@@ -97,8 +97,8 @@ def test_an_advice_is_no_less_than_the_heaviest_brick_and_no_more_than_is_needed
     assert seqopt.solve(posed(wall(HEAVY * (1 - 1e-12), 400.0))).steps  # the last bit is not asked
 
 
-@pytest.mark.parametrize("rules", [ANYHOW, FreeRules(least_grips=1), DOWN])
-@pytest.mark.parametrize("payloads", [(150.0, 300.0), (300.0, 20.0, 150.0)])
+@pytest.mark.parametrize("rules", [ANYHOW, DOWN])
+@pytest.mark.parametrize("payloads", [(300.0, 20.0, 150.0)])
 def test_a_heavy_brick_is_for_a_strong_robot(rules, payloads):
     scene = wall(*payloads)
     plan = seqopt.solve(replace(posed(scene, rules, "minmax,steps"), criterion=ONES))
@@ -121,11 +121,6 @@ def test_orders_put_the_heavy_brick_into_strong_hands():
         seqopt.solve(posed(wall(150.0, 150.0), orders="any"))
     with pytest.raises(InfeasibleError, match=f"no order .* in the scene's own, .*{TOO_HEAVY}"):
         find_front(posed(wall(150.0, 150.0), goals="F_largest,D_max", orders="tied"))
-
-
-def test_payloads_that_are_ignored_carry_anything():
-    plan = seqopt.solve(posed(wall(20.0, 20.0), replace(ANYHOW, payload="ignored")))
-    assert 4 in [each.brick for each in plan.overloads]
 
 
 @pytest.mark.parametrize("name", formulations("costs"))

@@ -11,23 +11,10 @@ from seqopt.errors import StepError
 from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
-from seqopt.sequence.methods import (
-    SCHEDULES,
-    _two_robot_loop,
-    placing_node,
-    robot_loop,
-    sequential,
-    three_robot_loop,
-)
+from seqopt.sequence.methods import SCHEDULES, _two_robot_loop, placing_node, robot_loop, sequential
 from seqopt.sequence.steps import StepKind, idle_robots
 from seqopt.study.published import EQUATIONS, WEIGHTED
 from tests.builders import anywhere, small_arch
-
-
-def test_three_robots_of_any_scene_make_the_loop_of_the_paper(engine25):
-    loop, own = three_robot_loop(engine25.network), robot_loop(engine25.network)
-    assert own == loop == robot_loop(engine25.network, 3)
-    assert own.method == "three-robot"
 
 
 @pytest.mark.parametrize(("count", "word"), [(3, "three"), (4, "four"), (5, "five")])
@@ -58,18 +45,6 @@ def test_two_robots_filled_with_placing_nodes_are_the_sequential_method(engine25
     assert schedule.fill(nodes) == sequential(network)
 
 
-def test_a_move_of_two_robots_lasts_until_the_next_brick_is_held(engine25):
-    schedule = _two_robot_loop(engine25.network)
-    assert len(schedule.moves) == 25
-    assert idle_robots(schedule.scene, schedule.steps) == ("rob3",)
-    for k, move in enumerate(schedule.moves[1:-1], start=1):
-        window = [step for step in schedule.steps if k in step.moves]
-        kinds = [StepKind.PLACE, StepKind.RELEASE, StepKind.PLACE]
-        assert [step.kind for step in window] == kinds
-        assert [step.moves for step in window] == [(k - 1, k), (k,), (k, k + 1)]
-        assert {schedule.scene.brick_of_node[n].name for n in move.candidates} == {k + 1}
-
-
 def test_two_robots_hold_better_where_the_best_nodes_are_chosen(engine25):
     """The sequential method is one of the choices; the best is better, and proven so."""
     schedule = _two_robot_loop(engine25.network)
@@ -85,7 +60,7 @@ def test_two_robots_hold_better_where_the_best_nodes_are_chosen(engine25):
     assert plan.certificate.objective < problem.sums.cost(own)
 
 
-@pytest.mark.parametrize("count", [2, 3, 4, 5])
+@pytest.mark.parametrize("count", [2, 5])
 @pytest.mark.parametrize("criterion", [EQUATIONS, WEIGHTED], ids=lambda c: c.name)
 def test_any_loop_can_be_optimized(count, criterion):
     scene = replace(small_arch(9), robots=anywhere(count))
@@ -98,8 +73,8 @@ def test_any_loop_can_be_optimized(count, criterion):
 
 def test_the_more_robots_hold_the_less_the_arch_moves():
     largest = []
-    for count in (2, 3, 4, 5):
-        plan = seqopt.optimize(replace(small_arch(12), robots=anywhere(count)), "loop", "weighted")
+    for count in (2, 3, 5):
+        plan = seqopt.optimize(replace(small_arch(9), robots=anywhere(count)), "loop", "weighted")
         largest.append(plan.responses()["D_max_1e-3mm"].max())
     assert largest == sorted(largest, reverse=True)
     assert largest[-1] < 0.7 * largest[0]

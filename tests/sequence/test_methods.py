@@ -29,12 +29,6 @@ def test_any_arch_can_be_built(method, scene):
     assert all(s.held for s in steps[:-1])
 
 
-@given(scene=arches().map(far_reaching))
-def test_the_sequential_method_holds_the_newest_brick(scene):
-    for step in sequential(build_network(scene))[:-1]:
-        assert set(step.held) & set(scene.placed[step.bricks - 1].nodes)
-
-
 def test_where_all_bricks_lie_along_the_methods_are_one():
     net = build_network(arch_scene(ArchShape(pitch=[1.0, 0.6, 0.2, -0.2], pattern="V")))
     assert lies_along(net) == {1, 2, 3, 4}
@@ -59,18 +53,14 @@ def edited(plan, number, **changes):
     [
         (4, {"grips": (None, 2)}, "step 4: 2 grips for 3 robots"),
         (4, {"bricks": 0}, "step 4: 0 bricks"),
-        (4, {"bricks": 26}, "step 4: 26 bricks"),
         (4, {"grips": (None, 2, 99)}, "step 4: rob3 at node 99: there is no such node"),
-        (4, {"grips": (None, 2, 0)}, "step 4: rob3 at node 0: the node is blocked"),
         (4, {"grips": (None, 2, 9)}, "step 4: rob3 at node 9: brick 5 is not placed yet"),
         (4, {"grips": (None, 2, 2)}, "step 4: rob3 at node 2: rob2 holds it"),
         (9, {"grips": (7, 8, None)}, "step 9: rob2 at node 8: the node is out of its reach"),
         (4, {"grips": (1, 2, 4)}, r"step 4 \(release\): it takes grips \[\] and drops \[\]"),
         (4, {"grips": (None, 1, 4)}, "step 4 .*: rob2 moves from node 2 to 1"),
         (4, {"kind": StepKind.PLACE}, r"step 4 \(place\): 3 bricks after 3; give 4"),
-        (5, {"kind": StepKind.RELEASE}, r"step 5 \(release\): 4 bricks after 3; give 3"),
         (5, {"grips": (1, 2, 4)}, r"step 5 \(place\): its new grip is on node 1; hold brick 4"),
-        (7, {"kind": StepKind.RELEASE}, r"step 7 \(release\): it takes grips"),
     ],
 )
 def test_impossible_steps(arch25, number, changes, named):

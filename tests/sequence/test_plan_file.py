@@ -22,11 +22,9 @@ HEADER = "step,type,bricks,rob1_brick,rob1_node,rob2_brick,rob2_node,rob3_brick,
         ("step,type,bricks,rob1_node\n1,place,1,1\n", "column rob2_node is missing"),
         (HEADER, "no steps"),
         (HEADER + "1,put,1,1,1,,,,\n", "line 2: type is 'put'"),
-        (HEADER + "1,place,one,1,1,,,,\n", "line 2: bricks is 'one'"),
         (HEADER + "1,place,1,1,a,,,,\n", "line 2: rob1_node is 'a'"),
         (HEADER + "1,place,1,2,1,,,,\n", "rob1 holds node 1 of brick 2; it is on brick 1"),
         (HEADER + "2,place,1,1,1,,,,\n", "step 2 should be 1"),
-        (HEADER + "1,place\n", "line 2: bricks is ''"),
     ],
 )
 def test_plan_files_are_checked(arch25, text, named):
@@ -50,10 +48,8 @@ HEAD = "step,type,bricks,rob1_node,rob2_node,rob3_node\n"
     ("text", "named"),
     [
         (HEAD + "1,place,1," + "1" * 131_073 + ",,\n", "not a readable CSV file: field larger"),
-        ("x" * 200_000, "not a readable CSV file: field larger"),
         (HEAD.replace("\n", "\r") + "1,place,1,1,,\r", "not a readable CSV file: new-line"),
         (HEAD + "1,place,1," + "1" * 5000 + ",,\n", "rob1_node is '1111"),
-        (HEAD + f"1,place,1,{10**400},,\n", "rob1_node is '1000"),
         (HEAD.strip() + ",rob1_node\n1,place,1,1,,,4\n", "column rob1_node occurs twice"),
     ],
 )
@@ -71,9 +67,3 @@ def test_a_plan_that_pandas_wrote_again_is_the_same(tmp_path, arch25):
     pd.read_csv(path).to_csv(path, index=False)
     assert ",1.0," in path.read_text(encoding="utf-8")
     assert read_plan(arch25, path) == tuple(steps)
-
-
-@pytest.mark.parametrize("cell", ["1.5", "1e3", "1.0.0", "nan", "inf"])
-def test_what_is_not_whole_is_refused(arch25, cell):
-    with pytest.raises(StepError, match=f"rob1_node is '{cell}'; give a node"):
-        parse_plan(arch25, HEAD + f"1,place,1,{cell},,\n", "plan.csv")

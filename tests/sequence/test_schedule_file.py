@@ -47,34 +47,22 @@ def test_a_move_lasts_until_its_robot_lets_go(arch25):
     ]
 
 
-def test_spaces_and_other_columns_do_not_matter(arch25):
-    text = "step,type,bricks,rob1_brick,rob1_node,rob2_node,note,rob3_node\n"
-    text += "1,place,1,1, 1 ,,first, \n2,place,2,1,1,2,, \n3,reposition,2,1,1,2,, ? 1 \n"
-    assert parse_schedule(arch25, text, "x.csv").moves[0].candidates == (3,)
-
-
 @pytest.mark.parametrize(
     ("text", "named"),
     [
         ("", "schedule s.csv: column step is missing; give step, type"),
-        ("step,type,bricks,rob1_node,rob3_node\n", "column rob2_node is missing"),
         (HEADER, "schedule s.csv: it has no steps; give at least one"),
         (
             HEADER.replace("rob3_node", "rob3_node,rob4_node") + "1,place,1,1,,,\n",
             "column rob4_node: no robot of scene arch25 is called so; give rob1_node",
         ),
-        (HEADER.replace("rob3", "rob1") + "1,place,1,1,,\n", "column rob3_node is missing"),
         (
             HEADER.replace("rob3_node", "rob3_node,rob1_node") + "1,place,1,1,,,\n",
             "column rob1_node occurs twice",
         ),
         (HEADER + "1,put,1,1,,\n", "line 2: type is 'put'; give one of place"),
-        (HEADER + "1,place,one,1,,\n", "line 2: bricks is 'one'; give a whole number"),
         (HEADER + "1,place,1,1,,,5\n", "line 2: it has more cells than there are columns"),
-        (HEADER + "2,place,1,1,,\n", "line 2: step 2 should be 1"),
-        (START + "3,place,26,1,2,?\n", "line 4: step 3: 26 bricks; the scene has 1 to 25"),
         (START + "3,place,3,1,2,!\n", "line 4: rob3_node is '!'; give a node, \\? for an open"),
-        (START + "3,place,3,1,2,?x\n", "line 4: rob3_node is '\\?x'; give a node"),
         (START + "3,place,3,1,2,99\n", "line 4: step 3: rob3 at node 99: there is no such node"),
         (START + "3,place,3,1,2,1\n", "rob3 at node 1: rob1 holds it; hold another"),
         (START + "3,place,3,1,2,?2\n", "rob3_node is '\\?2', but this is open grip \\?1"),
@@ -86,7 +74,6 @@ def test_spaces_and_other_columns_do_not_matter(arch25):
             START + "3,place,3,1,2,?1\n4,release,3,,2,?2\n",
             "line 5: rob3_node is '\\?2', but this is open grip \\?1: .* let rob3 release first",
         ),
-        (START + "3,place,3,1,?,4\n", "line 4: step 3 .*: rob2 moves from node 2 to \\?1; let it"),
         (
             START + "3,place,3,1,2,?\n4,release,3,,2,4\n",
             "line 5: step 4 .*: rob3 moves from node \\?1 to 4; let it release first",
@@ -95,7 +82,6 @@ def test_spaces_and_other_columns_do_not_matter(arch25):
             START + "3,release,2,,2,\n4,reposition,2,?,2,?\n",
             "line 5: step 4 .*: it takes grips \\[\\?1, \\?2\\] and drops \\[\\]",
         ),
-        (START + "3,release,2,1,2,?\n", "line 4: step 3 .*: it takes grips \\[\\?1\\]"),
         (
             START + "3,release,2,,2,\n4,place,3,1,2,\n",
             "line 5: step 4 .*: its new grip is on node 1; hold brick 3 at one of",

@@ -12,7 +12,6 @@ from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.methods import (
     _alternate,
-    _begins_elsewhere,
     cantilever,
     lies_along,
     open_schedule,
@@ -41,15 +40,6 @@ def test_a_joint_that_resists_nothing_ties_nothing():
     for joint, found in ((turning, ()), (nothing, (frozenset({2, 3}),))):
         network = build_network(replace(scene, joints=(joint, scene.joints[1])))
         assert islands(network, 3) == found
-
-
-def test_a_brick_set_ahead_is_held_until_it_is_tied():
-    network = ordered(small_arch(4), 1, 3, 2, 4)
-    for method in (sequential, cantilever):
-        steps = method(network)
-        for step in steps:
-            if step.bricks == 2:
-                assert set(step.held) & set(network.scene.placed[1].nodes)
 
 
 @pytest.mark.parametrize("method", [sequential, cantilever])
@@ -137,30 +127,10 @@ def test_that_bricks_lie_along_is_not_enough_where_ends_take_turns():
     assert grows_from_what_is_held(network, steps)
 
 
-def test_in_a_chain_only_the_first_brick_begins_elsewhere(engine25):
-    assert _begins_elsewhere(engine25.network) == {1}
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [running_bond(3, 1), branch(), from_both_ends(9), from_both_ends(9, "V"), small_arch(2)],
-    ids=lambda value: value.name,
-)
-def test_where_each_brick_begins_elsewhere_or_lies_along_methods_are_one(scene):
-    network = build_network(replace(scene, robots=anywhere(2)))
-    assert cantilever(network) == sequential(network)
-
-
 def test_where_nothing_lies_along_the_first_brick_is_held_until_the_end():
     network = build_network(arch_scene(ArchShape(pitch=(1.2, 0.7, 0.2, -0.3), pattern="LR")))
     first = set(network.scene.placed[0].nodes)
     assert all(set(step.held) & first for step in cantilever(network)[:-1])
-
-
-def test_it_is_itself_where_one_side_is_built_after_the_other():
-    network = build_network(replace(from_both_ends(12, order=CROSS), robots=anywhere(2)))
-    assert _begins_elsewhere(network) == {1, 12}
-    assert cantilever(network) != sequential(network)
 
 
 def test_three_robots_hold_an_island_while_they_can():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise, permutations
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -11,7 +11,6 @@ import pytest
 import seqopt
 from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.exchange._tables import plan_csv
-from seqopt.exchange._tasks import Action, plan_tasks
 from seqopt.graph._orders import among_orders, order_rules
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
@@ -99,17 +98,6 @@ def test_a_part_is_taken_down():
         assert bool(plan.steps[-1].held) is held
 
 
-def test_it_begins_anywhere():
-    engine = arch()
-    whole = seqopt.solve(posed(engine, "minmax,steps"))
-    rules = replace(DOWN, begin=Site.after(whole.steps, 3))
-    rest = seqopt.solve(posed(engine, "minmax,steps", rules))
-    assert rest.selection.objective[0] <= whole.selection.objective[0] * (1 + 1e-9)
-    assert len(rest.steps) <= len(whole.steps) - 3
-    assert rest.steps[0].number == 4
-    assert Site.after(whole.steps, 0) == Site(4, (None,) * 3, step=0)
-
-
 def test_every_aim_and_regrips_that_count():
     engine = arch()
     plan = seqopt.solve(posed(engine, "regrips,travel,minmax", replace(DOWN, regrips=3)))
@@ -119,14 +107,6 @@ def test_every_aim_and_regrips_that_count():
     assert front.complete
     best = seqopt.solve(posed(engine, "minmax,steps")).selection.objective
     assert np.isclose(front.table.iloc[:, :2].to_numpy(float), best).all(axis=1).any()
-
-
-def test_states_stand_until_nothing_does():
-    engine = arch()
-    problem = seqopt.pose(engine, DOWN, ONES, "minmax", stands="epoxy")
-    plan = seqopt.solve(problem)
-    assert plan.status == "optimal"
-    assert {v.value for v in plan.verdicts("epoxy")} == {"stands"}
 
 
 @pytest.mark.slow
@@ -237,18 +217,6 @@ def test_plans_are_read_back():
     table = seqopt.analyze(seqopt.make_engine("auto", scene), down)
     assert table["bricks"].iloc[-1] == 0
     assert not table[["F_max_N", "D_max_1e-3mm"]].iloc[-1].any()
-
-
-def test_robots_put_away_what_they_remove():
-    engine = arch()
-    plan = seqopt.solve(posed(engine, "steps"))
-    tasks = [*plan_tasks(engine.network.scene, plan.steps)]
-    kinds = [task.action for task in tasks if task.kind is StepKind.REMOVE]
-    assert kinds.count(Action.REMOVE) == kinds.count(Action.STORE) == 4
-    out = next(task for task in tasks if task.action is Action.REMOVE)
-    assert out.grip is not None
-    assert out.retreat is not None
-    assert [a.number for a, b in pairwise(plan.steps) if b.bricks > a.bricks] == []
 
 
 def test_what_a_take_down_has_not():

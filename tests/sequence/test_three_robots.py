@@ -64,13 +64,3 @@ def test_schedules_are_checked(loop25):
     far = replace(loop25.steps[0], grips=(OpenGrip(0), OpenGrip(5), None))
     with pytest.raises(StepError, match="at most two neighboring"):
         Schedule("x", loop25.scene, (far,), loop25.moves).require_pairs()
-
-
-def test_candidates_are_free_and_within_reach(loop25, arch25):
-    robots = {robot.name: robot for robot in arch25.robots}
-    for k, move in enumerate(loop25.moves):
-        fixed = {g for s in loop25.steps if k in s.moves for g in s.grips if isinstance(g, int)}
-        placed = {n for b in arch25.placed[: move.bricks] for n in b.nodes}
-        for node in move.candidates:
-            assert node in placed - fixed - set(arch25.blocked_nodes)
-            assert robots[move.robot].reach.covers(arch25.node_position(node))

