@@ -48,15 +48,18 @@ def pytest_report_header():
 
 
 LONGEST = "test_the_site_builds_strictly"
+SLOW_ALONE = "pytestmark = pytest.mark.slow"  # in a file: all of its tests are
 LARGE = ("docs", "experiments", "times", "validation")  # folders with others that take long
 
 
 def pytest_ignore_collect(collection_path, config):
-    """Leave out files without a slow test where no others are asked for; loading takes long."""
-    slow_alone = config.option.markexpr.startswith("slow")
-    if slow_alone and collection_path.name.startswith("test_"):
-        return True if "slow" not in collection_path.read_text(encoding="utf-8") else None
-    return None
+    """Leave out files without a test that is asked for; loading takes long."""
+    asked = config.option.markexpr
+    if not collection_path.name.startswith("test_") or not asked.startswith(("slow", "not slow")):
+        return None
+    text = collection_path.read_text(encoding="utf-8")
+    wanted = "slow" in text if asked.startswith("slow") else SLOW_ALONE not in text
+    return None if wanted else True
 
 
 def pytest_collection_modifyitems(items):

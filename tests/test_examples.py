@@ -14,6 +14,8 @@ import pytest
 import seqopt
 from tests.builders import ROOT
 
+pytestmark = pytest.mark.slow
+
 ROOMS = sorted(page.parent.name for page in (ROOT / "seqopt").glob("[a-z]*/__init__.py"))
 
 
@@ -61,24 +63,22 @@ def test_examples_print_what_they_show(name):
     assert failures(examples(import_module(name))) == ""
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_a_room_opens_with_an_example(room):
-    page = import_module(f"seqopt.{room}")
-    assert ">>> " in page.__doc__
-    assert "\n\n" in page.__doc__  # one line on what it is for, then the rest
-    assert all(hasattr(page, name) for name in page.__all__)
-    nouns = [name for name in page.__all__ if name[0].isupper()]
-    assert len(nouns) <= 8
-    assert len(page.__all__) <= 10
-    assert page.__all__ or room in ("cli", "times")  # whose pages say why
+def test_a_room_opens_with_an_example():
+    for room in ROOMS:
+        page = import_module(f"seqopt.{room}")
+        assert ">>> " in page.__doc__, room
+        assert "\n\n" in page.__doc__, room  # one line on what it is for, then the rest
+        assert all(hasattr(page, name) for name in page.__all__), room
+        assert len([name for name in page.__all__ if name[0].isupper()]) <= 8, room
+        assert len(page.__all__) <= 10, room
+        assert page.__all__ or room in ("cli", "times"), room  # whose pages say why
 
 
-@pytest.mark.parametrize("name", sorted({*seqopt.__all__} - {"__version__"}))
-def test_a_name_at_the_door_has_an_example(name):
-    thing = getattr(seqopt, name)
-    home = import_module(f"seqopt.{seqopt._HOME_OF[name]}")
-    text = constant_docs(home).get(name) or inspect.getdoc(thing)
-    assert ">>> " in text.partition("Examples\n--------\n")[2]
+def test_a_name_at_the_door_has_an_example():
+    for name in {*seqopt.__all__} - {"__version__"}:
+        home = import_module(f"seqopt.{seqopt._HOME_OF[name]}")
+        text = constant_docs(home).get(name) or inspect.getdoc(getattr(seqopt, name))
+        assert ">>> " in text.partition("Examples\n--------\n")[2], name
 
 
 def test_a_wrong_example_is_seen():

@@ -10,7 +10,6 @@ where ``experiment`` takes the options of the command line and returns a `Findin
 from __future__ import annotations
 
 import argparse
-import ast
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -161,7 +160,8 @@ def modules(home: Path = HOME) -> dict[str, tuple[str, str]]:
     """
     found: dict[str, tuple[str, str]] = {}
     for path in sorted(home.rglob("*.py")):
-        text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        _, _, rest = path.read_text(encoding="utf-8").partition('"""')
+        text = rest.partition('"""')[0]
         if not text.startswith(START):
             continue
         module = ".".join(path.relative_to(home.parent).with_suffix("").parts)

@@ -14,6 +14,8 @@ import pytest
 from compas.datastructures import Mesh
 from compas.geometry import Box, Frame
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parents[2] / "docs/examples"
 SCRIPT = EXAMPLES / "grasshopper/seqopt_component.py"
 COMMAND = shutil.which("seqopt", path=str(Path(sys.executable).parent))
@@ -71,7 +73,6 @@ def test_a_plan_of_the_gallery_is_shown_where_it_is(component):
         shown_steps(component, plan, places, 1.0)
 
 
-@pytest.mark.slow
 def test_blocks_of_the_plan_are_those_that_were_given(component, planned, blocks):
     plan = component.read_plan(planned[0])
     places = {tuple(np.round(block.centroid(), 3)) for block in blocks}
@@ -79,7 +80,6 @@ def test_blocks_of_the_plan_are_those_that_were_given(component, planned, blocks
     assert shown_steps(component, plan, places, 1000.0) == len(blocks)
 
 
-@pytest.mark.slow
 def test_what_seqopt_refuses_is_said(component, blocks, tmp_path):
     with pytest.raises(RuntimeError, match="block 1 has no density; give one in kg/m³"):
         component.make_plan(blocks, tmp_path, COMMAND, "")

@@ -29,9 +29,6 @@ print("figures shown:", counts, "left:", len(plt.get_fignums()))
 """
 
 
-downloads, equations = extension("downloads"), extension("equations")
-
-
 RUN = (
     "adding_formulation",
     "comparing_formulations",
@@ -121,10 +118,16 @@ def test_images_have_words():
             assert len(words.split()) >= 3, f"{page.name}: {target} has the text {words!r}"
 
 
+def scripted(text):
+    """A page as a script."""
+    downloads = extension("downloads")
+    return downloads.script(downloads.notebook(text, stated()))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [*told()])
 def test_downloads_are_plain_python_without_checks(text):
-    told = downloads.notebook(text, stated())
-    script = downloads.script(told)
+    script = scripted(text)
     ast.parse(script)
     assert "{{" not in script.replace("f'{{", "")
     assert not re.search(r"\]\((?!http)[^)]*\.md", script)
@@ -135,7 +138,7 @@ def test_downloads_are_plain_python_without_checks(text):
 @pytest.mark.parametrize("text", [page for page in told() if page.id in RUN])
 def test_downloads_run_and_show_their_figures(text, tmp_path):
     script = tmp_path / "seqopt_page.py"
-    script.write_text(downloads.script(downloads.notebook(text, stated())), encoding="utf-8")
+    script.write_text(scripted(text), encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-c", SHOW, script],
         cwd=tmp_path,
@@ -150,6 +153,7 @@ def test_downloads_run_and_show_their_figures(text, tmp_path):
 
 
 def test_equations_become_mathml():
+    equations = extension("equations")
     found = equations.mathml(r"\min_x \; & x \\ \text{s.t.} \; & x \ge 1", block=True)
     assert found.startswith("<math")
     assert found.count("<mtr>") == 2

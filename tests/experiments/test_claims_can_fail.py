@@ -42,6 +42,8 @@ from experiments.study.parts.counterpart_items import ITEMS
 from experiments.times import makespan
 from seqopt.study.published import printed
 
+pytestmark = pytest.mark.slow
+
 STUDY = printed("de_validation").set_index("bricks")["error_percent"]
 NUMBERED = [item for item in ITEMS if item.has_numbers]
 
@@ -256,6 +258,5 @@ def test_pictures_of_another_scene_are_seen():
     assert figures.unlike(image[:32], image) == np.inf
 
 
-@pytest.mark.slow
 def test_every_claim_is_checked_here():
     assert {name.split()[0] for name in CHECKS} | {"figures"} == set(claims())

@@ -24,26 +24,26 @@ FREE = "optimize arch25 --schedule free"
 DURATIONS = "fetch=30,place=10,approach=10,grip=5,release=5"
 QUICK = {
     "loop, ranks": "optimize arch25",
+    "loop, ranks, cascade": "optimize arch25 --formulation cascade",
+    "loop, ratios, layers": f"optimize arch25 {WORST}",
+    "loop, budget of travel": "optimize arch25 --budget travel=16m",
+    "free, ratios": f"{FREE} --aim minmax,steps",
+    "free, wall": "optimize wall:columns=4,courses=3 --schedule free --aim minmax,steps",
+}
+SLOW = {
     "loop, ranks, linear program": "optimize arch25 --formulation overlap_lp",
     "loop, ranks, integer program": "optimize arch25 --formulation overlap_mip",
     "loop, ranks, labels": "optimize arch25 --formulation labels",
     "loop, ranks, multipliers": "optimize arch25 --formulation lagrangian",
-    "loop, ranks, cascade": "optimize arch25 --formulation cascade",
     "loop, ranks, rank search": "optimize arch25 --formulation rank_search",
     "loop, ranks, beam": "optimize arch25 --formulation beam",
     "loop, ranks, least peak": "optimize arch25 --formulation minimax",
     "loop, ratios, sum": f"optimize arch25 {WORST} --aim sum",
-    "loop, ratios, layers": f"optimize arch25 {WORST}",
     "loop, ratios, least peak": f"optimize arch25 {WORST} --aim minmax",
-    "loop, budget of travel": "optimize arch25 --budget travel=16m",
     "loop, budget of steps": "optimize arch25 --budget steps_over:F_largest=300:4",
     "modified sequential": "optimize arch25 --schedule modified-sequential",
     "free, published ratios": f"{FREE} --aim minmax,steps {WORST}",
-    "free, ratios": f"{FREE} --aim minmax,steps",
     "free, dry": f"{FREE} --aim minmax,steps --stands dry {WORST}",
-    "free, wall": "optimize wall:columns=4,courses=3 --schedule free --aim minmax,steps",
-}
-SLOW = {
     "free, four robots": f"{FREE} --robots 4 {WORST}",
     "free, sum of tension": f"{FREE} --aim sum(T_max) {WORST}",
     "free, budget": f"{FREE} --aim minmax --budget sum(T_max)=1150 {WORST}",
