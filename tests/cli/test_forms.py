@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from importlib.metadata import version
 
@@ -11,8 +10,6 @@ import pandas as pd
 import pytest
 
 from seqopt._cli.answer import plain
-from seqopt.responses.table import analyze
-from seqopt.sequence.methods import cantilever
 from tests.commands import beside_models
 from tests.commands import command as run
 
@@ -42,24 +39,6 @@ def test_json_is_one_document_with_the_same_keys_everywhere(capsys, words):
     assert (found["command"], found["seqopt"]) == (words[0], version("seqopt"))
     assert (found["exit_status"], found["written"], found["failures"]) == (status, [], [])
     assert isinstance(found["notes"], list)
-
-
-def test_json_has_the_facts_of_the_table_with_all_digits(capsys, engine25):
-    words = ("analyze", "--method", "cantilever")
-    _, out, err = run(capsys, *words, "--json")
-    found = strict(out)
-    assert found["notes"] == err.splitlines()
-    assert found["notes"][-1] == "robots: rob3 never grips"
-    _, text, _ = run(capsys, *words)
-    table = pd.read_csv(io.StringIO(text))
-    rows = pd.DataFrame(found["steps"])
-    assert list(rows.columns) == list(table.columns)
-    exact = analyze(engine25, cantilever(engine25.network))["F_max_N"].to_numpy(float)
-    assert (rows["F_max_N"].to_numpy(float) == exact).all()
-    assert not (table["F_max_N"].to_numpy(float) == exact).all()  # the CSV has six digits
-    np.testing.assert_allclose(table["F_max_N"], exact, rtol=1e-5)
-    (over,) = found["payloads_exceeded"]
-    assert over.startswith("rob2 holds up to 409.4 N")
 
 
 def test_json_of_optimize_is_its_summary_and_its_plan(capsys, tmp_path):

@@ -18,10 +18,8 @@ from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
 from seqopt.plan import _answers as _paths
 from seqopt.plan import _states
-from seqopt.plan.front import find_front
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.work.progress import INTERRUPT, TIME, Clock
-from tests.builders import small_arch
 
 WALL = "wall:columns=2,courses=2"
 FREE = ("optimize", WALL, "--schedule", "free", "--aim", "minmax,steps")
@@ -148,20 +146,6 @@ def test_without_responses_a_plan_is_its_steps(tmp_path, capsys, monkeypatch):
         assert found[name] == known[name]
 
 
-def test_a_pareto_set_that_is_ended_has_its_points(tmp_path, monkeypatch):
-    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
-    words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
-    out = tmp_path / "out"
-    answer = ended([*words, "--out", out], "drawing and writing the page", TimeoutError)
-    assert answer.status == 0
-    assert {p.name for p in out.iterdir()} == {
-        *("pareto.csv", "plans.csv", "summary.json", "scene.json")
-    }
-    points = pd.read_csv(out / "pareto.csv")
-    assert pd.read_csv(out / "plans.csv")["point"].nunique() == len(points) > 1
-    assert not answer.failures
-
-
 def test_an_interrupted_search_of_a_pareto_set_has_the_status_of_interrupts():
     words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
     answer = ended(words, "1 plans found")
@@ -170,16 +154,6 @@ def test_an_interrupted_search_of_a_pareto_set_has_the_status_of_interrupts():
     assert len(answer.facts["points"]) == 1
     with pytest.raises(KeyboardInterrupt):  # nothing is there that could be lost
         ended(words, "0 plans found")
-
-
-def test_a_pareto_set_whose_proof_is_ended_is_not_complete(monkeypatch):
-    engine = seqopt.make_engine("compliance", small_arch(4))
-    worst, rules = seqopt.CRITERIA["worst-ratio"], seqopt.FreeRules(least_grips=1)
-    problem = seqopt.pose(engine, rules, worst, "F_largest,M_sup")
-    assert find_front(problem).complete
-    in_the_midst(monkeypatch, seqopt.plan.front, "_require_complete", KeyboardInterrupt)
-    found = find_front(problem)
-    assert (found.complete, found.stopped) == (False, INTERRUPT)
 
 
 def test_a_clock_ends_what_is_late_and_names_it():

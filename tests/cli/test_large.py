@@ -38,15 +38,6 @@ def start(*words, **more):
     )
 
 
-def left(session):
-    """Return whether a process of a session is left."""
-    try:
-        os.killpg(session, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
 def contents(folder):
     """Return the files of a folder, times left out."""
     out = {path.name: path.read_text("utf-8") for path in folder.iterdir()}
@@ -127,28 +118,6 @@ def hired(run, count):
             return workers
         time.sleep(0.02)
     raise AssertionError(f"no {count} workers:\n{shown}")
-
-
-@pytest.mark.slow
-@posix
-def test_an_interrupt_names_what_was_chosen(tmp_path):
-    """A search without proof by the slow engine, ended on its way; every process is interrupted."""
-    words = [*WORDS, "cascade", "--no-proof", "--engine", "frame", "--out", tmp_path / "out"]
-    run = start(*words, "--workers", "2")
-    hired(run, 2)
-    os.killpg(run.pid, signal.SIGINT)
-    out, err = run.communicate(timeout=60)
-    assert (run.returncode, out) == (130, "")
-    assert re.fullmatch(
-        r"seqopt: interrupted; (no move was chosen yet|[0-9]+ of 22 moves were chosen, at nodes "
-        r"[0-9 ]+)\n",
-        err,
-    )
-    assert not (tmp_path / "out").exists()
-    until = time.monotonic() + 20
-    while left(run.pid) and time.monotonic() < until:
-        time.sleep(0.05)
-    assert not left(run.pid)
 
 
 @pytest.mark.slow

@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import json
 import math
+import platform
 import subprocess
 import sys
 from dataclasses import replace
+from importlib.metadata import version
 
 import numpy as np
 import pandas as pd
@@ -19,7 +21,7 @@ from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import cantilever, sequential
 from seqopt.study.published import printed_steps
-from tests.builders import anywhere, from_both_ends
+from tests.builders import anywhere, from_both_ends, small_arch
 from tests.commands import beside_models
 from tests.commands import command as run
 
@@ -137,42 +139,6 @@ def test_an_interrupt_of_analyze_leaves_the_rows_so_far(tmp_path):
     assert said.startswith("seqopt: interrupted; 2 of ")
     assert said.endswith("steps computed, 2 by discrete elements, which are what takes long")
     assert pd.read_csv(path)["step"].tolist() == [1, 2]
-
-
-def test_a_time_limit_of_analyze_before_the_first_row_is_one_line(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)  # what comes before is not late
-    path = tmp_path / "rows.csv"
-    words = ("analyze", "--method", "cantilever", "--time-limit", "0", "--out", str(path))
-    assert run(capsys, *words) == (
-        4,
-        "",
-        "seqopt: error: --time-limit 0: no step computed; give more seconds\n",
-    )
-    assert not path.exists()
-    assert run(capsys, *words[:4], "soon", *words[5:])[0] == 2
-    assert run(capsys, *words[:4], "1e9", *words[5:])[0] == 0
-
-
-@pytest.mark.slow
-def test_optimize(capsys, tmp_path):
-    folder = tmp_path / "new" / "out"
-    arguments = ("optimize", "--formulation", "overlap_dp", "--out", str(folder))
-    status, out, _ = run(capsys, *arguments)
-    assert (status, out.count("\n")) == (0, 4)
-    report = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    assert report["status"] == "optimal"
-    assert report["gap"] == pytest.approx(0)
-    assert report["models_paper_count"] == {"cascading": 2576, "overlap": 22724}
-    assert set(report["seconds"]) == {"assemble", "respond", "rank", "compile", "solve", "verify"}
-    plan = pd.read_csv(folder / "plan.csv")
-    study = list(printed_steps("sequential").columns[:21])
-    assert list(plan.columns[:21]) == study
-    selection = pd.read_csv(folder / "selection.csv")
-    total = selection["single_cost"].sum() + selection["shared_cost"].sum()
-    assert total == pytest.approx(report["objective"]["sum"], rel=1e-5)
-    again = ("analyze", "--plan", str(folder / "plan.csv"))
-    status, out, _ = run(capsys, *again)  # what it writes can be read as a plan
-    assert (status, out.count("\n")) == (0, 91)
 
 
 def test_robots_by_name_and_those_that_never_grip(capsys, tmp_path):
@@ -330,3 +296,46 @@ def test_a_comparison_with_speed(tmp_path, capsys):
     assert page.count("data:image/png;base64,") == 2  # for wide screens and for narrow ones
     assert (out / "speed.png").exists()
     assert "speed" not in json.loads(run(capsys, *words, "--json")[1])
+
+
+@pytest.fixture
+def arch(tmp_path):
+    path = tmp_path / "arch.json"
+    save_scene(small_arch(5), path)
+    return str(path)
+
+
+WRITES = {
+    "loop": ("optimize",),
+    "free": ("optimize", "--schedule", "free"),
+    "order": ("optimize", "--schedule", "free", "--order", "search"),
+    "robust": ("optimize", "--robust", "worst-peak", "--scenarios", "2"),
+    "pareto": ("pareto", "--aim", "F_largest,steps"),
+    "compare": ("compare", "--criteria", "worst-ratio"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WRITES)
+def test_every_summary_says_what_it_came_from(capsys, tmp_path, arch, name):
+    command, *words = WRITES[name]
+    assert main([command, arch, *words, "--out", str(tmp_path / "out")]) == 0
+    found = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    engine = found["engine"]
+    assert (engine["name"], engine["reason"]) == ("auto", "the default")
+    assert engine["level"]["engine"] == "compliance"
+    for package in ("seqopt", "numpy", "scipy", "pandas", "highspy", "clarabel"):
+        assert found["versions"][package] == version(package)
+    assert found["versions"]["python"] == platform.python_version()
+    if name == "compare":
+        assert {*found["criteria"]} == {"three-robot", "free"}
+        for criterion in found["criteria"].values():
+            assert criterion["criterion"] == "worst-ratio"
+            assert all(scale > 0 for scale in criterion["scales"].values())
+    elif name == "pareto":
+        assert (found["criterion"], found["aims"]) == (None, ["F_largest", "steps"])
+    elif name in ("free", "order"):
+        assert all(scale > 0 for scale in found["scales"].values())
+    else:
+        assert {*found["weights"]} == {"before_crown", "from_crown_on"}
+        assert found["resolution"]["F"] > 0

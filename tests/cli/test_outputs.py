@@ -57,14 +57,6 @@ def test_an_input_is_not_overwritten(capsys, tmp_path):
     assert len(list(tmp_path.iterdir())) == 2
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pipes are POSIX's")
-def test_a_pipe_is_no_input(capsys, tmp_path):
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    for words in (("scene", pipe), ("analyze", "--plan", pipe), ("scene", "/dev/zero")):
-        assert "it is not a regular file" in refused(capsys, *words)
-
-
 def test_what_a_line_says_is_not_asked_again_for_the_page(monkeypatch, tmp_path):
     """Tolerances and verdicts of states, and what robots do, are found once for line and page."""
     asked, tasks = Counter(), []

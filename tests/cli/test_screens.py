@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal
 
 import pytest
 
 from seqopt._cli.arguments import LINES, parser
 from seqopt._cli.main import main
 from seqopt._cli.signatures import signature_of
-from seqopt._cli.words import SPREAD
 from seqopt._registry import COMMANDS
 from seqopt.errors import ProblemError
 
@@ -83,65 +79,6 @@ def test_all_help_has_every_option_once(printed, name):
     body = defined("\n".join(kept).partition("\nexample")[0])
     for flag in flags(command):
         assert body.count(flag) == 1, flag
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reasoned:
-    """A reason.
-
-    Why?
-    reason : WORD
-        what for; and more
-    needed : CHOICE
-        this; and this of {choices}
-    often : N
-        how often
-    """
-
-    reason: str | None = None
-    needed: Literal["a", "b"]
-    often: tuple[str, ...] = ()
-
-
-def excuse(*, reasoned: Reasoned, loud: bool = False, excuse: Path | None = None):
-    """Give an excuse.
-
-    Why?
-    One or the other.
-    excuse : FILE
-        where it is
-
-    How?
-    loud :
-        louder
-
-    Examples
-    --------
-    $ seqopt excuse --loud
-    """
-    return reasoned, loud, excuse
-
-
-@pytest.fixture
-def excused(monkeypatch):
-    """The parser of a command that takes values spread, and others."""
-    monkeypatch.setitem(SPREAD, "reasoned", Reasoned)
-    signature_of.cache_clear()
-    command = argparse.ArgumentParser()
-    signature_of(excuse).fill(command)
-    return command
-
-
-def test_fields_say_how_options_are_read(excused, capsys):
-    found = excused.parse_args(
-        ["--needed", "a", "--often", "1", "--often", "2", "--excuse", "x", "--loud"]
-    )
-    assert (found.needed, found.often, found.excuse) == ("a", ["1", "2"], Path("x"))
-    assert (found.loud, found.reason, found.json) == (True, None, False)
-    for wrong in ("", "--needed c", "--needed a --json --quiet"):
-        with pytest.raises(SystemExit):
-            excused.parse_args(wrong.split())
-    assert capsys.readouterr().err
 
 
 def test_numbers_are_read_where_they_are_given():

@@ -131,12 +131,6 @@ def test_pictures_exist_and_no_number_is_missing():
             assert (page.parent / target).exists(), f"{page}: {target}"
 
 
-def test_every_stored_figure_is_stated_in_one_place_or_more():
-    pages = [page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md")]
-    for name in STATED:
-        assert any(f"{{{{ {name} }}}}" in page for page in pages), name
-
-
 SHOWN = {
     "arch": "- The reference arch",
     "soft": "The same arch with soft grips",

@@ -8,11 +8,9 @@ import pytest
 import rhino3dm as rhino
 import trimesh
 from compas.datastructures import Mesh
-from compas.geometry import Box, Frame, Polygon, Translation
-from compas_model.elements import BeamElement, ColumnElement, PlateElement
-from compas_model.models import Model
+from compas.geometry import Box, Frame
 
-from seqopt.errors import FileError, SceneError
+from seqopt.errors import SceneError
 from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene, read_content
 
@@ -103,33 +101,6 @@ def test_rhino_solids_bring_their_unit_and_names(tmp_path, kind):
     ] * 3
     with pytest.raises(SceneError, match="its lengths are known in mm; give no other unit"):
         import_scene(tmp_path / "model.3dm", given=Given(unit="m", density=1.0))
-
-
-def test_rhino_layers_name_supports_and_blocks_and_hide(tmp_path):
-    model = Rhino(rhino.UnitSystem.Centimeters)
-    stones, ground, away = (
-        model.layer("Stones"),
-        model.layer("Ground"),
-        model.layer("Off", visible=False),
-    )
-    low, high = WHERE["foot"]
-    model.add(brep(low, high), layer=ground)
-    model.add(brep(*WHERE["left"]), layer=stones)
-    model.add(brep(*WHERE["lid"]), layer=stones)
-    model.add(brep((0, 0, 0), (9, 9, 9)), layer=away)
-    model.add(brep((0, 0, 0), (9, 9, 9)), layer=stones, visible=False)
-    path = model.written(tmp_path)
-    content = read_content(path)
-    assert [block.key for block in content.blocks] == ["Ground", "Stones", "Stones-2"]
-    assert content.unit == "cm"
-    assert "2 objects are left out: hidden" in content.said
-    scene = import_scene(path, given=Given(density=2000.0, supports=["Ground"]))
-    assert len(scene.bricks) == 2
-    assert {ground.brick for ground in scene.grounds} == {2}
-    with pytest.raises(
-        SceneError, match="there is no block 'Earth'; known are 'Ground, Stones, Sto"
-    ):
-        import_scene(path, given=Given(density=1.0, supports=["Earth"]))
 
 
 def test_rhino_blocks_stand_where_they_are_put(tmp_path):
@@ -229,20 +200,6 @@ def test_a_file_that_is_broken_is_one_line(tmp_path, form):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("form", "package", "extra"), [("3dm", "rhino3dm", "cad"), ("glb", "trimesh", "blocks")]
-)
-def test_a_package_that_is_missing_is_named(tmp_path, monkeypatch, form, package, extra):
-    path = tmp_path / f"a.{form}"
-    path.write_bytes(b"")
-    found = "seqopt.exchange._mesh_files.find_spec"
-    monkeypatch.setattr(found, lambda name: None if name == package else object())
-    with pytest.raises(
-        FileError, match=rf"reading {form} needs {package}; pip install 'seqopt\[{extra}\]'"
-    ):
-        import_scene(path, given=DENSE)
-
-
 def boxes():
     """The blocks of the tower as boxes of COMPAS, m."""
     out = {}
@@ -267,24 +224,3 @@ def test_lists_and_dictionaries_of_compas_meshes(tmp_path):
     assert [block.key for block in read_content(path).blocks] == ["FOOT", "LEFT", "LID"]
     compas.json_dump(meshes["foot"], path)
     assert [*placed(import_scene(path, given=GIVEN)).values()] == [TOWER[1]]
-
-
-def test_elements_of_a_compas_model(tmp_path):
-    """A column that carries a plate, on which a beam stands."""
-    model = Model()
-    model.add_element(ColumnElement(0.4, 0.3, 2.0))
-    outline = Polygon([[0, 0, 0], [0, 1, 0], [1, 1, 0], [1, 0, 0]])  # looks down: grows upward
-    plate = PlateElement(outline, 0.1, transformation=Translation.from_vector([-0.5, -0.5, 2.0]))
-    model.add_element(plate)
-    beam = BeamElement(0.1, 0.2, 3.0, transformation=Translation.from_vector([0, 0, 2.1]))
-    model.add_element(beam)
-    path = tmp_path / "model.json"
-    compas.json_dump(model, path)
-    content = read_content(path)
-    for block, element in zip(content.blocks, model.elements(), strict=True):
-        own = element.modelgeometry
-        vertices = np.array(own.vertices_attributes("xyz") if isinstance(own, Mesh) else own.points)
-        np.testing.assert_allclose(block.vertices.min(axis=0), vertices.min(axis=0), atol=1e-12)
-        np.testing.assert_allclose(block.vertices.max(axis=0), vertices.max(axis=0), atol=1e-12)
-    masses = [brick.mass for brick in import_scene(path, given=GIVEN).bricks]
-    assert masses == pytest.approx([2000 * 0.24, 2000 * 0.1, 2000 * 0.06])

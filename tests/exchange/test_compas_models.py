@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from seqopt._cli.main import main
-from seqopt.errors import SceneError, SceneWarning
+from seqopt.errors import SceneError
 from seqopt.exchange._compas_models import read_model
 from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene
@@ -123,16 +122,3 @@ def test_a_tree_that_is_none_is_one_line(change, said):
     document["data"] |= change
     with pytest.raises(SceneError, match=said):
         read_model(document, "m")
-
-
-def test_import_prints_what_is_doubtful(tmp_path, capsys):
-    document = model()
-    document["data"]["materials"]["stone"]["data"]["density"] = 2.4
-    path, out = tmp_path / "m.json", tmp_path / "scene.json"
-    path.write_text(json.dumps(document), encoding="utf-8")
-    assert main(["import", str(path), "--unit", "m", "--out", str(out)]) == 0
-    said = capsys.readouterr().err
-    assert "seqopt: warning: " in said
-    assert "a density of 2.4 kg/m³ is odd" in said
-    with pytest.warns(SceneWarning, match="is odd"):
-        import_scene(path, given=Given(unit="m"))

@@ -71,14 +71,6 @@ def test_normals_point_from_the_first_brick_into_the_second(read):
             assert (place[ground.brick] - ground.position) @ ground.along > 0
 
 
-def test_courses_are_the_order(read):
-    document = json.loads(json.dumps(DOCUMENTS["legacy"]))
-    assert read("a.json", document).build_order == (0, 1, 2)
-    document["assembly"]["node"]["2"]["course"] = 0
-    assert read("a.json", document).build_order == (0, 1, 2)  # it touches 1 alone
-    assert "courses" in read("a.json", document).provenance
-
-
 def test_a_transformation_of_a_block_is_applied(read):
     shift = {"dtype": "compas.geometry/Transformation", "data": {"matrix": np.eye(4).tolist()}}
     shift["data"]["matrix"][0][3] = 5.0

@@ -7,6 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
 
 from seqopt._cli.main import main
 from seqopt.errors import SceneError, SceneWarning
@@ -15,9 +17,10 @@ from seqopt.exchange._mesh_files import read_obj
 from seqopt.exchange._meshes import repair_shape
 from seqopt.exchange.imports import import_scene, read_content
 from seqopt.scene.boxes import as_vectors
+from seqopt.scene.library.common import _touching_order
 from seqopt.scene.scene_file import load_scene
 from seqopt.scene.shape import Polyhedron
-from tests.blocks import box
+from tests.blocks import L_SHAPE, box, prism
 from tests.documents import HIGH, LOW, TOP, obj
 
 
@@ -143,3 +146,53 @@ def test_a_file_whose_y_is_up_stands_if_that_is_said(tmp_path):
     words = ["--unit", "m", "--density", "2000", "--up", "y", "--out", str(out)]
     assert main(["import", str(path), *words]) == 0
     assert load_scene(out).grounds == scene.grounds
+
+
+GIVEN = Given(unit="m", density=2000.0)
+TOWER = [box((0.4, 0.2, 0.1), at=(0.0, 0.0, 0.1 * i)) for i in range(3)]
+
+
+@pytest.fixture
+def imported(tmp_path):
+    def of(text):
+        path = tmp_path / "tower.obj"
+        path.write_text(text, encoding="utf-8")
+        return import_scene(path, given=GIVEN)
+
+    return of
+
+
+def test_faces_without_area_are_no_blocks(imported):
+    """As programs write them that cut every face into triangles."""
+    assert len(imported(obj(*TOWER) + "f 4 4 8\nf 4 8 8\n").bricks) == len(TOWER)
+
+
+def test_faces_inside_a_block_are_named(imported):
+    """A wall across an L, between edges of which each has two faces without it."""
+    shape, corners = prism(L_SHAPE, 0.1, at=(0.0, 0.0, 0.1)), len(L_SHAPE)
+    wall = f"f 1 4 {4 + corners} {1 + corners}\n"
+    with pytest.raises(SceneError, match=r"block 0: .* 2 of its edges have more than two faces"):
+        imported(obj(shape).replace("o block_0\n", "").replace("f ", f"{wall}f ", 1))
+
+
+def test_an_object_of_several_blocks_is_said(imported):
+    cubes = [box((0.2, 0.2, 0.1), at=(x, 0, 0)) for x in (0.0, 0.3)]
+    said = imported(obj(*cubes).replace("o block_1\n", "")).provenance
+    assert "2 closed pieces are called block_0: each is a block of its own" in said
+
+
+@given(
+    count=st.integers(1, 12),
+    links=st.lists(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=30),
+    rank=st.lists(st.integers(0, 5), min_size=12, max_size=12),
+)
+def test_each_touches_what_stands(count, links, rank):
+    pairs = [(a, b) for a, b in links if a < count and b < count and a != b]
+    order = _touching_order(rank[:count], pairs, [0])
+    reached, before = {0}, set()
+    while reached != before:
+        before = set(reached)
+        reached |= {b for pair in pairs for a, b in (pair, pair[::-1]) if a in reached}
+    assert sorted(order) == sorted(reached)
+    for k, i in enumerate(order):
+        assert i == 0 or any({i, j} in ({a, b} for a, b in pairs) for j in order[:k])

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 from collections import Counter
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,16 +16,11 @@ from hypothesis import strategies as st
 from experiments.harness.scenes import running_bond
 from seqopt.exchange._grip_frames import hold
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_csv, tasks_json
-from seqopt.exchange.contacts import face_ground, flat_face
 from seqopt.network.build import build_network
 from seqopt.scene._armed import PlanPostures
-from seqopt.scene.boxes import block_brick
-from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot, Side, Sphere
-from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind, check_sequence
-from tests.blocks import C_SHAPE, prism
 from tests.builders import six_bricks
 from tests.strategies import builds
 
@@ -126,22 +120,6 @@ def test_a_tool_comes_from_its_robot_through_a_face_that_is_free():
     assert outward(wall, mobile, wall.bricks[-1].nodes[0])[2] == pytest.approx(1.0)  # none ever
 
 
-def test_a_block_that_is_no_box_is_held_through_a_face_before_the_node():
-    shape = prism(C_SHAPE, 0.5)
-    floor = flat_face(np.array([(0, 0, 0), (3, 0, 0), (3, 1, 0), (0, 1, 0)], dtype=float))
-    nodes = np.array([(0.5, 1.5, 0.25), (2.0, 0.5, 0.25)])
-    offsets = tuple(map(tuple, (nodes - shape.centroid).tolist()))
-    brick = replace(block_brick(0, shape, 2000.0), node_offsets=offsets)
-    robot = Robot(name="r", payload=1.0, reach=Sphere(center=(2.0, 9.0, 0.25), radius=20.0))
-    ground = face_ground(0, floor, MASONRY)
-    scene = Scene(
-        name="c", bricks=[brick], joints=(), grounds=[ground], build_order=(0,), robots=[robot]
-    )
-    held = hold(scene, robot, brick.nodes[1])
-    np.testing.assert_allclose(-held.grip.axes[2], (0, 1, 0), atol=1e-9)  # into the notch
-    assert held.depth == pytest.approx(0.5)
-
-
 def test_a_brick_is_placed_away_from_all_that_it_touches():
     """Up on a course, and out of the gap between two for one that closes an arch."""
     wall, robot = running_bond(3, 2), Robot(name="r", payload=1.0)
@@ -164,19 +142,6 @@ def stands_on(scene, brick):
         if brick.name in spring.ends and earlier:
             normal = np.array(spring.along)
             yield normal * np.sign(normal @ np.subtract(brick.position, spring.position))
-
-
-def test_distance_is_that_given_and_by_default_the_longest_side():
-    for distance in (None, 0.07):
-        for task in plan_tasks(SCENE, STEPS, distance):
-            longest = max(SCENE.brick_of_node[task.node].dimensions)
-            for frame in filter(None, (task.approach, task.retreat)):
-                gone = np.linalg.norm(np.subtract(frame.point, task.grip.point))
-                assert gone == pytest.approx(longest if distance is None else distance)
-                assert frame.xaxis == task.grip.xaxis
-            has = (task.approach is not None, task.retreat is not None)
-            comes = task.action in (Action.PLACE, Action.REPOSITION)
-            assert has == (comes, task.action is Action.RELEASE)
 
 
 def test_postures_are_written_where_they_are_given():

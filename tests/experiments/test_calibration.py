@@ -24,11 +24,9 @@ from experiments.calibration.parts.barrel_vaults import (
     fit,
     laws,
     load_stiffness,
-    median_scale,
     planar_parts,
     planar_stiffness,
     scene,
-    square_scale,
     vaults,
 )
 from experiments.harness.results import RESULTS
@@ -99,15 +97,6 @@ def test_reciprocity_and_mirror():
         shifted = Chain(*chain(vault)[:2], np.array([at, total - at]))  # both at once, half each
         pair = planar_stiffness(planar_parts(shifted), np.array([SLIDE]), np.array([TURN]))[0]
         assert pair > k  # a spread load moves its mean place less
-
-
-@pytest.mark.parametrize(("_scale_of", "power"), [(median_scale, 1), (square_scale, 2)])
-def test_the_best_scale_beats_every_other(_scale_of, power):
-    share = np.random.default_rng(1).uniform(0.2, 3.0, (8, 5))
-    trial = np.linspace(0.01, 5, 4001)[:, None, None]
-    least = (np.abs(trial * share - 1) ** power).sum(axis=1).min(axis=0)
-    best = (np.abs(_scale_of(share) * share - 1) ** power).sum(axis=0)
-    assert (best <= least + 1e-12).all()
 
 
 def test_a_fit_finds_the_stiffnesses_that_made_the_data():

@@ -9,7 +9,7 @@ import sys
 import pandas as pd
 import pytest
 
-from experiments.__main__ import main, run
+from experiments.__main__ import main
 from experiments.harness import claim as harness
 from experiments.harness.claim import Claim, ClaimError, Finding, find_claim, modules
 from experiments.harness.results import RESULTS
@@ -139,21 +139,6 @@ def test_tables_and_verdicts_are_stored_when_asked(tmp_path, monkeypatch):
     after = pd.read_csv(tmp_path / "verdicts.csv")
     assert after["experiment"].tolist() == ["figures", "peers"]
     assert after["verdict"].tolist() == ["does not hold", "holds"]
-
-
-@pytest.mark.parametrize(
-    ("printed", "status", "verdict"),
-    [
-        ("verdict: the claim holds", 0, "holds"),
-        ("no verdict", 0, "failed: no verdict"),
-        ("verdict: the claim holds", 3, "failed: verdict: the claim holds"),
-        ("pip install extra", 2, "left out: pip install extra"),
-    ],
-)
-def test_a_verdict_is_the_last_line_of_a_run_that_ended_well(monkeypatch, printed, status, verdict):
-    done = subprocess.CompletedProcess([], status, f"table\n{printed}\n", "")
-    monkeypatch.setattr("experiments.__main__.subprocess.run", lambda *_, **__: done)
-    assert run("figures") == verdict
 
 
 @pytest.mark.parametrize(("verdict", "status"), [("left out: pip", 0), ("does not hold", 1)])

@@ -43,20 +43,6 @@ def wrong_numbers(text, table):
     return out
 
 
-def test_every_figure_and_table_is_listed_once():
-    """The source has 13 figures and 12 tables, and refers to one more in Appendix B."""
-    labels = [label for item in ITEMS for label in (item.label, *item.parts)]
-    assert len(labels) == len(set(labels)) == 33
-    assert sum(item.label.startswith("fig:") for item in ITEMS) == 13
-    assert [i.number for i in ITEMS if i.label.startswith("fig:")] == [
-        f"Figure {n}" for n in range(1, 14)
-    ]
-    assert [i.number for i in ITEMS if i.label.startswith("table:")] == [
-        *(f"Table {n}" for n in range(1, 11)), "Table A.1", "Table A.2", "Table B.1",
-    ]  # fmt: skip
-    assert all(item.why for item in ITEMS if not item.has_numbers)
-
-
 def test_whatever_has_numbers_has_a_counterpart():
     labels = {item.label for item in WITH_NUMBERS}
     assert labels == set(COUNTERPARTS) == set(STORED["id"])

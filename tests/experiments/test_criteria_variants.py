@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 
 from experiments.harness.results import RESULTS
+from experiments.placement.heuristic_gaps import COMPARED, gaps, summary
 from experiments.study.criteria_variants import (
     FOUND,
     Rule,
@@ -50,3 +51,13 @@ def test_compression_explains_more_than_displacement_in_every_setting():
     assert len(pairs) == 32
     assert (pairs["C_max"] > pairs["D_max"]).all()
     assert (pairs.min().tolist(), pairs.max().tolist()) == ([6, 2], [10, 6])
+
+
+STORED = pd.read_csv(RESULTS / "heuristic_gaps.csv")
+
+
+def test_the_stored_rows_can_be_drawn_again():
+    again = pd.DataFrame(gaps(2)).set_index(["draw", "criterion", "formulation"])["gap"]
+    stored = STORED.set_index(["draw", "criterion", "formulation"])["gap"].loc[again.index]
+    assert (again - stored).abs().max() <= 1e-3 * stored.max()
+    assert set(summary(STORED).index.get_level_values("criterion")) == set(COMPARED)

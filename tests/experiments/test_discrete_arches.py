@@ -7,17 +7,7 @@ import pandas as pd
 import pytest
 
 from experiments.discrete.discrete_arches import row_of, stresses, within_limits
-from experiments.discrete.parts.arch_pads import (
-    CORNERS,
-    Across,
-    AtCorners,
-    PaddedEngine,
-    Pinch,
-    Reading,
-    pad_stiffness,
-    pads_at_corners,
-    readings,
-)
+from experiments.discrete.parts.arch_pads import Across, PaddedEngine, Pinch, Reading
 from experiments.harness.yardstick import STEPS, moved
 from seqopt.engines.interface import Want
 from seqopt.sequence.methods import sequential
@@ -36,31 +26,6 @@ def test_pads_let_a_brick_turn_and_balance(engine25):
     total = found.grip_force[0].sum(axis=0) + found.support[0, :, :3].sum(axis=0)
     weight = -net.weight[:10].sum(axis=0)
     assert total == pytest.approx(weight, abs=1e-6 * np.abs(weight).max())
-
-
-@pytest.mark.parametrize("across", list(Across))
-def test_even_pads_can_stand_for_pads_at_corners(engine25, across):
-    """They hold as stiffly against motion, and three times so against turning about themselves."""
-    pinch, brick = Pinch(across, STUDY_PADS, side=0.02), engine25.network.scene.placed[16]
-    center, axis = np.array(brick.position), np.array(brick.width_axis)
-    if across == Across.THICKNESS:
-        axis = np.cross(brick.length_axis, axis)
-    even, corners = (
-        pad_stiffness(engine25.network, 16, center, p) for p in (pinch, pads_at_corners(pinch))
-    )
-    np.testing.assert_allclose(corners[:3, :3], even[:3, :3], atol=1e-6)
-    turning = 2 * pinch.stiffness.tangential * pinch.side**4 / 6
-    assert axis @ even[3:, 3:] @ axis == pytest.approx(turning)
-    assert axis @ corners[3:, 3:] @ axis == pytest.approx(3 * turning)
-
-
-def test_the_pads_of_all_readings_are_named_and_found_again(engine25):
-    names = {(r.grip, 1e3 * r.pinch.side if r.pinch else 0.0, r.joint) for r in readings()}
-    assert len(names) == len(readings()) == 28
-    for name in names:
-        reading = Reading.of(*name)
-        assert (reading.grip, reading.joint) == (name[0], name[2])
-        assert isinstance(reading.engine(engine25.network), AtCorners) == (name[2] == CORNERS)
 
 
 def test_softer_joints_move_more_and_a_node_lets_the_brick_turn(engine25, step):

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import seqopt
-from experiments.failing import where_methods_fail
 from experiments.failing.parts import engine_cells, step_cells
-from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -72,43 +69,6 @@ def test_a_missed_and_a_false_mechanism_are_wrong():
     made = engine_cells.engines(apart.network)["compliance"]
     assert engine_cells.ending("compliance", made, (), nothing)["status"] == "mechanism"
     assert engine_cells.ending("compliance", made, (), exact[0])["status"] == "wrong"
-
-
-def test_a_refusal_without_a_way_out_is_seen():
-    """Another method answers, or a message says that none can."""
-    row = {"half": "engines", "kernel": "one", "axis": "a", "value": "1", "error": np.nan}
-    row |= {"stated": np.nan, "case": "0"}
-    refused = row | {"method": "frame", "status": "refused", "message": "take another engine"}
-    silent = row | {"method": "compliance", "status": "refused", "message": "no"}
-    said = silent | {"message": "too close to a mechanism for double precision"}
-    answered = silent | {"status": "answered", "error": 1e-10, "stated": 1e-9}
-    for beside, count in ((silent, 2), (said, 0), (answered, 0)):
-        table = where_methods_fail.cells(pd.DataFrame([refused, beside]))
-        assert table["unexplained"].sum() == count
-
-
-def block(net, degrees, mortar, **changes):
-    blocks = replace(step_assembly(net, 1, [None, None]), **changes)
-    up = np.array(net.scene.up)
-    return step_cells.own_verdict(blocks, mortar, step_cells.tilted(blocks.weight, up, degrees))
-
-
-def test_own_programs_know_when_a_block_slides_tips_and_is_held():
-    """A block on a slope: friction, then width over height, decide."""
-    scene = seqopt.load_scene("wall:columns=1,courses=1")
-    net = seqopt.build_network(scene.with_robots(*scene.robots[:2]))
-    width, _, height = scene.bricks[0].dimensions
-    rough, steep = Mortar(friction=5.0), np.degrees(np.arctan(min(width, 0.116) / height))
-    assert block(net, 16.0, Mortar(friction=np.tan(np.radians(15.0)))) == "falls"
-    assert block(net, 14.0, Mortar(friction=np.tan(np.radians(15.0)))) == "stands"
-    assert block(net, 1.05 * steep, rough) == "falls"
-    assert block(net, 0.9 * steep, rough) == "stands"
-    weight = np.linalg.norm(net.weight[0])
-    held = {"grip_block": np.zeros(1, int), "grip_position": net.centroid[:1]}
-    none = {"normal": np.array([[0.0, 0.0, -1.0]])}  # the ground can only pull
-    for payload, verdict in ((0.9, "falls"), (1.3, "stands"), (1.05, "open")):
-        grip = held | none | {"payload": np.array([payload * weight])}
-        assert block(net, 0.0, Mortar(friction=0.5), **grip) == verdict
 
 
 def test_own_programs_agree_with_the_verdicts_and_contradict_false_ones(monkeypatch):

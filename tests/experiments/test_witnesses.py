@@ -26,7 +26,6 @@ from experiments.stability.witnesses import (
     row_of,
     sample_trials,
 )
-from seqopt.network.network import GROUND
 from seqopt.stability.assessment import Verdict
 
 
@@ -57,14 +56,6 @@ def test_the_largest_sample_is_read_as_published():
     middle = np.array([solid.mass[1] for solid in scene.solids])
     normal = np.array([touch.normal for touch in scene.touches])
     assert (np.einsum("ci,ci->c", normal, middle[second] - middle[first]) > 0).all()
-
-
-def test_a_support_is_the_ground_and_comes_first():
-    scene = sample_scene("bridge")
-    assembly = scene.assembly()
-    assert len(assembly.centroid) == len(scene.solids) - len(scene.supports)
-    assert (assembly.bodies[:, 0] == GROUND).any()
-    assert -assembly.weight[:, 2].sum() == pytest.approx(scene.volume)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from dataclasses import replace
 from importlib.metadata import entry_points
-from itertools import cycle, pairwise
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,19 +18,12 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.decisions import pose_decisions, steps_over, travel
-from seqopt.graph.formulation import (
-    GROUP,
-    End,
-    FormulationKind,
-    exhibits,
-    find_formulation,
-    formulations,
-)
+from seqopt.graph.formulation import GROUP, End, FormulationKind, exhibits, formulations
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
-from seqopt.sequence.methods import SCHEDULES, three_robot_loop
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS, WORST_RATIO
 from tests.builders import small_arch
 from tests.layered import Costs, answer
@@ -46,7 +39,6 @@ EXACT_SUMS = [
     n for n, f in SHOWN.items() if f.aim is Aim.SUM and f.kind is not FormulationKind.HEURISTIC
 ]
 RELAXED = ("overlap_lp", "lagrangian")
-HEURISTICS = [n for n, f in SHOWN.items() if f.kind is FormulationKind.HEURISTIC]
 AIMED = [(n, aim) for n, f in ALL.items() for aim in ([f.aim] if f.aim else Aim)]
 every = pytest.mark.parametrize("name", ALL)
 every_aim = pytest.mark.parametrize(("name", "aim"), AIMED)
@@ -308,22 +300,6 @@ def test_prices_are_slopes_of_the_bound(name, problem):
         assert best >= relaxed.bound - price - 1e-4
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("criterion", "method"),
-    [*zip(CRITERIA.values(), cycle(SCHEDULES)), *((EQUATIONS, name) for name in [*SCHEDULES][1:])],
-    ids=lambda given: getattr(given, "name", given),
-)
-def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
-    problem = pose_decisions(engine25, SCHEDULES[method](engine25.network), criterion)
-    values = [valued(problem, name) for name in EXACT_SUMS]
-    assert len(values) == 5
-    assert np.ptp(values) <= 1e-6 * max(values)
-    for name in HEURISTICS:
-        assert valued(problem, name) >= min(values) * (1 - 1e-9)
-    assert solve(problem, ALL["minimax"]).certificate.gap <= 1e-9
-
-
 def valued(problem, name, **options):
     return solve(problem, name, **options).certificate.objective
 
@@ -342,34 +318,6 @@ def test_all_exact_ones_equal_brute_force_on_a_small_arch(criterion):
     for name in EXACT_SUMS:
         assert valued(problem, name) == pytest.approx(best, rel=1e-6)
     assert valued(problem, "minimax") == pytest.approx(Costs(problem.peaks).best(Aim.PEAK))
-
-
-def test_options_are_checked(problem25, monkeypatch):
-    monkeypatch.setattr("formulations.rank_search.MOST", 20_000)
-    for name, options, named in (
-        ("cascade", {"charge": "both"}, "charge is 'both'; give one of later, earlier"),
-        ("beam", {"width": 0}, "width is 0"),
-        ("rank_search", {"horizon": 0}, "horizon is 0"),
-        ("rank_search", {"horizon": 9}, "lower the horizon"),
-        ("labels", {"most": 0}, "most is 0"),
-        ("cascade", {"width": 3}, "option width: cascade has "),
-    ):
-        with pytest.raises(ProblemError, match=named):
-            solve(problem25, name, **options)
-    with pytest.raises(ProblemError, match="does not exist; give one of beam, best_first"):
-        find_formulation("simplex")
-
-
-def test_a_longer_horizon_and_a_wider_beam_serve(problem25):
-    one = valued(problem25, "rank_search", horizon=1)
-    assert one == valued(problem25, "cascade")
-    two = valued(problem25, "rank_search")
-    assert one - two > 3  # by default it is a search of its own
-    three = valued(problem25, "rank_search", horizon=3)
-    best = valued(problem25, "overlap_dp")
-    assert best <= three <= two
-    assert valued(problem25, "beam", width=46) == pytest.approx(best)
-    assert valued(problem25, "cascade", charge="earlier") >= best
 
 
 def test_limits_hold_or_are_infeasible(engine25):

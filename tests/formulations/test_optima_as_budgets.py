@@ -124,19 +124,6 @@ def test_scenarios_have_a_plan_within_every_optimum(name):
     check(posed(4, UP).but(scenarios=drawn), name, "schedule_search")
 
 
-@slow
-@pytest.mark.parametrize("orders", [None, "tied"])
-def test_margins_are_the_best_within_budgets(orders):
-    """The plan of the least bond takes more than the budget: another one keeps it."""
-    problem, name = posed(3, UP, orders).but(goals="bond"), "sum(M_sup)"
-    least = seqopt.solve(problem.but(goals=name, stands="epoxy")).objective[name]
-    plan = seqopt.solve(problem.but(budgets=words(name, 1.000001 * least)))
-    assert plan.objective[name] <= 1.000002 * least
-    assert plan.objective["bond"] > seqopt.solve(problem).objective["bond"]
-    with pytest.raises(InfeasibleError):
-        seqopt.solve(problem.but(budgets=words(name, 0.9 * least)))
-
-
 @pytest.mark.parametrize("formulation", ["labels", "overlap_mip", "lagrangian", "overlap_lp"])
 def test_candidates_have_a_choice_within_every_optimum(formulation):
     problem = decisions_of(posed(6, "loop").but(goals=()))

@@ -213,20 +213,6 @@ def test_the_order_of_the_best_margin_equals_brute_force():
     assert better(problem, 2 * least)
 
 
-def test_states_of_all_orders_that_do_not_fit_the_memory_get_one_line(monkeypatch):
-    monkeypatch.setattr("formulations.states._search.free_memory", lambda: 0)
-    problem = posed(small_arch(3), aim="minmax")
-    capped = within(problem, {"travel": 9.0})
-    with pytest.raises(ProblemError, match="too little to find a plan; give more"):
-        seqopt.solve(capped, FORMULATION)
-    monkeypatch.undo()
-    assert seqopt.solve(capped, FORMULATION).status == "optimal"
-    with pytest.raises(ProblemError, match="too little to find a plan; give more"):
-        seqopt.solve(capped, FORMULATION, max_memory=1.0)
-    with pytest.raises(ProblemError, match="flow_lp: it takes no budgets; take schedule_search"):
-        seqopt.solve(capped, "flow_lp")
-
-
 @once
 @pytest.mark.slow
 @pytest.mark.parametrize("aim", ["minmax", "sum"])

@@ -21,61 +21,13 @@ from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge._schedules import judge_schedule, plan_values
 from seqopt.network.build import build_network
-from seqopt.plan.front import FrontProblem, find_front, pick, upper_bounds
+from seqopt.plan.front import FrontProblem, find_front, upper_bounds
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.methods import modified_sequential
-from seqopt.sequence.rules import FreeRules, with_robots
-from tests.brute_force import FOUR, ONES, least_peak, peaks, whole_graph
+from seqopt.sequence.rules import FreeRules
+from tests.brute_force import ONES, least_peak, peaks, whole_graph
 from tests.builders import small_arch
 from tests.strategies import free_builds
-
-
-def brute_force(engine, rules):
-    """The least peak, the fewest steps at it, then the fewest steps of all, the peak at them."""
-    graph, start = whole_graph(engine, rules)
-    costs = peaks(graph)
-    found = least_peak(graph, start, costs)
-    if found is None:
-        return None
-    value, below = found
-    steps = nx.shortest_path_length(below, start, "end") - 1
-    regrips = nx.shortest_path_length(below, start, "end", weight="regrip")
-    fewest = nx.shortest_path_length(graph, start, "end")
-    to, back = (
-        nx.single_source_shortest_path_length(graph, start),
-        nx.single_source_shortest_path_length(graph.reverse(), "end"),
-    )
-    tight = nx.DiGraph(
-        (a, b) for a, b in graph.edges if to.get(a, 99) + 1 + back.get(b, 99) == fewest
-    )
-    return value, steps, regrips, fewest - 1, least_peak(tight, start, costs)[0]
-
-
-def check_against_brute_force(scene, rules):
-    engine = ComplianceEngine(build_network(scene))
-    best = brute_force(engine, rules)
-    first, second, third = (
-        build_states(engine, rules, ONES, aim)
-        for aim in ("minmax,steps", "steps,minmax", "minmax,regrips")
-    )
-    if best is None:
-        with pytest.raises(InfeasibleError, match="free schedule: "):
-            seqopt.solve(first, "schedule_search")
-        return
-    value, steps, regrips, fewest, peak = best
-    plan = seqopt.solve(first, "schedule_search")
-    assert plan.certificate.values == pytest.approx((value, steps))
-    assert plan.certificate.gap == 0
-    other = seqopt.solve(second, "schedule_search")
-    assert other.certificate.values == pytest.approx((fewest, peak))
-    last = seqopt.solve(third, "schedule_search")
-    assert last.certificate.values == pytest.approx((value, regrips))
-
-
-@given(build=free_builds(most_bricks=4, most_robots=3))
-@settings(max_examples=4, deadline=None)
-def test_it_equals_brute_force(build):
-    check_against_brute_force(*build)
 
 
 @pytest.mark.slow
@@ -296,21 +248,6 @@ def test_refusals_name_the_brick_and_what_opens_a_way(arch, engine25):
     assert seqopt.solve(replace(tight, limits=tuple(enough)), "schedule_search").steps
 
 
-@pytest.mark.slow
-def test_the_front_of_the_arch_rounded(arch):
-    problem = replace(arch, goals=pose_goals("F_largest,M_sup,T_max,D_max"))
-    rounding = {"F_largest": 5.0, "M_sup": 1.0, "T_max": 5.0, "D_max": 1e-6}
-    front = find_front(FrontProblem(problem, rounding))
-    assert front.complete
-    assert len(front.table) == 34
-    best = pick(front.table, "D_max", {"F_largest": 250.0})
-    assert front.table.iloc[best][[*FOUR]].tolist() == pytest.approx([245, 17, 70, 1.2e-5])
-    with pytest.raises(ProblemError, match="no plan of the set is below all bounds"):
-        pick(front.table, "steps", {"F_largest": 100.0})
-    with pytest.raises(ProblemError, match="no such column"):
-        pick(front.table, "speed")
-
-
 def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force():
     """Where a step without an open grip decides, less in the open ones is worth nothing."""
     engine = ComplianceEngine(build_network(small_arch(5)))
@@ -324,21 +261,6 @@ def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force():
     kept = {each for each, some in others.items() if not (some <= each).all(axis=1).any()}
     assert front.complete
     assert {tuple(row) for row in front.table[["T_max", "F_largest"]].round(6).to_numpy()} == kept
-
-
-def test_the_short_cut_does_what_the_long_way_does():
-    scene, limits = small_arch(5), [Limit("F_largest", 250.0)]
-    rules = FreeRules(ending="held")
-    engine = ComplianceEngine(build_network(with_robots(scene, 4)))
-    problem = build_states(engine, rules, ONES, "minmax,steps", limits, "bond=1e5")
-    plan = seqopt.solve(problem, "schedule_search")
-    words = {"aim": "minmax,steps", "rules": rules, "robots": 4, "stands": "bond=1e5"}
-    short = seqopt.optimize(scene, "free", ONES, engine="compliance", limits=limits, **words)
-    assert (short.steps, short.objective) == (plan.steps, plan.objective)
-    assert [*short.seconds] == ["assemble", "solve", "verify"]
-    alone = seqopt.optimize(scene, "free", robots=["rob1", "rob3"], rules=FreeRules(least_grips=1))
-    assert alone.problem.criterion.name == "worst-ratio"
-    assert alone.summary()["rules"]["robots"] == ["rob1", "rob3"]
 
 
 @pytest.mark.parametrize(

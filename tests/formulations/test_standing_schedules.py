@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-import networkx as nx
 import numpy as np
 import pytest
 
@@ -13,43 +12,26 @@ import seqopt
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, find_mortar
-from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.states.states import build_states
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
 from seqopt.plan._infeasible import worst_least
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import NARROW, Standing, _without_implied, slack
-from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.sequence.rules import FreeRules
 from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import GAP
+from tests.brute_force import ONES as FOUR_ONES
+from tests.brute_force import allowed, least_peak, peaks, whole_graph
 from tests.builders import small_arch
-from tests.plain_rules import PlainBook
 
 slow, long = pytest.mark.slow, (pytest.mark.slow, pytest.mark.long)
 TILTS = pytest.param("tilt,minmax", marks=long)
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
-
-
-def worth(engine, bricks, grips):
-    """What a state is worth, solved alone; infinite if it is loose or a robot holds too much."""
-    held = [node for node in grips if node is not None]
-    try:
-        fields = engine.solve(bricks, np.array([held], dtype=int).reshape(1, -1), Want.ALL)
-    except MechanismError:
-        return np.inf
-    force = dict(zip(held, lengths(fields.grip_force)[0], strict=True))
-    for robot, node in zip(engine.network.scene.robots, grips, strict=True):
-        if node is not None and force[node] > robot.payload * (1 + LIMIT_TOLERANCE):
-            return np.inf
-    moment = CHOSEN_BY["M_sup"].of(engine.network, fields)[0]
-    return max(max(force.values(), default=0.0) / 100.0, moment / 10.0)
 
 
 def stands(network, bricks, grips, mortar):
@@ -60,46 +42,26 @@ def stands(network, bricks, grips, mortar):
 
 def brute_force(engine, rules, mortar):
     """The least peak of all plans whose states stand, by every state that can be reached."""
-    book = PlainBook(engine.network, rules)
-    start = (0, (None,) * len(engine.network.scene.robots), 0)
-    graph, work = nx.DiGraph(), [start]
-    graph.add_node(start, worth=0.0)
-    while work:
-        state = work.pop()
-        for _, bricks, grips, regrips in book.follow(*state):
-            after = (bricks, grips, regrips if rules.regrips is not None else 0)
-            if after not in graph:
-                value = worth(engine, bricks, grips)
-                fine = stands(engine.network, bricks, grips, mortar) is Verdict.STANDS
-                graph.add_node(after, worth=value if fine else np.inf)
-                work += [after] if fine and np.isfinite(value) else []
-            graph.add_edge(state, after)
-    ends = [n for n in graph if n[0] and book.ends(*n[:2])]
-    for value in sorted({d for _, d in graph.nodes(data="worth") if np.isfinite(d)}):
-        kept = graph.subgraph([n for n, d in graph.nodes(data="worth") if d <= value])
-        reached = nx.descendants(kept, start)
-        if any(end in reached for end in ends):
-            return value
-    return None
 
+    def allow(bricks, grips):
+        if bricks and stands(engine.network, bricks, grips, mortar) is not Verdict.STANDS:
+            return None
+        return allowed(engine, rules, bricks, grips)
 
-def check(scene, rules, mortar="dry"):
-    engine = ComplianceEngine(build_network(scene))
-    best = brute_force(engine, rules, find_mortar(mortar))
-    problem = build_states(engine, rules, ONES, "minmax", stands=mortar)
-    if best is None:
-        with pytest.raises(InfeasibleError, match="free schedule: "):
-            seqopt.solve(problem, "schedule_search")
-        return
-    plan = seqopt.solve(problem, "schedule_search")
-    assert plan.certificate.values == pytest.approx((best,))
-    assert set(plan.stability()["verdict"]) == {"stands"}
-    assert problem.stability.undecided == 0
+    graph, start = whole_graph(engine, rules, allow=allow)
+    found = least_peak(graph, start, peaks(graph))
+    return None if found is None else found[0]
 
 
 @pytest.mark.slow
 def test_a_small_arch_equals_brute_force():
-    check(small_arch(4), FreeRules(least_grips=2))
+    engine, rules = ComplianceEngine(build_network(small_arch(4))), FreeRules()
+    best = brute_force(engine, rules, find_mortar("dry"))
+    problem = build_states(engine, rules, FOUR_ONES, "minmax", stands="dry")
+    plan = seqopt.solve(problem, "schedule_search")
+    assert plan.certificate.values == pytest.approx((best,))
+    assert set(plan.stability()["verdict"]) == {"stands"}
+    assert problem.stability.undecided == 0
 
 
 @pytest.fixture(scope="module")

@@ -142,28 +142,6 @@ def whole(goals):
 WATER, MOVES = _Target("water", "peak", (0,)), _Target("moves", "sum", (1,))
 
 
-@pytest.mark.parametrize(
-    ("name", "goal"), [*((n, MOVES) for n in SUMS), *((n, WATER) for n in PEAKS)]
-)
-def test_every_formulation_solves_a_space_that_nobody_knows(name, goal):
-    plan = seqopt.solve(whole((goal,))[0], name)
-    fewest = min(k for k in range(1, 12) if least_moves(k))
-    least = {"water": least_of_space()[0], "moves": fewest}[goal.name]
-    value = plan.objective[goal.name]
-    assert value >= least - 1e-9
-    if EVERY[name].kind.value == "exact":
-        assert value == pytest.approx(least)
-        assert plan.certificate.gap <= 1e-9
-
-
-def least_moves(count):
-    """Whether so many moves are enough."""
-    reached = {(0, 0)}
-    for _ in range(count):
-        reached = {t for s in reached for t in poured(s)}
-    return any(full[0] == WANTED for full in reached)
-
-
 def by_thresholds(numbers):
     """A formulation that searches the space itself, by thresholds, as schedules are searched."""
     found = ThresholdSearch(Jugs()).best()

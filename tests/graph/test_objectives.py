@@ -7,22 +7,20 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import rankdata
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError
-from seqopt.graph.decision_costs import LayeredCosts, best_in_order
+from seqopt.graph.decision_costs import best_in_order
 from seqopt.graph.decisions import move_costs, pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, _ranks_of
 from seqopt.problem.problem import Aim
 from seqopt.sequence.methods import three_robot_loop
-from seqopt.study.published import EQUATIONS, WEIGHTED
+from seqopt.study.published import EQUATIONS
 from tests.builders import small_arch
-from tests.strategies import problems
 
 CONDITIONAL = replace(EQUATIONS, ranked=Ranked.CONDITIONAL)
 values = st.one_of(st.integers(0, 4).map(float), st.just(np.nan))
@@ -109,35 +107,3 @@ def test_the_reference_arch_under_both(problem25):
     assert solve(other, "cascade").certificate.gap == pytest.approx(0.01275, abs=1e-5)
     sighted = best_in_order([(other.sums, Aim.SUM), (problem25.sums, Aim.SUM)])
     assert problem25.sums.cost(sighted) == pytest.approx(663.81, abs=0.01)
-
-
-def test_a_search_of_one_move_is_charged_ranks_given_the_choice_before(problem25, engine25, loop25):
-    assert problem25.alone == conditional(problem25).sums
-    assert conditional(problem25).alone == conditional(problem25).sums
-    assert problem25.alone != problem25.sums
-    plain = pose_decisions(engine25, loop25, WEIGHTED)
-    assert plain.alone is plain.sums
-
-
-@given(first=problems(), data=st.data())
-@settings(max_examples=20)
-def test_of_the_best_choices_the_cheapest_by_the_other_costs(first, data):
-    costs = first.sums
-    draw = st.integers(0, 3).map(float)
-    parts = [
-        tuple(
-            np.array(data.draw(st.lists(draw, min_size=a.size, max_size=a.size))).reshape(a.shape)
-            for a in arrays
-        )
-        for arrays in (costs.single, costs.shared)
-    ]
-    second = LayeredCosts(*parts)
-    goals = [(costs, Aim.SUM), (second, Aim.SUM)]
-    choices = [c for c in product(*map(range, costs.sizes)) if np.isfinite(costs.cost(c))]
-    if not choices:
-        with pytest.raises(InfeasibleError):
-            best_in_order(goals)
-        return
-    least = min(map(costs.cost, choices))
-    wanted = min(second.cost(c) for c in choices if costs.cost(c) == least)
-    assert second.cost(best_in_order(goals)) == pytest.approx(wanted)

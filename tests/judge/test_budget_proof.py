@@ -167,19 +167,6 @@ def test_multipliers_bound_what_is_capped_and_others_are_refused(peak):
             budget_bounds(graph, (4.0,), (4.0,), ((1.0,), (none,)))
 
 
-def test_budgets_that_conflict_are_named(problem25):
-    way, force = travel(problem25, 11.5), steps_over(problem25, "F_largest", 238.7, 8.0)
-    for budget in (way, force):
-        assert solve(replace(problem25, budgets=(budget,)), "labels").certificate.gap <= 1e-6
-    idle = travel(problem25, 1e3)
-    capped = replace(problem25, budgets=(idle, way, force))
-    said = "11.5 of 'robot travel [m]' and 8 of 'steps with F_largest over 238.7' cannot be kept"
-    with pytest.raises(InfeasibleError) as caught:
-        solve(capped, "labels")
-    assert said in str(caught.value)
-    assert "1000" not in str(caught.value)
-
-
 def test_few_labels_stop_with_a_bound(problem25):
     capped = replace(
         problem25,

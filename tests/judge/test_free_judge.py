@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 import seqopt
+from seqopt._registry import ADDED
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import ProblemError, SolverError, StepError
-from seqopt.graph.states.states import build_states, within
+from seqopt.errors import SolverError, StepError
+from seqopt.graph.states.states import build_states
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
+from seqopt.problem import Amount
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
-from seqopt.problem.standing import slack
 from seqopt.sequence.rules import FreeRules
 from tests.builders import small_arch
 
@@ -65,24 +66,6 @@ def test_a_limit_that_is_exceeded_is_seen(plan):
         judge_schedule(capped, plan.selection, plan.steps)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ({"goals": "fast"}, "aim 'fast' does not exist"),
-        ({"goals": "steps,steps"}, "aim steps: it is listed twice"),
-        ({"goals": ()}, "give goals, or their names"),
-        ({"limits": [Limit("F_move", 3.0)]}, "a state of a free schedule has no F_move"),
-        ({"criterion": seqopt.CRITERIA["equations-2-3"]}, "it ranks the choices of a move"),
-    ],
-)
-def test_what_cannot_be_posed_gets_one_line(arguments, said):
-    engine = ComplianceEngine(build_network(small_arch(4)))
-    given = {"criterion": ONES} | arguments
-    with pytest.raises(ProblemError, match=said) as caught:
-        build_states(engine, FreeRules(), **given)
-    assert "\n" not in str(caught.value)
-
-
 def test_weights_of_scenarios_that_prove_little_leave_a_gap():
     """Wrong weights are no error, but prove less; a wrong total, or none for a scenario, is one."""
     scene = small_arch(5)
@@ -109,18 +92,35 @@ def test_weights_of_scenarios_that_prove_little_leave_a_gap():
         judge_schedule(states, replace(found, objective=(0.9 * found.objective[0],)), plan.steps)
 
 
-@pytest.mark.slow
-def test_a_margin_within_a_budget_is_proven_to_its_width():
-    """The margin comes first, and the budget holds beside it."""
-    problem = within(posed("friction,minmax"), {"travel": 1.0})
-    plan = solve(problem, "schedule_search")
-    alone = solve(posed("friction"), "schedule_search")
-    friction, travel = plan.objective["friction"], plan.objective["travel"]
-    width = slack("friction", friction)
-    assert travel <= 1.0
-    assert alone.certificate.bounds[0] - width <= plan.certificate.bounds[0] <= friction
-    with pytest.raises(SolverError, match="no multiplier for every budget and goal"):
-        judge_schedule(plan.states, replace(plan.selection, prices=()), plan.steps)
-    objective = (0.5 * friction, *plan.selection.objective[1:])
-    with pytest.raises(SolverError):
-        judge_schedule(plan.states, replace(plan.selection, objective=objective), plan.steps)
+def held(states):
+    return (states.nodes >= 0).sum(axis=1)
+
+
+@pytest.fixture
+def registered(monkeypatch):
+    monkeypatch.setitem(ADDED, (Amount, "held_alone"), Amount("held_alone", held))
+
+
+def basis(plan):
+    named = {n: str(b) for n, b in zip(plan.goals, plan.certificate.rests_on, strict=False)}
+    assert plan.summary()["bound_rests_on"] == named
+    return [*named.values()]
+
+
+def test_states_are_rebuilt_and_costs_of_choices_are_given():
+    scene = seqopt.load_scene("chain:bricks=7")
+    assert basis(seqopt.optimize(scene, "free", aim="minmax,steps")) == ["rebuilt", "rebuilt"]
+    loop = seqopt.optimize(scene)
+    assert basis(loop) == ["given"]
+    assert basis(seqopt.solve(seqopt.compile_instance(loop.problem))) == ["given"]
+
+
+@pytest.mark.usefixtures("registered")
+def test_what_has_no_twin_is_claimed():
+    plan = seqopt.optimize("chain:bricks=7", "free", aim="minmax,held_alone")
+    assert basis(plan) == ["rebuilt", "claimed"]
+
+
+def test_without_a_proof_nothing_is_said():
+    plan = seqopt.optimize("chain:bricks=7", "free", search=seqopt.Search(proof=False))
+    assert plan.summary()["bound_rests_on"] == {}

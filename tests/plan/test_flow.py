@@ -57,17 +57,6 @@ def flow_of(choice):
 ALLOWED = [(0, 0, 0), (0, 0, 1), (0, 1, 0), (0, 1, 1), (2, 0, 0), (2, 0, 1)]
 
 
-def test_arcs_are_the_pairs_on_paths():
-    compiled, flow = problem().compiled(), flow_through(problem())
-    pairs = zip(flow.graph.source, flow.graph.target, strict=True)
-    named = [tuple(compiled.candidates[[*pair]].tolist()) for pair in pairs]
-    assert named == [arc for _, arc in ARCS]
-    assert flow.scale == 3003
-    cost = [1001, 3003, 11, 22, 15, 93, 208, 109, 210]
-    assert flow.cost * 3003 == pytest.approx(cost, rel=1e-14)
-    assert (flow.takes, flow.caps, flow.units) == ((), (), ())
-
-
 @pytest.mark.parametrize("choice", ALLOWED)
 def test_a_choice_is_a_unit_flow_and_comes_back(choice):
     own = problem(90.0)
@@ -78,30 +67,6 @@ def test_a_choice_is_a_unit_flow_and_comes_back(choice):
     assert own.compiled().choice(flow.path(arcs)) == choice
     mixed = 0.6 * arcs + 0.4 * flow_of((2, 0, 0))
     assert own.compiled().choice(flow.path(mixed)) == choice
-
-
-def test_what_is_no_path_is_out_of_balance():
-    """One unit that ends with the second move, one that starts there, two, one that jumps."""
-    balance = flow_through(problem()).balance
-    whole, moves = flow_of((0, 0, 0)), np.array([move for move, _ in ARCS])
-    jumps = np.where(moves == 1, flow_of((2, 0, 0)), whole)
-    for arcs in (whole * (moves < 2), whole * (moves > 0), whole + flow_of((2, 0, 1)), jumps):
-        assert (balance @ arcs).tolist() != [1, 0, 0, 0, 0]
-
-
-@pytest.mark.parametrize(("factor", "unit"), [(0.2, 10.0), (0.19, 1.0), (0.0, 1.0)])
-def test_amounts_are_of_order_one(factor, unit):
-    """The largest amount is 50; its unit is the power of ten below it, or 1 without any."""
-    own = problem(1e9)
-    taken = own.budgets[0]
-    single, shared = (tuple(factor * a for a in part) for part in (taken.single, taken.shared))
-    budget = replace(taken, single=single, shared=shared, bound=120.0)
-    flow = flow_through(replace(own, budgets=(budget,)))
-    assert flow.units == pytest.approx([unit], rel=1e-12)
-    assert flow.caps == pytest.approx([120.0 / unit], rel=1e-12)
-    assert flow.takes[0] * unit == pytest.approx(
-        factor * np.array([30, 50, 1, 2, 3, 0, 0, 0, 0]), rel=1e-12
-    )
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-3])

@@ -5,13 +5,12 @@ from __future__ import annotations
 import pytest
 
 import seqopt
-from seqopt._cli.main import main
 from seqopt.contact.mortar import bond_mortar
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import AutoEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses.table import OUTSIDE
-from seqopt.scene.scene_file import load_scene, save_scene
+from seqopt.scene.scene_file import load_scene
 from tests.builders import small_arch
 
 WALL, ARCH = load_scene("wall:columns=3,courses=2"), small_arch(5)
@@ -37,16 +36,6 @@ def test_it_chooses_as_rigid_bricks_do_and_asks_no_joint(scene, schedule, monkey
     assert (said["name"], said["reason"]) == ("auto", "the default")
     assert said["level"]["engine"] == "compliance"
     assert plan.enough.engine == "compliance"
-
-
-def test_without_a_name_python_and_the_command_line_take_it(capsys, tmp_path):
-    save_scene(WALL, path := tmp_path / "wall.json")
-    assert main(["optimize", str(path)]) == 0
-    said = capsys.readouterr()
-    assert "enough: compliance; discrete elements with epoxy would change nothing" in said.err
-    assert "engine: " not in said.err
-    assert main(["optimize", str(path), "--engine", "auto"]) == 0
-    assert "engine: compliance: the simplest, until a joint" in capsys.readouterr().err
 
 
 def test_a_plan_that_leaves_elastic_limits_says_so_first_and_what_to_do():

@@ -21,7 +21,7 @@ from seqopt.plan.solve import NONE_KEEPS, UNKNOWN, keeping
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.filters import parse_limits
 from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits
-from seqopt.responses._grip_sets import Moved, most_moved
+from seqopt.responses._grip_sets import Moved
 from tests.builders import scaled, small_arch
 
 FORCES = WeightedSum("forces", (("F_largest", 1.0, 100.0), ("D_max", 1e-6, 1e-3)))  # no ties
@@ -161,20 +161,6 @@ def test_only_a_proof_says_that_no_plan_keeps_it(error, why):
     assert keeping("first", Moved(1.5, 3), again) == ("first", why)
     assert keeping("first", Moved(1.0, 3), again) == ("first", "")
     assert keeping("first", Moved(1.5, 3), lambda: "second") == ("second", "")
-
-
-def test_scenarios_count_beside_the_scene_itself():
-    scene = between(KINDS["scenarios"][0], None)
-    problem = posed(scene, goals="minmax", scenarios=2, limits=[LIFTED])
-    plan = seqopt.solve(problem)
-    alone = [most_moved(engine, plan.steps, {}).share for engine in plan.states.scenarios]
-    assert plan.moved.share == max(alone)
-    own = most_moved(plan.engine, plan.steps, {}).share
-    assert own != plan.moved.share
-    stiffer = replace(plan, moved=plan.moved._replace(share=own * 0.5))  # were they softer alone
-    softer = replace(plan, moved=plan.moved._replace(share=2.0))
-    assert stiffer.is_far == (own > 2)
-    assert next(each.what for each in softer.departures) == "displacement"
 
 
 def test_the_largest_motion_is_that_of_the_table():

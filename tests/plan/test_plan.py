@@ -13,7 +13,8 @@ from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError
 from seqopt.graph.decision_costs import LayeredCosts
 from seqopt.graph.decisions import pose_decisions
-from seqopt.graph.formulation import FormulationKind
+from seqopt.graph.formulation import Watch, find_formulation
+from seqopt.plan.solve import solve
 from seqopt.workflow import Robust
 from tests.builders import small_arch
 from tests.layered import Costs
@@ -97,19 +98,6 @@ def test_a_plan_of_costs_alone_has_a_path_and_no_steps():
             ask()
 
 
-@pytest.mark.parametrize("name", seqopt.formulations("costs"))
-def test_without_proof_only_windows_are_searched(counted, name):
-    engine, problem = counted
-    formulation = seqopt.formulations()[name]
-    if formulation.window_options is not None:
-        assert formulation.kind is FormulationKind.HEURISTIC
-        assert seqopt.solve(problem, formulation, proof=False).steps
-        return
-    with pytest.raises(ProblemError, match="needs all models: use cascade or rank_search"):
-        seqopt.solve(problem, formulation, proof=False)
-    assert engine.asked == 0
-
-
 def test_every_plan_has_one_summary():
     """Its keys do not depend on what was chosen from, but for the criterion's and the order's."""
     scene, ones = small_arch(5), seqopt.CRITERIA["worst-ratio"]
@@ -135,20 +123,36 @@ def criterion_of(plan):
     return plan.problem.criterion
 
 
-def test_a_problem_is_changed_in_words():
-    scene = small_arch(5)
-    engine = seqopt.make_engine("compliance", scene)
-    problem = seqopt.pose(engine, seqopt.FreeRules(), seqopt.CRITERIA["worst-ratio"])
-    drawn = seqopt.scenarios(scene, count=2)
-    words = {"goals": "minmax,steps", "stands": "bond=1e6", "over": "worst-peak", "orders": "tied"}
-    changed = problem.but(
-        **words, scenarios=drawn, budgets="steps=40", limits=seqopt.Limit("T_max", 1e6)
-    )
-    posed = seqopt.pose(*(engine, seqopt.FreeRules(), problem.criterion), goals="minmax,steps")
-    assert changed.goals == posed.goals
-    assert changed.but(orders=None).orders is None
-    assert (changed.scenarios, changed.budgets) == (drawn.scenes, ("steps=40",))
-    assert str(changed.over) == "worst-peak"
-    for wrong in ({"goals": 5}, {"orders": "any order"}, {"over": 3}, {"stands": "jelly"}):
-        with pytest.raises(seqopt.SeqoptError):
-            problem.but(**wrong)
+def test_only_what_is_better_is_told():
+    told = []
+    watch = Watch(progress=told.append)
+    for objective, bound in ((np.inf, -np.inf), (9, 1), (9, 1), (10, 0), (8, 0), (9, 2)):
+        watch.tell(objective, bound)
+    assert [(f.objective, f.bound) for f in told] == [(np.inf, -np.inf), (9, 1), (8, 1), (8, 2)]
+    assert tuple(told) == watch.trace
+
+
+def problem():
+    costs = LayeredCosts((np.array([2.0, 1.0]),), (np.zeros((1, 2)),))
+    return Costs(costs).compiled().instance
+
+
+@pytest.mark.parametrize("limit", [-1, "1", np.nan, None])
+def test_a_time_limit_is_seconds(limit):
+    with pytest.raises(ProblemError, match=r"time_limit is .*; give seconds from 0"):
+        solve(problem(), "overlap_dp", time_limit=limit)
+
+
+def test_what_takes_no_watch_takes_no_time_limit():
+    exact = find_formulation("overlap_dp")
+
+    def unwatched(problem):
+        return exact.solve(problem)
+
+    bare = replace(exact, name="bare", solve=unwatched)
+    assert not bare.watched
+    assert solve(problem(), bare).certificate.objective == 1.0
+    assert solve(problem(), bare).selection.trace[-1].objective == 1.0
+    with pytest.raises(ProblemError, match="bare takes no time limit; leave it out"):
+        solve(problem(), bare, time_limit=1.0)
+    assert "watch" not in exact.options

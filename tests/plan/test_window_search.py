@@ -17,7 +17,7 @@ from seqopt.problem.requirements import Limit
 from seqopt.responses import _choices
 from seqopt.responses.table import analyze
 from seqopt.sequence.methods import three_robot_loop
-from seqopt.study.published import EQUATIONS, WEIGHTED
+from seqopt.study.published import EQUATIONS
 
 
 def test_a_dead_end_that_the_cascade_foresees(engine25):
@@ -39,17 +39,6 @@ def test_a_window_depends_on_the_choices_before_it(engine25):
     own, other = (each.sums.single[0].tolist() for each in (own, other))
     assert own == pytest.approx(found.costs(9).tolist())
     assert other != own
-
-
-def test_the_table_says_what_the_next_one_costs(engine25):
-    problem = pose_decisions(engine25, three_robot_loop(engine25.network), WEIGHTED)
-    plan = solve(problem, "rank_search", proof=False)
-    found, table = plan.search, plan.table()
-    assert len(table) == 22
-    assert (table["margin"] >= 0).all()
-    last = np.sort(found.costs(21))
-    assert table["cost"].iloc[-1] == last[0]
-    assert table["margin"].iloc[-1] == last[1] - last[0]
 
 
 @pytest.mark.slow

@@ -38,16 +38,3 @@ def test_words_of_budgets(text, of_states, read):
 def test_what_is_no_budget_is_refused(text, of_states, said):
     with pytest.raises(ProblemError, match=said):
         parse_budgets([text], of_states=of_states)
-
-
-@pytest.mark.parametrize(
-    ("texts", "of_states"),
-    [
-        (["travel=2m", "travel=0.5"], False),
-        (["steps_over:F_rob1=80:3", "robot_use:rob1=80:2"], False),
-        (["steps=2", "steps=3"], True),
-    ],
-)
-def test_a_budget_stands_there_once(texts, of_states):
-    with pytest.raises(ProblemError, match="stands there twice"):
-        parse_budgets(texts, of_states=of_states)

@@ -11,7 +11,6 @@ from seqopt.errors import ProblemError
 from seqopt.problem.criteria import (
     OVER_METHODS,
     WORST_OVER_METHODS,
-    Ranked,
     RankSum,
     WeightedSum,
     _mean_ranks,
@@ -83,32 +82,6 @@ def test_ranks_of_pairs_run_as_far_as_those_of_candidates():
         [NAN, 2, NAN, 1], nan_ok=True
     )
     assert _mean_ranks(np.array([7.0, 1.0, 7.0, 7.0, 3.0])).tolist() == [4, 1, 4, 4, 2]
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_given_the_choice_before_every_row_is_ranked_for_itself(seed):
-    rng = np.random.default_rng(seed)
-    values = rng.integers(-4, 5, size=rng.integers(1, 7, size=2)) + rng.uniform(-0.4, 0.4)
-    values[rng.random(values.shape) < 0.2] = NAN
-    if np.isnan(values).all():
-        values[0, 0] = 1.0
-    rows = _ranks_of(values, 9, Ranked.CONDITIONAL)
-    for row, own in zip(rows, values, strict=True):
-        one = np.full(own.shape, NAN) if np.isnan(own).all() else _ranks_of(own, len(own))
-        assert row == pytest.approx(one, nan_ok=True)
-    assert _ranks_of(np.full((2, 3), NAN), 4, Ranked.CONDITIONAL).tolist() == [[2.5] * 3] * 2
-
-
-@pytest.mark.parametrize("ranked_among", Ranked)
-def test_what_one_move_decides_is_ranked_in_either_way(ranked_among):
-    single, pairs = np.array([3.0, 1.0, 2.0]), np.array([[4.0, 1.0], [2.0, 3.0]])
-    assert _ranks_of(single, 3, ranked_among).tolist() == [3, 1, 2]
-    by_row = [[2.0, 1.0], [1.0, 2.0]]
-    by_pair = [[2.25, 0.75], [1.25, 1.75]]
-    expected = by_pair if ranked_among is Ranked.PAIRS else by_row
-    assert _ranks_of(pairs, 2, ranked_among).tolist() == expected
-    own = replace(ranked((("T_max", 1.0),)), ranked=ranked_among)
-    assert own.costs({"T_max": 10 * pairs}, 3, 2).tolist() == expected
 
 
 def test_what_ranks_take_from_a_scene():

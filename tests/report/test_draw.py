@@ -1,6 +1,8 @@
-"""Pictures hold what they should show."""
+"""Pictures, charts and comparisons hold what they should show."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import matplotlib as mpl
 import numpy as np
@@ -8,10 +10,16 @@ import pytest
 import trimesh
 
 from seqopt.engines.interface import Want
+from seqopt.engines.registry import make_engine
 from seqopt.network.build import build_network
+from seqopt.report._style import WIDTH
+from seqopt.report.charts import responses_figure
+from seqopt.report.comparison import LARGEST, compare
 from seqopt.report.draw import View, _inner_edges, draw_bricks, draw_grips, draw_network
+from seqopt.study.published import CRITERIA, EQUATIONS
 from tests.blocks import with_shapes
-from tests.builders import six_bricks
+from tests.builders import six_bricks, small_arch
+from tests.pictures import flaws
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -69,3 +77,39 @@ def test_cuts_of_flat_faces_are_no_edges_of_a_block():
     bent = block.vertices + np.array([0.0, 0.0, 0.1]) * (block.vertices[:, :1] > 0)
     bent[0] += 0.2  # the control: a corner out of the plane of three sides
     assert len(_inner_edges(bent, faces)) < 6
+
+
+def test_a_comparison_is_readable_and_every_plan_has_a_line_of_its_own():
+    engine = make_engine("compliance", build_network(six_bricks()))
+    result = compare(engine, CRITERIA["weighted-published"])
+    figure = responses_figure(result.tables)
+    assert figure.get_figwidth() == WIDTH
+    assert flaws(figure) == []
+    axes, *_ = figure.axes
+    assert len(axes.get_lines()) < len(result.tables)  # equal plans are one line
+    words = " ".join(text.get_text() for text in figure.legends[0].get_texts())
+    assert all(name in words.replace(" ", "_") or name in words for name in ("overlap_dp", "beam"))
+
+
+def test_without_weight_nothing_is_above_the_best():
+    """Found by fuzzing: all responses are zero, and so is what gaps are relative to."""
+    scene = replace(small_arch(4), gravity=(0.0, 0.0, 0.0))
+    table = compare(make_engine("compliance", scene), EQUATIONS).table
+    assert table.loc["free", ["objective", "gap"]].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("comparison")
+def test_the_free_schedule_is_compared_by_the_criterion_that_is_asked_for(engine25, compared25):
+    """No figure of the row is above the least of the closed rows and the published plan."""
+    published = CRITERIA["worst-ratio-published"]
+    asked = compare(engine25, published)
+    assert asked.table.loc["free", "objective"] == pytest.approx(0.840088, rel=1e-5)
+    assert asked.criteria["free"] == published
+    ranks = compared25
+    for table in (asked.table, ranks.table):
+        others = table.loc[["sequential", "cantilever", "published"], [*LARGEST]]
+        assert (table.loc["free", [*LARGEST]] <= others.min()).all()
+    least = ranks.criteria["free"].limits
+    assert dict(least)["F_largest"] == pytest.approx(others["F_rob"].min())
+    assert dict(least)["D_max"] == pytest.approx(1e-6 * others["D_max"].min())

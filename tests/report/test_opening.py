@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 
 import pytest
 
@@ -13,7 +12,7 @@ from seqopt.responses.table import Departure, analyze
 from seqopt.sequence.methods import sequential
 from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from tests.browser import BROWSER, PLAIN, browsed, browses
+from tests.browser import BROWSER, browsed, browses
 
 STANDS, FALLS, OPEN = Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED
 browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
@@ -112,22 +111,3 @@ def test_a_browser_opens_the_step_that_decides_and_shows_every_verdict(page, tmp
     heights = [float(point.split(",")[1]) for line in lines for point in line.split()]
     assert len(lines) == 4
     assert max(heights) == 172  # on the axis, not below it
-
-
-@pytest.mark.slow
-@browser
-def test_a_summary_is_one_sheet(page, tmp_path):
-    def sheets(path):
-        out = tmp_path / "summary.pdf"
-        words = [word for word in PLAIN.split() if word != "--dump-dom"]
-        words += [f"--print-to-pdf={out}", f"--user-data-dir={tmp_path / 'profile'}"]
-        subprocess.run(
-            [BROWSER, *words, f"file://{path}"], check=True, capture_output=True, timeout=120
-        )
-        return len(re.findall(rb"/Type\s*/Page\b", out.read_bytes()))
-
-    assert sheets(page) == 1
-    text = page.read_text("utf-8")
-    text = re.sub('<meta http-equiv="Content-Security-Policy"[^>]*>', "", text)
-    page.write_text(text.replace("@media print", "@media speech"), "utf-8")
-    assert sheets(page) > 1  # the control

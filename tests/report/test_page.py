@@ -10,7 +10,6 @@ import re
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from seqopt._cli.main import main
@@ -18,19 +17,13 @@ from seqopt._files import csv_text
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
-from seqopt.exchange.contacts import face_ground, flat_face
 from seqopt.network.build import build_network
 from seqopt.plan.build import GivenSequence
 from seqopt.report import page
 from seqopt.report._pages import OVER, plan_page
-from seqopt.report.page import LARGEST, Build, Scatter, _build_data, _structure_data, report_page
+from seqopt.report.page import LARGEST, Build, _build_data, _structure_data, report_page
 from seqopt.responses.table import analyze
-from seqopt.scene.boxes import block_brick
-from seqopt.scene.library.common import MASONRY
-from seqopt.scene.parts import Robot
-from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import cantilever, sequential
-from tests.blocks import L_SHAPE, prism
 from tests.browser import BROWSER, PLAIN, WORDS, browsed, browses
 
 browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
@@ -268,77 +261,3 @@ def test_a_browser_runs_no_script_that_is_not_the_pages_own(engine25, builds, sh
         found, _ = shown(path, words=PLAIN)
         assert 'data-ready="true"' in found
         assert ('data-wrong="' in found) == runs
-
-
-LOOK = """<script>
-const light = (color) => {
-  const [r, g, b] = color.match(/[\\d.]+/g).slice(0, 3).map((v) => v / 255)
-    .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
-  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-};
-const behind = (e) => {
-  for (; e; e = e.parentElement) {
-    const color = getComputedStyle(e).backgroundColor;
-    if (!/rgba\\(.*, 0\\)|transparent/.test(color)) return color;
-  }
-  return "rgb(255, 255, 255)";
-};
-const timer = setInterval(() => {
-  if (document.body.dataset.ready !== "true") return;
-  clearInterval(timer);
-  const point = document.querySelector('circle[data-build="cantilever"]');
-  point.focus();
-  point.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
-  const told = [...document.querySelectorAll("body *")].filter((e) =>
-    e.checkVisibility() && [...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim()));
-  const ratios = told.map((e) => {
-    const style = getComputedStyle(e), own = e instanceof SVGElement ? style.fill : style.color;
-    const [dark, pale] = [light(own), light(behind(e))].sort((a, b) => a - b);
-    return (pale + 0.05) / (dark + 0.05);
-  });
-  document.body.dataset.contrast = Math.min(...ratios).toFixed(2);
-  document.body.dataset.texts = ratios.length;
-}, 50);
-</script>"""
-
-
-@pytest.mark.slow
-@browser
-def test_a_point_shows_its_build_and_words_stand_out(engine25, builds, shown, tmp_path):
-    points = pd.DataFrame({"time, s": [1.0, 2.0], "gap, %": [2, 3]}, index=[*builds])
-    scatter = Scatter("both", points)
-    text = report_page(engine25, list(builds.values()), "Two ways.", (), scatter)
-    path, pale = tmp_path / "report.html", tmp_path / "pale.html"
-    text = unguarded(text)
-    path.write_text(text.replace("</body>", f"{LOOK}</body>"), "utf-8")
-    found, errors = shown(path, "step=12&build=sequential", PLAIN)
-    assert errors == []
-    assert "cantilever, step 12 of 49" in found  # its point was chosen by its key
-    contrast, told = (re.search(f'data-{n}="([0-9.]+)"', found)[1] for n in ("contrast", "texts"))
-    assert float(contrast) >= 4.5
-    assert int(told) > 60
-    faint = text.replace("--soft: #595959", "--soft: #999999")
-    pale.write_text(faint.replace("</body>", f"{LOOK}</body>"), "utf-8")
-    low = re.search('data-contrast="([0-9.]+)"', shown(pale, words=PLAIN)[0])[1]
-    assert float(low) < 4.5  # the control
-
-
-def test_blocks_of_any_shape_are_drawn_as_they_are():
-    """An L is drawn as a fan from the one corner that sees all of it."""
-    brick = block_brick(1, prism(L_SHAPE), 2000.0)
-    floor = flat_face([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    scene = Scene(
-        name="L",
-        bricks=(brick,),
-        joints=(),
-        grounds=(face_ground(1, floor, MASONRY),),
-        build_order=(1,),
-        robots=(Robot(name="rob1", payload=1e6),),
-    )
-    (drawn,) = _structure_data(build_network(scene))["bricks"]
-    corners = np.array(drawn["corners"])
-    area = 0.0
-    for face in drawn["faces"]:
-        spokes = corners[list(face[1:])] - corners[face[0]]
-        area += 0.5 * np.linalg.norm(np.cross(spokes[:-1], spokes[1:]), axis=1).sum()
-    assert area == pytest.approx(2 * 4.0 + 10.0)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pandas as pd
 import pytest
 
 from seqopt.report._style import look, looks, new_figure, picture_files, plain
-from seqopt.report.charts import _merged, front_figure
+from seqopt.report.charts import _merged
 from seqopt.report.draw import POINTS, _aside
-from tests.pictures import flaws
 
 
 def test_seventy_series_differ_and_ten_do_without_color():
@@ -65,32 +62,3 @@ def test_equal_tables_are_one_line():
     table = pd.DataFrame({"bricks": [1, 1, 2], "M": [1.0, 3.0, 2.0], "phase": list("abc")})
     other = table.assign(M=[1.0, 3.0, 2.5])
     assert _merged({"a": table, "b": other, "c": table.copy()}) == {"a": ("a", "c"), "b": ("b",)}
-
-
-def front_of(table):
-    """A Pareto set of which only the table counts."""
-    return SimpleNamespace(table=table)
-
-
-def test_the_chart_of_a_pareto_set_marks_methods_and_names_them():
-    rng = np.random.default_rng(1)
-    names = ["F_largest", "M_sup", "T_max", "D_max", "steps"]
-    table = pd.DataFrame(rng.uniform(1, 2, (9, 5)), columns=names)
-    method = pd.DataFrame(
-        {
-            "rob1_node": [1],
-            "F_rob1_N": [2.0],
-            "M_sup_Nm": [1.0],
-            "F_max_N": [1.0],
-            "D_max_1e-3mm": 9.0,
-        }
-    )
-    figure = front_figure(
-        front_of(table), {"sequential": method, "cantilever": method}, {"loop": table}
-    )
-    assert len(figure.axes) == 4 + 1  # and the scale of colors
-    (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == [
-        "loop, its set", "sequential", "cantilever",
-    ]  # fmt: skip
-    assert flaws(figure) == []
