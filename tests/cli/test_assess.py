@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 
 import pandas as pd
@@ -16,10 +15,6 @@ from seqopt.stability._steps import stability_row
 
 ARCH = "arch:span=1,rise=0.4,pattern=VLR"
 WORDS = ["assess", ARCH, "--method", "sequential", "--mortar", "dry"]
-
-
-def contents(path):
-    return path.read_text(encoding="utf-8")
 
 
 def ended_in(row):
@@ -56,23 +51,6 @@ def test_margins_of_some_steps(capsys, tmp_path, words, known):
     table = pd.read_csv(out)
     assert table["step"][table["bond_needed_Pa"].notna()].tolist() == known
     assert table["friction_needed"].isna().all()
-
-
-def test_a_map_of_one_method(capsys, tmp_path):
-    words = ["--map", "friction=0.2,0.6", "--holds", "dry,bond=1e5"]
-    assert main([*WORDS, *words, "--json", "--out", str(tmp_path / "map")]) == 1
-    found = json.loads(capsys.readouterr().out)
-    assert [case["value"] for case in found["cases"]] == [0.2, 0.6, 0.2, 0.6]
-    assert {case["build"] for case in found["cases"]} == {"sequential"}
-    folder = {path.name for path in (tmp_path / "map").iterdir()}
-    assert folder >= {"map.csv", "map_steps.csv", "report.html"}
-    table = pd.read_csv(tmp_path / "map" / "map.csv")
-    assert table["fall"].tolist() == [case["fall"] for case in found["cases"]]
-    page = contents(tmp_path / "map" / "report.html")
-    data = json.loads(re.search(r'type="application/json">(.*?)</script>', page)[1])
-    (build,) = data["builds"]
-    assert build["fall"]["width"] == 6 * 9
-    assert "falls dry" in " ".join(build["marks"])
 
 
 def test_without_a_mortar_both_answers_are_given(capsys, tmp_path):

@@ -64,16 +64,6 @@ def test_the_tab_key_offers_what_there_is(scripts, tmp_path, shell, line, want):
     assert offered(shell, scripts[shell], line, tmp_path) - {""} == want
 
 
-def test_a_file_is_offered_where_one_will_do(scripts, tmp_path):
-    (tmp_path / "mine.json").write_text("{}", encoding="utf-8")
-    if shutil.which("bash") is None:
-        pytest.skip("bash is not installed")
-    found = offered("bash", scripts["bash"], "seqopt compare ", tmp_path)
-    assert {"arch25", "mine.json"} <= found
-    found = offered("bash", scripts["bash"], "seqopt compare --engine ", tmp_path)
-    assert "mine.json" not in found
-
-
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_each_script_has_all_names_and_is_one_its_shell_reads(scripts, shell):
     text = scripts[shell].read_text(encoding="utf-8")

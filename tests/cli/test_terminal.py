@@ -11,7 +11,7 @@ import threading
 import pytest
 
 from seqopt._cli import watcher
-from seqopt._cli.terminal import columns, complain, show_text, wrapped
+from seqopt._cli.terminal import complain, show_text
 from seqopt._cli.watcher import Watcher
 from seqopt.work.progress import Stage
 
@@ -132,12 +132,3 @@ def test_long_lines_are_wrapped_for_people_only(monkeypatch):
     monkeypatch.setattr(sys, "stderr", io.StringIO())
     complain("seqopt: error: " + "word " * 40)
     assert sys.stderr.getvalue().count("\n") == 1
-
-
-@pytest.mark.parametrize(("width", "found"), [("20", 40), ("300", 100)])
-def test_columns_are_those_of_the_terminal_within_reason(monkeypatch, width, found):
-    monkeypatch.setenv("COLUMNS", width)
-    assert columns() == found
-    lines = wrapped("word " * 100, first="- ").splitlines()
-    assert max(map(len, lines)) <= found
-    assert all(line.startswith("  ") for line in lines[1:])

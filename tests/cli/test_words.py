@@ -7,7 +7,6 @@ import re
 import pytest
 
 from seqopt._cli.arguments import EXAMPLES, parser
-from seqopt._cli.commands.completion import _commands
 from seqopt._cli.main import main
 from seqopt._cli.signatures import signature_of
 from seqopt._registry import COMMANDS
@@ -73,13 +72,3 @@ def test_every_example_of_help_can_be_parsed():
         for example in examples:
             if name != "completion":  # whose examples are lines of a shell
                 assert parser().parse_args(example.split()[1:]).command == name
-
-
-def test_every_option_stands_in_a_group_with_a_title():
-    for command in _commands(parser()):
-        titles = [group.title for group in command._action_groups if group._group_actions]
-        if command.prog != "seqopt completion":
-            assert len(titles) >= 3, command.prog
-            assert all(title.endswith("?") for title in titles[1:] if title), command.prog
-        loose = [a.dest for a in command._optionals._group_actions]
-        assert loose == ["help", "help_all"], command.prog

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import compas
 import numpy as np
 import pytest
 import rhino3dm as rhino
 import trimesh
-from compas.datastructures import Mesh
 from compas.geometry import Box, Frame
 
 from seqopt.errors import SceneError
 from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene, read_content
 
-DENSE, GIVEN = Given(density=2000.0), Given(unit="m", density=2000.0)
+DENSE = Given(density=2000.0)
 WHERE = {  # lowest and highest corner of the blocks of a tower, mm
     "foot": ((0, 0, 0), (400, 200, 100)),
     "left": ((0, 0, 100), (200, 200, 200)),
@@ -207,20 +205,3 @@ def boxes():
         low, high = np.array(bounds) / 1e3
         out[name] = Box(*(high - low), frame=Frame(0.5 * (low + high), [1, 0, 0], [0, 1, 0]))
     return out
-
-
-def test_lists_and_dictionaries_of_compas_meshes(tmp_path):
-    path = tmp_path / "meshes.json"
-    meshes = {name: Mesh.from_shape(box) for name, box in boxes().items()}
-    for written in (meshes, {"course": [*boxes().values()]}, [[box] for box in boxes().values()]):
-        compas.json_dump(written, path)
-        found = [*placed(import_scene(path, given=GIVEN)).values()]
-        assert found == [*TOWER.values()]
-    compas.json_dump(meshes, path)
-    assert [block.key for block in read_content(path).blocks] == [*WHERE]
-    for name, item in meshes.items():
-        item.name = name.upper()
-    compas.json_dump([*meshes.values()], path)
-    assert [block.key for block in read_content(path).blocks] == ["FOOT", "LEFT", "LID"]
-    compas.json_dump(meshes["foot"], path)
-    assert [*placed(import_scene(path, given=GIVEN)).values()] == [TOWER[1]]

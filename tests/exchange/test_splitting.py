@@ -1,4 +1,4 @@
-"""Blocks of a mesh are found where its faces close, however a program wrote them."""
+"""Blocks of a mesh are found where its faces close, mended or refused, and put into an order."""
 
 from __future__ import annotations
 

@@ -9,14 +9,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from experiments.calibration.calibration import (
-    ANEW,
-    GAIN,
-    IN_SAMPLE,
-    comparison,
-    interval,
-    intervals,
-)
+from experiments.calibration.calibration import ANEW, GAIN, IN_SAMPLE, comparison
 from experiments.calibration.parts.barrel_vaults import (
     BED,
     Chain,
@@ -87,18 +80,6 @@ def test_a_straight_chain_has_its_closed_form(bricks):
     assert k == pytest.approx(1 / energy, rel=1e-12)
 
 
-def test_reciprocity_and_mirror():
-    vault = VAULTS[6]
-    built = scene(vault, SLIDE, TURN)
-    total = chain(vault).points[-1, 0]
-    for at in (0.3, 0.9, 1.7):
-        k = load_stiffness(built, at)
-        assert load_stiffness(built, total - at) == pytest.approx(k, rel=1e-9)
-        shifted = Chain(*chain(vault)[:2], np.array([at, total - at]))  # both at once, half each
-        pair = planar_stiffness(planar_parts(shifted), np.array([SLIDE]), np.array([TURN]))[0]
-        assert pair > k  # a spread load moves its mean place less
-
-
 def test_a_fit_finds_the_stiffnesses_that_made_the_data():
     law, pair = MODELS[BED], (4e10, 1.1e11)
     made = pair[0] * law.curves(np.array([pair[1] / pair[0]]))[:, 0]
@@ -136,13 +117,3 @@ def test_what_is_left_of_the_lead():
     test = stats.ttest_rel(rows["paper_percent"].abs(), rows["fit_percent"].abs())
     assert test.statistic == pytest.approx(gain[0] / gain[1], rel=1e-3)
     assert test.pvalue > 0.5
-
-
-def test_an_interval_ends_where_its_border_is_crossed():
-    """Also between the values at which it is known; the one number lies within 67 and 100."""
-    values = np.geomspace(0.1, 10, 41)
-    ends = interval(values, 1 + np.log(values) ** 2, 1.25)
-    assert ends == pytest.approx((np.exp(-0.5), np.exp(0.5)), rel=5e-3)
-    assert interval(values, 1 + 0 * values, 2.0) == (0.0, np.inf)
-    one = intervals(MODELS[f"{BED}, k_r = k_t"])
-    assert (one["k_r_from"] / 1e9, one["k_r_to"] / 1e9) == pytest.approx((66.8, 99.7), abs=0.05)

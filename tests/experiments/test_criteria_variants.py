@@ -1,4 +1,4 @@
-"""Which criteria name the published nodes: what is claimed, and what is only observed."""
+"""Which criteria name the published nodes, and what heuristics lose on random arches."""
 
 from __future__ import annotations
 

@@ -37,19 +37,6 @@ def test_a_device_stays_a_device(tmp_path):
     assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
 
 
-@posix
-def test_a_link_is_followed_and_a_mode_is_kept(tmp_path):
-    target, link = tmp_path / "target", tmp_path / "link"
-    target.write_text("old", encoding="utf-8")
-    target.chmod(0o640)
-    link.symlink_to(target)
-    write_text(link, "new")
-    assert link.is_symlink()
-    assert target.read_text(encoding="utf-8") == "new"
-    assert stat.S_IMODE(target.stat().st_mode) == 0o640
-    assert names(tmp_path) == ["link", "target"]
-
-
 @pytest.mark.parametrize("length", [246, 255])
 def test_a_long_name_is_a_name(tmp_path, length):
     path = tmp_path / ("x" * length)

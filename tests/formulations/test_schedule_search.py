@@ -102,49 +102,6 @@ def test_pareto_sets_equal_brute_force(build):
     assert found.table[["F_largest", "M_sup"]].to_numpy() == pytest.approx(np.array(expected))
 
 
-def counted_front(graph, start, worst, counted):
-    """All (worst, count) that no plan dominates, by labels at every state."""
-    labels = {start: [(0.0, 0)]}
-    work = [(start, (0.0, 0))]
-    while work:
-        state, (peak, count) = work.pop()
-        for _, after, data in graph.edges(state, data=True):
-            at_end = after == "end"
-            more = int(data["regrip"] if counted == "regrips" else not at_end)
-            new = (max(peak, worst.get(after, 0.0)), count + more)
-            known = labels.setdefault(after, [])
-            if not any(all(a <= b for a, b in zip(old, new, strict=True)) for old in known):
-                labels[after] = [new, *(o for o in known if not all(map(np.less_equal, new, o)))]
-                if not at_end:
-                    work.append((after, new))
-    return sorted(labels.get("end", []))
-
-
-@pytest.mark.slow
-@given(build=free_builds(most_bricks=4, most_robots=4))
-@settings(max_examples=6, deadline=None)
-def test_steps_or_regrips_in_a_set_equal_brute_force(build):
-    scene, rules = build
-    engine = ComplianceEngine(build_network(scene))
-    graph, start = whole_graph(engine, rules)
-    worst = {
-        n: float(np.ceil(d["worst"][0] / 10 - 1e-9) * 10)
-        for n, d in graph.nodes(data=True)
-        if n != "end"
-    }
-    for counted in ("steps", "regrips"):
-        expected, aim = counted_front(graph, start, worst, counted), f"F_largest,{counted}"
-        front = FrontProblem(build_states(engine, rules, ONES, aim), {"F_largest": 10.0})
-        if not expected:
-            with pytest.raises(InfeasibleError):
-                find_front(front)
-            continue
-        found = find_front(front)
-        assert found.complete
-        rows = found.table[["F_largest", counted]].to_numpy().tolist()
-        assert np.array(sorted(map(tuple, rows))) == pytest.approx(np.array(expected))
-
-
 @given(
     points=st.lists(st.tuples(*[st.integers(0, 4)] * 3), min_size=1, max_size=6),
     z=st.tuples(*[st.integers(0, 5)] * 3),

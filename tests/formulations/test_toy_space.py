@@ -15,12 +15,10 @@ from seqopt.graph._explore import Explorer
 from seqopt.graph.formulation import find_formulation, formulations
 from seqopt.graph.instance import Instance, _Cap, _Target
 from seqopt.graph.space import Moves, Space
-from seqopt.problem import Resource
 from seqopt.problem.problem import Aim
 
 JUGS, WANTED = (5, 3), 4  # liters that jugs hold, and liters to be measured
 EVERY = formulations("goals", "instance")
-POURS = 1  # from the large jug into the small one
 SUMS = [name for name, f in EVERY.items() if f.aim is not Aim.PEAK]
 PEAKS = [*EVERY]  # whatever their own aim is
 
@@ -171,70 +169,3 @@ def test_the_search_leaves_out_what_takes_more_than_the_best():
     best_value = search.best().objective[0]
     visited = np.concatenate(search.wide.visited())
     assert visited.sum(axis=1).max() <= best_value < sum(JUGS)
-
-
-def poured_over(steps, values):
-    """How often water went from the large jug into the small one."""
-    change = steps.after - steps.before
-    over = (change[:, :1] < 0) & (change[:, 1:] > 0)
-    return np.where(values + over > POURS, np.inf, values + over)
-
-
-def poured_again(steps, values):
-    small = [max(0, after[1] - before[1]) for before, after in zip(*steps[1:], strict=True)]
-    large = [max(0, before[0] - after[0]) for before, after in zip(*steps[1:], strict=True)]
-    count = values[:, 0] + np.minimum(np.minimum(small, large), 1)
-    return np.where(count <= POURS, count, np.inf)[:, None]
-
-
-POUR = Resource("pour", (0.0,), poured_over, twin=Resource("pour", (0.0,), poured_again))
-
-
-def least_with_pours(kind, cap=14):
-    """The least water of sequences that pour over so often at most, by trying all."""
-    one, join = puzzle(kind), {"sum": np.add, "peak": np.maximum}[kind]
-    rows, found, reached = one.states[:, 1:], np.inf, {(0, 0): 0.0}
-    for _ in range(cap):
-        after = dict[tuple[int, int], float]()
-        arcs = zip(one.source.tolist(), one.target.tolist(), one.amounts[:, 0], strict=True)
-        for s, t, water in arcs:
-            more = int(rows[t, 0] < rows[s, 0] and rows[t, 1] > rows[s, 1])
-            for count in range(POURS + 1 - more):
-                if (s, count) in reached:
-                    value = float(join(reached[s, count], water))
-                    key = t, count + more
-                    after[key] = min(after.get(key, np.inf), value)
-        found = min([found, *(v for (t, _), v in after.items() if one.ends[t])])
-        reached = after
-    return found
-
-
-@pytest.mark.parametrize("kind", ["sum", "peak"])
-def test_a_resource_on_it_is_solved_and_judged(kind):
-    asked = replace(puzzle(kind), resources=(POUR,))
-    plan = seqopt.solve(asked)
-    assert plan.formulation.name == "makespan_labels"
-    assert plan.objective["water"] == pytest.approx(least_with_pours(kind))
-    assert (plan.status, plan.certificate.gap) == ("optimal", 0.0)
-    claimed = seqopt.solve(replace(asked, resources=(replace(POUR, twin=None),)))
-    free = plan.objective["water"] == pytest.approx(best(kind))  # proven without it as well
-    assert str(claimed.status) == ("optimal" if free else "claimed optimal")
-    assert free is (kind == "peak")
-
-
-@pytest.mark.parametrize(
-    "extend",
-    [
-        lambda steps, values: poured_over(steps, values) + 0.25,
-        lambda steps, values: np.where(np.isfinite(v := poured_over(steps, values)), v, 1.0),
-        lambda steps, values: (
-            poured_over(steps, values) + np.where(steps.after[:, :1] == WANTED - 1, np.inf, 0.0)
-        ),
-    ],
-    ids=["a constant added", "let through", "left out"],
-)
-def test_a_resource_that_the_search_gets_wrong_is_seen(extend):
-    right = replace(puzzle("sum"), resources=(POUR,))
-    assert seqopt.solve(right).status == "optimal"
-    with pytest.raises((SolverError, seqopt.errors.InfeasibleError)):
-        seqopt.solve(replace(right, resources=(replace(POUR, extend=extend),)))

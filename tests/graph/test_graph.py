@@ -1,4 +1,4 @@
-"""Best paths, their bounds and the visits of an explorer, against brute force and networkx."""
+"""Paths, bounds, multipliers and visits of an explorer against brute force and other solvers."""
 
 from __future__ import annotations
 

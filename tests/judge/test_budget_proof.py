@@ -182,22 +182,3 @@ def test_few_labels_stop_with_a_bound(problem25):
     tight = replace(capped, budgets=(*capped.budgets, travel(problem25, 11.4)))
     with pytest.raises(TimeUpError, match="no path within all caps was found yet"):
         solve(tight, "labels", most=1, time_limit=0)
-
-
-def test_what_a_budget_costs(problem25):
-    """Less travel costs more, at a price that rises; both formulations name it."""
-    bounds = (12.0, 16.0, 20.0, 30.0)
-    capped = [replace(problem25, budgets=(travel(problem25, bound),)) for bound in bounds]
-    plans = [solve(problem, "labels") for problem in capped]
-    proofs = [plan.certificate for plan in plans]
-    values = [proof.objective for proof in proofs]
-    prices = [plan.selection.prices[0][0] for plan in plans]
-    assert values == sorted(values, reverse=True)
-    assert all(p.spent["robot travel [m]"] <= b for p, b in zip(proofs, bounds, strict=True))
-    assert all(proof.gap <= 1e-6 for proof in proofs)
-    assert prices == sorted(prices, reverse=True)
-    assert prices[-1] == 0
-    relaxed = [solve(problem, "lagrangian").selection.prices[0][0] for problem in capped[:2]]
-    np.testing.assert_allclose(relaxed, prices[:2])
-    with pytest.raises(InfeasibleError):
-        solve(replace(problem25, budgets=(travel(problem25, 10.0),)), "labels")

@@ -1,4 +1,4 @@
-"""What judges free schedules and Pareto sets sees what is wrong with them."""
+"""What judges free schedules and Pareto sets sees what is wrong, and says what bounds rest on."""
 
 from __future__ import annotations
 

@@ -67,6 +67,9 @@ NONSENSE = {
             "states": {
                 "None": None,
                 "of floats": ((0.0,), (1.0,), (0.5,)),
+                "of None": ((None,),) * 3,
+                "nested twice": ((NODES,),) * 3,
+                "below": ((-1,), (2,), (3,)),
                 "of NaN": ((np.nan,),) * 3,
                 "not nested": (1, 2, 3),
                 "a table of floats": np.zeros((3, 2)),

@@ -1,4 +1,4 @@
-"""One way to solve: what is computed when, and what a plan says of itself."""
+"""One way to solve: what is computed when, what a plan says of itself, what a watch is told."""
 
 from __future__ import annotations
 

@@ -141,13 +141,6 @@ def test_a_search_of_few_labels_still_has_a_valid_bound(aim, layers, most):
         assert plan.certificate.objective >= min(found.values()) - 1e-9
 
 
-@given(each=st.lists(st.floats(-100, 100), min_size=1, max_size=8), level=st.floats(0, 0.99))
-def test_a_tail_is_the_least_over_thresholds(each, level):
-    aim = cvar(level)
-    assert aim.value(np.array(each)) == pytest.approx(tail(each, aim), abs=1e-9)
-    assert aim.ordered_weights(len(each)).sum() == pytest.approx(1.0)
-
-
 # negative controls: a wrong claim is seen
 
 

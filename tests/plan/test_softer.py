@@ -66,12 +66,6 @@ def test_a_payload_that_a_robot_could_have_is_still_said():
     assert least <= float(newton) < 1.1 * least
 
 
-def test_weights_loads_and_wind_are_the_most_that_robots_need_to_carry():
-    scene = replace(small_arch(3), wind=(0.0, 0.25, 0.0), weight_factor=2.0)
-    weight = sum(brick.mass for brick in scene.bricks) * 9.81
-    assert whole_load(build_network(scene)) == pytest.approx((2.0 + 0.25) * weight, rel=1e-9)
-
-
 def test_a_free_schedule_names_grips_with_which_there_is_a_plan():
     engine = seqopt.make_engine("compliance", settled(bricks=4))
     problem = build_states(engine, FreeRules(), ONES, "steps")

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 import seqopt
 from experiments.harness.scenes import running_bond
-from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
@@ -104,14 +103,6 @@ def test_a_scene_that_no_fixed_method_builds_has_scales_of_its_own(criterion):
     assert summary["scales"]["T_max"] == pytest.approx(weight)
     given = seqopt.optimize(scene, "free", "worst-ratio-published", rules=ALONE)
     assert given.summary()["criterion"] == "worst-ratio-published"
-
-
-def test_the_command_line_says_so(capsys, tmp_path):
-    seqopt.save_scene(one_places(5), tmp_path / "s.json")
-    words = ["--schedule", "free", "--rule", "newest=free", "--rule", "least_grips=1"]
-    assert main(["optimize", str(tmp_path / "s.json"), *words]) == 0
-    said = capsys.readouterr().err
-    assert "criterion: worst-ratio over payload, weight and size: no fixed method builds" in said
 
 
 def test_scales_of_a_scene_go_with_its_units():

@@ -41,15 +41,6 @@ def test_bars_are_the_grips_of_the_steps(plan25, arch25, loop25):
     assert bars(loop25.gantt()) == expected(arch25, loop25.steps)
 
 
-def test_words_name_brick_and_node_and_open_moves(plan25, loop25):
-    words = [text.get_text() for text in plan25.gantt().axes[0].texts]
-    assert len(words) == len(plan25.grips())
-    rows = plan25.grips().to_dict("records")
-    assert sorted(words) == sorted(f"{row['brick']} · {row['node']}" for row in rows)
-    open_ones = [w.get_text() for w in loop25.gantt().axes[0].texts if "?" in w.get_text()]
-    assert sorted(open_ones) == sorted(f"?{k}" for k in range(1, len(loop25.moves) + 1))
-
-
 def test_shades_follow_the_forces(engine25):
     build = GivenSequence(engine25, sequential(engine25.network))
     figure = build.gantt()

@@ -15,7 +15,6 @@ from seqopt.plan.pose import states_of
 from seqopt.report._regret._chart import PALE, regret_chart
 from seqopt.report._regret._measure import RIGID_GRIPS, Timer, measure_regret
 from seqopt.report._regret._table import CUT, DONE, FALLS, SAME, RegretTable, dominated
-from seqopt.responses import analyze_staged
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.table import force_column
 from seqopt.sequence.rules import FREE
@@ -138,28 +137,6 @@ def test_softer_grips_are_the_reference_and_rigid_ones_a_way():
     rigid = found.table[found.table["engine"] == RIGID_GRIPS]
     assert (rigid["error"].dropna() > 0.01).all()  # what they promise is not what comes
     assert not {"ranks"} & {*found.table["without"]}  # nothing ranks here
-
-
-def test_what_earlier_steps_lock_in_is_valued_by_their_table():
-    """A second route: the worst share of limits in the table of staged responses."""
-    engine = seqopt.make_engine("compliance", small_arch(3))
-    found = measure_regret(engine, WORST, reference="staged", **ONCE)
-    rows = found.table.set_index(["schedule", "formulation", "without"])
-    row = rows[rows["engine"] == "compliance"].loc[FREE, "schedule_search", ""]
-    problem = seqopt.pose(engine, seqopt.FreeRules(), WORST, "minmax")
-    plan = seqopt.solve(problem, "schedule_search")
-    limits = dict(states_of(problem).criterion.limits)
-    table = analyze_staged(engine.network, plan.steps)
-    grips = table[[force_column(robot) for robot in engine.network.scene.robots]].to_numpy(float)
-    shares = [np.nanmax(np.abs(grips)) / limits["F_largest"]]
-    for name in ("M_sup", "T_max", "D_max"):
-        shares.append(table[RESPONSES[name].column].max() / RESPONSES[name].scale / limits[name])
-    assert row["value"] == pytest.approx(max(shares))
-    assert row["value"] != pytest.approx(
-        row["own"]
-    )  # what its own model promises is not what comes
-    assert found.reference == "staged"
-    assert not found.is_proven  # no way chooses by it
 
 
 @pytest.mark.slow
