@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -22,8 +22,9 @@ from seqopt.scene._checks import short
 
 FORMAT, VERSION = "seqopt-instance", 1
 TEXT = "instance.json"  # the name of the text in the archive
-WHEN = (1980, 1, 1, 0, 0, 0)  # of every part: the same instance is the same file
-TIMED = ("free", "alike", "kinds", "move", "column", "origin", "prepares", "acts", "work")
+TIMED = (
+    *("free", "alike", "kinds", "move", "column", "origin", "prepares", "acts", "work", "longest"),
+)
 
 
 def stored(instance: Instance) -> bytes:
@@ -44,8 +45,7 @@ def stored(instance: Instance) -> bytes:
     if instance.alone is not None:
         arrays["alone"] = instance.alone
     if instance.timed is not None:
-        for name in (*TIMED, "longest"):
-            arrays[f"timed_{name}"] = _narrow(getattr(instance.timed, name))
+        arrays |= {f"timed_{name}": _narrow(getattr(instance.timed, name)) for name in TIMED}
     document = {
         "format": FORMAT,
         "version": VERSION,
@@ -59,39 +59,32 @@ def stored(instance: Instance) -> bytes:
         "alone": instance.alone is not None,
         "facts": dict(instance.facts),
     }
-    return _archive(arrays, json.dumps(document, indent=1) + "\n")
-
-
-def _narrow(values: np.ndarray) -> np.ndarray:
-    """Return integers in the smallest type that holds them."""
-    if values.dtype.kind not in "iu":
-        return values
-    low, high = values.min(initial=0), values.max(initial=0)
-    kinds = (np.int8, np.int16, np.int32)
-    fits = (k for k in kinds if np.iinfo(k).min <= low and high <= np.iinfo(k).max)
-    return values.astype(next(fits, np.int64))
-
-
-def _archive(arrays: dict[str, np.ndarray], text: str) -> bytes:
+    parts: dict[str, bytes | str] = {}
+    for name, array in arrays.items():
+        np.save(part := io.BytesIO(), array, allow_pickle=False)
+        parts[f"{name}.npy"] = part.getvalue()
+    parts[TEXT] = json.dumps(document, indent=1) + "\n"
     out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-        for name, array in arrays.items():
-            part = io.BytesIO()
-            np.save(part, array, allow_pickle=False)
-            archive.writestr(_named(f"{name}.npy"), part.getvalue())
-        archive.writestr(_named(TEXT), text)
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, content in parts.items():
+            about = zipfile.ZipInfo(name)  # of 1980, whenever it is written
+            about.create_system = 3  # the same on every system
+            archive.writestr(about, content, zipfile.ZIP_DEFLATED)
     return out.getvalue()
 
 
-def _named(name: str) -> zipfile.ZipInfo:
-    info = zipfile.ZipInfo(name, WHEN)
-    info.compress_type = zipfile.ZIP_DEFLATED
-    info.create_system = 3  # the same on every system
-    return info
+def _narrow(values: np.ndarray) -> np.ndarray:
+    """Return integers in the smallest signed type that holds them."""
+    if values.dtype.kind not in "iu":
+        return values
+    low, high = int(values.min(initial=0)), int(values.max(initial=0))
+    return values.astype(np.min_scalar_type(min(low, -1 - high)))
 
 
 def read(path: Path) -> Instance:
     """Read the instance of a file; raise a `FileError` that names the fault."""
+    import jsonschema  # noqa: PLC0415  # slow to import, and needed for files only
+
     if path.suffix in WRITERS and path.suffix != ".npz":
         raise FileError(f"{path}: {path.suffix} is written for solvers, not read; give the .npz")
     content = read_bytes(path)
@@ -100,13 +93,14 @@ def read(path: Path) -> Instance:
         document = parse_json(archive.text(TEXT), f"{path}: {TEXT}")
     except FileError as error:
         raise FileError(f"{error}; it is no instance: write one with seqopt instance") from error
-    _check(document, path)
+    schema = json.loads(files("seqopt").joinpath("data/instance.schema.json").read_text("utf-8"))
+    validator = jsonschema.Draft202012Validator(schema)
+    wrong = jsonschema.exceptions.best_match(validator.iter_errors(document))
+    if wrong is not None:
+        where = "/".join(map(str, wrong.absolute_path)) or "the text"
+        raise FileError(f"{path}: {TEXT}, {where}: {wrong.message}")
     for name in ("nodes", "arcs"):
         document[name] = int(document[name])  # JSON Schema takes 5.0 for a whole number
-    for goal in document["goals"]:
-        goal["columns"] = [*map(int, goal["columns"])]
-    for cap in document["caps"]:
-        cap["column"] = None if cap["column"] is None else int(cap["column"])
     try:
         return _instance(document, _arrays(document, archive))
     except (ProblemError, ValueError) as error:
@@ -116,46 +110,50 @@ def read(path: Path) -> Instance:
 def _arrays(document: dict[str, Any], archive: Archive) -> dict[str, np.ndarray]:
     """Return the arrays that a document declares, after checks of shape and type."""
     nodes, arcs, timed = document["nodes"], document["arcs"], document["timed"]
-    names = [f"amount_{k}" for k in range(len(document["columns"]))]
-    more = [f"timed_{name}" for name in (*TIMED, "longest")] if timed else []
-    beside = ("alone",) * document.get("alone", False)
-    every = ("source", "target", "ends", "states", *names, *beside, *more)
-    archive.require((TEXT, *(f"{name}.npy" for name in every)))
-    out = {name: archive.array(name, "iu", (arcs,)) for name in ("source", "target")}
-    out["ends"] = archive.array("ends", "iu", (None,))
-    out["states"] = archive.array("states", "iu", (nodes, None))
-    for name, column in zip(names, document["columns"], strict=True):
-        out[name] = archive.array(name, "iuf", (nodes if column["of"] == "nodes" else arcs,))
+    of = {f"amount_{k}": column["of"] for k, column in enumerate(document["columns"])}
+    shapes = {name: (nodes if kind == "nodes" else arcs,) for name, kind in of.items()}
+    shapes |= {"alone": (arcs, 2)} if document.get("alone", False) else {}
+    whole = {"source": (arcs,), "target": (arcs,), "ends": (None,), "states": (nodes, None)}
+    more = [f"timed_{name}" for name in TIMED] if timed else []
+    archive.require((TEXT, *(f"{name}.npy" for name in (*whole, *shapes, *more))))
+    out = {name: archive.array(name, "iu", shape) for name, shape in whole.items()}
+    for name, shape in shapes.items():
+        out[name] = archive.array(name, "iuf", shape).astype(float)
         if not np.isfinite(out[name]).all():
             raise ValueError(f"{name}: give finite numbers; an arc that nobody may take is none")
-    for name in beside:
-        out[name] = archive.array(name, "iuf", (arcs, 2)).astype(float)
-        if not np.isfinite(out[name]).all():
-            raise ValueError(f"{name}: give finite numbers")
+    for name in ("source", "target", "ends"):
+        _require_between(name, out[name], 0, nodes)
+    states, source, target = out["states"], out["source"], out["target"]
+    if not states.shape[1] or (states[source, 0] > states[target, 0]).any():
+        raise ValueError("states: begin with levels, to lower ones of which no arc leads")
     return out | (_timed_arrays(archive, nodes, arcs) if timed else {})
 
 
 def _timed_arrays(archive: Archive, nodes: int, arcs: int) -> dict[str, np.ndarray]:
     """Return the arrays of acts, after checks of their indices of columns, arcs and kinds."""
-    kinds = archive.array("timed_kinds", "iu", (None,))
+    kinds, move = (archive.array(f"timed_{name}", "iu", (None,)) for name in ("kinds", "move"))
     c, k = len(kinds), int(kinds.max(initial=-1)) + 1
-    move = archive.array("timed_move", "iu", (None,))
-    out = {"kinds": kinds, "move": move, "free": archive.array("timed_free", "b", (nodes, c))}
-    out["alike"] = archive.array("timed_alike", "b", (nodes, max(c - 1, 0)))
-    out["column"] = archive.array("timed_column", "iu", (len(move),))
-    out["origin"] = archive.array("timed_origin", "iu", (len(move), c))
-    shapes = {"prepares": (arcs,), "acts": (arcs,), "work": (arcs, 1 + k), "longest": (c,)}
-    out |= {name: archive.array(f"timed_{name}", "iuf", shape) for name, shape in shapes.items()}
+    shapes: dict[str, tuple[str, tuple[int, ...]]] = {
+        "free": ("b", (nodes, c)),
+        "alike": ("b", (nodes, max(c - 1, 0))),
+        "column": ("iu", (len(move),)),
+        "origin": ("iu", (len(move), c)),
+        "prepares": ("iuf", (arcs,)),
+        "acts": ("iuf", (arcs,)),
+        "work": ("iuf", (arcs, 1 + k)),
+        "longest": ("iuf", (c,)),
+    }
+    out = {name: archive.array(f"timed_{name}", *each) for name, each in shapes.items()}
     if {*kinds.tolist()} != {*range(k)} or not k:
         raise ValueError(f"kinds of robots are {short(kinds.tolist())}; count them from 0")
     if not np.array_equal(np.unique(move), np.arange(arcs)) or (np.diff(move) < 0).any():
         raise ValueError("timed_move: give the arcs of acts in order, every arc at least once")
-    for name, least, most in (("column", -1, c), ("origin", NOW, c)):
-        _require_between(f"timed_{name}", out[name], least, most)
-    for name in shapes:
-        if not (np.isfinite(out[name]) & (out[name] >= 0)).all():
+    _require_between("timed_column", out["column"], -1, c)
+    _require_between("timed_origin", out["origin"], NOW, c)
+    for name, (letters, _) in shapes.items():
+        if "f" in letters and not (np.isfinite(out[name]) & (out[name] >= 0)).all():
             raise ValueError(f"timed_{name}: give finite numbers of seconds from 0")
-    return {f"timed_{name}": array for name, array in out.items()}
+    return {f"timed_{name}": each for name, each in {**out, "kinds": kinds, "move": move}.items()}
 
 
 def _require_between(name: str, numbers: np.ndarray, least: int, end: int) -> None:
@@ -165,74 +163,40 @@ def _require_between(name: str, numbers: np.ndarray, least: int, end: int) -> No
         raise ValueError(f"{name}: {worst} is not from {least} to {end - 1}")
 
 
-def _check(document: object, path: Path) -> None:
-    """Raise a `FileError` that names the first entry where a document breaks the schema."""
-    import jsonschema  # noqa: PLC0415  # slow to import, and needed for files only
-
-    schema = json.loads(files("seqopt").joinpath("data/instance.schema.json").read_text("utf-8"))
-    validator = jsonschema.Draft202012Validator(schema)
-    error = jsonschema.exceptions.best_match(validator.iter_errors(document))
-    if error is not None:
-        where = "/".join(map(str, error.absolute_path)) or "the text"
-        raise FileError(f"{path}: {TEXT}, {where}: {error.message}")
-
-
 def _instance(document: dict[str, Any], arrays: dict[str, np.ndarray]) -> Instance:
     """Return the instance of a valid document and its arrays."""
-    count, names = document["nodes"], tuple(column["name"] for column in document["columns"])
-    for name in ("source", "target", "ends"):
-        _require_between(name, arrays[name], 0, count)
-    ends = np.zeros(count, dtype=bool)
-    ends[arrays["ends"]] = True
-    amounts = np.zeros((document["arcs"], len(names)))
-    for k, column in enumerate(document["columns"]):
-        values = arrays[f"amount_{k}"]
-        amounts[:, k] = values[arrays["target"]] if column["of"] == "nodes" else values
-    goals = tuple(
-        _Target(g["name"], g["kind"], tuple(g["columns"]), g["most"]) for g in document["goals"]
-    )
-    caps = tuple(_Cap(**cap) for cap in document["caps"])
-    _require_columns(goals, caps, len(names))
-    states = arrays["states"].astype(np.int64)
     rows = arrays["source"].astype(np.int32), arrays["target"].astype(np.int32)
-    if not states.shape[1] or (states[rows[0], 0] > states[rows[1], 0]).any():
-        raise ValueError("states: begin with levels, to lower ones of which no arc leads")
-    timed = None
-    if document["timed"]:
-        own: list[Any] = [arrays[f"timed_{name}"] for name in (*TIMED, "longest")]
-        whole: list[Any] = [
-            each.astype(np.int64) if each.dtype.kind in "iu" else each for each in own
-        ]
-        graph = Graph(*rows, amounts, (False,) * len(names), ends)
-        timed = TimedGraph(_by_goal(graph, (goals, caps)), states[:, 0], *whole)
-    return Instance(
-        document["name"],
-        *rows,
-        ends,
-        tuple(names),
-        amounts,
-        tuple(goals),
-        tuple(caps),
-        states=states,
-        timed=timed,
-        alone=arrays.get("alone"),
-        facts=document["facts"],
+    ends = np.isin(np.arange(document["nodes"]), arrays["ends"])
+    columns, states = document["columns"], arrays["states"].astype(np.int64)
+    names, amounts = tuple(each["name"] for each in columns), np.zeros((len(rows[0]), len(columns)))
+    for k, column in enumerate(columns):
+        values = arrays[f"amount_{k}"]
+        amounts[:, k] = values[rows[1]] if column["of"] == "nodes" else values
+    goals = tuple(
+        _Target(g["name"], g["kind"], tuple(map(int, g["columns"])), g["most"])
+        for g in document["goals"]
     )
-
-
-def _require_columns(goals: Sequence[_Target], caps: Sequence[_Cap], count: int) -> None:
-    """Raise a `ValueError` unless goals and caps refer to existing columns, in their number."""
-    for which in [c for g in goals for c in g.columns] + [cap.column or 0 for cap in caps]:
-        if which and which >= count:
-            raise ValueError(f"column {which} is named, and there are {count}")
+    whole = ((c["name"], c["column"], c["most"]) for c in document["caps"])
+    caps = tuple(_Cap(name, None if k is None else int(k), most) for name, k, most in whole)
+    for k in [k for goal in goals for k in goal.columns] + [cap.column or 0 for cap in caps]:
+        if k and k >= len(names):
+            raise ValueError(f"column {k} is named, and there are {len(names)}")
     for goal in goals:
-        if (goal.kind in (SUM, PEAK) and len(goal.columns) != 1) or (
-            goal.kind == TAIL and not goal.columns
-        ):
+        count = len(goal.columns)
+        if (goal.kind in (SUM, PEAK) and count != 1) or (goal.kind == TAIL and not count):
             raise ValueError(f"goal {goal.name}: {goal.kind} is of one column, tail of several")
     for cap in caps:
         if not cap.most >= 0:
             raise ValueError(f"cap {cap.name}: {cap.most:g} is no amount; give a number from 0")
+    timed = None
+    if document["timed"]:
+        graph = Graph(*rows, amounts, (False,) * len(names), ends)
+        own: list[Any] = [arrays[f"timed_{name}"] for name in TIMED]
+        own = [each.astype(np.int64) if each.dtype.kind in "iu" else each for each in own]
+        timed = TimedGraph(_by_goal(graph, (goals, caps)), states[:, 0], *own)
+    facts: dict[str, Any] = {"states": states, "timed": timed, "facts": document["facts"]}
+    facts["alone"] = arrays.get("alone")
+    return Instance(document["name"], *rows, ends, names, amounts, goals, caps, **facts)
 
 
 WRITERS: dict[str, Callable[[Instance], bytes | str]] = {".npz": stored, ".mps": as_mps}

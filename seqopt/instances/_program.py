@@ -20,7 +20,7 @@ from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.graph import HELD, NOW, TimedGraph
-from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target
+from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
 from seqopt.graph.paths import distances
 
 
@@ -84,54 +84,58 @@ def _columns(found: Program) -> Iterator[str]:
 class _Draft:
     """Rows of the program under construction."""
 
-    count: int
     at: list[tuple[Ints, Ints, Floats]] = field(default_factory=list)
     low: list[Floats] = field(default_factory=list)
     high: list[Floats] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
-    total: int = 0
 
     def add(
-        self, name: str, parts: tuple[Ints, Ints, Floats], limits: tuple[Floats, Floats]
+        self,
+        name: str,
+        rows: Ints | int,
+        columns: Ints | int,
+        values: Floats | float,
+        low: Floats | float,
+        high: Floats | float = np.inf,
     ) -> None:
-        """Add rows: entries (row, column, value) and limits."""
-        count = len(limits[0])
-        rows, columns, values = parts
-        self.at.append((rows + self.total, columns, values))
+        """Add rows: their entries by row from 0 and column, and limits, one for every row."""
+        entries = np.broadcast_arrays(len(self.names) + np.atleast_1d(rows), columns, values)
+        limits = np.broadcast_arrays(np.atleast_1d(low), high)
+        self.at.append((entries[0], entries[1], entries[2]))
         self.low.append(limits[0])
         self.high.append(limits[1])
+        count = len(limits[0])
         self.names += [name] if count == 1 else [f"{name}_{k}" for k in range(count)]
-        self.total += count
 
 
 def program(instance: Instance) -> Program:
     """Return the program of the first goal; further goals are unbounded rows."""
     timed = instance.timed if instance.asks_time else None
     arc = np.arange(instance.arcs) if timed is None else timed.move
-    letter, count = ("x" if timed is None else "y"), len(arc)
-    names = [f"{letter}{k}" for k in range(count)]
-    more = _more(instance, timed)
-    names += more.names
-    draft = _Draft(count)
+    every, more, draft = np.arange(len(arc)), _more(instance, timed), _Draft()
+    names = [*(f"{'x' if timed is None else 'y'}{k}" for k in every), *more.names]
     _flow(draft, instance, arc)
-    goals = [_goal(draft, instance, goal, arc, more) for goal in instance.goals]
-    _caps(draft, instance, arc, more)
+    goals = [_goal(draft, instance, k, arc, more) for k in range(len(instance.goals))]
+    for k, cap in enumerate(instance.caps):
+        if cap.column is None:
+            draft.add(f"cap_{k}", 0, more.at["end"], 1.0, -np.inf, cap.most)
+        else:
+            own = instance.amounts[arc, cap.column]
+            draft.add(f"cap_{k}", 0, every, own, -np.inf, cap.most)
     if timed is not None:
         _times(draft, instance, timed, more)
-    total = len(names)
     for k, own in enumerate(goals[1:], start=1):
         at = np.flatnonzero(own)
-        parts = np.zeros(len(at), dtype=int), at, own[at]
-        draft.add(f"goal_{k}", parts, (np.full(1, -np.inf), np.full(1, np.inf)))
+        draft.add(f"goal_{k}", 0, at, own[at], -np.inf)
     rows, columns, values = (np.concatenate(each) for each in zip(*draft.at, strict=True))
-    matrix = sparse.csr_array((values, (rows, columns)), shape=(draft.total, total))
+    shape = len(draft.names), len(names)
+    matrix = sparse.csr_array((values, (rows, columns)), shape=shape)
     matrix.sum_duplicates()
     matrix.eliminate_zeros()
-    cost = np.pad(goals[0], (0, total - len(goals[0])))
-    whole = np.arange(total) < count
+    whole = np.arange(len(names)) < len(arc)
     upper = np.where(whole, 1.0, more.most)
     limits = np.concatenate(draft.low), np.concatenate(draft.high)
-    return Program(names, cost, upper, whole, matrix, *limits, draft.names)
+    return Program(names, goals[0], upper, whole, matrix, *limits, draft.names)
 
 
 class _More(NamedTuple):
@@ -139,7 +143,7 @@ class _More(NamedTuple):
 
     names: list[str]
     at: dict[str, int]
-    most: float
+    most: float  # of each: with times an upper bound of the makespan, s
 
 
 def _more(instance: Instance, timed: TimedGraph | None) -> _More:
@@ -154,85 +158,53 @@ def _more(instance: Instance, timed: TimedGraph | None) -> _More:
             names += [f"eta{k}", *(f"u{k}_{s}" for s in range(len(goal.columns)))]
     if timed is None:
         return _More(names, at, np.inf)
-    at["end"] = first + len(names)
-    names.append("makespan")
-    at["node"] = first + len(names)
-    names += [f"T{v}" for v in range(instance.nodes)]
-    at["since"] = first + len(names)
+    at["end"], at["node"] = first + len(names), first + len(names) + 1
+    at["since"] = at["node"] + instance.nodes
+    names += ["makespan", *(f"T{v}" for v in range(instance.nodes))]
     names += [f"r{v}_{c}" for v in range(instance.nodes) for c in range(len(timed.kinds))]
-    return _More(names, at, horizon(timed))
-
-
-def horizon(timed: TimedGraph) -> float:
-    """Return an upper bound of the makespan, s: the shortest path with all work in sequence."""
-    graph = timed.graph
-    longest = timed.prepares + timed.acts
-    return float(distances(graph, longest)[graph.ends].min())
+    one_by_one = distances(timed.graph, timed.prepares + timed.acts)
+    return _More(names, at, float(one_by_one[timed.graph.ends].min()))
 
 
 def _flow(draft: _Draft, instance: Instance, arc: Ints) -> None:
     """Add flow conservation of one unit from node 0 to an end."""
-    source, target = instance.source[arc], instance.target[arc]
-    column, ones = np.arange(len(arc)), np.ones(len(arc))
-    inner = ~instance.ends
+    source, target, inner = instance.source[arc], instance.target[arc], ~instance.ends
     number = np.cumsum(inner) - 1
-    leaves, comes = inner[source], inner[target]
+    leaves, comes = np.flatnonzero(inner[source]), np.flatnonzero(inner[target])
     rows = np.concatenate([number[source[leaves]], number[target[comes]]])
-    columns = np.concatenate([column[leaves], column[comes]])
-    values = np.concatenate([ones[leaves], -ones[comes]])
+    signs = np.repeat([1.0, -1.0], [len(leaves), len(comes)])
     right = np.zeros(int(inner.sum()))
     right[0] = 1.0
-    draft.add("flow", (rows, columns, values), (right, right))
-    last = np.flatnonzero(instance.ends[target])
-    went = np.flatnonzero(instance.ends[source])
-    parts = np.concatenate([last, went])
-    signs = np.concatenate([np.ones(len(last)), -np.ones(len(went))])
-    draft.add("ends", (np.zeros(len(parts), dtype=int), parts, signs), (np.ones(1), np.ones(1)))
+    draft.add("flow", rows, np.concatenate([leaves, comes]), signs, right, right)
+    last, went = np.flatnonzero(instance.ends[target]), np.flatnonzero(instance.ends[source])
+    signs = np.repeat([1.0, -1.0], [len(last), len(went)])
+    draft.add("ends", 0, np.concatenate([last, went]), signs, 1.0, 1.0)
 
 
-def _goal(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, more: _More) -> Floats:
+def _goal(draft: _Draft, instance: Instance, k: int, arc: Ints, more: _More) -> Floats:
     """Add the rows of a goal, and return its cost vector."""
-    k = instance.goals.index(goal)
+    goal, every, to = instance.goals[k], np.arange(len(arc)), instance.target[arc]
+    out = np.zeros(len(arc) + len(more.names))
     if goal.kind == SUM:
-        return np.asarray(instance.amounts[arc, goal.columns[0]])
-    out = np.zeros(draft.count + len(more.names))
-    if goal.kind == TIME:
+        out[every] = instance.amounts[arc, goal.columns[0]]
+    elif goal.kind == TIME:
         out[more.at["end"]] = 1.0
-    elif goal.kind == PEAK:
-        out[more.at[f"peak {k}"]] = 1.0
-        _peak(draft, instance, goal, arc, more.at[f"peak {k}"])
+    elif goal.kind == PEAK:  # what arcs to a level take, or to a node
+        variable = more.at[f"peak {k}"]
+        out[variable] = 1.0
+        groups = instance.levels[to] if instance.is_layered else to
+        own, rows = np.unique(groups, return_inverse=True)
+        ones = np.ones(len(own))
+        columns = np.concatenate([every, np.full(len(own), variable)])
+        values = np.concatenate([-instance.amounts[arc, goal.columns[0]], ones])
+        draft.add("peak", np.append(rows, np.arange(len(own))), columns, values, 0 * ones)
     else:
         first, count = more.at[f"tail {k}"], len(goal.columns)
         out[first], out[first + 1 : first + 1 + count] = 1.0, goal.most
         for s, column in enumerate(goal.columns):  # u_s: what a total is above the threshold
-            columns = np.concatenate([np.arange(len(arc)), [first, first + 1 + s]])
-            values = np.concatenate([-instance.amounts[arc, column], [1.0, 1.0]])
-            parts = np.zeros(len(values), dtype=int), columns, values
-            draft.add(f"total_{s}", parts, (np.zeros(1), np.full(1, np.inf)))
+            values = np.append(-instance.amounts[arc, column], [1.0, 1.0])
+            draft.add(f"total_{s}", 0, np.append(every, [first, first + 1 + s]), values, 0.0)
     return out
-
-
-def _peak(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, variable: int) -> None:
-    """Add rows that bound the peak below by the amounts of each level, or of each node."""
-    to = instance.target[arc]
-    groups = instance.levels[to] if instance.is_layered else to
-    own, rows = np.unique(groups, return_inverse=True)
-    count = len(own)
-    at = np.concatenate([rows, np.arange(count)])
-    columns = np.concatenate([np.arange(len(arc)), np.full(count, variable)])
-    values = np.concatenate([-instance.amounts[arc, goal.columns[0]], np.ones(count)])
-    draft.add("peak", (at, columns, values), (np.zeros(count), np.full(count, np.inf)))
-
-
-def _caps(draft: _Draft, instance: Instance, arc: Ints, more: _More) -> None:
-    for k, cap in enumerate(instance.caps):
-        limits = np.full(1, -np.inf), np.full(1, cap.most)
-        if cap.column is None:
-            parts = np.zeros(1, dtype=int), np.array([more.at["end"]]), np.ones(1)
-        else:
-            own = instance.amounts[arc, cap.column]
-            parts = np.zeros(len(arc), dtype=int), np.arange(len(arc)), own
-        draft.add(f"cap_{k}", parts, limits)
 
 
 def _times(draft: _Draft, instance: Instance, timed: TimedGraph, more: _More) -> None:
@@ -257,10 +229,8 @@ def _times(draft: _Draft, instance: Instance, timed: TimedGraph, more: _More) ->
     last = np.full(len(ends), more.at["end"])
     _after(draft, "last", (last, node + ends), np.zeros(len(ends)))
     for k, size in enumerate(timed.sizes.tolist()):
-        parts = np.append(every, more.at["end"])
         values = np.append(-timed.work[move, k], float(size))
-        at = np.zeros(len(parts), dtype=int), parts, values
-        draft.add(f"share_{k}", at, (np.zeros(1), np.full(1, np.inf)))
+        draft.add(f"share_{k}", 0, np.append(every, more.at["end"]), values, 0.0)
 
 
 def _after(
@@ -275,12 +245,9 @@ def _after(
 
     Of acts, :math:`t - t' - (M + d) y \ge -M`: only of those that are ``taken``.
     """
-    first, second = variables
-    count = len(first)
-    ones, low = np.ones(count), least if taken is None else np.full(count, -big)
-    columns, values = [first, second], [ones, -ones]
+    ones = np.ones(len(least))
+    columns, values, low = [*variables], [ones, -ones], least
     if taken is not None:
-        columns, values = [*columns, taken], [*values, -(big + least)]
-    rows = np.tile(np.arange(count), len(columns))
-    parts = rows, np.concatenate(columns), np.concatenate(values)
-    draft.add(name, parts, (low, np.full(count, np.inf)))
+        columns, values, low = [*columns, taken], [*values, -(big + least)], -big * ones
+    rows = np.tile(np.arange(len(least)), len(columns))
+    draft.add(name, rows, np.concatenate(columns), np.concatenate(values), low)

@@ -93,25 +93,23 @@ def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
 
 
 def _loaded(given: Any) -> tuple[Any, str]:
-    """Return the content of a file or a text, or a given value; and its name in messages."""
-    if isinstance(given, Path):
-        return _parsed(read_text(given), str(given)), str(given)
-    if isinstance(given, str):
-        return _parsed(given, "the solution"), "the solution"
-    return given, "the solution"
+    """Return the content of a file or a text, or a given value; and its name in messages.
 
-
-def _parsed(text: str, where: str) -> Any:
-    """Parse a text: JSON, or numbers after a word that names their kind."""
+    A text is JSON, or numbers after a word that names their kind.
+    """
+    where = str(given) if isinstance(given, Path) else "the solution"
+    text = read_text(given) if isinstance(given, Path) else given
+    if not isinstance(text, str):
+        return given, where
     if text.lstrip()[:1] in ("{", "["):
-        return parse_json(text, where, ProblemError)
+        return parse_json(text, where, ProblemError), where
     words = re.split(r"[\s,;]+", text.strip())
     what = words[0].lower().rstrip(":").removesuffix("s") + "s"
     numbers = words[1:] if what in WHAT else words
     for word in numbers:
         if not re.fullmatch(r"[0-9]{1,18}", word):
             raise ProblemError(f"{where}: {short(word)} is no number of a node; give 0, 1, 2 …")
-    return {what if what in WHAT else "nodes": [int(word) for word in numbers]}
+    return {what if what in WHAT else "nodes": [int(word) for word in numbers]}, where
 
 
 def _whole(given: Any, where: str) -> Ints:
@@ -182,7 +180,13 @@ def _claim(given: Any, where: str) -> Claim:
     }
     shares = None if given.get("shares") is None else _table(given["shares"], f"{where}, shares")
     cut = None if given.get("cut") is None else _whole(given["cut"], f"{where}, cut")
-    labels = None if given.get("labels") is None else _labels(given["labels"], f"{where}, labels")
+    labels = None
+    if (found := given.get("labels")) is not None:
+        said = f"{where}, labels"
+        if not isinstance(found, Mapping) or {*found} != {"nodes", "values"}:
+            raise ProblemError(f"{said}: give nodes and values")
+        nodes, rows = _whole(found["nodes"], f"{said}, nodes"), found["values"]
+        labels = nodes, _table(rows, f"{said}, values")
     number = None if value is None else float(_floats([value], where)[0])
     named = {str(n): float(_floats([p], f"{where}, prices")[0]) for n, p in prices.items()}
     return Claim(number, **arrays, cut=cut, prices=named, shares=shares, labels=labels)
@@ -194,10 +198,3 @@ def _table(given: Any, where: str) -> Floats:
     if found is None or not 1 <= found.ndim <= 2:
         raise ProblemError(f"{where}: give rows of as many numbers each")
     return np.atleast_2d(found.astype(float))
-
-
-def _labels(given: Any, where: str) -> tuple[Ints, Floats]:
-    """Return labels: their nodes (n,) and values (n, k)."""
-    if not isinstance(given, Mapping) or {*given} != {"nodes", "values"}:
-        raise ProblemError(f"{where}: give nodes and values")
-    return _whole(given["nodes"], f"{where}, nodes"), _table(given["values"], f"{where}, values")

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from seqopt._registry import offered
-from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.decision_costs import on_paths
@@ -117,9 +116,18 @@ def _of_states(name: str, states: States, below: float) -> Instance:
         peaks = tuple(whole.peaks[k] for k in every)
         whole = Graph(whole.source, whole.target, whole.amounts[:, every], peaks, whole.ends)
     small, kept = on_paths(whole)
-    if timed is not None:
-        timed = _cut(timed, whole, kept, _by_goal(small, asked[1:]))
     names, goals, caps = asked
+    if timed is not None:  # of the nodes that are kept
+        on = np.isin(np.arange(whole.states), kept)
+        arcs = on[whole.source] & on[whole.target]
+        acts = arcs[timed.move]
+        timed = TimedGraph(
+            _by_goal(small, (goals, caps)),
+            *(timed.levels[on], timed.free[on], timed.alike[on], timed.kinds),
+            (np.cumsum(arcs) - 1)[timed.move[acts]],
+            *(timed.column[acts], timed.origin[acts]),
+            *(timed.prepares[arcs], timed.acts[arcs], timed.work[arcs], timed.longest),
+        )
     arrays = small.source, small.target, small.ends
     return Instance(name, *arrays, tuple(names), small.amounts, goals, caps, rows[kept], timed)
 
@@ -139,14 +147,3 @@ def _targets(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap
         else:
             caps.append(_Cap(str(goal), column, bound))
     return names, tuple(goals), tuple(caps)
-
-
-def _cut(timed: TimedGraph, whole: Graph, kept: Ints, graph: Graph) -> TimedGraph:
-    """Restrict a timed graph to the kept nodes; ``graph``: the restricted one without times."""
-    on = np.isin(np.arange(whole.states), kept)
-    arcs = on[whole.source] & on[whole.target]
-    acts = arcs[timed.move]
-    own = timed.prepares[arcs], timed.acts[arcs], timed.work[arcs]
-    who = (np.cumsum(arcs) - 1)[timed.move[acts]], timed.column[acts], timed.origin[acts]
-    states = timed.levels[on], timed.free[on], timed.alike[on], timed.kinds
-    return TimedGraph(graph, *states, *who, *own, timed.longest)
