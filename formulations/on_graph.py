@@ -89,10 +89,9 @@ class OnGraph(Terse):
 
     @property
     def __signature__(self) -> inspect.Signature:
-        """Its own parameters and the options of what it chooses by."""
-        own = inspect.signature(type(self).__call__).parameters.values()
-        mine = [p for p in own if p.name != "self" and p.kind is not inspect.Parameter.VAR_KEYWORD]
-        return inspect.Signature([*mine, *self._own_options().values()])
+        """The problem, the options of what it chooses by, and its own."""
+        problem, *own = [*inspect.signature(type(self).__call__).parameters.values()][1:-1]
+        return inspect.Signature([problem, *self._own_options().values(), *own])
 
     def _own_options(self) -> dict[str, inspect.Parameter]:
         """Return the options of what it chooses by, by name."""
@@ -114,6 +113,7 @@ class OnGraph(Terse):
         Raises a `ProblemError` if there are budgets that it does not take.
         """
         watch = watch or Watch(seconds)
+        watch.memory = min(watch.memory, max_memory)
 
         def choose(graph: Graph, watch: Watch) -> Choice:
             return self.choose(graph, watch, **options)
@@ -122,7 +122,7 @@ class OnGraph(Terse):
             if problem.caps and not self.takes_budgets:
                 raise ProblemError(f"formulation {self.name}: it takes no caps; take labels")
             return path_of_instance(problem, choose, watch)
-        tell = watched(problem, watch, max_memory, progress)
+        tell = watched(problem, watch, progress)
         if self.search is not None:
             own = {name: p.default for name, p in self._own_options().items()} | options
             return self.search(problem, watch, tell, **own)

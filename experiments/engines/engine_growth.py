@@ -11,10 +11,11 @@ Edge forces of the steps of every plan err by at most 1e-9 of the largest of eac
 Method: `analyze` of all steps of the sequential method, and the three-robot loop
 without proof (criterion `equations-2-3`, cascade; also with two processes), with proof (overlap_dp)
 and with a lazy proof (`worst-ratio`, minimax), on chains of 25 to 1,000 bricks in the shape of
-`arch25`, on `vault338` and vaults from words. Every run has a process of its own; seconds of the core are counted, by
-the clock where two processes work. Errors are those against the refined mixed system at up to forty
-steps of the plan, and at random sets of three grips as they are screened. Exponents are fitted over
-100 bricks and more; of memory what the smallest run takes is taken off, libraries above all.
+`arch25`, on `vault338` and vaults from words. Every run has a process of its own; seconds of the
+core are counted, by the clock where two processes work. Errors are those against the refined mixed
+system at up to forty steps of the plan, and at random sets of three grips as they are screened.
+Exponents are fitted over 100 bricks and more; of memory what the smallest run takes is taken off,
+libraries above all.
 
 Inputs: the shipped scenes; seed 0. Command: ``python -m experiments engine_growth [--quick]``.
 """

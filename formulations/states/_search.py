@@ -121,10 +121,10 @@ def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> Sol
     return replace(found, bound=bound, stopped=stopped, prices=best.prices)
 
 
-def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watching:
+def watched(problem: States, watch: Watch, progress: Tell) -> Watching:
     """Return a callback of explorers: it reports progress, and enforces time and memory limits.
 
-    ``watch``: whose end raises a `StopError`; ``most``: memory, bytes.
+    ``watch``: whose end raises a `StopError`.
     """
     asked = 0.0
 
@@ -135,7 +135,7 @@ def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watch
             raise StopError("time")
         nonlocal asked
         used = COPIES * (found.nbytes + problem.nbytes)
-        if used > most:
+        if used > watch.memory:
             raise StopError("memory")
         if used > GROWN * asked:
             asked = used

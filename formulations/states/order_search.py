@@ -26,6 +26,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from formulations.choice import Choice, shortest
+from formulations.on_graph import on_graph
 from formulations.states._search import (
     Options,
     StopError,
@@ -39,42 +41,36 @@ from formulations.states._search import (
 )
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph._orders import TooManySetsError, order_rules
-from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch, find_formulation
+from seqopt.graph.formulation import Solution, Watch, find_formulation
+from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
 from seqopt.scene.scene import Order
-from seqopt.work.progress import Tell
 
 HOW = Options(width=50, growth=1.1, dear=False)
 
 
-def solve(
-    problem: States,
-    *,
-    most: int = 5000,
-    seconds: float = np.inf,
-    max_memory: float = np.inf,
-    progress: Tell = lambda _: None,
-) -> Solution:
-    """Return the best plan in any order, or the best in the scene's own and a bound.
+def choose(graph: Graph, watch: Watch, *, most: int = 5000) -> Choice:  # noqa: ARG001  # of orders
+    """Return the best path of a graph that is there.
 
-    ``most``: pairs of a set of bricks and a newest one, up to which all orders are looked at;
-    ``seconds``, ``max_memory`` (bytes): after which, or above which, the best plan found is
-    returned. Raises `InfeasibleError`, `ProblemError`, `TimeUpError` if no order has a plan, a
-    number is none, or no plan was found by the end of the search.
+    ``most``: pairs of a set of bricks and a newest one, up to which all orders are looked at. What
+    the search returns at a limit of time or memory is the best plan by then.
     """
+    return shortest(graph, watch)
+
+
+def _of_orders(problem: States, watch: Watch, tell: Watching, *, most: int) -> Solution:
+    """Return the best plan in any order, or the best in the scene's own and a bound."""
     if most < 0:
         raise ProblemError(f"option most={most}: give a whole number from 0 on")
     first = problem.goals[0]
     if not first.is_peak or first.margins or problem.budgets:
-        limits = {"seconds": seconds, "max_memory": max_memory, "progress": progress}
-        found: Solution = find_formulation("schedule_search").solve(problem, **limits)
+        found: Solution = find_formulation("schedule_search").solve(problem, watch=watch)
         return found
-    watch = Watch(seconds)
-    search = threshold_search(problem, HOW, watched(problem, watch, max_memory, progress), most)
+    search = threshold_search(problem, HOW, tell, most)
     own = problem.network.scene.build_order
     try:
         if order_rules(problem).allows(own):
-            quiet = watched(problem, watch, max_memory, lambda _: None)
+            quiet = watched(problem, watch, lambda _: None)
             search.incumbent = _plan_in(problem, own, quiet)
         if search.is_best and search.incumbent:
             return search.incumbent
@@ -99,11 +95,10 @@ def _plan_in(problem: States, order: Order, tell: Watching) -> Solution | None:
     return replace(found, visited=(), order=order, effort=(1, own.models))
 
 
-FORMULATION = Formulation(
+FORMULATION = on_graph(
     "order_search",
     "the order in which bricks are placed, by all sets of bricks",
-    FormulationKind.EXACT,
-    None,
-    solve,
+    choose,
     answers=("order",),
+    search=_of_orders,
 )

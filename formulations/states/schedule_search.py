@@ -45,57 +45,51 @@ halving an interval, and all further states must have it.
 
 from __future__ import annotations
 
-import numpy as np
-
-from formulations.choice import shortest
+from formulations.choice import Choice, shortest
 from formulations.labels import relaxed
-from formulations.on_graph import path_of_instance
-from formulations.states._search import Options, after_margins, best_total, search_states, watched
+from formulations.on_graph import on_graph
+from formulations.states._search import Options, Watching, after_margins, best_total, search_states
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
-from seqopt.graph.instance import Instance
+from seqopt.graph.formulation import Solution, Watch
+from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
-from seqopt.work.progress import Tell
 
 
-def solve(
-    problem: States | Instance,
-    *,
-    width: int = 50,
-    growth: float = 1.1,
-    seconds: float = np.inf,
-    max_memory: float = np.inf,
-    progress: Tell = lambda _: None,
-) -> Solution:
-    """Return the best path.
+def choose(graph: Graph, watch: Watch, *, width: int = 50, growth: float = 1.1) -> Choice:
+    """Return the best path of a graph that is there.
 
     ``width``: from how many new states of a brick count the narrow search goes on; ``growth``: of
-    the threshold from one search to the next, over itself; ``seconds``, ``max_memory`` (bytes, by
-    default all that are free): after which, or above which, the best plan found is returned, and
-    what is proven by then. Raises `InfeasibleError` if no plan is allowed; `ProblemError`,
-    `TimeUpError` if an option is none, or memory or time is up before any plan is found.
+    the threshold from one search to the next, over itself. Raises `ProblemError` if an option is
+    none.
     """
+    _require_options(width, growth)
+    return relaxed(graph, watch)
+
+
+def _of_states(
+    problem: States, watch: Watch, tell: Watching, *, width: int, growth: float
+) -> Solution:
+    """Return the best path through states; where expensive, a first plan only without limits."""
+    _require_options(width, growth)
+    if problem.totals:
+        return best_total(problem, shortest, watch, tell)
+    dear = bool(problem.demands or problem.each) and not watch.is_limited
+    options = Options(width, growth, dear)
+    return after_margins(problem, lambda rest: search_states(rest, options, tell), tell)
+
+
+def _require_options(width: int, growth: float) -> None:
     if width < 1 or not growth > 1:
         raise ProblemError(
             f"options width={width}, growth={growth:g}: give a whole number from 1 on, and a "
             "number above 1"
         )
-    if isinstance(problem, Instance):
-        return path_of_instance(problem, relaxed, Watch(seconds))
-    tell = watched(problem, Watch(seconds), max_memory, progress)
-    if problem.totals:
-        return best_total(problem, shortest, Watch(seconds), tell)
-    dear = bool(problem.demands or problem.each) and min(seconds, max_memory) == np.inf
-    options = Options(width, growth, dear)
-    return after_margins(problem, lambda rest: search_states(rest, options, tell), tell)
 
 
-FORMULATION = Formulation(
+FORMULATION = on_graph(
     "schedule_search",
     "threshold and reachability among the states of a build",
-    FormulationKind.EXACT,
-    None,
-    solve,
-    answers=("goals", "tail", "order", "instance"),
+    choose,
     takes_budgets=True,
+    search=_of_states,
 )

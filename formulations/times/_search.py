@@ -157,14 +157,14 @@ class _InTime(Terse):
         progress: Tell = lambda _: None,
     ) -> Solution:
         """Return the plan of the chosen path, or the incumbent at the limit of time or memory."""
-        watch = Watch(seconds)
+        watch = Watch(seconds, memory=max_memory)
         if isinstance(problem, Instance):
             return of_instance(problem, self.choose, watch)
         if problem.standing is not None and problem.standing.curing and not self.exact:
             raise ProblemError(
                 f"{self.name}: it does not know mortar that cures; take makespan_labels"
             )
-        tell = watched(problem, watch, max_memory, progress)
+        tell = watched(problem, watch, progress)
         return after_margins(
             problem, lambda rest: _searched(rest, self.choose, watch, tell, progress), tell
         )

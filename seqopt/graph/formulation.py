@@ -86,7 +86,7 @@ class Watch:
     """Clock and log of one solve: the deadline, and the incumbents and bounds so far.
 
     ``time_limit``: after which the formulation has to stop, s; ``progress``: called with every
-    `Finding`.
+    `Finding`; ``memory``: above which it has to stop, bytes.
 
     >>> watch = Watch(time_limit=60.0)
     >>> watch.tell(objective=12.0)
@@ -96,9 +96,12 @@ class Watch:
     """
 
     def __init__(
-        self, time_limit: float = math.inf, progress: Callable[[Finding], object] | None = None
+        self,
+        time_limit: float = math.inf,
+        progress: Callable[[Finding], object] | None = None,
+        memory: float = math.inf,
     ) -> None:
-        self._start, self._limit = time.perf_counter(), time_limit
+        self._start, self._limit, self.memory = time.perf_counter(), time_limit, memory
         self._progress = progress
         self._trace: list[Finding] = []
         self._within: Watch | None = None
@@ -108,6 +111,11 @@ class Watch:
     def seconds(self) -> float:
         """Since the watch was started."""
         return time.perf_counter() - self._start
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether time or memory has a limit."""
+        return min(self._limit, self.memory) < math.inf
 
     @property
     def left(self) -> float:
@@ -122,7 +130,7 @@ class Watch:
 
     def apart(self) -> Watch:
         """Return a watch with a log of its own, which is over when this one is."""
-        other = Watch(self.left)
+        other = Watch(self.left, memory=self.memory)
         other._within = self
         return other
 
