@@ -59,21 +59,15 @@ class _Bodies:
         self._tools: dict[float, Any] = {}
 
     def __call__(self, posture: int, link: int) -> _Turned:
-        key = (posture, link)
-        if key not in self._made:
-            at = turned(self._placed.rotation[key], self._placed.shift[key])
-            self._made[key] = (self._shape(posture, link), at)
-        return self._made[key]
-
-    def _shape(self, posture: int, link: int) -> Any:
-        if link < len(self._model.moving):
-            return self._model.moving[link].shape
         import coal  # noqa: PLC0415  # an extra
 
-        long = float(self._placed.tools[posture])
-        if long not in self._tools:
-            self._tools[long] = coal.Cylinder(self._model.arm.tool_radius, long)
-        return self._tools[long]
+        key, moving, long = (posture, link), self._model.moving, float(self._placed.tools[posture])
+        if key not in self._made:
+            at = turned(self._placed.rotation[key], self._placed.shift[key])
+            if link == len(moving) and long not in self._tools:
+                self._tools[long] = coal.Cylinder(self._model.arm.tool_radius, long)
+            self._made[key] = (moving[link].shape if link < len(moving) else self._tools[long], at)
+        return self._made[key]
 
 
 def fixed_bodies(model: ArmModel) -> Obstacles:

@@ -10,17 +10,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from seqopt.arms.reach import find_postures
-from seqopt.scene.arm import Arm, HeldPostures
+from seqopt.scene.arm import HeldPostures
 from seqopt.scene.scene import Scene
 
 
 def compute_held_postures(scene: Scene) -> HeldPostures:
     """Return the postures in which arms with compliant joints hold."""
-    from seqopt.arms._tables import held_by  # noqa: PLC0415  # few scenes have arms
+    from seqopt.arms._tables import Site, held_by  # noqa: PLC0415  # few scenes have arms
 
     table = find_postures(scene)
     assert table is not None
-    return held_by(scene, table)
+    return held_by(Site.of(scene), table, tuple((r.name, r.arm) for r in scene.robots))
 
 
 def hold_alike(nominal: Scene, scene: Scene) -> Scene:
@@ -28,12 +28,13 @@ def hold_alike(nominal: Scene, scene: Scene) -> Scene:
 
     It is as it was where it has other arms: joints may have other stiffnesses.
     """
-    arms = [[_bare(robot.arm) for robot in each.robots] for each in (nominal, scene)]
+    arms = [  # what determines postures, and whether joints are compliant
+        [
+            arm and (replace(arm, postures=1, joint_stiffness=()), bool(arm.joint_stiffness))
+            for arm in (robot.arm for robot in each.robots)
+        ]
+        for each in (nominal, scene)
+    ]
     alike = arms[0] == arms[1] and {*nominal.brick_of_node} == {*scene.brick_of_node}
     held = nominal.held_postures if alike else None
     return scene if held is None else scene.holding(held)
-
-
-def _bare(arm: Arm | None) -> object:
-    """Return what determines the postures of an arm, and whether its joints are compliant."""
-    return arm and (replace(arm, postures=1, joint_stiffness=()), bool(arm.joint_stiffness))

@@ -45,16 +45,13 @@ class PostureRules:
 
         ``states`` (n, c): places in build order of the nodes held, from 1; none above 0 is free.
         """
-        held = states[:, [column for column, _ in self._armed]].clip(min=0)
-        return np.array([self._allows(bricks, row) for row in held.tolist()], dtype=bool)
-
-    def _allows(self, bricks: int, places: list[int]) -> bool:
-        key = (bricks, *places)
-        if key not in self._known:
-            pairs = zip(self._armed, places, strict=True)
-            masks = [self._mask(bricks, robot, place) for (_, robot), place in pairs if place]
-            self._known[key] = self._fit(masks)
-        return self._known[key]
+        held = states[:, [column for column, _ in self._armed]].clip(min=0).tolist()
+        for places in held:
+            if (bricks, *places) not in self._known:
+                pairs = zip(self._armed, places, strict=True)
+                masks = [self._mask(bricks, robot, place) for (_, robot), place in pairs if place]
+                self._known[bricks, *places] = self._fit(masks)
+        return np.array([self._known[bricks, *places] for places in held], dtype=bool)
 
     def _mask(self, bricks: int, robot: int, place: int) -> int:
         """Return the postures of a robot at a place that hit nothing, as bits of a number."""

@@ -86,7 +86,8 @@ def arm_faults(scene: Scene, steps: Sequence[Step]) -> tuple[str, ...]:
 
 def with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Plan]) -> Plan:
     """Return a plan with its postures, or one that keeps them; ``solved``: solves a problem."""
-    first = _postures(plan)
+    first = plan_postures(plan.engine.network.scene, plan.steps)
+    assert first is not None  # some robot has an arm
     most = max(robot.arm.choices for robot in problem.scene.robots if robot.arm is not None)
     bounds = {}
     if plan.certificate is not None and plan.gap is not None:
@@ -101,19 +102,13 @@ def with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Plan
             continue
         except TimeUpError:
             break
-        found = _postures(other)
-        if not found.unreached:
+        found = plan_postures(other.engine.network.scene, other.steps)
+        if found is not None and not found.unreached:
             pairs = [(v, bounds[name]) for name, v in other.objective.items() if name in bounds]
             none_below = all(v <= low + _SAME * max(abs(v), abs(low)) for v, low in pairs)
             best = bool(bounds) and none_below
             return replace(other, arms=KeptPostures(found, most, fewer, bounds, best))
     return replace(plan, arms=KeptPostures(first, most, most, bounds, best=False))
-
-
-def _postures(plan: Plan) -> PlanPostures:
-    found = plan_postures(plan.engine.network.scene, plan.steps)
-    assert found is not None  # some robot has an arm
-    return found
 
 
 def _with_fewer(problem: Problem, plan: Plan, postures: int) -> Problem:

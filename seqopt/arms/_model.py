@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -90,14 +91,11 @@ class ArmModel:
         self.fixed = [body for body in bodies if body.joint == 0]
         self.moving = [body for body in bodies if body.joint > 0]
         lower, upper = self.model.lowerPositionLimit, self.model.upperPositionLimit
-        turns = np.array(
-            [joint.shortname().startswith("JointModelR") for joint in [*self.model.joints][1:]]
-        )
-        self.turns: Bools = turns
+        kinds = (joint.shortname() for joint in [*self.model.joints][1:])
+        self.turns: Bools = np.array([kind.startswith("JointModelR") for kind in kinds])
         self.above = sum(body.joint == 1 for body in self.moving)  # what turns about the base
-        self.low: Floats = np.where(turns, np.maximum(lower, -np.pi), lower)
-        self.high: Floats = np.where(turns, np.minimum(upper, np.pi), upper)
-
+        self.low: Floats = np.where(self.turns, np.maximum(lower, -np.pi), lower)
+        self.high: Floats = np.where(self.turns, np.minimum(upper, np.pi), upper)
         self._require_shapes(path)
         known = len(arm.joint_stiffness)
         if known not in (0, self.joints):
@@ -148,10 +146,8 @@ class ArmModel:
             after |= {i} if frame.parentFrame in after else set()
         parents, shaped = {frame.parentFrame for frame in frames}, {body.name for body in bodies}
         beyond = {frames[i].name for i in after - {self.flange}}
-        tips = [
-            frames[i].name for i in sorted(after - parents) if frames[i].name in beyond - shaped
-        ]
-        flange = tips[-1] if tips else "the frame at its tip"
+        tips = (frames[i].name for i in sorted(after - parents, reverse=True))
+        flange = next((tip for tip in tips if tip in beyond - shaped), "the frame at its tip")
         tool = (
             f"; it comes after the flange {frames[self.flange].name}, so the model has the tool: "
             f"give flange={flange}, and tool_length from there"
@@ -228,12 +224,7 @@ class ArmModel:
             shift[i, -1] = end.translation + 0.5 * tools[i] * end.rotation[:, 2]
         rotation = self.base.rotation @ rotation
         shift = shift @ self.base.rotation.T + self.base.translation
-        low, high = self._boxes(rotation, shift, tools)
-        return Placed(rotation, shift, low, high, tools)
-
-    def _boxes(self, rotation: Floats, shift: Floats, tools: Floats) -> tuple[Floats, Floats]:
-        """Return the lowest and highest coordinates of bodies, each (P, L, 3), m."""
-        low, high = np.zeros(shift.shape), np.zeros(shift.shape)
+        low, high = np.zeros(shift.shape), np.zeros(shift.shape)  # of bodies, from where they are
         for k, body in enumerate(self.moving):
             points = np.einsum("pij,mj->pmi", rotation[:, k], body.points)
             low[:, k], high[:, k] = points.min(axis=1), points.max(axis=1)
@@ -241,7 +232,7 @@ class ArmModel:
         half = 0.5 * tools[:, None] * np.abs(axis)
         half += self.arm.tool_radius * np.sqrt(np.clip(1 - axis**2, 0.0, None))
         low[:, -1], high[:, -1] = -half, half
-        return low + shift, high + shift
+        return Placed(rotation, shift, low + shift, high + shift, tools)
 
 
 def flange_of(model: Any, arm: Arm) -> str:
@@ -292,20 +283,14 @@ def _bodies(model: Any, geometry: Any) -> Iterator[Body]:
         if isinstance(shape, coal.BVHModelBase):
             shape.buildConvexHull(True, "Qt")  # noqa: FBT003  # coal's own
             shape = shape.convex
-        at = each.placement
-        points = _corners(shape)
-        link = model.frames[each.parentFrame].name
+        if hasattr(shape, "num_points"):
+            points = np.array([shape.point(i) for i in range(shape.num_points)]).reshape(-1, 3)
+        else:  # a box around it
+            shape.computeLocalAABB()
+            low, high = shape.aabb_local.min_, shape.aabb_local.max_
+            points = np.array([*product(*zip(low, high, strict=True))])
+        at, link = each.placement, model.frames[each.parentFrame].name
         yield Body(link, each.parentJoint, shape, at.rotation, at.translation, points)
-
-
-def _corners(shape: Any) -> Floats:
-    """Return points (m, 3) in whose convex hull a shape lies."""
-    if hasattr(shape, "num_points"):
-        return np.array([shape.point(i) for i in range(shape.num_points)]).reshape(-1, 3)
-    shape.computeLocalAABB()
-    box = shape.aabb_local
-    ends = np.array([box.min_, box.max_])
-    return np.array([ends[[i, j, k], [0, 1, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 
 
 _AROUND = 12  # points around each end of a tool
@@ -339,10 +324,8 @@ class PosedArm:
         pin.forwardKinematics(model.model, data, self._own)
         joints = [model.base.act(data.oMi[j].translation) for j in range(1, model.model.njoints)]
         points = [root, *joints, flange, flange + self.arm.tool_length * axes[:, 2]]
-        apart = (
-            p for i, p in enumerate(points) if not i or np.linalg.norm(p - points[i - 1]) > _SAME
-        )
-        found = np.array([*apart])
+        far = np.linalg.norm(np.diff(points, axis=0), axis=1) > _SAME
+        found = np.array(points)[[True, *far]]
         return found if self.holds else found[[0, 1, 1]]
 
     @cached_property

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seqopt.arms.reach import find_postures
-from seqopt.arrays import Bools, Ints
 from seqopt.scene._armed import PlanPostures, Unreached
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
@@ -45,7 +44,7 @@ class _Search:
         self._scene, self._table, self._steps = scene, table, steps
         self._held = scene.held_postures
         self._holds = [h for h in holds(scene, steps) if scene.robots[h.robot].arm is not None]
-        self._since = [scene.since[name] for name in table.bricks]
+        self._since = np.array([scene.since[name] for name in table.bricks])
 
     def found(self) -> PlanPostures:
         """Return what there is."""
@@ -69,41 +68,27 @@ class _Search:
 
     def _ways(self, step: Step, now: Sequence[Hold]) -> tuple[list[_Way], str]:
         """Return all ways to hold in a step by itself; if there are none, why."""
-        options = [self._options(step, hold) for hold in now]
-        names = [f"{self._scene.robots[h.robot].name} at node {h.node}" for h in now]
-        for name, hold, rows in zip(names, now, options, strict=True):
-            if not rows:
-                return [], f"{name} {self._lacking(step, hold)}"
-        ways: list[_Way] = [()]
-        for k, rows in enumerate(options):
-            longer = [(*way, row) for way in ways for row in rows if self._free(way, row)]
+        table, standing = self._table, self._since <= step.bricks
+        options, names, ways = list[list[int]](), list[str](), list[_Way]([()])
+        for hold in now:
+            assert hold.node is not None
+            robot = self._scene.robots[hold.robot].name
+            names.append(f"{robot} at node {hold.node}")
+            rows = table.rows(robot, hold.node)
+            only = None if self._held is None else self._held.row(hold.robot, hold.node)
+            rows = rows if only is None else rows[rows == only]
+            options.append([int(row) for row in rows if not table.hits[row, standing].any()])
+            if not options[-1]:
+                one = self._held is not None and len(rows) == 1
+                lacks = "hits a brick in its one" if one else "has no"
+                why = table.why_not(robot, hold.node, rows, standing)
+                return [], f"{names[-1]} {lacks} posture ({why})"
+        for k, own in enumerate(options):
+            longer = [(*way, row) for way in ways for row in own if self._free(way, row)]
             if not longer:
                 return [], f"{self._in_the_way(names, options, k)} are in each other's way"
             ways = longer[:_MOST_WAYS]
         return ways, ""
-
-    def _lacking(self, step: Step, hold: Hold) -> str:
-        """Return why a hold has no posture, in words."""
-        assert hold.node is not None
-        rows, standing = self._own(step, hold)
-        name = self._scene.robots[hold.robot].name
-        why = self._table.why_not(name, hold.node, rows, standing)
-        one = self._held is not None and len(rows) == 1
-        return f"{'hits a brick in its one' if one else 'has no'} posture ({why})"
-
-    def _own(self, step: Step, hold: Hold) -> tuple[Ints, Bools]:
-        """Return the postures of a hold, as rows, and which bricks stand (B,)."""
-        assert hold.node is not None
-        rows = self._table.rows(self._scene.robots[hold.robot].name, hold.node)
-        only = None if self._held is None else self._held.row(hold.robot, hold.node)
-        if only is not None:
-            rows = rows[rows == only]
-        return rows, np.array(self._since) <= step.bricks
-
-    def _options(self, step: Step, hold: Hold) -> list[int]:
-        """Return the postures of a hold that hit no brick that stands."""
-        rows, standing = self._own(step, hold)
-        return [int(row) for row in rows if not self._table.hits[row, standing].any()]
 
     def _free(self, way: _Way, row: int) -> bool:
         return not any(self._table.collide[row, other] for other in way)

@@ -102,7 +102,7 @@ def solve(model: ArmModel, target: Target, draws: np.random.Generator) -> list[F
 
     wanted = model.base.actInv(pin.SE3(target.axes, target.place))
     found: list[Floats] = []
-    if _distance(model, target) > model.span:
+    if np.linalg.norm(target.place - model.base.translation) > model.span:
         return found
     for first in model.draw(draws, _TRIES):
         posture = _descend(pin, model, wanted, first)
@@ -114,11 +114,6 @@ def solve(model: ArmModel, target: Target, draws: np.random.Generator) -> list[F
         if inside and all(np.abs(posture - other).max() > _SAME for other in found):
             found.append(posture)
     return found
-
-
-def _distance(model: ArmModel, target: Target) -> float:
-    """Return how far the flange has to be from the root of an arm, m."""
-    return float(np.linalg.norm(target.place - model.base.translation))
 
 
 def way(model: ArmModel, target: Target, posture: Floats) -> Floats | None:
@@ -134,7 +129,7 @@ def way(model: ArmModel, target: Target, posture: Floats) -> Floats | None:
         found = _descend(pin, model, model.base.actInv(pin.SE3(target.axes, place)), last)
         if found is None or np.abs(found - last).max() > _JUMP:
             return None
-        if not ((found >= model.low) & (found <= model.high)).all():
+        if (found < model.low).any() or (found > model.high).any():
             return None
         out.append(found)
         last = found
@@ -230,13 +225,6 @@ class Reached:
     found: Ints
     why: dict[int, str]
 
-    def without(self, faults: Sequence[_Fault | None]) -> Reached:
-        """Return the postures that have no fault."""
-        rows = np.flatnonzero([fault is None for fault in faults])
-        parts = {name: getattr(self, name)[rows] for name in _BY_POSTURE}
-        why = self.why | _lacking(self.node, faults)
-        return replace(self, placed=self.placed.rows(rows), why=why, **parts)
-
 
 _Fault = tuple[int, int, str]  # the check that is not passed, by order; which body, the tool last
 
@@ -280,10 +268,12 @@ def reached_alone(site: Site, most: int) -> Reached:
     bricks = obstacles(
         [(convex(c - c.mean(axis=0)), turned(np.eye(3), c.mean(axis=0))) for c in corners], corners
     )
-    _require_free(site, robot, np.asarray(overlap(fixed_bodies(model), bricks).any(axis=0)))
+    inside = overlap(fixed_bodies(model), bricks).any(axis=0)
+    if inside.any():
+        name = site.bricks[int(inside.argmax())].name
+        raise SceneError(f"robot {robot.name}: the base of its arm hits brick {name}; move it")
     places, joints, flanges, why = _solved(site, model)
-    tools = np.array([flange.tool for flange in flanges])
-    placed, able = _with_ways(model, joints, flanges, tools)
+    placed, able = _with_ways(model, joints, flanges, np.array([each.tool for each in flanges]))
     up = np.array(site.up)
     ground = min(float(model.base.translation @ up), *(float((c @ up).min()) for c in corners))
     faults: list[_Fault | None] = [None] * len(able)
@@ -354,13 +344,6 @@ def _with_ways(
     return replace(placed, ways=ways), able
 
 
-def _require_free(site: Site, robot: Robot, inside: Bools) -> None:
-    """Raise a `SceneError` if a base stands in a brick. ``inside`` (B,): in which it does."""
-    if inside.any():
-        name = site.bricks[int(inside.argmax())].name
-        raise SceneError(f"robot {robot.name}: the base of its arm hits brick {name}; move it")
-
-
 def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
     """Return the postures of robots that touch no base of another one; bases stand apart."""
     bases = [fixed_bodies(each.model) for each in alone]
@@ -376,7 +359,10 @@ def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
             for placed in (own.placed, *own.placed.ways):
                 struck = np.asarray(hits(own.model, placed, bases[j]).any(axis=2))
                 _blame(faults, struck, said, 4)
-        out.append(own.without(faults))
+        rows = np.flatnonzero([fault is None for fault in faults])
+        parts = {name: getattr(own, name)[rows] for name in _BY_POSTURE}
+        why = own.why | _lacking(own.node, faults)
+        out.append(replace(own, placed=own.placed.rows(rows), why=why, **parts))
     return out
 
 
@@ -398,19 +384,20 @@ def _solved(site: Site, model: ArmModel) -> tuple[Ints, Floats, list[Target], di
         nodes += [place] * len(found)
         joints += [posture for posture, _ in found]
         flanges += [aim for _, aim in found]
-        if not found:
-            why[place] = _unsolved(model, aims)
+        far = [np.linalg.norm(aim.place - model.base.translation) for aim in aims]
+        if not aims:
+            why[place] = (
+                "the tool is too short: the flange would be in the brick, give a longer tool_length"
+            )
+        elif not found and min(far) > model.reach:
+            why[place] = f"too far: its flange gets about {model.reach:.2g} m from its base"
+        elif not found:
+            why[place] = (
+                "no posture was found within joint limits with the tool square to a face of the "
+                "brick"
+            )
     rows = np.array(joints).reshape(-1, model.joints)
     return np.array(nodes, dtype=np.int64), rows, flanges, why
-
-
-def _unsolved(model: ArmModel, aims: Sequence[Target]) -> str:
-    """Return why there is no posture for any of some targets, as far as it is known."""
-    if not aims:
-        return "the tool is too short: the flange would be in the brick, give a longer tool_length"
-    if min(_distance(model, aim) for aim in aims) > model.reach:
-        return f"too far: its flange gets about {model.reach:.2g} m from its base"
-    return "no posture was found within joint limits with the tool square to a face of the brick"
 
 
 def _corners(brick: Brick) -> Floats:

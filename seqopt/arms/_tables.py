@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache, partial
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -79,15 +80,15 @@ def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
 def _collisions(site: Site, reached: list[Reached], robot: Ints) -> Bools:
     """Return which pairs of postures of different robots collide, (P, P)."""
     out = np.zeros((len(robot), len(robot)), dtype=bool)
-    for i, one in enumerate(reached):
-        for j, two in ((j, reached[j]) for j in range(i) if site.together(i, j)):
-            rows, columns = np.flatnonzero(robot == i), np.flatnonzero(robot == j)
-            grid = np.meshgrid(np.arange(len(rows)), np.arange(len(columns)), indexing="ij")
-            pairs = grid[0].ravel(), grid[1].ravel()
-            found = collide_pairs((one.model, two.model), one.placed, two.placed, pairs)
-            block = found.reshape(len(rows), len(columns))
-            out[np.ix_(rows, columns)] = block
-            out[np.ix_(columns, rows)] = block.T
+    for i, j in combinations(range(len(reached)), 2):
+        if not site.together(i, j):
+            continue
+        one, two = reached[i], reached[j]
+        grid = np.indices((len(one.node), len(two.node))).reshape(2, -1)
+        found = collide_pairs((one.model, two.model), one.placed, two.placed, (grid[0], grid[1]))
+        block = found.reshape(len(one.node), len(two.node))
+        out[np.ix_(robot == i, robot == j)] = block
+        out[np.ix_(robot == j, robot == i)] = block.T
     return out
 
 
@@ -214,25 +215,17 @@ def known_table(scene: Scene, cache: Path | str | None, progress: Tell | None) -
     return known.get(arms, known[None])
 
 
-_Arms = tuple[tuple[str, Arm], ...]
-
-
 @lru_cache(maxsize=_SITES)
-def _known(site: Site) -> dict[Path | _Arms | None, PostureTable]:  # noqa: ARG001  # kept by site
+def _known(site: Site) -> dict[object, PostureTable]:  # noqa: ARG001  # kept by site
     """Return the table of a site, if it is known, under the folders and soft arms that have it."""
     return {}
 
 
-def held_by(scene: Scene, table: PostureTable) -> HeldPostures:
-    """Return the postures in which arms with compliant joints hold."""
-    arms = tuple((robot.name, robot.arm) for robot in scene.robots)
-    return _held(Site.of(scene), table, arms)
-
-
 @lru_cache(maxsize=_SITES)
-def _held(
+def held_by(
     site: Site, table: PostureTable, arms: tuple[tuple[str, Arm | None], ...]
 ) -> HeldPostures:
+    """Return the postures in which arms with compliant joints hold; ``arms``: with their names."""
     order = np.argsort(table.nodes)
     chosen, robots, rows, found = _chosen(site, table)[:, order], [], [], []
     for robot, (name, arm) in enumerate(arms):
