@@ -110,7 +110,7 @@ def test_motions_cancel_where_their_parts_are_ten_times_what_is_left(
         own = SimpleNamespace(
             flexibility=size * flexibility,
             dead_displacement=size * dead,
-            answer=lambda _, rows, pull: loads_of(rows, pull, 7).sum(motion),
+            answer=lambda _, rows, pull: loads_of(rows, pull, 7) @ motion,
         )
         assert _cancels(own, index, force)[row] == seen
     assert _cancels(own, np.zeros((3, 0), int), np.zeros((3, 0))).tolist() == [False] * 3

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.linalg import lapack
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
@@ -78,10 +77,6 @@ def _brace(system: Floats, pairs: Pairs, width: int) -> None:
     blocks[rows, :, columns, :, pairs.sets] += np.array([block, block, -block])
 
 
-_MANY = 256  # sets from which on more calls of NumPy that gather less take less
-_FEW = 12  # systems up to which one call of LAPACK for each takes less than one for all
-
-
 def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tuple[Floats, Floats]:
     """Solve S positive definite systems of k unknowns in place, the batch along the last axis.
 
@@ -96,10 +91,6 @@ def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tu
     equations nearly repeat those before them.
     """
     size = system.shape[1]
-    if size and system.shape[2] <= _FEW and not negative:
-        found = _solve_few(system)
-        if found is not None:
-            return found
     every = np.arange(size)
     diagonal = np.abs(system[every, every])  # a negative pivot stays negative beside it
     diagonal[size - negative :] = -scale
@@ -116,20 +107,6 @@ def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tu
             answer[:j] -= system[j, :j] * answer[j]
         pivots /= diagonal
     return answer, pivots
-
-
-def _solve_few(system: Floats) -> tuple[Floats, Floats] | None:
-    """Solve a few systems by LAPACK, one by one; None if one is not definite."""
-    size = system.shape[1]
-    answer, pivot = np.empty(system.shape[1:]), np.empty(system.shape[1:])
-    for s in range(system.shape[2]):
-        matrix = system[:size, :, s]
-        factor, unknown, failed = lapack.dposv(matrix, system[size, :, s], lower=1)
-        if failed:
-            return None
-        answer[:, s] = unknown
-        pivot[:, s] = factor.diagonal() ** 2 / matrix.diagonal()
-    return answer, pivot
 
 
 class _GripForces(NamedTuple):
@@ -303,12 +280,8 @@ def _solved(
     count, sets = rows.shape
     size = len(operator.flexibility)
     system = np.empty((count + 1, count, sets))
-    step = 3 if sets > _MANY else max(count, 1)
-    for i in range(0, count, step):  # what is above the diagonal is not read
-        mine = slice(i, min(i + step, count))
-        entries = rows[mine, None] * size + rows[: mine.stop]
-        part = system[mine, : mine.stop]
-        operator.flexibility.take(entries, out=part, mode="clip")  # others copy once more
+    entries = rows[:, None] * size + rows
+    operator.flexibility.take(entries, out=system[:count], mode="clip")  # others copy once more
     np.negative(dead, out=system[-1])
     scale = 1 / operator.softness if operator.loose else 1.0
     nodes = count - operator.loose

@@ -12,12 +12,12 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.engines.rigid._growth import Growth, SpanningTree
 from seqopt.engines.rigid._response_maps import (
     AT_ONCE,
-    Loads,
     ResponseMaps,
     inner_edges,
     loads_of,
@@ -28,7 +28,6 @@ from seqopt.network.network import Network
 
 _Number = TypeVar("_Number", np.float64, np.int64)
 _OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
-_TOGETHER = 1000  # sets up to which one product takes less than one for every field
 _FEW = 200  # loads whose responses take little, and are always made once for all
 
 
@@ -137,28 +136,25 @@ class ComplianceOperator(FrozenValue):
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
         return rows
 
-    def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> Loads:
-        """Return forces (S, k) at loads (S, k), and a share of the weight."""
+    def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> sparse.csr_array:
+        """Return forces (S, k) at loads (S, k), and a share of the weight, as `loads_of`."""
         return loads_of(index, force, len(self.twist), weight)
 
     def answers(self, names: Sequence[str], index: Ints, force: Floats) -> dict[str, Floats]:
         """Return fields (S, Q) of sets of forces beside the weight.
 
         Where there are fewer sets than loads of all bricks, their twists and wrenches are summed
-        and mapped; else those of the loads are mapped, once, and then summed, all fields together.
-        So are reactions, which few of the wrenches determine.
+        and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
+        which few of the wrenches determine.
         """
         few = are_few(self.axis.size, len(index))  # independent of earlier requests
-        at_once = tuple(name for name in names if few or name == "support")
-        found = {name: self._mapped(name, index, force) for name in names if name not in at_once}
-        if not at_once:
-            return found
-        loads, rows, first = self.loads(index, force), self.of_loads(*at_once), 0
-        sums = loads.sum(rows) if len(index) <= _TOGETHER else None
-        for name in at_once:
-            part = slice(first, first := first + self.maps.count(name))
-            found[name] = loads.sum(rows[:, part]) if sums is None else sums[:, part]
-        return found
+        loads = self.loads(index, force)
+        return {
+            name: np.asarray(loads @ self.of_loads(name))
+            if few or name == "support"
+            else self._mapped(name, index, force)
+            for name in names
+        }
 
     def answer(self, name: str, index: Ints, force: Floats) -> Floats:
         """Return one of these fields."""
@@ -171,7 +167,7 @@ class ComplianceOperator(FrozenValue):
         step = max(16, AT_ONCE // states.shape[1])
         for start in range(0, len(index), step):
             part = slice(start, start + step)
-            self.maps.apply(name, self.loads(index[part], force[part]).sum(states), out[part])
+            self.maps.apply(name, self.loads(index[part], force[part]) @ states, out[part])
         if name == "displacement" and self.maps.ground.any():
             out += self.maps.ground
         if name == "edge_force":  # of inner edges: the weight's and the grips' at second nodes too
@@ -184,11 +180,11 @@ class ComplianceOperator(FrozenValue):
                 out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
         return out
 
-    def of_loads(self, *names: str) -> Floats:
-        """Return fields under every load side by side, (l + 1, Q), made when first asked for."""
-        if names not in self._made:
-            self._made[names] = frozen(np.hstack([self.mean(name) for name in names]))
-        return self._made[names]
+    def of_loads(self, name: str) -> Floats:
+        """Return a field under every load, (l + 1, Q), made when first asked for."""
+        if name not in self._made:
+            self._made[name] = frozen(self.mean(name))
+        return self._made[name]
 
     def mean(self, name: str) -> Floats:
         """Return a field under every load, (l + 1, Q), and keep it nowhere."""
@@ -203,7 +199,7 @@ class ComplianceOperator(FrozenValue):
         return out
 
     @cached_property
-    def _made(self) -> dict[tuple[str, ...], Floats]:
+    def _made(self) -> dict[str, Floats]:
         return {}
 
     def _states(self, name: str) -> Floats:

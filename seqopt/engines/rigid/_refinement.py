@@ -34,8 +34,6 @@ from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import Fields, _join_sets, _merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import grip_forces, nearly_rigid, pairs_of, still_forces
 from seqopt.engines.rigid._mechanism import (
-    Hanging,
-    HangingSystem,
     Shared,
     Ungripped,
     require_resistance,
@@ -153,7 +151,7 @@ _TIED = 0.1  # most that what resists loose motions may be of the springs that t
 
 
 def _held_operator(
-    system: _HeldSystem | HangingSystem, inner: sparse.csr_array | None = None
+    system: _HeldSystem, inner: sparse.csr_array | None = None
 ) -> ComplianceOperator:
     """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
 
@@ -224,27 +222,15 @@ _HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into
 class Refinement:
     """Answers grip sets of one partial structure to rounding, also with loose parts.
 
-    ``tied``: whether springs are known to tie every brick to the ground; ``hanging``: of the
-    network.
+    ``tied``: whether springs are known to tie every brick to the ground.
     """
 
     def __init__(
-        self,
-        network: Network,
-        bricks: int,
-        shared: Shared | None = None,
-        *,
-        tied: bool = False,
-        hanging: Hanging | None = None,
+        self, network: Network, bricks: int, shared: Shared | None = None, *, tied: bool = False
     ) -> None:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, shared)
-        self.held: _HeldSystem | HangingSystem
-        firm = tied and bool((self.parts.stiffness >= _SOFT).all())
-        if hanging is not None and firm and bricks <= hanging.bricks:
-            self.held = HangingSystem(self.parts, hanging)
-        else:
-            self.held = _hold_loose(self.parts, tied=tied)
+        self.held = _hold_loose(self.parts, tied=tied)
         self.inner = _loaded(self.parts)
 
     @cached_property
@@ -280,14 +266,13 @@ class Refinements:
     largest = LAST_CORRECTION  # after which an answer needs no other
 
     def __init__(self, network: Network) -> None:
-        self._network, self._shared, self.hanging = network, share(network), Hanging(network)
+        self._network, self._shared = network, share(network)
         self._last: Refinement | None = None
 
     def of(self, bricks: int, *, tied: bool) -> Refinement:
         """Return that of a brick count."""
         if self._last is None or self._last.bricks != bricks:
-            asked = self._network, bricks, self._shared
-            self._last = Refinement(*asked, tied=tied, hanging=self.hanging)
+            self._last = Refinement(self._network, bricks, self._shared, tied=tied)
         return self._last
 
 
@@ -351,7 +336,7 @@ class _Corrector:
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
         """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
         loads = self.operator.loads(index, force, weight)
-        wrench, twist = (loads.sum(rows) for rows in (self.operator.wrench, self.operator.twist))
+        wrench, twist = (loads @ rows for rows in (self.operator.wrench, self.operator.twist))
         return rescaled(self.system.parts, wrench.reshape(len(index), -1, 6), twist)
 
     def _correct(self, asked: _Asked, states: Floats, force: Floats) -> Bools:

@@ -180,8 +180,8 @@ class ComplianceEngine(NamedEngine):
         if self._is_frontal(len(columns)):
             with suppress(SolverError):  # of what blocks of the stiffness do not answer
                 largest = _SCREEN if Want.SCREEN in want else self._refinements.largest
-                found = self._frontal.solve(bricks, columns, compliance, largest)
-                return keep_wanted(found, want)
+                answer = self._frontal.solve(bricks, columns, compliance, largest)
+                return keep_wanted(answer, want)
         fast: _FastSolution | None = None
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._uniform
