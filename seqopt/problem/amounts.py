@@ -232,7 +232,7 @@ def _distances(moves: MoveArrays) -> Floats:
 
 
 def _fewest_steps(space: Any) -> float:
-    return float(space.fewest_steps)
+    return float(space.steps_to_go(space.first, space.start())[0])
 
 
 def _tilt_survived(value: float) -> float:

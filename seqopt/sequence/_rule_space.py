@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -105,8 +105,19 @@ class StateRows(Terse):
     """Base class of spaces of states: rows with a column per robot."""
 
     network: Network
+    rules: Any
     kinds: tuple[RobotKind, ...]
     parks: bool
+
+    def __post_init__(self) -> None:
+        base = 1 + (2 if self.parks else 1) * 2 * len(self.network.inner)
+        regrips = getattr(self.rules, "regrips", None) or 0
+        if base**self.robots * (1 + regrips) >= 2**62:  # codes of a level are int64
+            raise StepError(
+                f"scene {self.network.scene.name}: {len(self.network.inner)} bricks and "
+                f"{self.robots} robots have more states than can be numbered; let fewer robots "
+                "take part"
+            )
 
     @property
     def robots(self) -> int:
@@ -122,16 +133,6 @@ class StateRows(Terse):
     def _place(self) -> dict[int | None, int]:
         """The places of nodes in build order, from 1."""
         return {node: i for i, node in enumerate(node_numbers(self.network), start=1)}
-
-    def require_codes(self, regrips: int = 0) -> None:
-        """Raise a `StepError` if the codes of a level exceed int64."""
-        base = 1 + (2 if self.parks else 1) * 2 * len(self.network.inner)
-        if base**self.robots * (1 + regrips) >= 2**62:
-            raise StepError(
-                f"scene {self.network.scene.name}: {len(self.network.inner)} bricks and "
-                f"{self.robots} robots have more states than can be numbered; let fewer robots "
-                "take part"
-            )
 
     def for_arms(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) are feasible for arms at a brick count, (n,)."""
@@ -198,11 +199,6 @@ class FreeSpace(StateRows):
         """Yield the level and the state (1, c) in which every build ends, if it is unique."""
         if self.ends_bare:
             yield self.levels, np.zeros_like(self.start())
-
-    @property
-    def fewest_steps(self) -> int:
-        """Lower bound of the number of steps of a build."""
-        return int(self.steps_to_go(self.first, self.start())[0])
 
     def steps_to_go(self, level: int, states: Ints) -> Floats:
         """Return lower bounds of steps to an end: all but a grip per robot are released singly."""
@@ -273,7 +269,7 @@ class FreeSpace(StateRows):
     def _holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot grips a placed brick."""
         begins = self.rules.begin is not None and bricks == self._span[0]
-        begins &= not self.rules.lets_go_one_by_one(bricks, self._span)
+        begins &= not self._lets_go_one_by_one(bricks)
         able = np.ones(len(states), dtype=bool) if begins else self.lawful(bricks, states)
         if self.rules.regrips is not None:
             able &= states[:, -1] < self.rules.regrips
@@ -288,7 +284,7 @@ class FreeSpace(StateRows):
     def _releases(self, bricks: int, states: Ints) -> Moves:
         """Return the feasible moves in which one robot releases, or at the end all do."""
         moves = self._lets_go(states, states[:, : self.robots] > 0)
-        if not self.rules.lets_go_one_by_one(bricks, self._span):
+        if not self._lets_go_one_by_one(bricks):
             moves = self._lawful_only(bricks, moves)
         if bricks != self._span[1] or not self.ends_bare:
             return moves
@@ -298,6 +294,10 @@ class FreeSpace(StateRows):
             moves.states[len(moves.source) - len(rows) :, : self.robots] = 0
         moves.states[self.grips(moves.states) == 0, : self.robots] = 0  # it forgets where they were
         return moves
+
+    def _lets_go_one_by_one(self, bricks: int) -> bool:
+        """Return whether at a brick count robots may only release, even against the rules."""
+        return bricks == self._span[1] and self.rules.how_it_ends is Ending.ONE_BY_ONE
 
     def _lets_go(self, states: Ints, may: Bools) -> Moves:
         """Return the moves in which one robot releases; ``may`` (n, robots): the feasible ones."""
@@ -359,13 +359,15 @@ class FreeSpace(StateRows):
         numbers = [None, *node_numbers(self.network)]
         begin = _begin_step(self.network.scene, self.rules.begin)
         grips: list[int | None] = [*begin.grips]
-        stays = self._stays()  # where a robot was last, as a place from 1
+        lasts = (begin.grips, self.rules.begin.stays) if self.rules.begin else ()
+        stays = {  # where a robot was last, as a place from 1
+            r: self._place[n] for nodes in lasts for r, n in enumerate(nodes) if n is not None
+        }
         before, out = begin.bricks, list[Step]()
         for level, *entries in states:
             if len(entries) < self.robots or not all(abs(n) < len(numbers) for n in entries):
                 raise SolverError(f"the state {[level, *entries]} is none of this free schedule")
-            bricks = self.bricks_at(level)
-            took = False
+            bricks, took = self.bricks_at(level), False
             for kind, (first, end) in zip(self.kinds, self.slots, strict=True):
                 took |= _follow(kind.robots, entries[first:end], grips, stays, numbers)
             stays = stays if self.parks else {}
@@ -375,15 +377,6 @@ class FreeSpace(StateRows):
             out.append(Step(number, step if took else other, bricks, tuple(grips)))
             before = bricks
         return check_sequence(self.network.scene, out, begin)
-
-    def _stays(self) -> dict[int, int]:
-        """Return where robots hold, or held last, where a build begins: places from 1."""
-        site, numbers = self.rules.begin, node_numbers(self.network)
-        if site is None:
-            return {}
-        lasts = (site.grips or (), site.stays)
-        found = [(r, n) for nodes in lasts for r, n in enumerate(nodes) if n is not None]
-        return {robot: numbers.index(node) + 1 for robot, node in found}
 
     @cached_property
     def _near(self) -> tuple[list[int], ...]:
@@ -519,6 +512,4 @@ def free_space(
     """
     kinds = sort_robots(network, rules, caps, timed=timed, worlds=worlds)
     rules = rules.begun(network.scene)
-    space = (_TakeDownSpace if rules.takes_down else FreeSpace)(network, rules, kinds, parks)
-    space.require_codes(rules.regrips or 0)
-    return space
+    return (_TakeDownSpace if rules.takes_down else FreeSpace)(network, rules, kinds, parks)

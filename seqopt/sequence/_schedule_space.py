@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, singledispatch
+from functools import cached_property
 from math import prod
 
 import numpy as np
@@ -36,20 +36,12 @@ class ScheduleSpace(StateRows):
     parks: bool = False  # free robots stay where they were, for their travel
     worlds: tuple[Scene, ...] = ()  # of scenarios, in which robots must carry their bricks as well
 
-    def __post_init__(self) -> None:
-        self.require_codes()
-
     first = 0  # the level before the first step
 
     @property
     def levels(self) -> int:
         """Number of steps, equal for all builds."""
         return len(self.rules.steps)
-
-    @property
-    def fewest_steps(self) -> int:
-        """Number of steps."""
-        return self.levels
 
     @property
     def ends_bare(self) -> bool:
@@ -162,7 +154,6 @@ class ScheduleSpace(StateRows):
         return check_sequence(self.network.scene, steps, self._begin)
 
 
-@singledispatch
 def _space_of(
     rules: FreeRules | Schedule,
     network: Network,
@@ -174,20 +165,8 @@ def _space_of(
 ) -> FreeSpace | ScheduleSpace:
     """Return the states that rules allow, or that fill a schedule's open grips: see `free_space`.
 
-    The builders of this room: who has a space asks nobody which one it is.
+    Who has a space asks nobody which one it is.
     """
-    assert isinstance(rules, FreeRules)  # of a schedule it is the other builder
-    return free_space(network, rules, caps, parks=parks, timed=timed, worlds=worlds)
-
-
-@_space_of.register
-def _(
-    rules: Schedule,
-    network: Network,
-    caps: Mapping[str, float],
-    *,
-    parks: bool,
-    timed: bool,  # noqa: ARG001  # its robots are never alike
-    worlds: tuple[Scene, ...],
-) -> ScheduleSpace:
-    return ScheduleSpace(network, rules, caps, parks, worlds)
+    if isinstance(rules, FreeRules):
+        return free_space(network, rules, caps, parks=parks, timed=timed, worlds=worlds)
+    return ScheduleSpace(network, rules, caps, parks, worlds)  # its robots are never alike

@@ -19,7 +19,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from seqopt.arrays import Bools
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network, PartKind
@@ -43,45 +42,35 @@ _NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str]:
     """Yield the least sufficient reach of a single robot, else of all robots, in words.
 
-    ``exists``: whether the problem is feasible in a scene with other reaches.
-    """
-    limited = {
-        robot.name: robot.reach
-        for robot in scene.robots
-        if robot.arm is None and not isinstance(robot.reach, Anywhere)
-    }
-    alone = 0
-    for name, reach in limited.items():
-        if more := _least(scene, {name: reach}, exists):
-            alone += 1
-            if isinstance(reach, Sphere):
-                radius = math.ceil(_MM * (reach.radius + more) - 1e-6) / _MM
-                yield f"a reach of {radius:.6g} m of {name} ({reach.radius:.6g} m now)"
-            else:
-                yield f"a reach of {name} that is {more:.6g} m longer"
-    if not alone and len(limited) > 1 and (more := _least(scene, limited, exists)):
-        yield f"a reach that is {more:.6g} m longer of every robot that does not reach everything"
-
-
-def _least(
-    scene: Scene, reaches: Mapping[str, Side | Sphere], exists: Callable[[Scene], bool]
-) -> float:
-    """Return the least sufficient extension of reaches, in whole mm; zero if none suffices.
-
-    Only lengths at which a further node is reached are tried. ``reaches``: by robot.
+    ``exists``: whether the problem is feasible in a scene with other reaches. Only lengths at which
+    a further node is reached are tried, in whole mm.
     """
     points = [scene.node_position(node) for node in scene.placed_nodes]
-    lacks = (reach.lack(point) for reach in reaches.values() for point in points)
-    steps = sorted({math.ceil(_MM * lack - 1e-6) / _MM for lack in lacks if lack > 0})
 
-    def is_enough(more: float) -> bool:
-        longer = {name: reach.longer(more) for name, reach in reaches.items()}
-        robots = (replace(r, reach=longer.get(r.name, r.reach)) for r in scene.robots)
-        return exists(scene.with_robots(*robots))
+    def least(reaches: Mapping[str, Side | Sphere]) -> float:
+        lacks = (reach.lack(point) for reach in reaches.values() for point in points)
+        steps = sorted({math.ceil(_MM * lack - 1e-6) / _MM for lack in lacks if lack > 0})
 
-    if not steps or not is_enough(steps[-1]):
-        return 0.0
-    return steps[bisect_left(steps, 1, hi=len(steps) - 1, key=is_enough)]
+        def is_enough(more: float) -> bool:
+            longer = {name: reach.longer(more) for name, reach in reaches.items()}
+            robots = (replace(r, reach=longer.get(r.name, r.reach)) for r in scene.robots)
+            return exists(scene.with_robots(*robots))
+
+        if not steps or not is_enough(steps[-1]):
+            return 0.0
+        return steps[bisect_left(steps, 1, hi=len(steps) - 1, key=is_enough)]
+
+    limited = {r.name: r.reach for r in scene.robots if r.arm is None}
+    own = {name: reach for name, reach in limited.items() if not isinstance(reach, Anywhere)}
+    alone = {name: more for name, reach in own.items() if (more := least({name: reach}))}
+    for name, more in alone.items():
+        if isinstance(reach := own[name], Sphere):
+            radius = math.ceil(_MM * (reach.radius + more) - 1e-6) / _MM
+            yield f"a reach of {radius:.6g} m of {name} ({reach.radius:.6g} m now)"
+        else:
+            yield f"a reach of {name} that is {more:.6g} m longer"
+    if not alone and len(own) > 1 and (more := least(own)):
+        yield f"a reach that is {more:.6g} m longer of every robot that does not reach everything"
 
 
 def _says_reach(make: _Make) -> _Make:
@@ -156,7 +145,15 @@ def _take_turns(
         able = {robot for robot in rank if within_reach(scene, scene.robots[robot])[k]}
         possible = {pair: way for pair, way in ways.items() if pair[0] in able}
         if not possible:
-            raise _nobody(scene, [pair[0] for pair in ways], able, k)
+            nodes = [node for node in brick.nodes if node not in scene.blocked_nodes]
+            free = [scene.robots[robot].name for robot in sorted({pair[0] for pair in ways})]
+            reach = "reach" if len(free) > 1 else "reaches"
+            why = f"{' and '.join(free)} {reach} none of its free nodes {nodes}"
+            if able and k:
+                why += f"; {scene.robots[min(able)].name} does, and holds the brick before"
+            raise StepError(
+                f"brick {brick.name}: {why}; extend a reach, or let another robot place it"
+            )
         ways = {}
         for (placer, holder), (changes, path) in possible.items():
             stays = k == 0 or brick.name in swap_after
@@ -168,18 +165,6 @@ def _take_turns(
     return [(robots[placer], robots[holder]) for placer, holder in path]
 
 
-def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepError:
-    """Return the error that no robot can place a brick."""
-    brick = scene.placed[k]
-    nodes = [node for node in brick.nodes if node not in scene.blocked_nodes]
-    names = " and ".join(scene.robots[robot].name for robot in sorted({*free}))
-    reach = "reach" if " and " in names else "reaches"
-    why = f"brick {brick.name}: {names} {reach} none of its free nodes {nodes}"
-    if able and k:
-        why += f"; {scene.robots[min(able)].name} does, and holds the brick before"
-    return StepError(f"{why}; extend a reach, or let another robot place it")
-
-
 def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list[int]:
     """Assign a robot to every role that reaches all bricks which the role places.
 
@@ -187,8 +172,18 @@ def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> lis
     """
     reach = {r: within_reach(scene, scene.robots[r]) for r in robots}
     fits = [[r for r in robots if all(reach[r][b] for b in role)] for role in roles]
-    if (found := _first_match(fits)) is not None:
-        return list(found)
+
+    @cache  # as many calls as there are sets of robots, not orders
+    def match(role: int, taken: frozenset[int]) -> list[int] | None:
+        if role == len(fits):
+            return []
+        for robot in fits[role]:
+            if robot not in taken and (rest := match(role + 1, taken | {robot})) is not None:
+                return [robot, *rest]
+        return None
+
+    if (found := match(0, frozenset())) is not None:
+        return found
     role = min(range(len(roles)), key=lambda r: len(fits[r]))
     names, fit = (", ".join(scene.robots[r].name for r in some) for some in (robots, fits[role]))
     bricks = ", ".join(str(scene.placed[b].name) for b in sorted(roles[role]))
@@ -199,31 +194,11 @@ def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> lis
     )
 
 
-def _first_match(fits: Sequence[Sequence[int]]) -> tuple[int, ...] | None:
-    """Return the lexicographically first assignment of robots to roles; None if there is none."""
-
-    @cache  # as many calls as there are sets of robots, not orders
-    def match(role: int, taken: frozenset[int]) -> tuple[int, ...] | None:
-        if role == len(fits):
-            return ()
-        for robot in fits[role]:
-            if robot not in taken and (rest := match(role + 1, taken | {robot})) is not None:
-                return (robot, *rest)
-        return None
-
-    return match(0, frozenset())
-
-
 def lies_along(network: Network) -> frozenset[int]:
     """Return the names of bricks along the structure: joints meet both of their inner nodes."""
-    along = _along(network, slice(None))
-    return frozenset(network.scene.placed[i].name for i in np.flatnonzero(along).tolist())
-
-
-def _along(network: Network, bricks: slice) -> Bools:
-    """Return which of the given bricks lie along the structure."""
     half = network.edge_kind == PartKind.JOINT.value
-    return np.asarray(np.isin(network.inner[bricks], network.edge_nodes[half, 0]).all(axis=1))
+    along = np.isin(network.inner, network.edge_nodes[half, 0]).all(axis=1)
+    return frozenset(network.scene.placed[i].name for i in np.flatnonzero(along).tolist())
 
 
 def _begins_elsewhere(network: Network) -> frozenset[int]:
@@ -251,15 +226,13 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     A robot on one side takes the node nearer to its side of a brick that lies across; any other
     case takes the brick's own placing node where it is within reach.
     """
-    scene = network.scene
-    at = scene.since[brick.name] - 1
-    free = within_reach(scene, robot)[at]
+    free = within_reach(network.scene, robot)[network.scene.since[brick.name] - 1]
     if not free:
         raise StepError(
             f"brick {brick.name}: {robot.name} reaches none of its free nodes {list(brick.nodes)}; "
             "extend a reach, or let another robot place it"
         )
-    if isinstance(robot.reach, Side) and not _along(network, slice(at, at + 1)).all():
+    if isinstance(robot.reach, Side) and brick.name not in lies_along(network):
         toward = np.array(robot.reach.toward)
         return max(free, key=lambda node: float(toward @ np.array(brick.node_position(node))))
     return brick.placing_node if brick.placing_node in free else free[0]
@@ -448,38 +421,28 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
             f"this method needs {_in_words(count)} robots and {_in_words(count + 1)} bricks"
         )
     longest = [*range(1, count - 1), 0, count - 1]  # who has held longest, again and again
+    # by brick: who takes a new grip, who places the next brick, and who has held longest
     turns = [[longest[(k - ago) % count] for ago in (1, 2, 0)] for k in range(bricks - count)]
     order = _find_robots(scene, names, f"the loop of {count}", count)
     if not names:
         placing = [*range(count), *(placer for _, placer, _ in turns)]  # roles, brick by brick
         roles = [{b for b, own in enumerate(placing) if own == role} for role in range(count)]
-        order = _cast(scene, roles, order)
-    steps = _steps(scene, _loop(network, order, turns))
-    return open_schedule(f"{_in_words(count)}-robot", network, steps)
+        order = _cast(scene, roles, order)  # the robot of every role
+    acts = list[_Act]()
 
+    def place(role: int, bricks: int) -> None:
+        node = placing_node(network, scene.robots[order[role]], scene.placed[bricks - 1])
+        acts.append((StepKind.PLACE, bricks, {order[role]: node}))
 
-def _loop(network: Network, order: Sequence[int], turns: Sequence[Sequence[int]]) -> Iterator[_Act]:
-    """Yield the acts of a loop.
-
-    ``order``: the robot of every role, named by the first brick that it places; ``turns``: the
-    roles that take a new grip, place the next brick, and have held longest.
-    """
-    scene = network.scene
-
-    def place(role: int, bricks: int) -> _Act:
-        robot, brick = order[role], scene.placed[bricks - 1]
-        node = placing_node(network, scene.robots[robot], brick)
-        return StepKind.PLACE, bricks, {robot: node}
-
-    for role in range(len(order) - 1):
-        yield place(role, role + 1)
+    for role in range(count - 1):
+        place(role, role + 1)
     for move, (mover, placer, oldest) in enumerate(turns):
-        bricks = len(order) + move
         kind = StepKind.REPOSITION if move else StepKind.PLACE
-        yield kind, bricks, {order[mover]: OpenGrip(move)}
-        yield StepKind.RELEASE, bricks, {order[placer]: None}
-        yield place(placer, bricks + 1)
-        yield StepKind.RELEASE, bricks + 1, {order[oldest]: None}
+        acts.append((kind, count + move, {order[mover]: OpenGrip(move)}))
+        acts.append((StepKind.RELEASE, count + move, {order[placer]: None}))
+        place(placer, count + move + 1)
+        acts.append((StepKind.RELEASE, count + move + 1, {order[oldest]: None}))
+    return open_schedule(f"{_in_words(count)}-robot", network, _steps(scene, acts))
 
 
 @_says_reach

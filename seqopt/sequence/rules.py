@@ -114,7 +114,13 @@ class FreeRules:
 
     def __post_init__(self) -> None:
         for name, kind in _CHOICES.items():
-            settle(self, **{name: _choice(name, kind, getattr(self, name))})
+            given, known = getattr(self, name), [str(member.value) for member in kind]
+            if given not in (*kind, *known):
+                hint = did_you_mean(given, known)
+                raise StepError(
+                    f"rule {name}: {short(given)}{hint}; give one of {', '.join(known)}"
+                )
+            settle(self, **{name: kind(given)})
         for name in ("robots", "placers"):
             given = getattr(self, name)
             names = (given,) if isinstance(given, str) else given
@@ -193,13 +199,6 @@ class FreeRules:
             return self.ending
         bare = self.ending if self.ending is not Ending.HELD else Ending.RELEASED
         return Ending.HELD if self.finish.held else bare
-
-    def lets_go_one_by_one(self, bricks: int, span: tuple[int, int]) -> bool:
-        """Return whether at a brick count robots may only release, even against the rules.
-
-        ``span``: brick counts, as of `span`.
-        """
-        return bricks == span[1] and self.how_it_ends is Ending.ONE_BY_ONE
 
     def near(self, scene: Scene, bricks: int) -> frozenset[int]:
         """Return the nodes of the placed bricks that may be gripped."""
@@ -372,14 +371,3 @@ def with_robots(scene: Scene, count: int) -> Scene:
     more = replace(like, payload=payload, reach=Anywhere(), arm=None)
     robots += [replace(more, name=name) for name in fresh[: count - len(robots)]]
     return scene.with_robots(*robots)
-
-
-def _choice(name: str, kind: type[Enum], given: object) -> Enum:
-    try:
-        return kind(given)
-    except ValueError:
-        known = [str(member.value) for member in kind]
-        hint = did_you_mean(given, known)
-        raise StepError(
-            f"rule {name}: {short(given)}{hint}; give one of {', '.join(known)}"
-        ) from None

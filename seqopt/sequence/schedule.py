@@ -189,8 +189,7 @@ class Schedule(Shown):
 
         What ranks or compares candidates of moves needs that; what chooses states does not.
         """
-        step = self._crowded
-        if step is not None:
+        if (step := self._crowded) is not None:
             raise StepError(
                 f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
                 "for costs of moves at most two neighboring ones can be; give an aim"
@@ -306,11 +305,13 @@ def islands(network: Network, bricks: int) -> tuple[frozenset[int], ...]:
     >>> islands(middle_first, 2), islands(middle_first, 3)
     ((frozenset({2, 3}),), ())
     """
-    if _always_tied(network):
+    springs, placed = network.springs, network.scene.placed
+    at_once = springs.stiffness.any(axis=1) & (springs.since == springs.bodies[:, 1] + 1)
+    if len(np.unique(springs.bodies[at_once, 1])) == len(placed):  # each to what stood before
         return ()
     from networkx import connected_components  # noqa: PLC0415  # 0.12 s, for this only
 
-    names = [brick.name for brick in network.scene.placed]
+    names = [brick.name for brick in placed]
     parts = connected_components(network.bodies(bricks))
     return tuple(frozenset(names[i] for i in part) for part in parts if GROUND not in part)
 
@@ -319,8 +320,6 @@ def check_support(
     network: Network, steps: Sequence[Step] | Sequence[OpenStep], moves: Sequence[Move] = ()
 ) -> None:
     """Require that every island is held at every step, for any choice of open grips."""
-    if _always_tied(network):
-        return
     on = network.scene.brick_of_node
     loose = cache(partial(islands, network))
     for step in steps:
@@ -337,13 +336,6 @@ def check_support(
                     "connects to the ground and no robot is sure to hold on; place it later, or "
                     "write a schedule in which one more robot holds it"
                 )
-
-
-def _always_tied(network: Network) -> bool:
-    """Return whether every placed brick has a joint to the ground or an earlier brick."""
-    springs = network.springs
-    at_once = springs.stiffness.any(axis=1) & (springs.since == springs.bodies[:, 1] + 1)
-    return len(np.unique(springs.bodies[at_once, 1])) == len(network.scene.placed)
 
 
 _ROUNDING = 1e-9  # over a payload, by which a load may exceed it

@@ -120,12 +120,6 @@ def _check_part(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
     return tuple(steps)
 
 
-def _check_step(scene: Scene, before: AnyStep | None, step: AnyStep) -> None:
-    """Require that a step is feasible after the previous one, for any choice of open grips."""
-    _check_state(scene, step, f"step {step.number}")
-    _check_change(scene, before or Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), step)
-
-
 def _check_state(scene: Scene, step: AnyStep, where: str) -> None:
     """Require feasible grips, regardless of previous steps; ``where``: named in messages."""
     if len(step.grips) != len(scene.robots):
@@ -167,8 +161,10 @@ def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int, where: str
     raise StepError(f"{where}: {robot.name} at node {node}: {reason}; it can hold {possible}")
 
 
-def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
-    """Require that a step makes exactly the change of its kind."""
+def _check_step(scene: Scene, before: AnyStep | None, step: AnyStep) -> None:
+    """Require that a step makes exactly the change of its kind, for any choice of open grips."""
+    _check_state(scene, step, f"step {step.number}")
+    before = before or Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots))
     where = f"step {step.number} ({step.kind.value})"
     removes = step.kind is StepKind.REMOVE
     expected = before.bricks + (step.kind is StepKind.PLACE) - removes
