@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
 from functools import partial
 from numbers import Real
 from typing import Any, TypeVar
@@ -69,15 +70,16 @@ def settle(value: object, **content: object) -> None:
         object.__setattr__(value, name, part)
 
 
-def check(value: object, where: str, **checks: Callable[[str, Any], object]) -> None:
-    """Set fields of a frozen value to results of checks, which get the name of the field."""
+def check(value: Any, where: str, **checks: Callable[[str, Any], object]) -> None:
+    """Set fields of a frozen value to results of checks, which get the name of the field.
+
+    A field that is None by default may be left out: then it is not checked.
+    """
+    known = {field.name: field.default for field in fields(value)}
     for name, checked in checks.items():
-        settle(value, **{name: checked(f"{where}: {name}", getattr(value, name))})
-
-
-def unless_none(checked: Callable[[str, Any], object]) -> Callable[[str, Any], object]:
-    """Return a check of a value that may be left out."""
-    return lambda where, value: None if value is None else checked(where, value)
+        given = getattr(value, name)
+        if given is not None or known[name] is not None:
+            settle(value, **{name: checked(f"{where}: {name}", given)})
 
 
 def one_of(where: str, value: str | None, known: Iterable[str]) -> str:

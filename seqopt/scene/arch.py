@@ -12,17 +12,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene._checks import (
-    LETTERS,
-    check,
-    density,
-    finite,
-    letters,
-    short,
-    sizes,
-    stiffness,
-    unless_none,
-)
+from seqopt.scene._checks import LETTERS, check, density, finite, letters, short, sizes, stiffness
 from seqopt.scene.boxes import _spring_fields, as_vector
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
@@ -85,24 +75,28 @@ class ArchShape(Terse):
     closed: bool = True
 
     @property
+    def letters(self) -> str:
+        """How each brick lies."""
+        return (self.pattern * len(self.pitch))[: len(self.pitch)]
+
+    @property
     def thickness(self) -> float | None:
         """The width of a joint, m, where it is so thick that a joint must say so."""
         return self.gap if self.gap > THICKEST * min(self.dimensions) else None
 
     def __post_init__(self) -> None:
-        some = unless_none(_numbers)
-        check(self, "arch", pitch=_numbers, roll=some, yaw=some, offset=some, pattern=letters)
-        check(self, "arch", gap=finite, overhang=finite, stub=finite)
+        check(self, "arch", pitch=_numbers, roll=_numbers, yaw=_numbers, offset=_numbers)
+        check(self, "arch", pattern=letters, gap=finite, overhang=finite, stub=finite)
         check(self, "arch", dimensions=sizes, density=density)
         check(self, "arch", translational_stiffness=stiffness, rotational_stiffness=stiffness)
-        count = len(self.pitch)
-        if not count:
+        bricks = len(self.pitch)
+        if not bricks:
             raise SceneError("arch: pitch is empty; give one angle per brick")
         for name in ("pitch", "roll", "yaw", "offset"):
             if (values := getattr(self, name)) is None:
                 continue
-            if len(values) != count:
-                said = f"{len(values)} {name} and {count} pitch values"
+            if len(values) != bricks:
+                said = f"{len(values)} {name} and {bricks} pitch values"
                 raise SceneError(f"arch: {said}; give as many")
             largest = max(map(abs, values))
             if name != "offset" and largest > 2 * math.pi:
@@ -144,22 +138,29 @@ def arch_scene(
     >>> arch_scene(ArchShape(pitch=(1.2, 0.6, 0.0, -0.6, -1.2), pattern="V"), "small")
     <Scene small: 5 bricks, 4 joints, 2 ground ends, 3 robots>
     """
-    axes = tangent, _, ends = _axes(shape)
-    bricks = _bricks(shape, axes)
-    bisector = tangent[:-1] + tangent[1:]
-    joints = []
-    for b, way in enumerate(bisector, start=1):
-        spring = _spring(shape, ends[b], way, way / np.linalg.norm(way))
-        joints.append(Joint(bricks=(b, b + 1), **spring))
-    grounds = [_ground(shape, 1, ends[0], tangent[0], -1.0)]
-    if shape.closed:
-        grounds.append(_ground(shape, len(bricks), ends[-1], tangent[-1], 1.0))
+    tangent, left, ends = _axes(shape)
+    stiffness = shape.translational_stiffness, shape.rotational_stiffness
+
+    def spring(place: Floats, direction: Floats, along: Floats) -> dict[str, Any]:
+        rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
+        fields = _spring_fields(place, along, rest / np.linalg.norm(rest), stiffness)
+        return {**fields, "thickness": shape.thickness}
+
+    def ground(brick: int, at: int, sign: float) -> Ground:
+        anchor = as_vector(ends[at] + sign * shape.stub * tangent[at])
+        return Ground(brick=brick, anchor=anchor, **spring(ends[at], tangent[at], tangent[at]))
+
+    ways = [(way, way / np.linalg.norm(way)) for way in tangent[:-1] + tangent[1:]]
+    bricks = _bricks(shape, tangent, left, ends)
+    grounds = (ground(1, 0, -1.0), ground(len(bricks), -1, 1.0))
     return Scene(
         name=name,
         provenance=provenance,
         bricks=bricks,
-        joints=tuple(joints),
-        grounds=tuple(grounds),
+        joints=tuple(
+            Joint(bricks=(b, b + 1), **spring(ends[b], *way)) for b, way in enumerate(ways, 1)
+        ),
+        grounds=grounds if shape.closed else grounds[:1],
         build_order=tuple(brick.name for brick in bricks),
         robots=_robots_beside(shape) if robots is None else tuple(robots),
         blocked_nodes=(0,),
@@ -192,10 +193,6 @@ def _numbers(where: str, values: Sequence[float]) -> Sequence[float]:
     return values
 
 
-def _pattern(shape: ArchShape) -> str:
-    return (shape.pattern * len(shape.pitch))[: len(shape.pitch)]
-
-
 def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     """Return the bricks' directions along the arch, to the left, and the points between them."""
     if not isinstance(shape, ArchShape):
@@ -206,7 +203,7 @@ def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     forward = np.stack([np.cos(pitch), zero, np.sin(pitch)], axis=1)
     normal = np.stack([-np.sin(pitch), zero, np.cos(pitch)], axis=1)
     rolled = np.cos(roll)[:, None] * _LEFT + np.sin(roll)[:, None] * normal
-    lies_along = np.array([letter == "V" for letter in _pattern(shape)])
+    lies_along = np.array([letter == "V" for letter in shape.letters])
     cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
     tangent = np.where(lies_along[:, None], cos * forward + sin * rolled, forward)
     left = np.where(lies_along[:, None], cos * rolled - sin * forward, cos * rolled + sin * forward)
@@ -215,21 +212,20 @@ def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     return tangent, left, ends
 
 
-def _bricks(shape: ArchShape, axes: tuple[Floats, Floats, Floats]) -> tuple[Brick, ...]:
+def _bricks(shape: ArchShape, tangents: Floats, lefts: Floats, ends: Floats) -> tuple[Brick, ...]:
     """Return all bricks, each in the middle between its ends and moved outward by its offset."""
-    tangents, lefts, ends = axes
     offset = np.zeros(len(tangents)) if shape.offset is None else np.asarray(shape.offset, float)
     middle = 0.5 * (ends[:-1] + ends[1:]) + offset[:, None] * np.cross(tangents, lefts)
-    poses, out = zip(tangents, lefts, middle, _pattern(shape), strict=True), list[Brick]()
+    poses, out = zip(tangents, lefts, middle, shape.letters, strict=True), list[Brick]()
     for b, (tangent, left, position, letter) in enumerate(poses, start=1):
         nodes, length_axis, width_axis = (2 * b - 2, 2 * b - 1), tangent, left
-        placing = nodes[1]
+        placing, aside = nodes[1], 0.0
         if letter != "V":
             length_axis = left if letter == "L" else -left
             width_axis = np.cross(np.cross(length_axis, tangent), length_axis)
             width_axis /= np.linalg.norm(width_axis)
             placing = nodes[int((letter == "L") == (b % 2 == 1))]  # both sides take turns
-        aside = 0.0 if letter == "V" else shape.overhang
+            aside = shape.overhang
         brick = Brick(
             name=b,
             position=as_vector(position + aside * length_axis),
@@ -242,16 +238,3 @@ def _bricks(shape: ArchShape, axes: tuple[Floats, Floats, Floats]) -> tuple[Bric
         )
         out.append(brick)
     return tuple(out)
-
-
-def _spring(shape: ArchShape, position: Floats, direction: Floats, along: Floats) -> dict[str, Any]:
-    """Return the properties that joints and ground ends of an arch share."""
-    stiffness = (shape.translational_stiffness, shape.rotational_stiffness)
-    rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
-    fields = _spring_fields(position, along, np.asarray(rest / np.linalg.norm(rest)), stiffness)
-    return {**fields, "thickness": shape.thickness}
-
-
-def _ground(shape: ArchShape, brick: int, end: Floats, tangent: Floats, sign: float) -> Ground:
-    anchor = as_vector(end + sign * shape.stub * tangent)
-    return Ground(brick=brick, anchor=anchor, **_spring(shape, end, tangent, tangent))

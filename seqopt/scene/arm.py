@@ -30,7 +30,6 @@ from seqopt.scene._checks import (
     settle,
     short,
     unit_axes,
-    unless_none,
     vector,
     whole_between,
 )
@@ -225,7 +224,7 @@ class Durations(Terse):
 
     def __post_init__(self) -> None:
         names = [name for name in _NAMES if name != "speed"]
-        check(self, "durations", **dict.fromkeys(names, _seconds), speed=unless_none(_speed))
+        check(self, "durations", **dict.fromkeys(names, _seconds), speed=_speed)
 
     def slower(self, factor: float) -> Durations:
         """Return durations that are longer by a factor, the speed lower by as much."""

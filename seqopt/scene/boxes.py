@@ -284,7 +284,16 @@ def _where_both(pair: Sequence[Polyhedron], deepest: float) -> Floats:
 
     Where eroded solids meet, a vertex of one lies in the other, or an edge passes a face.
     """
-    moved = [_eroded(solid, by * deepest) for solid, by in zip(pair, _ERODED, strict=True)]
+    moved = []
+    for solid, share in zip(pair, _ERODED, strict=True):  # with all faces moved inward
+        normals: list[list[Floats]] = [[] for _ in solid.points]
+        for face in solid.faces:
+            normal = normal_of(solid.points[list(face)])
+            for vertex in face if normal.any() else ():
+                normals[vertex].append(units(normal))
+        flat = (np.linalg.pinv(np.array(own or [[0.0] * 3]), _ALIKE_NORMALS) for own in normals)
+        shift = np.array([each.sum(axis=1) for each in flat])
+        moved.append(solid.points - share * deepest * shift)
     faces = [_faces(points, solid) for points, solid in zip(moved, pair, strict=True)]
     found = []
     for mine, other in ((0, 1), (1, 0)):
@@ -292,40 +301,15 @@ def _where_both(pair: Sequence[Polyhedron], deepest: float) -> Floats:
         rims = [moved[mine][list(face)] for face in pair[mine].faces]
         start = np.vstack(rims)
         step = np.vstack([np.roll(rim, -1, axis=0) - rim for rim in rims])
-        for face in faces[other]:  # where edges pass it
-            slope = step @ face.axes[0]
-            share = ((face.origin - start) @ face.axes[0]) / np.where(slope == 0, np.inf, slope)
-            met = start + share[:, None] * step
-            inside = _within(face, (met - face.origin) @ face.axes[1:].T)
-            found.append(met[(share > 0) & (share < 1) & inside])
+        for other_face in faces[other]:  # where edges pass it
+            normal, origin = other_face.axes[0], other_face.origin
+            slope = step @ normal
+            ahead = ((origin - start) @ normal) / np.where(slope == 0, np.inf, slope)
+            met = start + ahead[:, None] * step
+            inside = _within(other_face, (met - origin) @ other_face.axes[1:].T)
+            found.append(met[(ahead > 0) & (ahead < 1) & inside])
     points = np.vstack(found)
     return points[:: max(1, len(points) // _STARTS)][:_STARTS]
-
-
-def _eroded(solid: Polyhedron, by: float) -> Floats:
-    """Return the vertices (V, 3) of a solid whose faces are moved inward, m."""
-    normals: list[list[Floats]] = [[] for _ in solid.points]
-    for face in solid.faces:
-        normal = normal_of(solid.points[list(face)])
-        for vertex in face if normal.any() else ():
-            normals[vertex].append(units(normal))
-    shift = [
-        np.linalg.pinv(np.array(own), rcond=_ALIKE_NORMALS).sum(axis=1) if own else np.zeros(3)
-        for own in normals
-    ]
-    return np.asarray(solid.points - by * np.array(shift))
-
-
-def _foot(face: _Face, points: Floats) -> Floats:
-    """Return the points (k, 3) of a face that are nearest to others."""
-    seen = (points - face.origin) @ face.axes[1:].T
-    to, size = seen[:, None] - face.flat, (face.step**2).sum(axis=1)
-    share = np.einsum("kmi,mi->km", to, face.step) / np.where(size > 0, size, 1.0)
-    rim = face.flat + np.clip(share, 0.0, 1.0)[:, :, None] * face.step
-    away = ((seen[:, None] - rim) ** 2).sum(axis=2)
-    nearest = rim[np.arange(len(points)), away.argmin(axis=1)]
-    spot = np.where(_within(face, seen)[:, None], seen, nearest)
-    return np.asarray(face.origin + spot @ face.axes[1:])
 
 
 def _within(face: _Face, seen: Floats) -> Bools:
@@ -334,6 +318,17 @@ def _within(face: _Face, seen: Floats) -> Bools:
     crosses = (to[:, :, 1] < 0) != (to[:, :, 1] < face.step[:, 1])
     turn = to[:, :, 0] * face.step[:, 1] - to[:, :, 1] * face.step[:, 0]
     return np.asarray((crosses & (turn * np.sign(face.step[:, 1]) < 0)).sum(axis=1) % 2 == 1)
+
+
+def _foot(face: _Face, point: Floats) -> Floats:
+    """Return the point (3,) of a face that is nearest to another."""
+    spot = face.axes[1:] @ (point - face.origin)
+    if not _within(face, spot[None])[0]:
+        to, size = spot - face.flat, (face.step**2).sum(axis=1)
+        share = np.einsum("mi,mi->m", to, face.step) / np.where(size > 0, size, 1.0)
+        rim = face.flat + np.clip(share, 0.0, 1.0)[:, None] * face.step
+        spot = rim[((spot - rim) ** 2).sum(axis=1).argmin()]
+    return np.asarray(face.origin + spot @ face.axes[1:])
 
 
 def _hold(faces: Sequence[_Face], points: Floats) -> Bools:
@@ -357,7 +352,7 @@ def _grown(pair: Sequence[Sequence[_Face]], center: Floats) -> float:
 
     radius = 0.0
     while True:
-        feet = np.vstack([_foot(face, center[None]) for faces in pair for face in faces])
+        feet = np.array([_foot(face, center) for faces in pair for face in faces])
         away = np.linalg.norm(center - feet, axis=1)
         inside = all(_hold(faces, center[None])[0] for faces in pair)
         if not inside or not away.min() > radius * (1 + _STUCK):

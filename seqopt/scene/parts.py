@@ -31,7 +31,6 @@ from seqopt.scene._checks import (
     sizes,
     stiffness,
     unit_axes,
-    unless_none,
     vector,
     whole,
     wholes,
@@ -68,9 +67,8 @@ class Load(Terse):
     since: int | None = None
 
     def __post_init__(self) -> None:
-        settle(self, brick=whole("load: brick", self.brick))
-        since, position = unless_none(whole), unless_none(vector)
-        check(self, self.label, force=vector, position=position, since=since)
+        check(self, "load", brick=whole)
+        check(self, self.label, force=vector, position=vector, since=whole)
 
     @property
     def label(self) -> str:
@@ -111,20 +109,8 @@ def _convex_polygon(
     return tuple(points)
 
 
-@dataclass(frozen=True)
-class Anywhere:
-    """A mobile robot: every node is within reach."""
-
-    def covers(self, point: Vector) -> bool:
-        """Return whether a point is within reach."""
-        return True
-
-    def __str__(self) -> str:
-        return "anywhere"
-
-
-class _Limited:
-    """A reach that ends somewhere."""
+class _Region:
+    """What is within reach of a robot."""
 
     def lack(self, point: Vector) -> float:
         """Return how far a point is out of reach, m; negative within."""
@@ -135,8 +121,20 @@ class _Limited:
         return self.lack(point) <= 0
 
 
+@dataclass(frozen=True)
+class Anywhere(_Region):
+    """A mobile robot: every node is within reach."""
+
+    def lack(self, point: Vector) -> float:
+        """Return how far a point is out of reach, m: it is not."""
+        return -math.inf
+
+    def __str__(self) -> str:
+        return "anywhere"
+
+
 @dataclass(frozen=True, kw_only=True)
-class Side(_Limited):
+class Side(_Region):
     """A robot beside the structure reaches every point of a half-space.
 
     ``toward``: unit vector to the robot's side; ``point``: of the plane that bounds the reach, m.
@@ -165,7 +163,7 @@ class Side(_Limited):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sphere(_Limited):
+class Sphere(_Region):
     """A robot at a fixed base reaches every point within a radius.
 
     Parameters
@@ -332,7 +330,7 @@ class Spring(Terse):
         check(self, where, position=vector)
         unit_axes(self, where, "along", "across")
         check(self, where, translational_stiffness=stiffness, rotational_stiffness=stiffness)
-        check(self, where, thickness=unless_none(length), face=unless_none(_convex_polygon))
+        check(self, where, thickness=length, face=_convex_polygon)
 
     @property
     def corners(self) -> tuple[Vector, ...] | None:
@@ -398,7 +396,7 @@ class Ground(Spring):
     def __post_init__(self) -> None:
         check(self, "ground end", brick=whole)
         where = self.label
-        check(self, where, closes_with=unless_none(whole))
+        check(self, where, closes_with=whole)
         if self.movement is not None:
             what, wanted = f"{where}: movement", "three or six numbers"
             numbers = rows(what, self.movement, wanted)
@@ -436,6 +434,9 @@ def _each_way(where: str, value: float | Iterable[float], unit: str) -> Vector:
             f"{where} is {short(value)}; give one number or three, {low:g} to {high:g} {unit}"
         )
     return x, y, z
+
+
+_each_shift = partial(_each_way, unit="N/m, or none if rigid")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -489,12 +490,15 @@ class Robot(Terse):
         elif not isinstance(reach, Anywhere | Side | Sphere):
             wanted = "Anywhere(), Side(...) or Sphere(...)"
             raise SceneError(f"{where}: reach is {short(reach)}; give {wanted}")
-        check(self, where, payload=partial(positive, unit="N"))
-        check(self, where, stiffness=unless_none(partial(_each_way, unit="N/m, or none if rigid")))
-        turning = partial(_each_way, unit="N m/rad, or none if its node may turn")
-        check(self, where, rotational_stiffness=unless_none(turning))
-        check(self, where, arm=unless_none(partial(kind_of, kind=Arm)))
-        check(self, where, durations=unless_none(partial(kind_of, kind=Durations)))
+        check(
+            self,
+            where,
+            payload=partial(positive, unit="N"),
+            stiffness=_each_shift,
+            rotational_stiffness=partial(_each_way, unit="N m/rad, or none if its node may turn"),
+            arm=partial(kind_of, kind=Arm),
+            durations=partial(kind_of, kind=Durations),
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -609,12 +613,11 @@ class Prop(Terse):
     capacity: float | None = None
 
     def __post_init__(self) -> None:
-        check(self, "prop", node=unless_none(whole), position=unless_none(vector))
+        check(self, "prop", node=whole, position=vector)
         if (self.node is None) == (self.position is None):
             raise SceneError("prop: give the node that it holds, or a position near one")
-        newtons = unless_none(partial(positive, unit="N"))
-        ways = unless_none(partial(_each_way, unit="N/m, or none if rigid"))
-        check(self, self.label, stiffness=ways, direction=unless_none(vector), capacity=newtons)
+        newtons = partial(positive, unit="N")
+        check(self, self.label, stiffness=_each_shift, direction=vector, capacity=newtons)
         if self.direction is not None:
             size = math.hypot(*self.direction)
             if not size > 0:

@@ -18,48 +18,31 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError, SceneError
 from seqopt.scene._checks import short, whole_between
+from seqopt.scene.arm import Arm
 from seqopt.scene.boxes import as_vector
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 
-_End = TypeVar("_End", Joint, Ground)
-_Part = TypeVar("_Part", Brick, Joint, Ground, Load)
+_Part = TypeVar("_Part", Brick, Joint, Ground, Load, Robot, Arm)
 
 
-def _scaled(values: Any, factor: float) -> Any:
-    """Return a stiffness in three directions times a factor; None if rigid."""
-    return None if values is None else as_vector(factor * np.array(values))
+def _stiffer(part: _Part, **factors: float) -> _Part:
+    """Return a part with stiffnesses, by name, times factors; what is rigid stays so."""
+    own = {name: getattr(part, name) for name in factors}
+    scaled = {n: v and tuple((factors[n] * np.array(v)).tolist()) for n, v in own.items()}
+    return replace(part, **scaled)
 
 
 def _stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
     """Return a scene stiffer by factors (J + G,), one for every joint, then every ground end."""
-
-    def stiffer(spring: _End, shift: float, turn: float) -> _End:
-        return replace(
-            spring,
-            translational_stiffness=_scaled(spring.translational_stiffness, shift),
-            rotational_stiffness=_scaled(spring.rotational_stiffness, turn),
-        )
-
-    shift, turn, count = translational.tolist(), rotational.tolist(), len(scene.joints)
-    joints = map(stiffer, scene.joints, shift[:count], turn[:count])
-    grounds = map(stiffer, scene.grounds, shift[count:], turn[count:])
-    return replace(scene, joints=tuple(joints), grounds=tuple(grounds))
-
-
-def _gripped(scene: Scene, factors: Floats) -> Scene:
-    """Return a scene whose grips are stiffer by factors (K,), one for every kind of them."""
-
-    def stiffer(robot: Robot, factor: float) -> Robot:
-        shift, turn = (
-            _scaled(each, factor) for each in (robot.stiffness, robot.rotational_stiffness)
-        )
-        joints = () if robot.arm is None else (factor * k for k in robot.arm.joint_stiffness)
-        arm = robot.arm and replace(robot.arm, joint_stiffness=tuple(joints))
-        return replace(robot, stiffness=shift, rotational_stiffness=turn, arm=arm)
-
-    own = factors[scene.grip_kinds.of_robot].tolist()
-    return replace(scene, robots=tuple(map(stiffer, scene.robots, own)))
+    springs: list[Joint | Ground] = [*scene.joints, *scene.grounds]
+    factors = zip(springs, translational.tolist(), rotational.tolist(), strict=True)
+    out: list[Any] = [
+        _stiffer(spring, translational_stiffness=shift, rotational_stiffness=turn)
+        for spring, shift, turn in factors
+    ]
+    joints = len(scene.joints)
+    return replace(scene, joints=tuple(out[:joints]), grounds=tuple(out[joints:]))
 
 
 def weighed(scene: Scene, factors: Floats) -> Scene:
@@ -181,7 +164,12 @@ class Scenarios:
         for i, scene in enumerate(self.scenes):  # with random numbers of their own
             kinds = len(scene.grip_kinds.turns)
             logs = np.random.default_rng([self.seed, i, 3]).uniform(low, high, kinds)
-            scenes.append(_gripped(scene, np.exp(logs)))
+            own, robots = np.exp(logs)[scene.grip_kinds.of_robot].tolist(), list[Robot]()
+            for robot, factor in zip(scene.robots, own, strict=True):
+                arm = robot.arm and _stiffer(robot.arm, joint_stiffness=factor)
+                grip = _stiffer(robot, stiffness=factor, rotational_stiffness=factor)
+                robots.append(replace(grip, arm=arm))
+            scenes.append(scene.with_robots(*robots))
         return replace(self, scenes=tuple(scenes), grips=held)
 
 

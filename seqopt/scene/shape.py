@@ -46,8 +46,7 @@ class Polyhedron:
         points = tuple(vector("shape: a vertex", row) for row in vertices)
         faces = tuple(wholes("shape: a face", row) for row in faces)
         settle(self, vertices=points, faces=faces)
-        _require_corners(len(points), faces)
-        _require_closed(faces)
+        _require_closed(len(points), faces)
         size = float(np.ptp(self.points, axis=0).max(initial=0.0))
         for i, face in enumerate(faces):
             if bend(self.points[list(face)]) > FLAT * size:
@@ -203,23 +202,18 @@ def polygon_moments(flat: Floats) -> tuple[float, Floats, Floats]:
     return area, center, np.asarray(squares / 24)
 
 
-def _require_corners(count: int, faces: tuple[tuple[int, ...], ...]) -> None:
-    """Require faces of at least three different vertices that there are."""
+def _require_closed(count: int, faces: tuple[tuple[int, ...], ...]) -> None:
+    """Require faces of vertices that there are, and every edge to be passed once each way."""
     if count < 4 or len(faces) < 4:
         raise SceneError(f"shape: {count} vertices and {len(faces)} faces; give at least four each")
     for i, face in enumerate(faces):
+        wanted = ""
         if len(face) < 3 or len(set(face)) < len(face):
-            raise SceneError(
-                f"shape: face {i} is {short(list(face))}; give three vertices or more, each once"
-            )
-        if min(face) < 0 or max(face) >= count:
-            raise SceneError(
-                f"shape: face {i} is {short(list(face))}; name vertices from 0 to {count - 1}"
-            )
-
-
-def _require_closed(faces: tuple[tuple[int, ...], ...]) -> None:
-    """Require every edge to be passed once each way."""
+            wanted = "give three vertices or more, each once"
+        elif min(face) < 0 or max(face) >= count:
+            wanted = f"name vertices from 0 to {count - 1}"
+        if wanted:
+            raise SceneError(f"shape: face {i} is {short(list(face))}; {wanted}")
     passed = Counter(edge for face in faces for edge in edges(face))
     for (a, b), times in passed.items():
         if times == 1 and not passed[b, a]:

@@ -22,7 +22,6 @@ from seqopt.scene._checks import (
     positive,
     short,
     sizes,
-    unless_none,
     whole_between,
 )
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -151,7 +150,7 @@ class ArchForm:
     def __post_init__(self) -> None:
         check(self, "arch", span=length, rise=length, density=density)
         check(self, "arch", curve=partial(one_of, known=_CURVES), pattern=letters)
-        check(self, "arch", bricks=unless_none(partial(whole_between, least=2)))
+        check(self, "arch", bricks=partial(whole_between, least=2))
         check(self, "arch", dimensions=sizes, gap=_joint_width, law=a_law)
 
     @property

@@ -13,16 +13,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import (
-    MOST_BRICKS,
-    as_float,
-    check,
-    kind_of,
-    positive,
-    stiffness,
-    units,
-    unless_none,
-)
+from seqopt.scene._checks import MOST_BRICKS, as_float, check, kind_of, positive, stiffness, units
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.boxes import _spring_fields, as_vector
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
@@ -52,7 +43,7 @@ class JointLaw:
     rotational: Vector | None = None
 
     def __post_init__(self) -> None:
-        check(self, "joint law", translational=stiffness, rotational=unless_none(stiffness))
+        check(self, "joint law", translational=stiffness, rotational=stiffness)
 
     def stiffness(self, area: float, moments: tuple[float, float]) -> tuple[Vector, Vector]:
         """Return the stiffness of a joint over a face, N/m and N m/rad.
