@@ -19,7 +19,7 @@ from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.parts import THICKEST, Brick
-from seqopt.scene.shape import clip
+from seqopt.scene.shape import clip, polygon_moments
 
 _OVERLAP = 0.05  # by which bricks may interpenetrate, over their smallest dimension
 _BESIDE = 0.5  # by which a joint's position may lie beside the faces, over the same
@@ -56,15 +56,6 @@ def _face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
     outward = -np.sign(frame[i] @ normal) * frame[i]
     face = np.array(brick.position) + 0.5 * brick.dimensions[i] * outward
     return float((face - point) @ outward / (normal @ outward))
-
-
-def _distance_beside(polygon: Floats) -> float:
-    """Return how far the origin lies outside the edges of a convex polygon (m, 2), m."""
-    edge = np.roll(polygon, -1, axis=0) - polygon
-    size = np.linalg.norm(edge, axis=1)
-    real = size > 0
-    out = polygon[real, 1] * edge[real, 0] - polygon[real, 0] * edge[real, 1]
-    return float((out / size[real]).max())
 
 
 _SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
@@ -159,27 +150,23 @@ def _contact(
     below = np.array(between[0].position) if len(between) > 1 else point
     sign = np.sign(axes[0] @ (np.array(between[-1].position) - below)) or 1.0
     axes = axes * np.array([[sign], [1.0], [sign]])
-    common = _overlap(axes, point, between, name)
-    (x, y), (u, v) = common.T, np.roll(common, -1, axis=0).T
-    turn = x * v - u * y  # a corner that occurs twice does not count twice
-    middle = point + np.array([(x + u) @ turn, (y + v) @ turn]) / (3.0 * turn.sum()) @ axes[1:]
-    before = -_face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
-    ends = (before, _face_distance(between[-1], axes[0], middle))
-    _require_touching(name, between, ends, _distance_beside(common), thickness)
-    return axes, point + common @ axes[1:]
-
-
-def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Floats:
-    """Return the corners (m, 2) of the overlap of the bricks' faces in a contact's plane."""
     flat = [_face(brick, axes, point) for brick in between]
     common = flat[0] if len(flat) == 1 else clip(*flat)
-    size = min(map(_polygon_area, flat))
-    if len(common) < 3 or not _polygon_area(common) > _SLIVER * size:
+    smaller = min(map(_polygon_area, flat))
+    if len(common) < 3 or not _polygon_area(common) > _SLIVER * smaller:
         raise SceneError(
             f"joint {name}: the faces of its bricks do not overlap along its normal; "
             "move the joint between them or correct its axis"
         )
-    return common
+    middle = point + polygon_moments(common)[1] @ axes[1:]
+    before = -_face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
+    ends = (before, _face_distance(between[-1], axes[0], middle))
+    edge = np.roll(common, -1, axis=0) - common
+    size = np.linalg.norm(edge, axis=1)
+    real = size > 0
+    out = common[real, 1] * edge[real, 0] - common[real, 0] * edge[real, 1]  # of the origin
+    _require_touching(name, between, ends, float((out / size[real]).max()), thickness)
+    return axes, point + common @ axes[1:]
 
 
 def _face(brick: Brick, axes: Floats, point: Floats) -> Floats:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import inf
 
 from seqopt.arrays import Terse
 from seqopt.errors import SceneError, did_you_mean
@@ -71,12 +70,9 @@ def _is_as_strong(mortar: Mortar, other: Mortar) -> bool:
 
     Friction takes from what is carried in shear where a contact is pulled: there it must be equal.
     """
-    slides = mortar.friction - other.friction
-    return (
-        (slides == 0 or (slides > 0 and not other.tensile_strength))
-        and mortar.tensile_strength >= other.tensile_strength
-        and mortar.cohesion >= other.cohesion
-    )
+    slides, pulled = mortar.friction - other.friction, other.tensile_strength
+    rough = slides == 0 or (slides > 0 and not pulled)
+    return rough and mortar.tensile_strength >= pulled and mortar.cohesion >= other.cohesion
 
 
 def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:
@@ -107,15 +103,12 @@ def find_mortar(mortar: Mortar | str) -> Mortar:
 def _mortar_name(mortar: Mortar) -> str:
     """Return what a mortar is called: as `find_mortar` takes it, or its strengths."""
     tension, cohesion = mortar.tensile_strength, mortar.cohesion
-    named = (
-        n for n, m in MORTARS.items() if (m.tensile_strength, m.cohesion) == (tension, cohesion)
-    )
-    bonded = math.isclose(cohesion, tension * (1 + mortar.friction), rel_tol=1e-9)
-    own = (
-        f"bond={tension:.10g}" if bonded else f"{tension:g} Pa in tension, {cohesion:g} Pa in shear"
-    )
+    strengths = {(m.tensile_strength, m.cohesion): name for name, m in MORTARS.items()}
+    own = f"{tension:g} Pa in tension, {cohesion:g} Pa in shear"
+    if math.isclose(cohesion, tension * (1 + mortar.friction), rel_tol=1e-9):
+        own = f"bond={tension:.10g}"
     rough = "" if mortar.friction == _FRICTION else f", friction {mortar.friction:.3g}"
-    return f"{next(named, own)}{rough}"
+    return f"{strengths.get((tension, cohesion), own)}{rough}"
 
 
 def _with_mortar(name: str) -> str:
@@ -248,32 +241,27 @@ def _find_curing(given: Curing | str | Iterable[str]) -> Curing:
 
 
 def _in_words(word: str, text: str) -> Points:
+    """Return the points of a law in words; an age without a unit is in s."""
     if text == "never":
         return ()
-    if "=" not in text:
-        return _linear(_seconds(word, text))
     out = []
     for part in text.split(","):
         age, _, share = part.partition("=")
+        number = age.rstrip("minhs")
         try:
-            out.append((_seconds(word, age), float(share)))
+            seconds = float(number) * _UNITS[age[len(number) :] or "s"]
+        except (KeyError, ValueError):
+            wrong = f"{short(age)} is no age"
+            raise SceneError(f"curing {word}: {wrong}; give {EXAMPLE}, or never") from None
+        if not 0 <= seconds < math.inf:
+            raise SceneError(f"curing {word}: {short(age)} is no age; give zero or more")
+        if text == age:
+            return _linear(seconds)
+        try:
+            out.append((seconds, float(share)))
         except ValueError:
             raise SceneError(f"curing {word}: share {short(share)}; give {EXAMPLE}") from None
     return _checked(f"curing {word}", out)
-
-
-def _seconds(word: str, text: str) -> float:
-    """Return an age in s; without a unit it is in s."""
-    number = text.rstrip("minhs")
-    try:
-        value = float(number) * _UNITS[text[len(number) :] or "s"]
-    except (KeyError, ValueError):
-        raise SceneError(
-            f"curing {word}: {short(text)} is no age; give {EXAMPLE}, or never"
-        ) from None
-    if not 0 <= value < math.inf:
-        raise SceneError(f"curing {word}: {short(text)} is no age; give zero or more")
-    return value
 
 
 @dataclass(frozen=True)
@@ -288,5 +276,5 @@ class BedStiffness:
 
     def __post_init__(self) -> None:
         for name in ("normal", "tangential"):
-            if not 0 < getattr(self, name) < inf:
+            if not 0 < getattr(self, name) < math.inf:
                 raise SceneError(f"bed: {name} is {getattr(self, name)}; give a positive number")

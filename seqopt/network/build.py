@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,21 +20,15 @@ _EQUALLY_FAR = 1e-6  # inner nodes whose distances from a joint differ by no lar
 _Springs = list[tuple[Joint | Ground, int]]  # with the brick counts from which they act
 
 
-class _Node(NamedTuple):
-    name: object
+class _Part(NamedTuple):
+    """A node or an edge: its number, name or ends, kind, and the brick count that brings it."""
+
+    name: Any
     kind: PartKind
     since: int
-    position: tuple[float, float, float]
     spring: int = -1
     brick: int = -1
-
-
-class _Edge(NamedTuple):
-    nodes: tuple[object, object]
-    kind: PartKind
-    since: int
-    brick: int = -1
-    spring: int = -1
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Network:
@@ -78,22 +73,20 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     index = {node.name: i for i, node in enumerate(nodes)}
     support = np.argsort(ascending)[: len(scene.grounds)]
     mass = np.array([brick.mass for brick in scene.placed])[:, None]
+    arrays = {
+        f"{what}_{name}": np.array([int(getattr(part, name)) for part in parts])
+        for what, parts in (("node", nodes), ("edge", edges))
+        for name in ("kind", "since", "spring", "brick")
+    }
     return Network(
         scene=scene,
         springs=_springs(scene, springs, support, index),
         node_position=np.array([node.position for node in nodes]),
-        node_kind=np.array([node.kind.value for node in nodes]),
-        node_since=np.array([node.since for node in nodes]),
-        node_spring=np.array([node.spring for node in nodes]),
-        node_brick=np.array([node.brick for node in nodes]),
         node_name=tuple(index),
         inner=np.array([[index[n] for n in brick.nodes] for brick in scene.placed]),
-        edge_nodes=np.array([[index[name] for name in edge.nodes] for edge in edges]),
-        edge_kind=np.array([edge.kind.value for edge in edges]),
-        edge_since=np.array([edge.since for edge in edges]),
-        edge_brick=np.array([edge.brick for edge in edges]),
-        edge_spring=np.array([edge.spring for edge in edges]),
+        edge_nodes=np.array([[index[name] for name in edge.name] for edge in edges]),
         weight=mass * (scene.weight_factor * np.array(scene.gravity)),
+        **arrays,
     )
 
 
@@ -105,26 +98,26 @@ def network_of(given: Network | Scene) -> Network:
     raise SceneError(f"a {kind} is not a network; give build_network(scene), or the scene itself")
 
 
-def _nodes_and_edges(scene: Scene, springs: _Springs) -> tuple[list[_Node], list[_Edge]]:
+def _nodes_and_edges(scene: Scene, springs: _Springs) -> tuple[list[_Part], list[_Part]]:
     """Return the parts of the double cross, those of a partial structure first."""
-    nodes, edges = list[_Node](), list[_Edge]()
+    nodes, edges = list[_Part](), list[_Part]()
     for i, brick in enumerate(scene.placed):
         for number in brick.nodes:
-            nodes.append(_Node(number, PartKind.INNER, i + 1, brick.node_position(number), brick=i))
-        edges.append(_Edge(brick.nodes, PartKind.INNER, i + 1, brick=i))
+            at = brick.node_position(number)
+            nodes.append(_Part(number, PartKind.INNER, i + 1, brick=i, position=at))
+        edges.append(_Part(brick.nodes, PartKind.INNER, i + 1, brick=i))
     for s, (name, (spring, since)) in enumerate(zip(_joint_names(springs), springs, strict=True)):
-        ends = [scene.since[b] for b in spring.ends]
-        nodes.append(_Node(name, PartKind.JOINT, min(ends), spring.position, s))
+        ends, at = [scene.since[b] for b in spring.ends], spring.position
+        nodes.append(_Part(name, PartKind.JOINT, min(ends), s, position=at))
         for count in ends:  # each brick meets it through its nearer node, or the first
             brick = scene.placed[count - 1]
-            away = [np.subtract(brick.node_position(node), spring.position) for node in brick.nodes]
-            first, second = map(np.linalg.norm, away)
+            first, second = (math.dist(brick.node_position(node), at) for node in brick.nodes)
             met = brick.nodes[int(first > second * (1 + _EQUALLY_FAR))]
-            edges.append(_Edge((met, name), PartKind.JOINT, count, count - 1, s))
+            edges.append(_Part((met, name), PartKind.JOINT, count, s, count - 1))
         if isinstance(spring, Ground):
             base = ("base", *name[1:])
-            nodes.append(_Node(base, PartKind.BASE, since, spring.anchor, s))
-            edges.append(_Edge((name, base), PartKind.BASE, since, spring=s))
+            nodes.append(_Part(base, PartKind.BASE, since, s, position=spring.anchor))
+            edges.append(_Part((name, base), PartKind.BASE, since, s))
     return sorted(nodes, key=lambda n: n.since), sorted(edges, key=lambda e: e.since)
 
 

@@ -553,14 +553,10 @@ class _GripKinds(FrozenValue):
 
 def _grip_kinds(robots: Sequence[Robot], nodes: Sequence[int]) -> _GripKinds:
     """Return the kinds of robots; one that is rigid where there is none. ``nodes``: all numbers."""
+    own = (r.name if r.arm and r.arm.joint_stiffness else "" for r in robots)
     ways = [
-        (
-            r.stiffness,
-            r.rotational_stiffness,
-            r.payload,
-            r.name if r.arm and r.arm.joint_stiffness else "",
-        )
-        for r in robots
+        (r.stiffness, r.rotational_stiffness, r.payload, name)
+        for r, name in zip(robots, own, strict=True)
     ]
     kinds = list(dict.fromkeys(ways)) or [(None, None, np.inf, "")]
     shift, turn, payload, arms = zip(*kinds, strict=True)

@@ -72,9 +72,8 @@ def _check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick
             point = getattr(spring, name, None)
             if point and max(map(abs, point)) > farthest:
                 raise SceneError(f"{spring.label}: {name} is {list(point)}; move it to its bricks")
-        stiffness = (*spring.translational_stiffness, *spring.rotational_stiffness)
-        for value in filter(None, stiffness):
-            if not 1 / _HEAVY <= value <= _HEAVY:
+        for value in (*spring.translational_stiffness, *spring.rotational_stiffness):
+            if value and not 1 / _HEAVY <= value <= _HEAVY:
                 raise SceneError(
                     f"{spring.label}: a stiffness is {value:g}; "
                     f"give 0, or from {1 / _HEAVY:g} to {_HEAVY:g}"
@@ -91,18 +90,6 @@ def _check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick
                 raise SceneError(
                     f"{spring.label}: anchor and position are one point; give the stub a length"
                 )
-
-
-def _check_loads(loads: Sequence[Load], bricks: Mapping[int, Brick]) -> None:
-    """Require loads within bounds, at their bricks."""
-    for load in loads:
-        if math.hypot(*load.force) > _HEAVY:
-            raise SceneError(f"{load.label}: force is {list(load.force)}; give N, to {_HEAVY:g}")
-        far = _FAR * max(bricks[load.brick].dimensions)
-        if load.position and max(map(abs, load.position)) > far:
-            raise SceneError(
-                f"{load.label}: position is {list(load.position)}; move it to its brick"
-            )
 
 
 _PARTS = (Brick, Joint, Ground, Robot, Load, Prop)
@@ -179,7 +166,13 @@ class Scene(Shown):
         _check_bricks(self.bricks, self.gravity, self.weight_factor)
         by_name = {brick.name: brick for brick in self.bricks}
         _check_springs((*self.joints, *self.grounds), by_name)
-        _check_loads(self.loads, by_name)
+        for load in self.loads:
+            if math.hypot(*load.force) > _HEAVY:
+                given = list(load.force)
+                raise SceneError(f"{load.label}: force is {given}; give N, to {_HEAVY:g}")
+            at, far = load.position, _FAR * max(by_name[load.brick].dimensions)
+            if at and max(map(abs, at)) > far:
+                raise SceneError(f"{load.label}: position is {list(at)}; move it to its brick")
         held = {n: b for n, b in self.brick_of_node.items() if n not in self.blocked_nodes}
         settle(self, props=_settled_props(self.props, held))
         if math.hypot(*self.wind) > _STORM:
@@ -231,14 +224,15 @@ class Scene(Shown):
 
         Nodes that are blocked, or held by props, are not among them.
         """
-        if robot.reach not in self._within_reach:
+        known = self._within_reach
+        if robot.reach not in known:
             covers = robot.reach.covers
             blocked = {*self.blocked_nodes, *(prop.node for prop in self.props)}
-            self._within_reach[robot.reach] = tuple(
+            known[robot.reach] = tuple(
                 tuple(n for n in b.nodes if n not in blocked and covers(b.node_position(n)))
                 for b in self.placed
             )
-        return self._within_reach[robot.reach]
+        return known[robot.reach]
 
     @cached_property
     def _within_reach(self) -> dict[Reach, tuple[tuple[int, ...], ...]]:

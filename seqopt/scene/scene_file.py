@@ -37,19 +37,8 @@ _DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
 _PULL = 100.0  # m/s²; ten times that of the earth
 
 
-def _find_warnings(scene: Scene) -> tuple[str, ...]:
-    """Return warnings about a scene, one line each; most scenes have none."""
-    return (*_of_units(scene), *_find_overlapping(scene), *_of_places(scene))
-
-
-def warn_of(scene: Scene, name: str) -> None:
-    """Give a `SceneWarning` for each thing that looks wrong in a scene."""
-    for doubt in _find_warnings(scene):
-        warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=3)
-
-
-def _of_units(scene: Scene) -> Iterator[str]:
-    """Yield warnings of probable other units, of the first such brick."""
+def _find_warnings(scene: Scene) -> Iterator[str]:
+    """Yield warnings about a scene, one line each; most scenes have none."""
     pull = math.hypot(*scene.gravity)
     if pull > _PULL:
         yield f"gravity is {pull:g} m/s²: give it in meters, if it is meant in millimeters"
@@ -62,6 +51,22 @@ def _of_units(scene: Scene) -> Iterator[str]:
         if found:
             more = f" and {len(found) - 1} more" if len(found) > 1 else ""
             yield f"brick {found[0].name}{more}: {said.format(found[0])}"
+    yield from _find_overlapping(scene)
+    bricks = {brick.name: brick for brick in scene.bricks}
+    springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
+    placed = [(spring.label, spring.position, end) for spring in springs for end in spring.ends]
+    placed += [(load.label, load.position, load.brick) for load in scene.loads if load.position]
+    for label, position, end in placed:
+        at = np.abs(bricks[end].frame @ np.subtract(position, bricks[end].position))
+        away = np.linalg.norm(np.maximum(at - 0.5 * np.array(bricks[end].dimensions), 0.0))
+        if away > _FAR_AWAY * max(bricks[end].dimensions):
+            yield f"{label}: it lies {away:.4g} m from brick {end}"
+
+
+def warn_of(scene: Scene, name: str) -> None:
+    """Give a `SceneWarning` for each thing that looks wrong in a scene."""
+    for doubt in _find_warnings(scene):
+        warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=3)
 
 
 def _find_overlapping(scene: Scene) -> Iterator[str]:
@@ -82,19 +87,6 @@ def _find_overlapping(scene: Scene) -> Iterator[str]:
     yield from lines[:_SHOWN]
     if len(lines) > _SHOWN:
         yield f"{len(lines) - _SHOWN} more pairs of bricks interpenetrate"
-
-
-def _of_places(scene: Scene) -> Iterator[str]:
-    """Yield joints, ground ends and loads that lie far from their bricks."""
-    bricks = {brick.name: brick for brick in scene.bricks}
-    springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
-    placed = [(spring.label, spring.position, end) for spring in springs for end in spring.ends]
-    placed += [(load.label, load.position, load.brick) for load in scene.loads if load.position]
-    for label, position, end in placed:
-        at = np.abs(bricks[end].frame @ np.subtract(position, bricks[end].position))
-        away = np.linalg.norm(np.maximum(at - 0.5 * np.array(bricks[end].dimensions), 0.0))
-        if away > _FAR_AWAY * max(bricks[end].dimensions):
-            yield f"{label}: it lies {away:.4g} m from brick {end}"
 
 
 _VERSION = 1
@@ -181,23 +173,8 @@ def _scene_by_words(words: str) -> Scene:
 
 def builtin_scenes() -> tuple[str, ...]:
     """Return the names of the scenes that ship with the package, in alphabetical order."""
-    return tuple(sorted({*_stored(), *_GENERATED}))
-
-
-def _stored() -> tuple[str, ...]:
-    return tuple(item.name.removesuffix(".json") for item in _DATA.joinpath("scenes").iterdir())
-
-
-def _refuse_mesh(path: Path) -> None:
-    """Raise an error that says how a mesh becomes a scene."""
-    if path.is_file() and path.suffix.lower() in _MESHES:
-        unit = _MESHES[path.suffix.lower()]
-        out = shlex.quote(f"{path.resolve().stem}.json")
-        words = f"{shlex.quote(str(path))} {'--unit m ' * unit}--density 2400 --out {out}"
-        raise SceneError(
-            f"scene {path}: a mesh; seqopt import {words} makes a scene of it, with its own "
-            f"{'unit and ' * unit}density"
-        )
+    stored = (item.name.removesuffix(".json") for item in _DATA.joinpath("scenes").iterdir())
+    return tuple(sorted({*stored, *_GENERATED}))
 
 
 def load_scene(name: str | Path) -> Scene:
@@ -233,7 +210,7 @@ def load_scene(name: str | Path) -> Scene:
     name = str(name)
     if name in _GENERATED:
         return replace(_scene_by_words(_GENERATED[name]), name=name)
-    if name in _stored():
+    if name in builtin_scenes():
         text = _DATA.joinpath("scenes", f"{name}.json").read_text("utf-8")
         return _scene_from_dict(json.loads(text))  # ours obey the schema: a test asks
     kind, colon, _ = name.partition(":")
@@ -246,7 +223,13 @@ def load_scene(name: str | Path) -> Scene:
             f"scene {name}: no such built-in scene or file{hint}; "
             f"built in: {', '.join(builtin_scenes())}; or in words, as arch:span=2,rise=0.7"
         )
-    _refuse_mesh(path)
+    if path.is_file() and (unit := _MESHES.get(path.suffix.lower())) is not None:
+        out = shlex.quote(f"{path.resolve().stem}.json")
+        words = f"{shlex.quote(str(path))} {'--unit m ' * unit}--density 2400 --out {out}"
+        raise SceneError(
+            f"scene {path}: a mesh; seqopt import {words} makes a scene of it, with its own "
+            f"{'unit and ' * unit}density"
+        )
     scene = _with_models(_parse_scene(read_text(path), name), path.parent.joinpath)
     warn_of(scene, name)
     return scene
@@ -254,13 +237,11 @@ def load_scene(name: str | Path) -> Scene:
 
 def _with_models(scene: Scene, found: Callable[[str], Path]) -> Scene:
     """Return a scene whose arms have their models, if they are files, where these are found."""
-    robots = tuple(
-        robot
-        if robot.arm is None or robot.arm.in_package
-        else replace(robot, arm=replace(robot.arm, urdf=str(found(robot.arm.urdf))))
-        for robot in scene.robots
-    )
-    return scene if robots == scene.robots else replace(scene, robots=robots)
+    robots = list(scene.robots)
+    for i, robot in enumerate(robots):
+        if robot.arm is not None and not robot.arm.in_package:
+            robots[i] = replace(robot, arm=replace(robot.arm, urdf=str(found(robot.arm.urdf))))
+    return scene if (*robots,) == scene.robots else scene.with_robots(*robots)
 
 
 def _parse_scene(text: str, source: str = "text") -> Scene:
@@ -285,26 +266,25 @@ def _parse_scene(text: str, source: str = "text") -> Scene:
 
 def _scene_from_dict(document: dict[str, Any]) -> Scene:
     """Return the scene of a document that obeys the schema."""
+
+    def part(make: type, entry: dict[str, Any]) -> Any:
+        own = dict(entry)
+        if "reach" in own:
+            reach = dict(own["reach"])
+            own["reach"] = _REACHES[reach.pop("kind")](**reach)
+        for name, kind in _WITHIN.items():
+            if own.get(name):
+                try:
+                    own[name] = kind(**own[name])
+                except SceneError as error:
+                    where = f"brick {short(own['name'])}: " if name == "shape" else ""
+                    raise SceneError(f"{where}{error}") from error
+        return make(**own)
+
     content = {key: value for key, value in document.items() if key not in ("format", "version")}
     for kind, make in _KINDS.items():
-        content[kind] = [_part(make, entry) for entry in content.get(kind, ())]
+        content[kind] = [part(make, entry) for entry in content.get(kind, ())]
     return Scene(**content)
-
-
-def _part(make: type, entry: dict[str, Any]) -> Any:
-    """Return a part of a scene with the values that it holds."""
-    own = dict(entry)
-    if "reach" in own:
-        reach = dict(own["reach"])
-        own["reach"] = _REACHES[reach.pop("kind")](**reach)
-    for name, kind in _WITHIN.items():
-        if own.get(name):
-            try:
-                own[name] = kind(**own[name])
-            except SceneError as error:
-                where = f"brick {short(own['name'])}: " if name == "shape" else ""
-                raise SceneError(f"{where}{error}") from error
-    return make(**own)
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:

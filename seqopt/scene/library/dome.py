@@ -58,12 +58,11 @@ class DomeShape:
     law: JointLaw = MASONRY
 
     def __post_init__(self) -> None:
-        check(self, "dome", courses=partial(whole_between, least=1))
-        check(self, "dome", around=partial(whole_between, least=3))
+        least = partial(whole_between, least=1), partial(whole_between, least=3)
+        check(self, "dome", courses=least[0], around=least[1])
         _few_enough("dome", self.courses * self.around)
         check(self, "dome", span=length, rise=length, opening=length, thickness=length)
-        check(self, "dome", gap=_joint_width)
-        check(self, "dome", density=density, law=a_law)
+        check(self, "dome", gap=_joint_width, density=density, law=a_law)
         if self.rise > 0.5 * self.span:
             raise SceneError(
                 f"dome: rise is {self.rise:g} m; give at most half of the span, {0.5 * self.span:g}"
@@ -113,7 +112,13 @@ def dome(shape: DomeShape) -> Scene:
     >>> dome(DomeShape(courses=4, around=12))
     <Scene dome 39: 39 bricks, 82 joints, 12 ground ends, 3 robots>
     """
-    places = _places(shape)
+    places = list[_Place]()
+    for row in range(shape.courses):  # bricks as long as the lowest ones, half a brick shifted
+        size = math.cos(shape.latitude(row)) / math.cos(shape.latitude(0))
+        count = max(3, round(shape.around * size))
+        half = 0.5 * _TURN / count
+        shift = half * (row % 2)
+        places += [_Place(row, row + 1, 2 * half * i + shift, half) for i in range(count)]
     loose = [_brick(shape, place, i) for i, place in enumerate(places)]
     pairs, normals = _beside(shape, places)
     kept = np.flatnonzero(_shares(loose, pairs, normals) >= _LEAST_SHARE)
@@ -134,21 +139,6 @@ def dome(shape: DomeShape) -> Scene:
     feet = [(brick, DOWN) for brick, p in zip(bricks, places, strict=True) if not p.low]
     name = f"dome {len(bricks)}"
     return _masonry(name, ".dome.", bricks, ends, shape.law, feet, normals[turn])
-
-
-def _places(shape: DomeShape) -> list[_Place]:
-    """Return the places of bricks, from the ground up.
-
-    Bricks of courses are as long as the lowest ones, and shifted by half a brick.
-    """
-    out = []
-    for row in range(shape.courses):
-        size = math.cos(shape.latitude(row)) / math.cos(shape.latitude(0))
-        count = max(3, round(shape.around * size))
-        half = 0.5 * _TURN / count
-        shift = half * (row % 2)
-        out += [_Place(row, row + 1, 2 * half * i + shift, half) for i in range(count)]
-    return out
 
 
 def _beside(shape: DomeShape, places: Sequence[_Place]) -> tuple[list[tuple[int, int]], Floats]:
