@@ -291,7 +291,7 @@ def _where_both(pair: Sequence[Polyhedron], deepest: float) -> Floats:
             normal = normal_of(solid.points[list(face)])
             for vertex in face if normal.any() else ():
                 normals[vertex].append(units(normal))
-        flat = (np.linalg.pinv(np.array(own or [[0.0] * 3]), _ALIKE_NORMALS) for own in normals)
+        flat = (np.linalg.pinv(np.array(own or [np.zeros(3)]), _ALIKE_NORMALS) for own in normals)
         shift = np.array([each.sum(axis=1) for each in flat])
         moved.append(solid.points - share * deepest * shift)
     faces = [_faces(points, solid) for points, solid in zip(moved, pair, strict=True)]

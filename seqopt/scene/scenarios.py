@@ -18,15 +18,14 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError, SceneError
 from seqopt.scene._checks import short, whole_between
-from seqopt.scene.arm import Arm
 from seqopt.scene.boxes import as_vector
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 
-_Part = TypeVar("_Part", Brick, Joint, Ground, Load, Robot, Arm)
+_Part = TypeVar("_Part", Brick, Joint, Ground, Load)
 
 
-def _stiffer(part: _Part, **factors: float) -> _Part:
+def _stiffer(part: Any, **factors: float) -> Any:
     """Return a part with stiffnesses, by name, times factors; what is rigid stays so."""
     own = {name: getattr(part, name) for name in factors}
     scaled = {n: v and tuple((factors[n] * np.array(v)).tolist()) for n, v in own.items()}
@@ -35,9 +34,9 @@ def _stiffer(part: _Part, **factors: float) -> _Part:
 
 def _stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
     """Return a scene stiffer by factors (J + G,), one for every joint, then every ground end."""
-    springs: list[Joint | Ground] = [*scene.joints, *scene.grounds]
+    springs = (*scene.joints, *scene.grounds)
     factors = zip(springs, translational.tolist(), rotational.tolist(), strict=True)
-    out: list[Any] = [
+    out = [
         _stiffer(spring, translational_stiffness=shift, rotational_stiffness=turn)
         for spring, shift, turn in factors
     ]

@@ -146,9 +146,9 @@ def _take_turns(
         possible = {pair: way for pair, way in ways.items() if pair[0] in able}
         if not possible:
             nodes = [node for node in brick.nodes if node not in scene.blocked_nodes]
-            free = [scene.robots[robot].name for robot in sorted({pair[0] for pair in ways})]
-            reach = "reach" if len(free) > 1 else "reaches"
-            why = f"{' and '.join(free)} {reach} none of its free nodes {nodes}"
+            names = [scene.robots[robot].name for robot in sorted({pair[0] for pair in ways})]
+            reach = "reach" if len(names) > 1 else "reaches"
+            why = f"{' and '.join(names)} {reach} none of its free nodes {nodes}"
             if able and k:
                 why += f"; {scene.robots[min(able)].name} does, and holds the brick before"
             raise StepError(
