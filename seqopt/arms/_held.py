@@ -16,7 +16,8 @@ from seqopt.scene.scene import Scene
 
 def compute_held_postures(scene: Scene) -> HeldPostures:
     """Return the postures in which arms with compliant joints hold."""
-    from seqopt.arms._tables import Site, held_by  # noqa: PLC0415  # few scenes have arms
+    from seqopt.arms._reached import Site  # noqa: PLC0415  # few scenes have arms
+    from seqopt.arms._tables import held_by  # noqa: PLC0415
 
     table = find_postures(scene)
     assert table is not None

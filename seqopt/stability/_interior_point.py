@@ -362,7 +362,8 @@ class _Search:
         """
         balance, cones, square = self._balance, self._cones, times(inverse, inverse)
         weighed = times(square, cones.map)
-        soft = np.linalg.inv(cones.owned(times(cones.map.swapaxes(0, 1), weighed)).T).T
+        borne = cones.owned(times(cones.map.swapaxes(0, 1), weighed))
+        soft = np.asarray(np.linalg.inv(borne.T).T, dtype=float)
         solve = balance.solver(soft)
         lift, stiff = cones.owned(weighed[0]), cones.sums(square[0, 0])
         left = balance.wrench(point.force) + self._load
