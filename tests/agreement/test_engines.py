@@ -13,12 +13,11 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
-from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.responses.table import step_fields
-from seqopt.sequence.methods import METHODS, three_robot_loop
-from seqopt.study.published import WEIGHTED, published_plan
-from tests.builders import block, hinged, scaled, six_bricks, small_arch
+from seqopt.sequence.methods import METHODS
+from seqopt.study.published import published_plan
+from tests.builders import hinged, scaled
 from tests.direct_solve import solve_dense
 from tests.strategies import arches, both_sided, loosened, states, walls
 
@@ -45,7 +44,7 @@ def test_published_states_agree_with_the_frame(engine25, published):
     """At its best contrast the frame and the exactly rigid bricks differ by less than 5e-6."""
     frame = FrameEngine(engine25.network)
     worst = dict.fromkeys(FIELDS[:4], 0.0)
-    for step in published:
+    for step in published[::3]:
         a, b = step_fields(engine25, step), step_fields(frame, step)
         for name in worst:
             worst[name] = max(worst[name], gap(b, a, name))
@@ -61,7 +60,7 @@ def test_soft_bars_are_seen(engine25, published):
 
 
 def test_published_states_agree_with_the_direct_solve(engine25, published):
-    for step in published:
+    for step in published[::3]:
         columns = grip_columns(
             engine25.network, step.bricks, np.array([step.held], int).reshape(1, -1)
         )
@@ -70,6 +69,7 @@ def test_published_states_agree_with_the_direct_solve(engine25, published):
         assert max(gap(direct, fast, name) for name in FIELDS[:4]) <= 1e-9
 
 
+@settings(max_examples=8)
 @given(state=states(st.one_of(arches(), walls(), both_sided())))
 def test_three_routes_agree(state):
     scene, bricks, grips = state
@@ -96,7 +96,7 @@ def answered(solve, *asked):
         return type(error)
 
 
-@settings(max_examples=60)
+@settings(max_examples=15)
 @given(state=states(loosened(st.one_of(arches(), walls())), max_grips=6))
 def test_three_routes_agree_where_joints_are_loose(state):
     """Islands, hinges and loops of them; what one route calls a mechanism, the others do."""
@@ -118,6 +118,7 @@ def test_three_routes_agree_where_joints_are_loose(state):
             assert difference <= tolerance * scale, name
 
 
+@settings(max_examples=6)
 @given(state=states(max_grips=3), data=st.data())
 def test_a_batch_equals_its_sets_one_by_one(state, data):
     scene, bricks, grips = state
@@ -135,20 +136,8 @@ def test_a_batch_equals_its_sets_one_by_one(state, data):
             assert np.abs(a - b).max(initial=0) <= 1e-9 * np.abs(b).max(initial=1e-300)
 
 
-def test_two_bricks_held_at_both_nodes():
-    """Each inner edge carries nothing, whatever the order of the grips."""
-    net = build_network(six_bricks())
-    sets = np.array([[4, 5, 8, 9], [9, 4, 8, 5], [4, 8, 1, 11], [10, 11, 4, 7]])
-    fast = ComplianceEngine(net).solve(6, sets, Want.ALL)
-    direct = solve_dense(net, 6, grip_columns(net, 6, sets))
-    assert max(gap(direct, fast, name) for name in FIELDS) <= 1e-9
-    held = np.flatnonzero((net.edge_spring < 0) & np.isin(net.edge_brick, [2, 4]))
-    largest = np.abs(fast.edge_force).max()
-    assert np.abs(fast.edge_force[:2][:, held]).max() <= 1e-12 * largest
-
-
 @pytest.mark.parametrize("engine_type", [ComplianceEngine, FrameEngine])
-@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("factor", [1e-3, 1e3])
 def test_mechanisms_are_told_from_sound_structures(arch25, engine_type, factor):
     """A hinge below one grip is a mechanism, below two it is not; in any unit of length."""
     engine = engine_type(build_network(scaled(hinged(arch25, 3), length=factor)))
@@ -176,34 +165,7 @@ def test_a_loose_brick_needs_grips(arch25, engine_type):
     assert np.isfinite(held.displacement).all()
 
 
-@pytest.mark.parametrize("engine_type", [ComplianceEngine, FrameEngine])
-@pytest.mark.parametrize("grips", [[], [1], [1, 2]])
-def test_a_brick_on_springs_without_stiffness_is_loose(engine_type, grips):
-    """Where nothing holds it either, no row at all says what resists."""
-    none = {f"{way}_stiffness": (0.0, 0.0, 0.0) for way in ("translational", "rotational")}
-    with pytest.raises(MechanismError, match="nothing resists a motion of brick 1"):
-        engine_type(build_network(block(**none))).solve(1, [grips])
-
-
-def test_engines_agree_where_grips_hold_a_hinged_chain(arch25):
-    net = build_network(hinged(arch25, 3))
-    grips = [[47, 43], [44, 20]]
-    a, b = (engine(net).solve(24, grips) for engine in (ComplianceEngine, FrameEngine))
-    for name in FIELDS[:4]:
-        assert gap(b, a, name) <= 1e-5
-
-
 def test_the_frame_says_when_it_fails(engine25):
     """Beyond any use of double precision the answer is a solver's failure, not a verdict."""
     with pytest.raises(SolverError, match="contrast"):
         FrameEngine(engine25.network, contrast=1e14).solve(25, [[1, 25, 49]])
-
-
-def test_the_frame_poses_the_same_problem():
-    net = build_network(small_arch(6))
-    a, b = (
-        pose_decisions(e(net), three_robot_loop(net), WEIGHTED)
-        for e in (ComplianceEngine, FrameEngine)
-    )
-    for x, y in zip(a.sums.single, b.sums.single, strict=True):
-        assert x == pytest.approx(y, rel=1e-4)

@@ -21,7 +21,7 @@ from tests.builders import largest_difference
 from tests.strategies import arches, both_sided, states, walls
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(states(scenes=st.one_of(arches(max_bricks=5), walls(), both_sided())))
 def test_within_the_elastic_limits_discrete_elements_are_rigid_bricks(state):
     scene, bricks, grips = state

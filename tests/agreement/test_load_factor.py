@@ -85,7 +85,7 @@ def voussoirs(count, thickness, at, friction):
 
 
 @pytest.mark.parametrize("friction", [0.5, 2.0])
-@pytest.mark.parametrize(("count", "thickness", "at"), [(11, 0.3, 3), (20, 0.25, 5), (9, 0.3, 4)])
+@pytest.mark.parametrize(("count", "thickness", "at"), [(11, 0.3, 3), (9, 0.3, 4)])
 def test_an_arch_under_a_force(count, thickness, at, friction):
     """Pippard, Tranter and Chitty (1936) loaded arches of voussoirs like these until they fell."""
     assembly, expected = voussoirs(count, thickness, at, friction)
@@ -151,7 +151,7 @@ def plane_collapse(scene, friction):
 
 
 @pytest.mark.parametrize("friction", [0.3, 0.8])
-@pytest.mark.parametrize(("columns", "courses"), [(2, 3), (3, 4)])
+@pytest.mark.parametrize(("columns", "courses"), [(2, 3)])
 @pytest.mark.parametrize("force", [(10.0, 0.0, 0.0), (-10.0, 0.0, 6.0)])
 def test_a_wall_that_is_pushed_along(columns, courses, force, friction):
     scene = pushed_wall(columns, courses, force)

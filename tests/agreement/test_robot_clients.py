@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import re
 
 import numpy as np
-import pandas as pd
 import pytest
-from scipy.spatial.transform import Rotation
 
 from seqopt._cli.main import main
 from seqopt.exchange._tasks import FRAMES, plan_tasks
@@ -54,22 +51,6 @@ def test_compas_has_frames_and_meshes():
         assert block["shape"].volume() * brick.density == pytest.approx(block["mass"])
         assert list(block["shape"].centroid()) == pytest.approx(list(block["frame"].point))
     assert not same(found["tasks"][1]["grip"], TASKS[1].block_frame)  # the control
-
-
-def test_pandas_has_a_row_for_every_task():
-    table = pd.read_csv(io.StringIO(export_plan(SCENE, STEPS, "tasks_csv")))
-    assert [*table["action"]] == [task.action.value for task in TASKS]
-    for name in FRAMES:
-        known = [getattr(task, name) for task in TASKS]
-        rows = table[
-            [f"{name}_{end}" for end in ("x", "y", "z", "qx", "qy", "qz", "qw")]
-        ].to_numpy()
-        for row, frame in zip(rows, known, strict=True):
-            assert np.isnan(row).all() == (frame is None)
-            if frame is not None:
-                np.testing.assert_allclose(row[:3], frame.point, atol=1e-8)
-                turned = Rotation.from_quat(row[3:]).as_matrix().T
-                np.testing.assert_allclose(turned, frame.axes, atol=1e-7)
 
 
 def test_compas_fab_takes_blocks_and_targets_of_tasks():

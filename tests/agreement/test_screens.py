@@ -65,7 +65,7 @@ def compare(scene, bricks, mortar):
     return found
 
 
-@settings(max_examples=8)
+@settings(max_examples=5)
 @given(arches(max_bricks=5), st.sampled_from(MORTARS), st.floats(0.5, 6.0), st.integers(1, 5))
 def test_small_arches(scene, mortar, multiple, bricks):
     compare(with_payload(scene, multiple), min(bricks, len(scene.bricks)), mortar)

@@ -138,11 +138,3 @@ def test_builds_come_to_what_the_page_says(soft):
     held = [worst(soft, plans[name].steps)[1] for name in ("rigid", "alike", "soft")]
     assert held[0] > 1.5 * held[2]
     assert held[1] > 1.2 * held[2]
-
-
-def test_one_posture_at_a_node_costs_nothing_here(soft):
-    stiff = [replace(r.arm, joint_stiffness=(1e14,) * 6) for r in soft.robots]
-    pairs = zip(soft.robots, stiff, strict=True)
-    near = soft.with_robots(*(replace(robot, arm=arm) for robot, arm in pairs))
-    plans = [seqopt.optimize(each, "free", aim="D_max") for each in (near, soft.with_grips(None))]
-    assert plans[0].objective == pytest.approx(plans[1].objective, rel=1e-5)

@@ -31,8 +31,6 @@ def folder(tmp_path, monkeypatch, capsys):
     "words",
     [
         ["report", "plan", "--no-stability"],
-        ["times", "plan"],
-        ["scene", "s.json", "--view"],
         ["replan", "plan", "--no-stability"],
         ["export", "plan", "--format", "tasks"],
         ["reach", "s.json"],
@@ -60,12 +58,3 @@ def test_times_say_where_arms_cannot_be(folder, capsys):
         (folder / "plan" / "scene.json").write_text(moved, encoding="utf-8")
         assert main(["times", "plan"]) == 0
         assert said in capsys.readouterr().err
-
-
-def test_a_report_says_why_arms_are_drawn_without_postures(folder, capsys):
-    file = folder / "plan" / "scene.json"
-    text = file.read_text(encoding="utf-8")
-    file.write_text(text.replace("[0.3, -0.9, 0.0]", "[0.3, 0.0, 0.0]"), encoding="utf-8")
-    assert main(["report", "plan", "--no-stability"]) == 0
-    said = capsys.readouterr().err
-    assert "arms: drawn without postures; robot arm: the base of its arm hits brick 2" in said

@@ -61,12 +61,6 @@ def test_flanges_are_where_the_table_says(table, witness):
         assert np.allclose(place, table.place[row], atol=5e-6)
 
 
-def test_the_tool_ends_at_the_node_that_it_grips(scene, table):
-    tips = table.place + 0.3 * table.axes[:, :, 2]
-    nodes = np.array([scene.node_position(table.nodes[n]) for n in table.node])
-    assert np.allclose(tips, nodes, atol=1e-12)
-
-
 def test_postures_touch_what_the_table_says_and_nothing_else(table, witness):
     assert table.hits.any()
     assert not table.hits.all()
@@ -216,16 +210,6 @@ def hostile(scene):
         for i, r in enumerate(scene.robots, 1)
     ]
     return scene.with_robots(*far)
-
-
-def test_given_steps_say_which_robot_has_no_posture(scene):
-    steps = seqopt.sequential(without(scene))
-    assert plan_postures(without(scene), steps) is None
-    far = hostile(scene.with_robots(*scene.robots[:2]))
-    faults = plan_postures(far, [*map(held_by_two, steps)]).unreached
-    assert [fault.step for fault in faults] == [s.number for s in steps if s.held]
-    assert "north at node" in faults[0].why
-    assert "has no posture" in faults[0].why
 
 
 def test_given_steps_say_who_is_in_the_way(tight):

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import csv
-import gzip
-import io
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +19,6 @@ from seqopt.exchange._tasks import Action, plan_tasks, tasks_json
 from seqopt.exchange.exports import export_plan, read_folder
 from seqopt.report._pictures import VIEW, steps_picture
 from seqopt.report._robots import _known_arms
-from seqopt.report.page import Build, _tasks
 from tests.arms.scenes import TOOL, beside, two_arms
 
 pytest.importorskip("pinocchio")
@@ -65,14 +59,6 @@ def test_tasks_have_the_joints_and_the_tool_of_the_posture(plan):
             assert np.allclose(way / np.linalg.norm(way), -table.axes[row][:, 2], atol=1e-5)
     assert turned  # some proposals were others
     assert any(task.action is Action.RELEASE and task.posture for task in tasks)
-
-
-def test_files_beside_a_plan_have_postures(plan):
-    files = task_files(plan)
-    told = [row for row in json.loads(files["tasks.json"])["tasks"] if row["posture"]]
-    rows = [row for row in csv.DictReader(io.StringIO(files["tasks.csv"])) if row["joint_6"]]
-    assert len(told) == len(rows) > 0
-    assert float(rows[0]["joint_1"]) == pytest.approx(told[0]["posture"][0])
 
 
 @pytest.fixture(scope="module")
@@ -128,14 +114,6 @@ def test_an_export_names_steps_that_arms_cannot_be_in(folder, tmp_path, capsys):
     words = ["export", str(tmp_path), "--format", "tasks", "--out", str(tmp_path / "tasks.json")]
     assert main(words) == 0
     assert "arms cannot: " in capsys.readouterr().err
-
-
-def test_a_page_keeps_tasks_with_postures(plan):
-    scene = plan.engine.network.scene
-    kept = _tasks(plan.engine, Build("plan", plan.steps, plan.responses()))
-    told = gzip.decompress(base64.b64decode(kept["json"])).decode()
-    assert told == export_plan(scene, plan.steps, "tasks")
-    assert any(row["posture"] for row in json.loads(told)["tasks"])
 
 
 def test_arms_are_drawn_from_their_base_to_what_they_hold(plan):

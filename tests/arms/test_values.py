@@ -24,25 +24,16 @@ ARM = {"urdf": "robot.urdf", "position": (0.0, 1.0, 0.0), "tool_length": 0.3, "t
     ("wrong", "said"),
     [
         ({"urdf": 3}, "urdf is 3; give the path of a URDF, or package:path"),
-        ({"position": (0.0, 1.0)}, "position is (0.0, 1.0); give three numbers"),
         ({"tool_length": 0.0}, "tool_length is 0.0; give a positive number of m"),
         ({"x_axis": (1.0, 1.0, 0.0)}, "give perpendicular unit vectors"),
         ({"fingers": 0.3}, "fingers stand out 0.3 m from a brick"),
         ({"faces": ("top",)}, "faces are ('top',); give some of length, width, thickness"),
-        ({"postures": 9}, "postures is 9; give a whole number from 1 to 8"),
         ({"joint_stiffness": (1e6, 0.0)}, "joint_stiffness is 0.0; give a positive number"),
-        ({"keeps_apart": 1}, "keeps_apart is 1; give a bool"),
     ],
 )
 def test_a_wrong_value_is_a_line(wrong, said):
     with pytest.raises(SceneError, match=re.escape(said)):
         Arm(**ARM | wrong)
-
-
-def test_a_robot_takes_an_arm_and_nothing_else():
-    with pytest.raises(SceneError, match="robot a: arm is 'ABB'; give a Arm"):
-        seqopt.Robot(name="a", payload=1.0, arm="ABB")
-    assert not seqopt.load_scene("arch25").has_arms
 
 
 def test_a_scene_with_arms_comes_back_from_its_file(tmp_path):

@@ -17,7 +17,7 @@ from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.schedule import islands
 from tests.strategies import arches, both_sided
 
-few = settings(max_examples=15, deadline=None)
+few = settings(max_examples=8, deadline=None)
 scenes = st.one_of(arches(max_bricks=6, min_bricks=3), both_sided())
 NAMES = ("T_max", "M_sup", "D_max", "C_max")
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import networkx as nx
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.harness.scenes import running_bond
@@ -66,6 +66,7 @@ def broken(network, name, steps):
 
 
 @pytest.mark.parametrize("name", [*METHODS, *SCHEDULES])
+@settings(max_examples=8)
 @given(scene=builds(), data=st.data())
 def test_with_any_robots_steps_are_possible_and_all_is_held(name, scene, data):
     network = build_network(scene)
@@ -74,9 +75,9 @@ def test_with_any_robots_steps_are_possible_and_all_is_held(name, scene, data):
     assert not steps or broken(network, name, steps) == []
 
 
-@pytest.mark.parametrize("count", [2, 3, 4, 5])
+@pytest.mark.parametrize("count", [2, 3, 5])
 @pytest.mark.parametrize(
-    "scene", [small_arch(8), running_bond(3, 3), from_both_ends(9), branch()], ids=lambda s: s.name
+    "scene", [running_bond(3, 3), from_both_ends(9), branch()], ids=lambda s: s.name
 )
 @pytest.mark.parametrize("name", [*METHODS, *SCHEDULES])
 def test_robots_that_reach_everything_build_everything(name, scene, count):

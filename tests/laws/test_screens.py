@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
-from seqopt.network.build import build_network
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
 from tests.builders import about_vertical, moved, scaled
 from tests.strategies import arches
@@ -57,7 +56,7 @@ def test_more_never_hurts(question, extra, friction, payload):
     never_hurts(before, asked(scene, bricks, held, bond_mortar(2e3, friction), payload))
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(questions(grips=3))
 def test_what_is_learned_changes_no_verdict(question):
     """Together and one by one; and whichever robot holds which node."""
@@ -70,7 +69,7 @@ def test_what_is_learned_changes_no_verdict(question):
     assert (alone[settled] == swapped[settled]).all()
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(questions(), st.floats(-1, 1), st.floats(-2, 2), st.floats(0, 3))
 def test_units_place_and_scale_change_nothing(question, length, density, angle):
     """Weights and payloads grow alike; the arch is turned, moved, larger and of other matter."""
@@ -83,15 +82,6 @@ def test_units_place_and_scale_change_nothing(question, length, density, angle):
     settled = (here != OPEN) & (there != OPEN)
     assert (here[settled] == there[settled]).all()
     assert settled.any()
-
-
-@pytest.mark.parametrize("tilt", [0.02, 0.1])
-def test_less_tilt_never_hurts(arch25, tilt):
-    network, sets = build_network(arch25), np.array([[a, 24] for a in range(2, 24)])
-    sets = np.vstack([sets, sets - [0, 1]])
-    upright, tilted = (Screen(network, DRY, x).stands(12, sets) for x in (0.0, tilt))
-    assert (tilted == STANDS).any()
-    never_hurts(tilted, upright)
 
 
 def test_a_law_that_is_broken_is_seen():

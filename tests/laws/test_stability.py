@@ -23,7 +23,7 @@ from tests.builders import about_vertical, held, moved
 from tests.strategies import arches
 
 
-@settings(max_examples=15)
+@settings(max_examples=6)
 @given(
     length=st.floats(-3, 3),
     force=st.floats(-3, 3),
@@ -50,7 +50,7 @@ def test_units_change_no_verdict(length, force, offset, blocks):
     assert (a.first_block, a.first_contact) == (b.first_block, b.first_contact)
 
 
-@pytest.mark.parametrize("density", [1e-3, 1.0, 1e3, 2420.0, 1e6])
+@pytest.mark.parametrize("density", [1e-3, 1e6])
 @pytest.mark.parametrize(
     ("half_angle", "verdict"), [(90.0, Verdict.STANDS), (120.0, Verdict.FALLS)]
 )
@@ -61,6 +61,7 @@ def test_density_does_not_flip_an_arch(density, half_angle, verdict):
     assert assess(arch, Mortar(friction=0.7)).verdict is verdict
 
 
+@settings(max_examples=6)
 @given(arches(), st.integers(0, 1))
 def test_where_the_scene_stands_changes_nothing(scene, grips):
     turn = about_vertical(0.7)

@@ -12,7 +12,6 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.main import main
 from seqopt._cli.remarks import held_to
 from seqopt.contact.faces import step_assembly
-from seqopt.report.comparison import compare
 from seqopt.report.page import Build, _build_data
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import dump_scene
@@ -47,12 +46,13 @@ def test_they_are_those_of_every_step_on_its_own(flat, builds, found):
     for name, steps in builds.items():
         for each, (mortar, held) in zip(found[name], SHOWN.items(), strict=True):
             assert each.mortar == mortar
-            for step, said in [*zip(steps, each.verdicts, strict=True)][::4]:
+            for step, said in [*zip(steps, each.verdicts, strict=True)][::8]:
                 assert verdict(step_assembly(flat, step.bricks, step.grips), held) is said
     counts = {name: [each.count(Verdict.FALLS) for each in found[name]] for name in builds}
     assert counts == {"sequential": [18, 0], "cantilever": [20, 0]}
 
 
+@pytest.mark.slow
 def test_another_process_that_begins_says_the_same(flat, builds, found, monkeypatch):
     monkeypatch.setattr(_builds, "_SHARED", 0)
     monkeypatch.setattr(_builds, "cores", lambda: 2)
@@ -107,14 +107,6 @@ def test_what_is_not_known_has_a_reason(arch25, tmp_path, capsys):
     assert (out / "report.html").exists()
 
 
-def test_progress_is_told_as_verdicts_are_found(flat, builds):
-    known = []
-    prover = BuildProver(flat, SHOWN, lambda _: known.append(len(prover._known["dry"])))
-    prover.of_builds(builds)
-    assert known[0] == 0
-    assert len(set(known)) > 10  # not told all at once, before the first is found
-
-
 def test_what_is_tried_ahead_changes_no_verdict(flat, builds, found, monkeypatch):
     """Steps of as many bricks are tried by what they have in common, of use or not."""
     tried, real = [], VerdictChain.__call__
@@ -139,7 +131,7 @@ def test_equal_structures_are_asked_once(flat, builds, found, monkeypatch):
     assert prover.of_builds(builds) == found
 
 
-@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize("shared", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_what_was_asked_before_fails_alike_after_lower_builds(flat, builds, monkeypatch, shared):
     if shared:
         monkeypatch.setattr(_builds, "_SHARED", 0)
@@ -150,14 +142,6 @@ def test_what_was_asked_before_fails_alike_after_lower_builds(flat, builds, monk
         first = prover.of_builds({"late": late})["late"]
     assert [each.mortar for each in first if each.first] == [mortars[0]]  # dry, it falls
     assert prover.of_builds({"early": early, "late": late})["late"] == first
-
-
-def test_words_count_what_falls_and_what_is_open():
-    falls, open_ = Verdict.FALLS, Verdict.UNDECIDED
-    assert str(BuildVerdicts("dry", (Verdict.STANDS,) * 2)) == "dry: every step stands"
-    first = BuildVerdicts("epoxy", (falls, falls, open_), 1, "3", "2-3")
-    wanted = "with epoxy: 2 of 3 steps fall; 1 of 3 steps is undecided, first step 1 "
-    assert str(first) == f"{wanted}(brick 3, joint 2-3)"
 
 
 def test_a_step_that_falls_with_the_own_mortar_is_marked(flat, builds):
@@ -171,22 +155,11 @@ def test_a_step_that_falls_with_the_own_mortar_is_marked(flat, builds):
     assert data["stands"] == []
 
 
-def test_a_comparison_counts_them():
-    engine = seqopt.make_engine("compliance", seqopt.load_scene("chain:bricks=7"))
-    result = compare(engine, seqopt.CRITERIA["worst-ratio"])
-    assert (result.table["falls_dry"] > 0).any()
-    assert (result.table["falls_epoxy"] == 0).all()
-    bare = compare(engine, seqopt.CRITERIA["worst-ratio"], prover=BuildProver(engine.network, {}))
-    assert not bare.verdicts
-    assert "falls_dry" not in bare.table
-
-
 @pytest.mark.parametrize(
     ("words", "falls"),
     [
         ((), {"dry": True, "epoxy": False}),
         (("--stands", "bond=2e4", "--friction", "0.7"), {"dry": True, "bond=2e4": False}),
-        (("--stands", "dry"), {"dry": False}),
         (("--no-stability",), {}),
     ],
 )

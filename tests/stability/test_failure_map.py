@@ -79,11 +79,6 @@ def test_the_least_friction_is_enough_and_less_is_not():
     assert any(falls(network, steps, Mortar(friction=0.98 * least)))
 
 
-def test_no_friction_holds_what_tips(found):
-    tips = found.cases[(found.cases["fall"] > 0) & (found.cases["holds"] == "dry")]
-    assert np.isinf(tips["friction_needed"]).all()
-
-
 def test_one_more_robot_holds_the_first_step(network, builds, found):
     scene = network.scene
     more = replace(scene.robots[0], name="more")
@@ -96,15 +91,6 @@ def test_one_more_robot_holds_the_first_step(network, builds, found):
         mortar = Mortar(friction=case["value"])
         if case["holds"] == "dry":
             assert step_verdicts(helped, [step], mortar) == (Verdict.STANDS,)
-
-
-def test_motions_are_of_the_steps_that_fall(builds, found):
-    dry = found.steps[(found.steps["holds"] == "dry") & (found.steps["value"] == found.usual)]
-    assert found.usual == 0.45
-    for build, motion in found.motions.items():
-        assert motion.shape[0] == len(builds[build])
-        fall = dry["verdict"][dry["build"] == build] == Verdict.FALLS.value
-        assert (np.abs(motion).max(axis=(1, 2)) > 0).tolist() == fall.tolist()
 
 
 def test_no_tilt_is_the_friction_of_the_mortar_and_more_tilt_fells_no_less(network, builds):

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.stability.parts.blocks import Blocks, ring, stack
+from experiments.stability.parts.blocks import ring, stack
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.network.build import build_network
 from seqopt.sequence.methods import METHODS
-from seqopt.stability._prover import Prover, sideways
+from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, assess, bonded
-from seqopt.stability.limit_analysis import CAP, EXACT, Answer, Case, Claim, Sense, bound, violation
+from seqopt.stability.limit_analysis import CAP, EXACT, Claim, bound, violation
 
 
 def liar(change):
@@ -100,29 +100,12 @@ def test_proofs_are_the_assemblys_own():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_published_step_is_decided(arch25, method):
-    """Every seventh here; all of them in the experiment."""
+    """Every fourteenth here; all of them in the experiment."""
     net = build_network(arch25)
-    for step in METHODS[method](net)[::7]:
+    for step in METHODS[method](net)[3::14]:
         assembly = step_assembly(net, step.bricks, step.grips)
         assert assess(assembly, EPOXY).verdict is Verdict.STANDS
         assert assess(assembly, DRY).verdict is not Verdict.UNDECIDED
-
-
-def test_sideways_pulls_are_at_right_angles_to_gravity():
-    up = (0.6, 0.0, 0.8)
-    fixed = Case(sense=Sense.SMALLEST, friction=0.5, tension=(0.0, 0.0), cohesion=(0.0, 0.0))
-    pulls = np.array([case.pull for case in sideways(fixed, up)])
-    np.testing.assert_allclose(pulls @ up, 0, atol=1e-15)
-    np.testing.assert_allclose(np.linalg.norm(pulls, axis=1), 1, atol=1e-15)
-
-
-def test_a_ring_of_blocks_has_its_volume():
-    """The builder itself: a half ring of many blocks."""
-    weight = -ring(400, 5.0, 1.0).assembly(1.0, gravity=1.0).weight[:, 2].sum()
-    assert weight == pytest.approx(np.pi * 5.0, rel=1e-4)
-    assert isinstance(ring(3, 1.0, 0.1), Blocks)
-    assert CAP > 1
-    assert Answer  # the protocol's value is public
 
 
 def test_minus_infinity_is_no_proof():
@@ -154,12 +137,12 @@ def faked(rng, true):
 
 @pytest.mark.parametrize("falls", [True, False])
 def test_faked_answers_give_no_false_verdict(falls):
-    """120 solvers that fake all of their answers, for a stack that falls and one that stands."""
+    """60 solvers that fake all of their answers, for a stack that falls and one that stands."""
     leaning = stack([0.7 if falls else 0.2]).assembly(2000.0)
     truth = Verdict.FALLS if falls else Verdict.STANDS
     true = compile_equilibrium(leaning)(bonded(leaning, DRY))
     verdicts = []
-    for seed in range(120):
+    for seed in range(60):
         rng = np.random.default_rng(seed)
 
         def compiled(assembly, rng=rng):

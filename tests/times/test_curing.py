@@ -71,7 +71,7 @@ def test_instant_bond_takes_as_long_as_ever_and_none_as_dry():
     rules = FreeRules()
     usual = seqopt.solve(seqopt.pose(engine, rules, ONES, "makespan", stands="epoxy"))
     dry = seqopt.solve(seqopt.pose(engine, rules, ONES, "makespan", stands="dry"))
-    for words, same in (("0", usual), ("1e-6s", usual), ("never", dry), ("1e9h=1", dry)):
+    for words, same in (("0", usual), ("never", dry)):
         plan = cured(engine, words, rules=rules)
         assert plan.makespan == pytest.approx(same.makespan), words
         assert plan.status is Status.OPTIMAL
@@ -99,14 +99,6 @@ def test_no_step_comes_before_its_proof(plan):
         early[i] -= 0.02 * times["cures_s"].iloc[i]
         with pytest.raises(SolverError, match=f"step {i + 1} is not proven to stand with the bond"):
             check_cured(network, plan.steps, standing, early)
-
-
-def test_the_chart_marks_waits_for_mortar(plan):
-    axes = plan.gantt().axes[0]
-    spans = [each for each in axes.patches if each.get_gid() == "cures"]
-    waits = plan.times().query("cures_s > 0")
-    assert [each.get_width() for each in spans] == pytest.approx(waits["cures_s"].tolist())
-    assert "waits for mortar" in [text.get_text() for text in axes.get_legend().get_texts()]
 
 
 def judged(plan, **changes):
@@ -196,12 +188,9 @@ def test_with_full_bond_verdicts_are_those_without_age():
     [
         ("15", None),
         ("soon", "'soon' is no age; give 15min"),
-        ("-1min", "no age; give zero or more"),
         ("5min=0.4", "the last share is 0.4; give 1 last"),
         ("5min=0.4,3min=1", "ages and shares must rise"),
-        ("5min=x,15min=1", "share 'x'"),
         ("15min 30min", "give one law for all joints"),
-        ("1-2:15min", "give one law for all joints"),
         ("never 1-2:15min", "never cures beside others"),
         ("15min 8-9:1h", "no joint 8-9; its joints are named as ground-1"),
     ],
@@ -241,14 +230,3 @@ def test_the_dry_arch_takes_two_more_steps_and_is_the_limit_of_no_bond():
     assert [plan.regrips for plan in plans] == [2, 2, 1, 1]
     assert [plan.status for plan in plans] == [Status.OPTIMAL] * 4
     assert plans[1].steps == plans[0].steps
-
-
-@pytest.mark.parametrize("aim", ["minmax,steps", "steps,minmax"])
-def test_mortar_that_never_cures_is_none(aim):
-    engine = engine_of(4, 3)
-    dry, never = (
-        seqopt.solve(seqopt.pose(engine, FreeRules(), ONES, aim, stands=stands))
-        for stands in ("dry", Standing("epoxy", curing="never"))
-    )
-    assert never.steps == dry.steps
-    assert never.certificate.values == pytest.approx(dry.certificate.values, rel=1e-9)
