@@ -54,11 +54,12 @@ class _Block(NamedTuple):
 class FrontalFactor:
     """The scaled stiffness of a growing structure, factored brick by brick in build order.
 
-    ``whole``: the system of the whole structure, whose units it keeps.
+    ``whole``: the system of the whole structure, whose units it keeps; ``at_once``: bricks of a
+    block.
     """
 
-    def __init__(self, whole: Ungripped) -> None:
-        self.whole, springs = whole, whole.network.springs
+    def __init__(self, whole: Ungripped, at_once: int) -> None:
+        self.whole, self._at_once, springs = whole, at_once, whole.network.springs
         load, since, _ = whole.network.loads
         last = np.zeros(whole.bricks, dtype=np.int64)  # the brick count that changes a brick last
         for side in springs.bodies.T:
@@ -79,7 +80,7 @@ class FrontalFactor:
         while self.bricks < bricks:
             self._add()
             done = self._last[self.front[::6] // 6] <= self.bricks
-            if done.sum() >= AT_ONCE:
+            if done.sum() >= self._at_once:
                 self._eliminate(np.repeat(done, 6))
 
     def _add(self) -> None:
@@ -161,10 +162,10 @@ def _solved(factor: Floats, right: Floats) -> Floats:
 class FrontalSystem:
     """Answers few grip sets of large structures, best by ascending brick counts."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, network: Network, at_once: int = AT_ONCE) -> None:
         self._network, self._shared, self._maps = network, share(network), scene_maps(network)
         whole = ungripped_system(network, len(network.inner), self._shared)
-        self._factor = FrontalFactor(whole)
+        self._factor = FrontalFactor(whole, at_once)
 
     def solve(
         self, bricks: int, columns: Ints, compliance: GripCompliance, largest: float
