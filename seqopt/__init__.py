@@ -20,45 +20,12 @@ formulation solves the problem, and the plan is the checked answer.
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
+from pathlib import Path
 
-_HOMES = {
-    "scene.scene": ("Scene",),
-    "scene.parts": ("Robot", "Sphere", "Prop"),
-    "scene.scene_file": ("load_scene", "save_scene"),
-    "scene.arch": ("ArchShape", "arch_scene"),
-    "network.network": ("Network",),
-    "network.build": ("build_network",),
-    "sequence.steps": ("Step", "Site"),
-    "sequence.schedule": ("Schedule",),
-    "sequence.methods": ("sequential", "cantilever", "three_robot_loop", "modified_sequential"),
-    "sequence.schedule_file": ("read_plan", "read_schedule"),
-    "engines.interface": ("Engine",),
-    "engines.registry": ("make_engine",),
-    "responses.table": ("analyze",),
-    "study.published": ("CRITERIA",),
-    "problem.criteria": ("StepCost",),
-    "problem.requirements": ("Limit",),
-    "problem.filters": ("register",),
-    "problem.problem": ("Problem",),
-    "graph.formulation": ("Formulation", "formulations"),
-    "sequence.rules": ("FreeRules",),
-    "plan.pose": ("pose",),
-    "plan.solve": ("solve",),
-    "workflow": ("Robust", "Search", "optimize"),
-    "scene.scenarios": ("scenarios",),
-    "plan.plan": ("Plan",),
-    "instances._files": ("read_instance", "save_instance"),
-    "instances.compiled": ("compile_instance",),
-    "instances.answers": ("judge_instance",),
-    "plan.build": ("GivenSequence",),
-    "contact.mortar": ("DRY", "EPOXY"),
-    "stability.assessment": ("Stability",),
-    "stability._steps": ("assess_steps",),
-    "doors": ("assess", "compare", "pareto", "replan"),
-    "errors": ("SeqoptError",),
-}  # in the order in which they are met; type checkers read them in __init__.pyi
-_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")  # also of type checkers
+_HOME_OF = {name: home for home, name in re.findall(r"from seqopt\.(\S+) import (\w+)", _STUB)}
 __all__ = [*_HOME_OF, "__version__"]  # noqa: PLE0604  # they are strings
 
 

@@ -46,17 +46,12 @@ FORMS = "PLAN:STEP (a plan's folder or CSV file), a STATE.json, or a number of b
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
-class Defaults:
-    """Defaults of criterion, aims and engine, in Python and on the command line."""
-
-    criterion: Criterion
-    aim: str = ""
-    engine: str = DEFAULT
-
-
-DEFAULTS = {FREE: Defaults(WORST_OVER_METHODS, "minmax"), "any other": Defaults(EQUATIONS)}
-"""By schedule; of those with open grips the loop of three robots, or of two without a third."""
+DEFAULTS: dict[str, tuple[Criterion, str]] = {
+    FREE: (WORST_OVER_METHODS, "minmax"),
+    "any other": (EQUATIONS, ""),
+}
+"""Criterion and aim, in Python and on the command line, by schedule; of those with open grips the
+loop of three robots, or of two without a third."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,18 +61,18 @@ class Search:
     Parameters
     ----------
     options : mapping or sequence of str, optional
-        Options of the formulation, as ``{"width": 10}``, or in words, as width=10.
+        Options of the formulation, as width=10; or a mapping.
     proof : bool, optional
-        False with cascade or rank_search: compute only the responses that the search meets, about a
-        fifth; how far the choice is from the optimum stays unknown.
+        If not, with cascade or rank_search, compute only the responses that the search meets, about
+        a fifth; how far the choice is from the optimum stays unknown.
     lazy : bool, optional
         With an exact formulation: compute only the responses that the proof needs; stopped before
         it is done, it leaves its best choice and a bound; with an aim, and of a free schedule it is
         done at any rate.
     time_limit : float, optional
         Seconds of choosing; the best choice by then has a lower bound. On the command line of the
-        whole command, with proof, verdicts and page: what there was no time for is named; with
-        ``proof=False``, where choosing and computing are one, the moves that were chosen by then.
+        whole command, with proof, verdicts and page: what there was no time for is named; without
+        proof, where choosing and computing are one, the moves that were chosen by then.
     workers : int, optional
         Processes to share the work among; pays from about ten seconds (default: {default}).
     executor : concurrent.futures.Executor, optional
@@ -336,26 +331,11 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     >>> optimize("arch25", "free", "worst-ratio-published", aim="minmax,steps")
     Plan('arch25', 'free', by schedule_search: 50 steps, minmax 0.840088, steps 50, optimal)
     """
-    start = time.perf_counter()
+    asked, start = locals(), time.perf_counter()  # all of its parameters
     clock = search.clock or Clock()
     limit = search.time_limit if search.clock is None else math.inf
     with clock.needed("posing the problem"):
-        problem = _pose_build(
-            *(scene, schedule, criterion, formulation, engine),
-            aim=aim,
-            limits=limits,
-            budgets=budgets,
-            stands=stands,
-            also=also,
-            robust=robust,
-            order=order,
-            mortar=mortar,
-            robots=robots,
-            candidates=candidates,
-            rules=rules,
-            search=search,
-            progress=progress,
-        )
+        problem = _pose_build(**asked)
         found = as_formulation(formulation or graph_of(problem).default_formulation)
         options = search.parse_options(found)
     tell = within(progress, clock.left) if progress and not found.of_states else progress
@@ -417,12 +397,13 @@ def _pose_build(  # noqa: PLR0913  # as of `optimize`
     asked: Sequence[Any] = parse_limits(limits, found)
     states = _chooses_states(moves, formulation, asked, (aim, stands, sought))
     over: RobustAim | str = WORST_PEAK if robust is None else robust.aim
-    usual, totals = DEFAULTS[FREE if states else "any other"], str(over) != str(WORST_PEAK)
+    usual, minimized = DEFAULTS[FREE if states else "any other"]
+    minimized = minimized if str(over) == str(WORST_PEAK) else ""  # totals are of sums
     return pose(
         own,
         moves,
-        _choose_criterion(criterion, usual.criterion),
-        aim or (not totals and usual.aim) or (),  # totals are of sums
+        _choose_criterion(criterion, usual),
+        aim or minimized or (),
         asked,
         budgets=budgets,
         stands=stands,

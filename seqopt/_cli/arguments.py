@@ -38,16 +38,8 @@ LINES = 40  # of a screen
 ALL = "--help-all"
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
-LEADS = {
-    "begin": ("begin",),
-    "criterion": ("criterion",),
-    "direction": ("direction",),
-    "engine": ("engine",),
-    "limits": ("limit",),
-    "options": ("option",),
-    "rules": ("rules",),
-    "to": ("to",),
-}  # first words of messages that name a parameter
+LEADS = {each: each for each in ("begin", "criterion", "direction", "engine", "rules", "to")}
+LEADS |= {"limit": "limits", "option": "options"}  # first words of messages, and their parameters
 GIVEN = re.compile(r"\b(\w+)='([\w-]+)'")
 PRINTED = ("quiet", "json", "strict")  # what concerns the printed answer alone
 GONE = {
@@ -168,15 +160,13 @@ class Request:
         """Return a message about parameters of Python as one about options."""
         options = SIGNATURES.signature_of(find_command(self.name).load()).options
         lead, space, rest = message.partition(" ")
-        known = {key: option for option in options.values() for key in LEADS.get(option.name, ())}
-        if lead in known:
-            message = known[lead].flag + space + rest
-        return GIVEN.sub(lambda found: self._option(options, found), message)
+        if LEADS.get(lead) in options:
+            message = options[LEADS[lead]].flag + space + rest
 
-    @staticmethod
-    def _option(options: Mapping[str, Any], found: re.Match[str]) -> str:
-        known = options.get(found[1])
-        return found[0] if known is None else f"{known.flag} {found[2]}"
+        def given(found: re.Match[str]) -> str:
+            return f"{options[found[1]].flag} {found[2]}" if found[1] in options else found[0]
+
+        return GIVEN.sub(given, message)
 
 
 def request(words: Sequence[str]) -> Request:

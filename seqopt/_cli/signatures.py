@@ -42,7 +42,7 @@ TOGETHER = ({"quiet", "json"}, {"method", "plan"}, {"list", "export", "view"})  
 PATHS = ("FILE", "DIR", "FOLDER", "PLAN_DIR", "INSTANCE", "SOLUTION")
 NAMED = re.compile(r"(\w+(?:, \w+)*) :(?: (\S.*))?")  # begins what a docstring says of parameters
 SECTIONS = ("Parameters", "Returns", "Raises", "Examples", "Usage", "Notes", "Yields")
-SAME = re.compile(r"As of `(\w+)`\.")
+SAME = re.compile(r"As of `(\w+)`")
 WORD = re.compile(r"``(\w+)(?:=\"?([^`\"]*)\"?)?``")  # a parameter in a docstring, with its value
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -191,8 +191,9 @@ class Signature:
             own |= {name: said[name] for name in names if name in said}
         for name, (question, value, text) in own.items():
             same = SAME.match(text)
-            told = signature_of(COMMANDS[same[1]].load()).texts()[name][2] if same else text
-            out[name] = question, value, told
+            if same and name in self.options:
+                text = signature_of(COMMANDS[same[1]].load()).texts()[name][2]  # noqa: PLW2901
+            out[name] = question, value, text
         return out
 
     @property
@@ -209,7 +210,7 @@ class Signature:
         command.description = wrapped(self._spoken(" ".join(lines.get("", ()))))
         if usages := lines.get("Usage"):
             command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
-        elif self._foreign or self.options:
+        else:
             places = (each for each in self.options.values() if each.place)
             shown = (e.value if e.default is MISSING else f"[{e.value}]" for e in places)
             command.usage = " ".join([command.prog, *shown, "[options]"])
@@ -251,7 +252,7 @@ class Signature:
             option = self.options.get(found[1])
             if option is None:
                 return found[0].strip("`")
-            return option.flag + (f" {found[2]}" if found[2] else "")
+            return f"{option.flag} {found[2]}" if found[2] and option.value else option.flag
 
         return WORD.sub(word, text).replace("`", "")
 

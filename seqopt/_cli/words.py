@@ -6,6 +6,7 @@ meaning in all commands.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import radians
@@ -67,42 +68,22 @@ FLAGS = {
     "rounding": "round",
     "rules": "rule",
 }  # words for options that are not their names
-METAVARS = {
-    "SCENE": "scene",
-    "ORDER": "order",
-    "STIFFNESS": "grips",
-    "NODES": "props",
-    "NEWTON": "payload",
-    "N|NAME,NAME": "robots",
-    "WORDS": "durations curing",
-    "NAME": "criterion formulation pick name format",
-    "NAME,NAME": "aim",
-    "NAMES": "margins holds",
-    "NAME=VALUE": "rules vary options",
-    "NAME=VALUES": "over",
-    "NAME=STEP": "rounding",
-    "BOUND": "under",
-    "LIMIT": "limits",
-    "BUDGET": "budgets",
-    "MORTAR": "stands mortar",
-    "F": "friction",
-    "DEG": "tilt",
-    "PA": "tensile_strength cohesion",
-    "NAME|FILE": "schedule",
-    "PLAN:STEP|STATE|N": "begin to",
-    "build|take-down": "direction",
-    "AIM": "robust",
-    "N": "scenarios seed workers",
-    "RULE": "candidates",
-    "SECONDS": "time_limit",
-    "SIZE": "max_memory",
-    "FILE": "plan source bound file",
-    "DIR": "cache",
-    "STEP": "at",
-    "ROBOT": "lost",
-    "BRICK": "missing",
-}
-VALUES = {name: value for value, names in METAVARS.items() for name in names.split()}
+VALUES = dict(
+    re.findall(
+        r"(\w+)=(\S+)",
+        """
+        grips=STIFFNESS props=NODES payload=NEWTON durations=WORDS curing=WORDS robots=N|NAME,NAME
+        criterion=NAME formulation=NAME pick=NAME name=NAME format=NAME margins=NAMES holds=NAMES
+        aim=NAME,NAME rules=NAME=VALUE vary=NAME=VALUE options=NAME=VALUE over=NAME=VALUES
+        rounding=NAME=STEP under=BOUND limits=LIMIT budgets=BUDGET stands=MORTAR friction=F tilt=DEG
+        tensile_strength=PA cohesion=PA schedule=NAME|FILE begin=PLAN:STEP|STATE|N
+        to=PLAN:STEP|STATE|N direction=build|take-down robust=AIM scenarios=N seed=N workers=N
+        candidates=RULE time_limit=SECONDS max_memory=SIZE plan=FILE source=FILE bound=FILE
+        cache=DIR at=STEP lost=ROBOT missing=BRICK
+        """,
+    )
+)
+"""Words for the values of options, if not their names."""
 HOW: dict[str, dict[str, Any]] = {
     "engine": {"choices": lambda: ENGINES},
     "method": {"choices": (*METHODS, PUBLISHED)},

@@ -56,16 +56,16 @@ def analyze(  # noqa: PLR0913  # every option is a parameter
     scene: BuiltFrom = "arch25",
     *,
     robots: Words | None = None,
-    method: str | None = None,
-    plan: ShownBuild | Path | str | None = None,
     engine: str | None = None,
     mortar: Mortar | str | None = None,
-    tolerance: Annotated[str | None, ("value", "LENGTH"), ("const", "")] = None,
     cache: Path | str | None = None,
+    progress: Tell = shown,
+    method: str | None = None,
+    plan: ShownBuild | Path | str | None = None,
+    tolerance: Annotated[str | None, ("value", "LENGTH"), ("const", "")] = None,
     fields: File | None = None,
     time_limit: float = inf,
     out: File | None = None,
-    progress: Tell = shown,
 ) -> Answer[pd.DataFrame]:
     """Compute how the structure responds in every step of one sequence, and write a table.
 
@@ -74,24 +74,18 @@ def analyze(  # noqa: PLR0913  # every option is a parameter
 
     Parameters
     ----------
-    scene : Scene, ShownBuild, pathlib.Path or str, optional
-        What is built; of a plan its steps too.
-    robots : str or sequence of str, optional
-        As of `optimize`.
+    scene, robots, engine, mortar, cache, progress : optional
+        As of `optimize`; of a plan its steps are taken too.
     method : str, optional
         How it is built: by two robots, or published, the three-robot plan that Bruun et al. print
         for arch25 (default: the first of sequential, cantilever that fits, or the steps of a plan's
         folder).
     plan : ShownBuild, pathlib.Path or str, optional
         A plan's folder, or a CSV file of steps: step, type, bricks, NAME_node of each robot.
-    engine, mortar : optional
-        As of `optimize`.
     tolerance : str, optional
         Also find how far every grip may be from where it should be before a robot carries more than
         its payload, in the worst direction: a column tolerance_mm; of a length, such as 0.4mm, also
         how soft grips must be to be so far off.
-    cache : pathlib.Path or str, optional
-        As of `optimize`.
     fields : pathlib.Path or str, optional
         Also write every edge force, node displacement and reaction, as a NumPy archive (.npz).
     time_limit : float, optional
@@ -99,8 +93,6 @@ def analyze(  # noqa: PLR0913  # every option is a parameter
         are written, and what there was no time for is named.
     out : pathlib.Path or str, optional
         CSV file to write (default: standard output).
-    progress : callable, optional
-        Called with the progress.
 
     Returns
     -------

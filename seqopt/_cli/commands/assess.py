@@ -45,6 +45,8 @@ def assess(  # noqa: PLR0913  # every option is a parameter
     scene: BuiltFrom = "arch25",
     *,
     robots: Words | None = None,
+    cache: Path | str | None = None,
+    progress: Tell = shown,
     method: str | None = None,
     plan: ShownBuild | Path | str | None = None,
     mortar: Mortar | str | None = None,
@@ -56,9 +58,7 @@ def assess(  # noqa: PLR0913  # every option is a parameter
     map: Annotated[str | None, ("value", "AXIS")] = None,  # noqa: A002  # the option's name
     holds: Words | None = None,
     workers: int = 1,
-    cache: Path | str | None = None,
     out: File | None = None,
-    progress: Tell = shown,
 ) -> Answer[pd.DataFrame]:
     """Prove of every step of a sequence that it stands, or that it does not.
 
@@ -68,10 +68,8 @@ def assess(  # noqa: PLR0913  # every option is a parameter
 
     Parameters
     ----------
-    scene : Scene, ShownBuild, pathlib.Path or str, optional
-        What is built; of a plan its steps too.
-    robots : str or sequence of str, optional
-        As of `optimize`.
+    scene, robots, cache, progress : optional
+        As of `optimize`; of a plan its steps are taken too.
     method, plan : optional
         As of `analyze`.
     mortar : Mortar or str, optional
@@ -97,12 +95,8 @@ def assess(  # noqa: PLR0913  # every option is a parameter
         between them (default: dry,epoxy).
     workers : int, optional
         Processes to share the steps among (default: 1).
-    cache : pathlib.Path or str, optional
-        As of `optimize`.
     out : pathlib.Path or str, optional
         CSV file to write (default: standard output); with ``map`` a folder.
-    progress : callable, optional
-        Called with the progress.
 
     Returns
     -------

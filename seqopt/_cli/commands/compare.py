@@ -43,6 +43,11 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     *,
     robots: int | Words | None = None,
     criterion: Criterion | str | None = None,
+    engine: str | None = None,
+    mortar: Mortar | str | None = None,
+    stability: bool = True,
+    cache: Path | str | None = None,
+    progress: Tell = shown,
     speed: Annotated[
         float,
         ("value", "SECONDS"),
@@ -50,12 +55,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
         ("advice", "; give seconds, and the scene before it"),
     ] = 0.0,
     reference: Annotated[str, ("value", "ENGINE")] = "",
-    engine: str | None = None,
-    mortar: Mortar | str | None = None,
-    stability: bool = True,
-    cache: Path | str | None = None,
     out: Folder | None = None,
-    progress: Tell = shown,
 ) -> Result[Comparison]:
     """Build a scene in every way that seqopt knows, on paper, and show all side by side.
 
@@ -65,28 +65,16 @@ def compare(  # noqa: PLR0913  # every option is a parameter
 
     Parameters
     ----------
-    scene : Scene, ShownBuild, pathlib.Path or str, optional
-        What is built.
-    robots : int, str or sequence of str, optional
+    scene, robots, criterion, engine, mortar, stability, cache, progress : optional
         As of `optimize`.
-    criterion : Criterion or str, optional
-        What a step costs.
     speed : float, optional
         Also chart speed against regret: every engine, schedule and formulation, all within so many
         seconds together (60), each plan valued in the most detailed model that there is data for.
     reference : str, optional
         With ``speed``: the engine that values plans (compliance; with ``mortar`` every step has to
         stand, too; discrete lets joints open; staged adds what earlier steps lock in).
-    engine, mortar : optional
-        As of `optimize`.
-    stability : bool, optional
-        As of `optimize`.
-    cache : pathlib.Path or str, optional
-        As of `optimize`.
     out : pathlib.Path or str, optional
         Write tables, figures and a page with all builds.
-    progress : callable, optional
-        Called with the progress.
 
     Returns
     -------
@@ -111,7 +99,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     built, output = as_built(scene).read(robots), Output.of(out, scene)
     find_postures(built, cache, progress)
     computed = find_engine(build_network(built), engine, mortar, verdicts=stability)
-    costs = _choose_criterion(criterion, DEFAULTS["any other"].criterion)
+    costs = _choose_criterion(criterion, DEFAULTS["any other"][0])
     output.require()
     prover = find_prover(computed.network, mortar, progress, asks=stability)
     named = names_of_robots(robots)

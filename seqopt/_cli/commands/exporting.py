@@ -21,12 +21,12 @@ from seqopt.work.progress import Tell
 def export(
     folder: Annotated[BuiltFrom, ("value", "PLAN_DIR|SCENE")],
     *,
+    cache: Path | str | None = None,
+    progress: Tell = shown,
     format: Annotated[str, ("choices", writable)] = "csv",  # noqa: A002  # the option's name
     source: Path | str | None = None,
     distance: Annotated[float | None, ("value", "M")] = None,
-    cache: Path | str | None = None,
     out: File | None = None,
-    progress: Tell = shown,
 ) -> Answer[str]:
     """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
 
@@ -37,6 +37,8 @@ def export(
     ----------
     folder : pathlib.Path, ShownBuild, Scene or str
         Folder of a plan; of a scene, in its place, the usual steps are taken.
+    cache, progress : optional
+        As of `optimize`.
     format : str, optional
         What to write (default: {default}): {choices}.
     source : pathlib.Path or str, optional
@@ -44,12 +46,8 @@ def export(
     distance : float, optional
         With tasks or tasks_csv: from a grip to where the tool comes from and goes to, m (default:
         the longest side of each block).
-    cache : pathlib.Path or str, optional
-        As of `optimize`.
     out : pathlib.Path or str, optional
         File to write (default: standard output).
-    progress : callable, optional
-        Called with the progress.
 
     Returns
     -------

@@ -118,8 +118,8 @@ def run(
     Parameters
     ----------
     stability : bool
-        Do not prove which steps stand, dry and with epoxy (or the mortar of --stands or --mortar):
-        quicker.
+        If not, it is not proven which steps stand, dry and with epoxy (or the mortar of ``stands``
+        or ``mortar``): quicker.
     out : pathlib.Path or str
         Folder to write plan, tables, summary and page to.
 

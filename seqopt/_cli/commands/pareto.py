@@ -112,21 +112,21 @@ def pareto(  # noqa: PLR0913  # every option is a parameter
     scene: BuiltFrom = "arch25",
     *,
     schedule: Schedule | Part | Path | str = FREE,
-    aim: Words = FOUR,
-    rounding: Numbers = (),
-    pick: str | None = None,
-    under: Words = (),
     order: Bricks | None = None,
     robots: int | Words | None = None,
     rules: FreeRules | Words = (),
     limits: Sequence[Limit | str] | Limit | str = (),
     stands: Standing | Mortar | str | None = None,
-    time_limit: float = inf,
     engine: str | None = None,
     mortar: Mortar | str | None = None,
     stability: bool = True,
-    out: Folder | None = None,
     progress: Tell = shown,
+    aim: Words = FOUR,
+    rounding: Numbers = (),
+    pick: str | None = None,
+    under: Words = (),
+    time_limit: float = inf,
+    out: Folder | None = None,
 ) -> Result[Front]:
     """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
 
@@ -135,10 +135,10 @@ def pareto(  # noqa: PLR0913  # every option is a parameter
 
     Parameters
     ----------
-    scene : Scene, ShownBuild, pathlib.Path or str, optional
-        What is built.
-    schedule : Schedule, Part, pathlib.Path or str, optional
-        Which steps a build may have; by default any.
+    scene, schedule, order, robots, rules, limits, stands : optional
+        As of `optimize`; any steps are allowed by default.
+    engine, mortar, stability, progress : optional
+        As of `optimize`.
     aim : str or sequence of str, optional
         What is to be small: responses and, of the free schedule, steps or regrips (default:
         {default}).
@@ -148,21 +148,11 @@ def pareto(  # noqa: PLR0913  # every option is a parameter
         Also write a folder, pick, of the plan with the least of a column.
     under : str or sequence of str, optional
         For ``pick``: only plans below it, as F_largest=250 (SI units).
-    order, robots, rules, limits : optional
-        As of `optimize`.
-    stands : Standing, Mortar or str, optional
-        What every state must stand with.
     time_limit : float, optional
         Limit of the whole command, with its proof, verdicts and page: what it has no time for is
         left out and named; the points that were found by then are there.
-    engine, mortar : optional
-        As of `optimize`.
-    stability : bool, optional
-        As of `optimize`.
     out : pathlib.Path or str, optional
         Folder to write.
-    progress : callable, optional
-        Called with the progress.
 
     Returns
     -------

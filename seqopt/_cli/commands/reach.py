@@ -28,8 +28,8 @@ def reach(
     scene: BuiltFrom = "arch25",
     *,
     cache: Path | str | None = None,
-    out: Folder | None = None,
     progress: Tell = shown,
+    out: Folder | None = None,
 ) -> Answer[pd.DataFrame]:
     """Say which robots reach which nodes.
 
@@ -38,14 +38,10 @@ def reach(
 
     Parameters
     ----------
-    scene : Scene, ShownBuild, pathlib.Path or str, optional
-        What is built.
-    cache : pathlib.Path or str, optional
+    scene, cache, progress : optional
         As of `optimize`.
     out : pathlib.Path or str, optional
         Folder to write reach.csv, postures.csv and a picture to.
-    progress : callable, optional
-        Called with the progress.
 
     Returns
     -------

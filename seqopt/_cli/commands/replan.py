@@ -44,12 +44,6 @@ NOTHING, USUAL = Changed(), Search()
 def replan(  # noqa: PLR0913  # every option is a parameter
     plan: Annotated[BuiltFrom, ("value", "PLAN_DIR|SCENE")] = "arch25",
     *,
-    at: int | str = 1,
-    lost: Words = (),
-    missing: Bricks = (),
-    changed: Changed = NOTHING,
-    to: _Place | int | str | None = None,
-    robots: Annotated[int | str | None, ("value", "N"), ("parse", str)] = None,
     criterion: Criterion | str | None = None,
     aim: Words | None = None,
     limits: Sequence[Limit | str] | Limit | str = (),
@@ -59,8 +53,14 @@ def replan(  # noqa: PLR0913  # every option is a parameter
     mortar: Mortar | str | None = None,
     stability: bool = True,
     search: Search = USUAL,
-    out: Folder | None = None,
     progress: Tell = shown,
+    at: int | str = 1,
+    lost: Words = (),
+    missing: Bricks = (),
+    changed: Changed = NOTHING,
+    to: _Place | int | str | None = None,
+    robots: Annotated[int | str | None, ("value", "N"), ("parse", str)] = None,
+    out: Folder | None = None,
 ) -> Result[Plan]:
     """Plan the rest of a build from one of its steps, after something has changed.
 
@@ -72,6 +72,8 @@ def replan(  # noqa: PLR0913  # every option is a parameter
     plan : pathlib.Path, Plan, Scene or str, optional
         Folder that optimize wrote: its plan, scene and summary; in place of it a scene, for which
         the best free schedule is planned first.
+    criterion, aim, limits, rules, stands, engine, mortar, stability, search, progress : optional
+        As of `optimize`; criterion, aims, limits and rules are by default those of the plan.
     at : int, optional
         Number of the last step that was done (default: {default}).
     lost : str or sequence of str, optional
@@ -86,22 +88,8 @@ def replan(  # noqa: PLR0913  # every option is a parameter
         Where the build ends, as of optimize.
     robots : int, optional
         How many robots there are from now on; new ones reach every node.
-    criterion : Criterion or str, optional
-        What a step costs.
-    aim, limits, rules : optional
-        As of `optimize`.
-    stands : Standing, Mortar or str, optional
-        What every state must stand with.
-    engine, mortar : optional
-        As of `optimize`.
-    stability : bool, optional
-        As of `optimize`.
-    search : Search, optional
-        How it is searched, and what that may use.
     out : pathlib.Path or str, optional
         Folder to write the new plan to.
-    progress : callable, optional
-        Called with the progress.
 
     Returns
     -------

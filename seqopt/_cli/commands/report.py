@@ -27,9 +27,9 @@ def report(  # noqa: PLR0913  # every option is a parameter
     mortar: Mortar | str | None = None,
     stability: bool = True,
     cache: Path | str | None = None,
+    progress: Tell = shown,
     figures: Annotated[Path | str | None, ("value", "FOLDER")] = None,
     out: File | None = None,
-    progress: Tell = shown,
 ) -> Answer[tuple[Path, ...]]:
     """Write a page with a step viewer of the plans in a folder.
 
@@ -41,21 +41,13 @@ def report(  # noqa: PLR0913  # every option is a parameter
     ----------
     folder : pathlib.Path, ShownBuild, Scene or str
         Folder that holds plans as CSV; in place of it a scene, whose usual steps are shown.
-    scene : Scene, ShownBuild, pathlib.Path or str, optional
-        What is built.
-    engine, mortar : optional
-        As of `optimize`.
-    stability : bool, optional
-        As of `optimize`.
-    cache : pathlib.Path or str, optional
+    scene, engine, mortar, stability, cache, progress : optional
         As of `optimize`.
     figures : pathlib.Path or str, optional
         Also write figures there as PNG and SVG: steps, who holds what when, and responses along the
         build (needs matplotlib).
     out : pathlib.Path or str, optional
         Page to write (default: report.html in the folder, of a scene its name with .html).
-    progress : callable, optional
-        Called with the progress.
 
     Returns
     -------

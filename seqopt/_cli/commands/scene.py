@@ -25,11 +25,11 @@ from seqopt.work.progress import Tell, with_progress
 def run(
     scene: BuiltFrom = "arch25",
     *,
+    cache: Path | str | None = None,
+    progress: Tell = shown,
     list: bool = False,  # noqa: A002  # the option's name
     export: Annotated[Path | None, ("value", "FILE")] = None,
     view: bool = False,
-    cache: Path | str | None = None,
-    progress: Tell = shown,
 ) -> Answer[None]:
     """Check a scene, say what is in it, and write it as a JSON file if asked.
 
@@ -37,8 +37,8 @@ def run(
 
     Parameters
     ----------
-    scene : Scene, ShownBuild, pathlib.Path or str, optional
-        What is built.
+    scene, cache, progress : optional
+        As of `optimize`.
     list : bool, optional
         Name all built-in scenes, and the words that make others.
     export : pathlib.Path, optional
@@ -46,10 +46,6 @@ def run(
     view : bool, optional
         Write a page for the browser: bricks by name in their order, nodes at which robots can hold,
         ground, bases and reaches.
-    cache : pathlib.Path or str, optional
-        As of `optimize`.
-    progress : callable, optional
-        Called with the progress.
 
     Returns
     -------

@@ -39,13 +39,13 @@ def times(  # noqa: PLR0913  # every option is a parameter
     *,
     robots: Words | None = None,
     durations: Words = (),
+    stands: Standing | Mortar | str | None = None,
+    cache: Path | str | None = None,
+    progress: Tell = shown,
     method: str | None = None,
     plan: ShownBuild | Path | str | None = None,
     reassign: bool = False,
-    stands: Standing | Mortar | str | None = None,
-    cache: Path | str | None = None,
     out: Folder | None = None,
-    progress: Tell = shown,
 ) -> Answer[pd.DataFrame]:
     """Say how long a build takes and who does what when.
 
@@ -55,25 +55,15 @@ def times(  # noqa: PLR0913  # every option is a parameter
 
     Parameters
     ----------
-    scene : Scene, ShownBuild, pathlib.Path or str, optional
-        What is built; of a plan its steps too.
-    robots : str or sequence of str, optional
-        As of `optimize`.
-    durations : str or sequence of str, optional
-        As of `optimize`.
+    scene, robots, durations, stands, cache, progress : optional
+        As of `optimize`; of a plan its steps are taken too.
     method, plan : optional
         As of `analyze`.
     reassign : bool, optional
         Give the same grips, in the same order, to the robots with which the build ends first,
         within their reach and payload.
-    stands : Standing, Mortar or str, optional
-        What mortar cures to.
-    cache : pathlib.Path or str, optional
-        As of `optimize`.
     out : pathlib.Path or str, optional
         Folder to write plan.csv, times.csv and a chart to.
-    progress : callable, optional
-        Called with the progress.
 
     Returns
     -------
