@@ -12,8 +12,7 @@ from shutil import rmtree
 from tempfile import mkdtemp
 from typing import NamedTuple
 
-from seqopt._cli.grammar import parse_mortar
-from seqopt._cli.words import BuiltFrom, Words, as_built, is_folder
+from seqopt._cli.words import BuiltFrom, Words, as_built, is_folder, parse_mortar
 from seqopt._files import csv_text, write_folder
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import Mortar, _mortar_name
@@ -92,14 +91,6 @@ def plan_folder(
     return folder, notes
 
 
-def names_of_robots(robots: int | Words | None) -> tuple[str, ...]:
-    """Return names of robots; none where their number is given."""
-    text = "" if robots is None else robots if isinstance(robots, str) else str(robots)
-    if isinstance(robots, Sequence) and not isinstance(robots, str):
-        return tuple(robots)
-    return tuple(name.strip() for name in text.split(",")) if text and not text.isdecimal() else ()
-
-
 def find_steps(
     network: Network,
     scene: BuiltFrom,
@@ -114,7 +105,7 @@ def find_steps(
     Raises `SceneError`, `StepError` if the method is not applicable to the scene, or robots are
     named beside a plan.
     """
-    given, named = given_plan(scene, plan, method), names_of_robots(robots)
+    given, named = given_plan(scene, plan, method), robots if isinstance(robots, tuple) else ()
     if robots and (given is not None or method == PUBLISHED):
         raise StepError(
             f"--robots {','.join(named) or robots}: a plan says itself who holds; leave it out, "
@@ -160,17 +151,17 @@ def _free(scene: Scene, tell: Tell) -> tuple[Plan, tuple[str, ...]]:
 
 def mortar_of_engine(
     engine: str | None, mortar: Mortar | str | None, *, verdicts: bool
-) -> Mortar | str | None:
+) -> Mortar | None:
     """Return the mortar that an engine is asked with; that of ``verdicts`` may be theirs alone."""
-    return None if mortar is None or (verdicts and engine not in LIMITED) else mortar
+    own = None if mortar is None else parse_mortar(mortar, "--mortar")
+    return None if verdicts and engine not in LIMITED else own
 
 
 def find_engine(
     network: Network, engine: str | None, mortar: Mortar | str | None, *, verdicts: bool = False
 ) -> Engine:
     """Return the requested engine, by default that of the scene."""
-    own = None if mortar is None else parse_mortar(mortar, "--mortar")
-    own = None if mortar_of_engine(engine, own, verdicts=verdicts) is None else own
+    own = mortar_of_engine(engine, mortar, verdicts=verdicts)
     found = make_engine(engine or DEFAULT, network, own)
     # with a mortar of its own an engine is asked where joints open: set by set
     return simplest(found) if engine is None and own is None else found

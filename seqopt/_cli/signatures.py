@@ -22,10 +22,19 @@ from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args,
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Result
-from seqopt._cli.grammar import parse_count
 from seqopt._cli.terminal import columns, wrapped
 from seqopt._cli.watcher import Watcher
-from seqopt._cli.words import FLAGS, HIDDEN, HOW, MOST_WORKERS, NAMES, QUESTIONS, SPREAD, VALUES
+from seqopt._cli.words import (
+    FLAGS,
+    HIDDEN,
+    HOW,
+    MOST_WORKERS,
+    NAMES,
+    QUESTIONS,
+    SPREAD,
+    VALUES,
+    parse_count,
+)
 from seqopt._registry import COMMANDS
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.problem.requirements import number_word

@@ -127,7 +127,9 @@ def analyze(  # noqa: PLR0913  # every option is a parameter
         tolerances = partial(_with_tolerances, tolerance, computed, solved_steps, table)
         table, off = clock.spare("tolerances", tolerances, (table, off))
     whole = _with_faults(built, table, steps, faults) if faults or table.empty else table
-    said = outputs.put_table(output.path, whole, _counted(whole, faults)) if len(whole) else {}
+    mechanisms = sum(isinstance(fault, MechanismError) for fault in faults.values())
+    counted = f"{len(whole)} steps" + f", {mechanisms} of them mechanisms," * bool(mechanisms)
+    said = outputs.put_table(output.path, whole, counted) if len(whole) else {}
     answer = Answer({"steps": whole}, scene=built, value=whole, **said)
     notes = (*named.notes, *off)
     answer = replace(answer, notes=notes, failures=failures, status=status)
@@ -217,13 +219,6 @@ def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:
     if told.finding is Finding.MECHANISM:
         return MechanismError(f"step {step.number}: {told.reason}; add a grip or a joint")
     return error
-
-
-def _counted(table: pd.DataFrame, faults: Mapping[int, SeqoptError]) -> str:
-    """Return how many steps a table has, and how many of them are mechanisms."""
-    mechanisms = sum(isinstance(fault, MechanismError) for fault in faults.values())
-    of_them = f", {mechanisms} of them mechanisms," if mechanisms else ""
-    return f"{len(table)} steps{of_them}"
 
 
 def _describe_faults(faults: Mapping[int, SeqoptError], steps: int) -> tuple[str, ...]:

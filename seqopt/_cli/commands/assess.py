@@ -13,12 +13,11 @@ import pandas as pd
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.grammar import parse_count, parse_mortar
 from seqopt._cli.inputs import NamedSteps, find_steps, given_plan
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import door
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.words import BuiltFrom, File, Words, as_built, shown
+from seqopt._cli.words import BuiltFrom, File, Words, as_built, parse_count, parse_mortar, shown
 from seqopt._files import csv_text
 from seqopt._later import Later
 from seqopt._showing import PAGE

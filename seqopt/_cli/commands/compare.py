@@ -11,7 +11,7 @@ import pandas as pd
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Result
-from seqopt._cli.inputs import find_engine, find_prover, names_of_robots
+from seqopt._cli.inputs import find_engine, find_prover
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import door
 from seqopt._cli.terminal import columns, wrapped
@@ -35,6 +35,7 @@ from seqopt.work.progress import Tell
 from seqopt.workflow import DEFAULTS, _choose_criterion
 
 SPEED = "Speed against regret"
+WHAT = "every build step by step"
 
 
 @door
@@ -102,7 +103,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     costs = _choose_criterion(criterion, DEFAULTS["any other"][0])
     output.require()
     prover = find_prover(computed.network, mortar, progress, asks=stability)
-    named = names_of_robots(robots)
+    named = robots if isinstance(robots, tuple) else ()
     result = compare_builds(computed, costs, progress, named, prover, speed, reference)
     levels = remarks.level_notes(engine, simplest(computed))
 
@@ -127,18 +128,25 @@ def _answer(
     about = {"criteria": criteria, **provenance(engine)}
     blocks = [format_comparison(result, scene, criterion, columns())]
     facts = about | {"criterion": criterion.name, **_facts(result)}
-    if result.speed is not None:
-        blocks.append("\n".join([SPEED, str(result.speed)]))
-        facts |= {"speed": result.speed.facts()}
+    if (speed := result.speed) is not None:
+        blocks.append("\n".join([SPEED, str(speed)]))
+        facts |= {"speed": speed.facts()}
     written: tuple[Path, ...] = ()
     if output.path is not None:
         tell("drawing figures")
-        files = _files(result) | {PAGE: comparison_page(engine, result)}
-        files["summary.json"] = json.dumps({"scene": scene.name, **about}, indent=2) + "\n"
+        charts = outputs.picture("responses", lambda c: c.responses_figure(result.tables))
+        files: dict[str, bytes | str] = {
+            "comparison.csv": result.table.to_csv(float_format="%.6g"),
+            "summary.json": json.dumps({"scene": scene.name, **about}, indent=2) + "\n",
+            **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
+            **charts,
+            PAGE: comparison_page(engine, result),
+        }
+        if speed is not None:
+            files |= {"speed.csv": csv_text(speed.table)}
+            files |= outputs.picture("speed", lambda _: speed.plot())
         written = output.write(tell, lambda: files)
-        blocks.append(_where(output.path, speed=result.speed is not None))
-    else:
-        blocks.append(wrapped("--out DIR writes tables, figures and a step viewer."))
+    blocks.append(wrapped(outputs.written_to(output.path, tables="tables, figures", what=WHAT)))
     said = (*levels, *result.enough.lines, *remarks.refused(prover), *outputs.figure_notes(written))
     answer = Answer(
         facts, "\n\n".join(blocks), written=written, scene=scene, notes=said, value=result
@@ -148,53 +156,23 @@ def _answer(
     return remarks.held_to(answer, over, left, result.verdicts)
 
 
-def _where(folder: Path, *, speed: bool) -> str:
-    timed = "\n  speed.csv: a row per engine, schedule and formulation" * speed
-    return (
-        f"written to {folder}\n"
-        f"  {PAGE}: every build step by step; open it in a browser\n"
-        "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
-        "  summary.json: the criteria with their numbers, the engine, and versions of packages"
-        f"{timed}"
-    ) + ("" if outputs.figure_notes() else "\n  *.png, *.svg: the figures")
-
-
 def _facts(result: Comparison) -> dict[str, object]:
     """Return rows, notes and the published values, for scripts."""
     table = result.table.assign(
         steps=[len(result.tables[name]) for name in result.table.index],
         paper=pd.Series({name: _printed_largest(result, name) for name in result.table.index}),
     )
-    loop, printed = result.loop, result.printed
+    own, printed, loop = result.loop, result.printed, dict[str, object]()
+    if own is not None:
+        loop = {"method": own.method, "seconds": dict(own.seconds)}
+        loop |= {"models_paper_count": own.paper_models}
     paper = None if printed is None else printed.set_axis(result.maxima.columns, axis=1)
     return {
         "rows": table.rename_axis("name").reset_index(),
         "largest_by_robot": result.maxima.to_dict(),
         "paper_by_robot": None if paper is None else paper.to_dict(),
-        "loop": None
-        if loop is None
-        else {
-            "method": loop.method,
-            "seconds": dict(loop.seconds),
-            "models_paper_count": loop.paper_models,
-        },
+        "loop": loop or None,
         "why_no_loop": result.refusal or None,
         "enough": result.enough.facts(),
         "findings": list(result.notes),
-    }
-
-
-def _files(result: Comparison) -> dict[str, bytes | str]:
-    """Return tables and figures of a comparison by file name."""
-    speed = result.speed
-    files: dict[str, bytes | str] = {
-        "comparison.csv": result.table.to_csv(float_format="%.6g"),
-        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
-    }
-    files |= outputs.picture("responses", lambda charts: charts.responses_figure(result.tables))
-    if speed is None:
-        return files
-    return files | {
-        "speed.csv": csv_text(speed.table),
-        **outputs.picture("speed", lambda _: speed.plot()),
     }

@@ -40,10 +40,6 @@ def run(shell: Literal["bash", "zsh", "fish"]) -> Answer[None]:
     shell : str
         Which shell reads it.
 
-    Returns
-    -------
-    Answer
-
     Examples
     --------
     $ eval "$(seqopt completion bash)"      in ~/.bashrc, or for this shell alone

@@ -75,10 +75,6 @@ def run(  # noqa: PLR0913  # every option is a parameter
     progress : callable, optional
         Called with the progress.
 
-    Returns
-    -------
-    Answer
-
     Examples
     --------
     $ seqopt import wall.obj --unit m --density 2400 --out wall.json

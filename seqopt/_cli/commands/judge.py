@@ -31,10 +31,6 @@ def run(instance: Path, solution: Path, *, bound: Path | None = None) -> Answer[
         JSON file with a bound for every goal and what proves it: potentials, a cut, multipliers,
         weights, shares, labels (default: the judge looks for a proof itself).
 
-    Returns
-    -------
-    Answer
-
     Examples
     --------
     $ seqopt judge arch25.npz mine.txt

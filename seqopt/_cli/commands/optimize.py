@@ -235,7 +235,13 @@ def _lines(found: Found, over: Sequence[str]) -> Iterator[str]:
     held = ""
     if found.analyzed:
         held = f"{OUTSIDE}: " * bool(plan.outside) + f"{TEXT._headline(scene, plan._columns)}; "
-    yield f"{held}{_value(found)}"
+    scenarios = len(_problem(plan).scenarios)
+    value = plan._value
+    if plan.order:
+        value = f"{values_text(plan.objective)}, {plan.status}, {plan.order_bound_said}"
+    elif scenarios and plan.graph.candidates:
+        value += f" over {scenarios} scenarios ({plan.title})"
+    yield held + value
     counts = [f"{len(plan.steps)} steps"]
     if not plan.graph.candidates:
         counts.append(f"{plan.regrips} regrip{'s' * (plan.regrips != 1)}")
@@ -272,24 +278,9 @@ def _notes(found: Found) -> Iterator[str]:
     yield from remarks.refused(found.prover)
 
 
-def _value(found: Found) -> str:
-    """Describe objective, bound and gap of a plan."""
-    plan = found.plan
-    if plan.order:
-        return f"{values_text(plan.objective)}, {plan.status}, {plan.order_bound_said}"
-    scenarios = _problem(plan).scenarios
-    if not scenarios or not plan.graph.candidates:
-        return plan._value
-    return f"{plan._value} over {len(scenarios)} scenarios ({plan.title})"
-
-
 def _problem(plan: Plan) -> Problem:
     assert isinstance(plan.problem, Problem)  # as the command poses it
     return plan.problem
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count:,} {what}{'s' * (count != 1)}"
 
 
 def _proof(plan: Plan) -> str:
@@ -299,8 +290,9 @@ def _proof(plan: Plan) -> str:
         return "left out, time is over; values and bounds are claimed"
     if proof is None or plan.gap is None:
         return "none; how much better another plan may be is not known"
-    looked = _counted(proof.models or plan.models, "model")
-    looked += f" and {_counted(proof.states, 'state')}" if proof.states else ""
+    models, states = proof.models or plan.models, proof.states
+    looked = f"{models:,} model{'s' * (models != 1)}"
+    looked += f" and {states:,} state{'s' * (states != 1)}" if states else ""
     looked += " prove it" + f", {plan.models:,} models were searched" * bool(proof.models)
     other = "no other plan among these" if plan.among else "no other plan"
     other = f"{OUTSIDE}, where {other}" if plan.is_far else other

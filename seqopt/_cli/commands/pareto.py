@@ -16,11 +16,10 @@ import pandas as pd
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Result
 from seqopt._cli.commands.optimize import posed
-from seqopt._cli.grammar import parse_numbers
 from seqopt._cli.inputs import find_prover
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call, door
-from seqopt._cli.words import Bricks, BuiltFrom, Folder, Numbers, Words, shown
+from seqopt._cli.words import Bricks, BuiltFrom, Folder, Numbers, Words, parse_numbers, shown
 from seqopt._files import csv_text, write_folder
 from seqopt._showing import PAGE
 from seqopt.contact.mortar import Mortar

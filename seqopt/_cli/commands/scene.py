@@ -47,10 +47,6 @@ def run(
         Write a page for the browser: bricks by name in their order, nodes at which robots can hold,
         ground, bases and reaches.
 
-    Returns
-    -------
-    Answer
-
     Examples
     --------
     $ seqopt scene --list
@@ -83,38 +79,30 @@ def run(
 
 def _network_facts(network: Network) -> dict[str, object]:
     """Return size and weight of a scene's network, and properties of its robots."""
-    scene = network.scene
-    count = len(scene.bricks)
+    scene, count = network.scene, len(network.scene.bricks)
+    robots = {robot.name: robot for robot in scene.robots}
     return {
         "nodes": network.count_nodes(count),
         "edges": network.count_edges(count),
         "weight_N": float(np.linalg.norm(network.weight.sum(axis=0))),
         "loading": scene.loading,
-        "payloads_N": {robot.name: robot.payload for robot in scene.robots},
-        "grips_N_per_m": {robot.name: robot.stiffness for robot in scene.robots},
-        "grips_Nm_per_rad": {robot.name: robot.rotational_stiffness for robot in scene.robots},
-        "joints_Nm_per_rad": {r.name: r.arm.joint_stiffness for r in scene.robots if r.arm},
+        "payloads_N": {name: robot.payload for name, robot in robots.items()},
+        "grips_N_per_m": {name: robot.stiffness for name, robot in robots.items()},
+        "grips_Nm_per_rad": {n: robot.rotational_stiffness for n, robot in robots.items()},
+        "joints_Nm_per_rad": {n: r.arm.joint_stiffness for n, r in robots.items() if r.arm},
         "props": [prop.node for prop in scene.props],
-        "reaches": {robot.name: type(robot.reach).__name__.lower() for robot in scene.robots},
+        "reaches": {n: type(robot.reach).__name__.lower() for n, robot in robots.items()},
         "provenance": scene.provenance,
     }
 
 
 def _list(tell: Tell) -> Answer[None]:
-    found = {
-        name: load_scene(name)
-        for name in with_progress("reading built-in scenes", builtin_scenes(), tell)
-    }
-    lines = [
-        f"{name}: {len(scene.bricks)} bricks, {len(scene.joints)} joints; {ABOUT[name]}"
-        for name, scene in found.items()
-    ]
-    lines += KINDS.values()
-    facts = {
-        "scenes": [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()],
-        "kinds": KINDS,
-    }
-    return Answer(facts=facts, text="\n".join(lines))
+    told = with_progress("reading built-in scenes", builtin_scenes(), tell)
+    found = {name: load_scene(name) for name in told}
+    sizes = {n: f"{len(s.bricks)} bricks, {len(s.joints)} joints" for n, s in found.items()}
+    lines = (f"{name}: {size}; {ABOUT[name]}" for name, size in sizes.items())
+    scenes = [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()]
+    return Answer({"scenes": scenes, "kinds": KINDS}, "\n".join([*lines, *KINDS.values()]))
 
 
 def _grip(robot: Robot | Prop) -> str:
