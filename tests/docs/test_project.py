@@ -139,7 +139,7 @@ def test_the_architecture_names_what_exists():
 
 
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
-ELSEWHERE = r"pip|uv |sphinx|pytest|experiments|pre-commit|npx|ruff|mutation|LMGC90|weigh"
+ELSEWHERE = r"pip|uv |sphinx|pytest|experiments|pre-commit|npx|ruff|LMGC90|weigh"
 
 
 def unknown(text, known):
