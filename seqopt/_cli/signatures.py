@@ -47,7 +47,7 @@ PRINTED = {
     "json": "print one JSON document, for scripts",
 }  # what concerns the printed answer alone
 STRICT = ("optimize", "compare", "analyze", "replan", "instance", "sweep")
-TOGETHER = ({"quiet", "json"}, {"method", "plan"}, {"list", "export", "view"})  # one of each
+TOGETHER = ({"quiet", "json"}, {"method", "plan"}, {"list", "export"})  # one of each
 PATHS = ("FILE", "DIR", "FOLDER", "PLAN_DIR", "INSTANCE", "SOLUTION")
 NAMED = re.compile(r"(\w+(?:, \w+)*) :(?: (\S.*))?")  # begins what a docstring says of parameters
 SECTIONS = ("Parameters", "Returns", "Raises", "Examples", "Usage", "Notes", "Yields")

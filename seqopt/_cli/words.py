@@ -44,7 +44,7 @@ _Kind = TypeVar("_Kind")
 MOST_WORKERS = 1024
 SPREADS = ("stiffness", "density", "position", "grips")
 QUESTIONS = {
-    "What is built, and by whom?": "scene folder list export view order grips props payload "
+    "What is built, and by whom?": "scene folder list export order grips props payload "
     "durations robots",
     "Which steps may a build have?": "schedule method plan begin to direction rules reassign",
     "What has changed?": "at lost missing measured",

@@ -80,11 +80,6 @@ def failure_page(engine: Engine, builds: Builds, found: FailureMap) -> str:
         f"map. Step by step, with {axis} {value:.3g}: a step that falls can be shown as it falls."
     )
     caption = f"Steps that fall, by what holds the joints and by {axis}; a click shows the build"
-    return report_page(engine, shown, sentence, [(caption, _cases_shown(found, axis))])
-
-
-def _cases_shown(found: FailureMap, axis: str) -> pd.DataFrame:
-    """Return the cases of a map in display units, unknown numbers left empty."""
     table = found.cases.assign(bond_needed_Pa=found.cases["bond_needed_Pa"] / 1e3)
     falls = table["fall"] > 0
     for name in ("bond_needed_Pa", "friction_needed"):
@@ -92,7 +87,8 @@ def _cases_shown(found: FailureMap, axis: str) -> pd.DataFrame:
     table["first_step"] = table["first_step"].where(falls)
     none = [] if table["undecided"].any() else ["undecided"]
     table = table.drop(columns=["axis", "bricks", *none])
-    return table.rename(columns={**SHOWN, "value": axis})
+    cases = table.rename(columns={**SHOWN, "value": axis})  # in display units
+    return report_page(engine, shown, sentence, [(caption, cases)])
 
 
 def _verdicts(found: FailureMap, build: str, value: float) -> tuple[BuildVerdicts, ...]:

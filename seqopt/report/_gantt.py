@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,6 @@ LANE = 0.74  # height of a bar, of a lane's
 SIZES = {"steps": (0.13, 6.0, 1.6, 1.2), "seconds": (0.15, 7.0, 1.8, 1.3)}
 """Inches: of a step, of a chart at least, beside the bars, above and below them."""
 WIDEST, LETTER = 30.0, 0.06  # inches: of a chart, of a letter
-Span = tuple[float, float]
 Clock = tuple[Waits | None, Site | None]
 """Of a chart over seconds: how mortar waits, and where a part of a build begins, if it does."""
 
@@ -57,28 +55,20 @@ def gantt_picture(
     if not begins <= first <= last <= done:
         raise StepError(f"steps {first} to {last}: the build has steps {begins} to {done}")
     times = None if clock is None else step_times(scene, steps, *clock)
-    ends: Floats = np.asarray(
-        np.arange(len(steps) + 1) + begins - 0.5
-    )  # before and after every step
-    if times is not None:
-        ends = np.array([0.0, *(time.end for time in times)])
-    span = float(ends[first - begins]), float(ends[last - begins + 1])
-    stops = partial(_stops, begins, ends, times)
-    along = "seconds" if times else "steps"
-    figure, axes, shade = _lanes(scene, steps, responses, (first, last), stops, span, along)
+    figure, axes, shade = _lanes(scene, steps, responses, (first, last), times)
     marks: list[Line2D | Patch] = [
         Line2D([], [], color=DARK, marker="|", ms=11, mew=3.2, lw=0, label="places the brick"),
         Patch(fc="white", ec=DARK, label="holds it (brick · node)"),
     ]
     if times is not None:
-        some = slice(first - begins, last - begins + 1)
-        cures = _prepared(axes, times[some], ends[some])
+        start = times[first - begins - 1].end if first > begins else 0.0
+        cures = _prepared(axes, times[first - begins : last - begins + 1], start)
         marks.insert(0, Patch(lw=0.5, label="prepares", **PREPARED))
         marks += [Patch(fc=CURES, label="waits for mortar")] if cures else []
         axes.set_xlabel("seconds")
     else:
-        whole = (first, last) == (1, steps[-1].number)
-        axes.set_xlabel("step" if whole else f"step, {first} to {last} of {steps[-1].number}")
+        whole = (first, last) == (1, done)
+        axes.set_xlabel("step" if whole else f"step, {first} to {last} of {done}")
         if any(getattr(step, "moves", ()) for step in steps):
             marks.append(Patch(fc=PALE, ec=DARK, hatch="//", label="still to be chosen"))
     place: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
@@ -88,23 +78,13 @@ def gantt_picture(
     return figure
 
 
-def _stops(begins: int, ends: Floats, times: Sequence[StepTime] | None, hold: Hold) -> list[Span]:
-    """Return from when to when a grip has each step; ``ends``: before and after every step."""
-    at, end = hold.first - begins, hold.last - begins
-    out: list[Span] = [*zip(ends[at : end + 1], ends[at + 1 : end + 2], strict=True)]
-    if times is not None:  # from its own act, or from the start, up to letting go
-        out[0] = (times[at].start if hold.robot in times[at].robots else 0.0, out[0][1])
-        out[-1] = (out[-1][0], ends[min(end + 2, len(times))])
-    return out
-
-
-def _prepared(axes: Axes, times: Sequence[StepTime], before: Floats) -> bool:
+def _prepared(axes: Axes, times: Sequence[StepTime], start: float) -> bool:
     """Draw what robots prepare for steps, and waits for mortar; return whether there are any.
 
-    ``before``: when the steps before end, s.
+    ``start``: of the first of the steps, s.
     """
     cures = False
-    for start, time in zip(before.tolist(), times, strict=True):
+    for time in times:
         if time.prepares is not None and time.ready is not None:
             low, wide = time.robots[0] - LANE / 4, time.ready - time.prepares
             named: Any = {"gid": f"prepares {time.step}", "lw": 0.4, **PREPARED}
@@ -113,6 +93,7 @@ def _prepared(axes: Axes, times: Sequence[StepTime], before: Floats) -> bool:
         if time.joint and time.start > ready:  # it waits for mortar alone
             axes.axvspan(ready, time.start, fc=CURES, lw=0, zorder=0, gid="cures")
             cures = True
+        start = time.end
     return cures
 
 
@@ -121,21 +102,22 @@ def _lanes(
     steps: Sequence[AnyStep],
     responses: pd.DataFrame | None,
     shown: tuple[int, int],
-    stops: Callable[[Hold], list[Span]],
-    span: Span,
-    along: str,
+    times: Sequence[StepTime] | None,
 ) -> tuple[Figure, Axes, ScalarMappable | None]:
     """Draw a lane per robot and a bar per grip; return what shades them, too, if forces are known.
 
-    ``along``: what the axis is, a name of `SIZES`; ``stops``: of a grip there; ``span``: shown.
+    With ``times`` over seconds: from a grip's own act, or from the start, up to letting go.
     """
-    first, last = shown
-    per_step, least, beside, above = SIZES[along]
+    (first, last), begins, count = shown, steps[0].number, len(scene.robots)
+    ends: Floats = np.arange(len(steps) + 1) + begins - 0.5  # before and after every step
+    if times is not None:
+        ends = np.array([0.0, *(time.end for time in times)])
+    left, right = float(ends[first - begins]), float(ends[last - begins + 1])
+    per_step, least, beside, above = SIZES["steps" if times is None else "seconds"]
     width = float(np.clip(per_step * (last - first + 1) + beside, least, WIDEST))
-    count = len(scene.robots)
     figure = new_picture(width, 0.62 * count + above)
     axes = figure.add_subplot()
-    inch = (width - beside) / (span[1] - span[0] or 1.0)
+    inch = (width - beside) / (right - left or 1.0)
     shade, colors = None, None
     if responses is not None:  # N, by step and robot
         forces = responses[[force_column(robot) for robot in scene.robots]].to_numpy(float)
@@ -144,11 +126,15 @@ def _lanes(
         colors = shade.to_rgba(forces)
     for hold in holds(scene, steps):
         if hold.last >= first and hold.first <= last:
-            parts = slice(hold.first - steps[0].number, hold.last - steps[0].number + 1)
-            _bar(axes, hold, stops(hold), None if colors is None else colors[parts, hold.robot])
-            _label(axes, scene, hold, stops(hold), inch)
-    room = 0.2 if along == "steps" else 0.01 * (span[1] - span[0])
-    axes.set(ylim=(count - 0.5, -0.5), xlim=(span[0] - room, span[1] + room), axisbelow=True)
+            at, end = hold.first - begins, hold.last - begins + 1
+            stops = ends[at : end + 1].copy()
+            if times is not None:
+                stops[0] = times[at].start if hold.robot in times[at].robots else 0.0
+                stops[-1] = ends[min(end + 1, len(times))]
+            own = None if colors is None else colors[at:end, hold.robot]
+            _grip(axes, scene, hold, stops, own, inch)
+    room = 0.2 if times is None else 0.01 * (right - left)
+    axes.set(ylim=(count - 0.5, -0.5), xlim=(left - room, right + room), axisbelow=True)
     axes.set_yticks(range(count), [robot.name for robot in scene.robots])
     axes.tick_params(left=False)
     axes.grid(visible=True, axis="x", lw=0.3)
@@ -156,12 +142,15 @@ def _lanes(
     return figure, axes, shade
 
 
-def _bar(
-    axes: Axes, hold: Hold, stops: Sequence[tuple[float, float]], colors: np.ndarray | None
+def _grip(
+    axes: Axes, scene: Scene, hold: Hold, stops: Floats, colors: np.ndarray | None, inch: float
 ) -> None:
-    """Draw a grip: shaded step by step, framed as a whole, marked where it places a brick."""
-    low, begin, end = hold.robot - LANE / 2, stops[0][0], stops[-1][1]
-    for (start, stop), color in zip(stops, () if colors is None else colors, strict=False):
+    """Draw a grip: shaded step by step, framed as a whole, marked where it places a brick.
+
+    Brick and node, or the number of an open grip, stand in it as far as they fit.
+    """
+    low, begin, end = hold.robot - LANE / 2, float(stops[0]), float(stops[-1])
+    for start, stop, color in zip(stops, stops[1:], () if colors is None else colors, strict=False):
         axes.add_patch(Rectangle((start, low), stop - start, LANE, fc=color, lw=0))
     look: Any = {"fc": PALE if colors is None else "none", "ec": DARK, "lw": 0.9}
     look |= {"hatch": "//"} if hold.node is None else {}
@@ -169,13 +158,6 @@ def _bar(
     axes.add_patch(Rectangle((begin, low), end - begin, LANE, gid=name, **look))
     if hold.places is not None:
         axes.plot([begin] * 2, [low, low + LANE], color=DARK, lw=3.2)
-
-
-def _label(
-    axes: Axes, scene: Scene, hold: Hold, stops: Sequence[tuple[float, float]], inch: float
-) -> None:
-    """Write brick and node, or the number of an open grip, into a bar as far as they fit."""
-    begin, end = stops[0][0], stops[-1][1]
     room = inch * (end - begin)
     if room < 0.12:
         return
@@ -183,6 +165,6 @@ def _label(
     if hold.node is not None:
         words = f"{scene.brick_of_node[hold.node].name} · {hold.node}"
     flat = room >= LETTER * len(words) + 0.06
-    look: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
-    look["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
-    axes.annotate(words, ((begin + end) / 2, hold.robot), rotation=0 if flat else 90, **look)
+    said: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
+    said["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
+    axes.annotate(words, ((begin + end) / 2, hold.robot), rotation=0 if flat else 90, **said)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from seqopt.arrays import Floats
-from seqopt.engines.interface import Engine, Fields, Want
+from seqopt.engines.interface import Engine, Want
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -140,12 +140,17 @@ def steps_picture(
         largest = max(float(np.abs(f.edge_force).max(initial=0.0)) for f in fields.values())
     key: dict[int, Line2D] = {}
     for axes, at in zip(panels, picked, strict=True):
-        step, found = steps[at], fields.get(at)
-        if forces and found is not None:
-            _draw_forces(axes, engine.network, step.bricks, found, magnify, largest)
+        step, drawn = steps[at], (axes, engine.network, steps[at].bricks, VIEW)
+        if forces:
+            how: dict[str, Any] = {"edge_force": fields[at].edge_force[0]}
+            how |= {"displacement": fields[at].displacement[0]} if magnify else {}
+            draw_network(*drawn, magnify=magnify, largest_force=largest, **how)
         else:
             _draw_robots(axes, cell, cell.arms(step, at), VIEW)
-            _draw_built(axes, engine.network, step, found, magnify)
+            _draw_props(axes, scene, step.bricks, held=bool(step.held), view=VIEW)
+            draw_bricks(*drawn, alpha=0.15 if magnify else 1.0)
+            if magnify:
+                draw_bricks(*drawn, twist=fields[at].brick_twist[0], magnify=magnify)
         axes.set_title(_describe(scene, step, steps[-1].number), loc="center")
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         if len(picked) == 1:
@@ -158,27 +163,6 @@ def steps_picture(
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
-
-
-def _draw_forces(
-    axes: Axes, network: Network, bricks: int, found: Fields, magnify: float, largest: float | None
-) -> None:
-    """Draw the network, colored by axial force; the largest force, N, is drawn widest."""
-    how: dict[str, Any] = {"edge_force": found.edge_force[0], "largest_force": largest}
-    how |= {"displacement": found.displacement[0], "magnify": magnify} if magnify else {}
-    draw_network(axes, network, bricks, VIEW, **how)
-
-
-def _draw_built(
-    axes: Axes, network: Network, step: Step, found: Fields | None, magnify: float
-) -> None:
-    """Draw props and bricks, moved and where they would be, pale, if fields are given."""
-    _draw_props(axes, network.scene, step.bricks, held=bool(step.held), view=VIEW)
-    if found is None:
-        draw_bricks(axes, network, step.bricks, VIEW)
-        return
-    draw_bricks(axes, network, step.bricks, VIEW, alpha=0.15)
-    draw_bricks(axes, network, step.bricks, VIEW, twist=found.brick_twist[0], magnify=magnify)
 
 
 def _describe(scene: Scene, step: Step, last: int) -> str:

@@ -70,11 +70,16 @@ VERDICTS = {
 @styled
 def responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the largest responses at every number of bricks; equal builds share a line."""
+    numbers = {name: table.select_dtypes("number") for name, table in builds.items()}
+    same: dict[str, tuple[str, ...]] = {}  # by the first of each: a line would hide another
+    for name, own in numbers.items():
+        alike = (n for n in same if numbers[n].shape == own.shape)
+        twin = next((n for n in alike if np.allclose(numbers[n], own, equal_nan=True)), name)
+        same[twin] = (*same.get(twin, ()), name)
     tables = {}
-    for first, names in _merged(builds).items():
+    for first, names in same.items():
         called = typed(first) if len(names) == 1 else f"the same plan: {', '.join(names)}"
-        numbers = builds[first].select_dtypes("number")
-        tables[called] = numbers.groupby("bricks").max().reset_index()
+        tables[called] = numbers[first].groupby("bricks").max().reset_index()
     figure = new_figure(6.6 + 0.2 * len(tables))
     figure.suptitle("Worst step at every number of bricks", x=0.01, ha="left")
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
@@ -108,17 +113,6 @@ def draw_responses(
         dress(axis)
     axes[-1].set_xlabel("bricks placed")
     axes[0].legend(frameon=False, ncols=min(len(tables), 4), fontsize=SMALL)
-
-
-def _merged(tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[str, ...]]:
-    """Return the names of tables by the first with the same numbers: a line would hide another."""
-    out: dict[str, tuple[str, ...]] = {}
-    numbers = {name: table.select_dtypes("number") for name, table in tables.items()}
-    for name, own in numbers.items():
-        alike = (n for n in out if numbers[n].shape == own.shape)
-        twin = next((n for n in alike if np.allclose(numbers[n], own, equal_nan=True)), name)
-        out[twin] = (*out.get(twin, ()), name)
-    return out
 
 
 @styled

@@ -177,12 +177,13 @@ def compare(
         notes += _idle_note(scene, f"{loop_name} loop", problem.schedule.steps)
         criteria[loop_name] = problem.criterion
     if free is not None:
-        tables[FREE], rows[FREE] = free.responses(), _free_row(free)
+        tables[FREE], rows[FREE] = free.responses(), _row(free)
         criteria[FREE] = free.states.criterion
-    notes += _add_largest(scene, rows, tables)
     prover = prover or BuildProver(engine.network, progress=progress)
     verdicts = prover.of_builds({name: _steps_in_table(scene, t) for name, t in tables.items()})
-    table = _table(rows, left := (within := LinearRange(engine)).of_builds(tables), verdicts)
+    left = (within := LinearRange(engine)).of_builds(tables)
+    table, faults = _table(scene, rows, tables, left, verdicts)
+    notes += faults
     notes += [] if known is None else [f"In the paper: {text}" for text in known.irregularities]
     found = (maxima, printed, table, tables, loop, tuple(notes), refusal, left)
     enough = what_was_enough(within, tables)
@@ -190,33 +191,31 @@ def compare(
 
 
 def _table(
-    rows: dict[str, dict[str, object]],
+    scene: Scene,
+    rows: Mapping[str, dict[str, object]],
+    tables: Mapping[str, pd.DataFrame],
     left: Iterable[str],
     verdicts: Mapping[str, Sequence[BuildVerdicts]],
-) -> pd.DataFrame:
-    """Return rows as a table, which of them leave the linear range, and how many steps fall."""
+) -> tuple[pd.DataFrame, list[str]]:
+    """Return rows with the largest responses, and the payloads that are exceeded, in words.
+
+    They say which of them leave the linear range (``left``), and how many steps fall.
+    """
+    notes: list[str] = []
+    for name, steps in tables.items():
+        over = overloads(scene, steps)
+        rows[name].update(largest(scene, steps), overloaded=bool(over))
+        faults = (
+            arm_faults(scene, parse_plan(scene, csv_text(steps), name)) if scene.has_arms else ()
+        )
+        notes += [f"{name}: {fault}" for fault in (*over, *_prop_faults(scene, steps), *faults)]
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
     falls = {
         name: {f"falls_{each.mortar}": each.count(Verdict.FALLS) for each in found}
         for name, found in verdicts.items()
     }
     table = table.assign(outside=table.index.isin([*left]))
-    return table.join(pd.DataFrame.from_dict(falls, orient="index"))
-
-
-def _add_largest(
-    scene: Scene, rows: Mapping[str, dict[str, object]], tables: Mapping[str, pd.DataFrame]
-) -> list[str]:
-    """Add the largest responses to every row; return the payloads that are exceeded, in words."""
-    notes: list[str] = []
-    for name, steps in tables.items():
-        over = overloads(scene, steps)
-        rows[name].update(largest(scene, steps), overloaded=bool(over))
-        notes += [f"{name}: {excess}" for excess in (*over, *_prop_faults(scene, steps))]
-        if scene.has_arms:
-            found = arm_faults(scene, parse_plan(scene, csv_text(steps), name))
-            notes += [f"{name}: {fault}" for fault in found]
-    return notes
+    return table.join(pd.DataFrame.from_dict(falls, orient="index")), notes
 
 
 def _plans(
@@ -280,16 +279,18 @@ def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
 
 
 def _row(plan: Plan) -> dict[str, object]:
-    """Return the objective of a plan, and the seconds that it alone took."""
-    assert plan.certificate is not None  # asked for
-    return {
-        "problem": plan.method,
-        "objective": plan.certificate.objective,
-        "gap": plan.certificate.gap,
-        "models": plan.models_needed,
-        "seconds": sum(plan.seconds[stage] for stage in ("compile", "solve", "verify")),
-        "solve_seconds": plan.seconds["solve"],
-    }
+    """Return the objective of a plan, and the seconds that it alone took; for a free one all."""
+    if plan.method == FREE:
+        bound, value = plan.selection.bound[0], plan.selection.objective[0]
+        gap = (value - bound) / (abs(value) or 1.0)  # without weight all responses are zero
+        models, seconds = plan.models, sum(plan.seconds.values())
+    else:
+        assert plan.certificate is not None  # asked for
+        value, gap = plan.certificate.objective, plan.certificate.gap
+        models = plan.models_needed
+        seconds = sum(plan.seconds[stage] for stage in ("compile", "solve", "verify"))
+    about = {"problem": plan.method, "objective": value, "gap": gap, "models": models}
+    return about | {"seconds": seconds, "solve_seconds": plan.seconds["solve"]}
 
 
 def _facts(
@@ -350,22 +351,6 @@ def method_tables(
     return tables, refusals + notes, refused
 
 
-def _free_criterion(criterion: Criterion, rows: Sequence[Mapping[str, float]]) -> Criterion:
-    """Return the criterion of a comparison, or what takes the place of ranks in a free schedule.
-
-    States have no ranks: below 1, the worst ratio to the largest responses of these rows means that
-    the free schedule is better than all of them in everything.
-    """
-    if not isinstance(criterion, RankSum):
-        return criterion
-    if not rows:
-        return WORST_OVER_METHODS  # of none: over what the scene itself says
-    units = {"D_max": 1e-6}  # m of 1e-3 mm
-    least = {n: units.get(n, 1.0) * min(r[n] for r in rows) or 1.0 for n in LARGEST}
-    limits = [("F_largest", least.pop("F_rob")), *least.items()]
-    return WorstRatio("worst-ratio-to-rows", tuple(limits))
-
-
 def _free_plan(
     engine: Engine,
     criterion: Criterion,
@@ -375,28 +360,22 @@ def _free_plan(
 ) -> tuple[Plan | None, list[str]]:
     """Return the shortest free schedule with the smallest worst step, or why there is none.
 
-    ``fixed``: the largest responses of fixed methods.
+    States have no ranks: in their place is the worst ratio to the largest responses of the fixed
+    methods, so that below 1 the free schedule is better than all of them in everything.
     """
+    if isinstance(criterion, RankSum) and not fixed:
+        criterion = WORST_OVER_METHODS  # of none: over what the scene itself says
+    elif isinstance(criterion, RankSum):
+        units = {"D_max": 1e-6}  # m of 1e-3 mm
+        least = {n: units.get(n, 1.0) * min(r[n] for r in fixed) or 1.0 for n in LARGEST}
+        limits = [("F_largest", least.pop("F_rob")), *least.items()]
+        criterion = WorstRatio("worst-ratio-to-rows", tuple(limits))
     try:
-        rules, asked = FreeRules(robots=tuple(robots)), _free_criterion(criterion, fixed)
-        problem = pose(engine, rules, asked, "minmax,steps")
+        problem = pose(engine, FreeRules(robots=tuple(robots)), criterion, "minmax,steps")
         plan = solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress)
     except SeqoptError as error:
         return None, [f"{FREE}: {error}"]
     return on_the_way(plan), []
-
-
-def _free_row(plan: Plan) -> dict[str, object]:
-    """Return the objective of a free schedule for a row: its worst step."""
-    bound, value = plan.selection.bound[0], plan.selection.objective[0]
-    return {
-        "problem": FREE,
-        "objective": value,
-        "gap": (value - bound) / (abs(value) or 1.0),  # without weight all responses are zero
-        "models": plan.models,
-        "seconds": sum(plan.seconds.values()),
-        "solve_seconds": plan.seconds["solve"],
-    }
 
 
 def _worst_of(table: pd.DataFrame) -> dict[str, float]:
@@ -497,14 +476,6 @@ def format_comparison(
     return "\n\n".join("\n".join(map(wrapped, block)) for block in blocks)
 
 
-def _unlike(table: pd.DataFrame) -> dict[str, int]:
-    """Return rows with different figures, the plainest of each, and how many others have these."""
-    figures = table[[*HEADS]].round(3).apply(tuple, axis=1)
-    ranked = figures[sorted(figures.index, key=_plainness)]
-    first = {*ranked.index[~ranked.duplicated()]}
-    return {n: int((figures == figures[n]).sum()) - 1 for n in figures.index if n in first}
-
-
 def _responses(comparison: Comparison) -> Iterator[str]:
     """Yield the table of the largest responses; rows with the same figures are one."""
     for line in (0, 1):
@@ -512,7 +483,11 @@ def _responses(comparison: Comparison) -> Iterator[str]:
         yield f"{'':{NAME}}{''.join(heads)}".rstrip()
     for problem, rows in comparison.table.groupby("problem", sort=False):
         yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")
-        for name, more in _unlike(rows).items():
+        figures = rows[[*HEADS]].round(3).apply(tuple, axis=1)
+        ranked = figures[sorted(figures.index, key=_plainness)]
+        plainest = {*ranked.index[~ranked.duplicated()]}  # of the rows with the same figures
+        for name in (name for name in figures.index if name in plainest):
+            more = int((figures == figures[name]).sum()) - 1
             label = f"  {name}{f' +{more}' if more else ''}"
             row, paper, cells = rows.T[name], _printed_largest(comparison, name), ""
             marks = {

@@ -55,13 +55,7 @@ RESPONSES = {
     "F_max_N": "largest tension in an edge, N",
     "D_max_1e-3mm": "largest displacement, µm",
 }
-PARTS = {
-    "style": "viewer.css",
-    "three": "three.js",
-    "charts": "charts.js",
-    "marks": "marks.js",
-    "viewer": "viewer.js",
-}
+PARTS = {"style": "viewer.css", "three": "three.js", "charts": "charts.js", "viewer": "viewer.js"}
 _WANT = Want.EDGES | Want.BRICKS | Want.SUPPORT
 MOST = 6_000_000  # numbers of fields in a page: about 8 MB
 NARROW = 600  # pixels up to which a screen shows the narrow form of a picture

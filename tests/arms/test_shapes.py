@@ -11,7 +11,6 @@ import pytest
 from seqopt.arms import find_postures
 from seqopt.arms._model import ArmModel
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.report._scene_page import scene_page
 from seqopt.scene.arm import Arm
 from tests.arms.boxes import beside_a_wall, boxes
 
@@ -84,13 +83,6 @@ def test_a_link_with_a_length_and_no_shape_is_refused(tmp_path, link, name):
         ArmModel(Arm(urdf=urdf, position=INSIDE, tool_length=0.2, tool_radius=0.03))
 
 
-def test_a_page_says_that_it_is_not_known_what_an_arm_reaches(tmp_path):
-    page = scene_page(beside_a_wall(boxes(tmp_path / "twin.urdf"), INSIDE))
-    assert "What arms reach is not known: robot arm: the base of its arm hits brick 2" in page
-    assert "0 of 12" not in page
-    free = scene_page(beside_a_wall(boxes(tmp_path / "twin.urdf")))
-    assert "12 of 12" in free
-    assert "What arms reach" not in free
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from seqopt.report._style import look, looks, new_figure, picture_files, plain
-from seqopt.report.charts import _merged
+from seqopt.report.charts import COLUMNS, responses_figure
 from seqopt.report.draw import POINTS, _aside
 
 
@@ -59,6 +59,9 @@ def test_numbers_stand_beside_lines_and_apart():
 
 
 def test_equal_tables_are_one_line():
-    table = pd.DataFrame({"bricks": [1, 1, 2], "M": [1.0, 3.0, 2.0], "phase": list("abc")})
-    other = table.assign(M=[1.0, 3.0, 2.5])
-    assert _merged({"a": table, "b": other, "c": table.copy()}) == {"a": ("a", "c"), "b": ("b",)}
+    rows = {"step": [1, 2, 3], "bricks": [1, 1, 2], **{name: [1.0, 3.0, 2.0] for name in COLUMNS}}
+    table = pd.DataFrame(rows | {"phase": list("abc")})
+    other = table.assign(M_sup_Nm=[1.0, 3.0, 2.5])
+    figure = responses_figure({"a": table, "b": other, "c": table.copy()})
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["the same plan: a, c", "b"]

@@ -8,14 +8,12 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from seqopt._cli import inputs, remarks
+from seqopt._cli import remarks
 from seqopt._cli.answer import Answer, scene_facts
 from seqopt._cli.outputs import Output
 from seqopt._cli.words import BuiltFrom, as_built, shown
-from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.report._scene_page import scene_page
 from seqopt.scene.parts import Prop, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
@@ -25,11 +23,9 @@ from seqopt.work.progress import Tell, with_progress
 def run(
     scene: BuiltFrom = "arch25",
     *,
-    cache: Path | str | None = None,
     progress: Tell = shown,
     list: bool = False,  # noqa: A002  # the option's name
     export: Annotated[Path | None, ("value", "FILE")] = None,
-    view: bool = False,
 ) -> Answer[None]:
     """Check a scene, say what is in it, and write it as a JSON file if asked.
 
@@ -37,22 +33,18 @@ def run(
 
     Parameters
     ----------
-    scene, cache, progress : optional
+    scene, progress : optional
         As of `optimize`.
     list : bool, optional
         Name all built-in scenes, and the words that make others.
     export : pathlib.Path, optional
         JSON file to write.
-    view : bool, optional
-        Write a page for the browser: bricks by name in their order, nodes at which robots can hold,
-        ground, bases and reaches.
 
     Examples
     --------
     $ seqopt scene --list
     $ seqopt scene arch:span=2,rise=0.8
     $ seqopt scene arch25 --export my.json
-    $ seqopt scene my.json --view
     """
     if list:
         return _list(progress)
@@ -65,15 +57,6 @@ def run(
         save_scene(found, export)
         lines.append(f"written to {export}")
     written = () if export is None else (export,)
-    if view:
-        page = inputs.file_name(found.name, ".html")
-        output.keep_apart(page)
-        trouble = inputs.posture_trouble(found, cache, progress)
-        lines += [f"arms: their reach is not known; {trouble}"] if trouble else []
-        progress("writing the page")
-        write_text(page, scene_page(found))
-        lines.append(f"written to {page}; open it in a browser")
-        written = (page,)
     return Answer(facts={"scene": facts}, text="\n".join(lines), written=written)
 
 

@@ -58,7 +58,6 @@
       this.makeEdges();
       this.makeGrips();
       this.makeRobots();
-      this.marks = marks && marks(this, radius * 0.026);
       this.look();
       new ResizeObserver(() => this.resize()).observe(this.box);
       this.resize();
@@ -307,7 +306,6 @@
       const struck = step.bricks === structure.bricks.length && step.grips.every((node) => node === null);
       this.props.forEach(({ pole, brick }) => { pole.visible = !struck && rank(build, brick) < step.bricks; });
       this.showRobots(build, s, options);
-      if (this.marks) this.marks.show(step.bricks);
       this.draw();
     }
     showForces(build, s, step, options) {
@@ -390,7 +388,6 @@
   }
   const yard = 1.05 * Math.max(radius, ...stands.map((place) => place.distanceTo(middle)));
   const panes = [];
-  const marks = structure.marks && makeMarks(structure, () => refresh());
   let mirroring = false;
   function mirror(from) {
     if (mirroring) return;
@@ -542,7 +539,7 @@
     row.dataset.build = name;
   }
 
-  byId("name").textContent = structure.marks ? structure.name : `${structure.name}, step by step`;
+  byId("name").textContent = `${structure.name}, step by step`;
   byId("note").textContent = data.note;
   byId("sentence").classList.toggle("wrong", /^(Not buildable|Outside)/.test(byId("sentence").textContent));
   builds.forEach((build, i) => {

@@ -34,14 +34,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
 from seqopt.engines.registry import USUAL as USUAL_ENGINE
 from seqopt.errors import MechanismError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
-from seqopt.graph.formulation import (
-    End,
-    Finding,
-    Formulation,
-    FormulationKind,
-    find_formulation,
-    formulations,
-)
+from seqopt.graph.formulation import End, Finding, FormulationKind, find_formulation, formulations
 from seqopt.judge._schedules import plan_values
 from seqopt.network.build import build_network
 from seqopt.plan.plan import Plan
@@ -188,7 +181,9 @@ class _Course:
             late = isinstance(error, TimeoutError | TimeUpError)
             return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}
         self.findings[:] = [each for each in told if isinstance(each, Finding)]
-        value, along, status, why = self.value(plan.steps)
+        if plan.steps not in self.known:
+            self.known[plan.steps] = self._value(plan.steps)
+        value, along, status, why = self.known[plan.steps]
         if plan.ended is not End.DONE and status == DONE:
             status = CUT
         gap = plan.certificate.gap if plan.certificate is not None else np.nan
@@ -198,13 +193,8 @@ class _Course:
         row |= {"own": own, "error": abs(own - along) / (abs(along) or 1.0)}
         return row | {"models": plan.models, "status": status, "why": why}
 
-    def value(self, steps: Sequence[Step]) -> Valued:
-        """Return the worst step of a plan in the reference; infinite, and why, where it falls."""
-        if steps not in self.known:
-            self.known[steps] = self._value(steps)
-        return self.known[steps]
-
     def _value(self, steps: Sequence[Step]) -> Valued:
+        """Return the worst step of a plan in the reference; infinite, and why, where it falls."""
         last, bare = steps[-1], (None,) * len(steps[-1].grips)
         end = [replace(last, grips=bare, kind=StepKind.RELEASE)] if last.held else []
         try:
@@ -288,7 +278,10 @@ def measure_regret(
     worst = WORST_OVER_METHODS if isinstance(criterion, RankSum) else criterion
     problem = pose(named, rules, worst, "minmax")
     staged = reference == STAGED
-    course = _Course(problem, criterion, _loop(engine), rules, mortar, timer, staged)
+    loop = None
+    with suppress(SeqoptError):
+        loop = find_schedule(engine.network)
+    course = _Course(problem, criterion, loop, rules, mortar, timer, staged)
     ways, refused = _ways(course, _name_of(named))
     name = reference if staged else _name_of(named)
     rows, curves = list[dict[str, object]](), dict[int, tuple[Finding, ...]]()
@@ -330,12 +323,6 @@ def check_reference(name: str) -> None:
         raise ProblemError(f"reference {name!r} does not exist; give one of {', '.join(known)}")
 
 
-def _loop(engine: Engine) -> Schedule | None:
-    with suppress(SeqoptError):
-        return find_schedule(engine.network)
-    return None
-
-
 def _ways(course: _Course, reference: str) -> tuple[list[Way], dict[str, str]]:
     """Return all ways, the usual ones first, and engines that cannot model the scene, and why."""
     refused, engines = dict[str, str](), list[str]()
@@ -359,7 +346,13 @@ def _ways(course: _Course, reference: str) -> tuple[list[Way], dict[str, str]]:
         for more in [*[(LOOP, "cascade", "no proof")][: len(kinds) - 1], *USUAL.items()]
         if more[0] in kinds
     ]
-    every = [Way(base, kind, name) for kind in kinds for name in _formulations(kind)]
+    every = list[Way]()
+    for kind in kinds:  # integer programs and bounds last
+        known = formulations("costs" if kind == LOOP else "goals").values()
+        bounds = {f.name for f in known if f.kind is FormulationKind.BOUND}
+        slow = bounds | {f.name for f in known if f.name.endswith("_mip")}
+        names = sorted((f.name for f in known), key=lambda n: (n in slow, n != "path_dp"))
+        every += [Way(base, kind, name) for name in names]
     quick = [way for way in usual if way.engine not in SLOW]
     out = [*quick, *(Way(base, *more) for more in _variants(course)), *every, *usual]
     return [*dict.fromkeys(out)], refused
@@ -377,14 +370,3 @@ def _variants(course: _Course) -> Iterator[tuple[str, str, str]]:
     if course.mortar is not None:
         yield from [(LOOP, USUAL[FREE], "stands")] if course.loop else []
         yield FREE, USUAL[FREE], "stands"
-
-
-def _formulations(kind: str) -> list[str]:
-    """Return the formulations of a kind of schedule; integer programs and bounds last."""
-    known = formulations("costs" if kind == LOOP else "goals").values()
-
-    def late(each: Formulation) -> tuple[bool, bool]:
-        slow = each.kind is FormulationKind.BOUND or each.name.endswith("_mip")
-        return slow, each.name != "path_dp"
-
-    return [each.name for each in sorted(known, key=late)]

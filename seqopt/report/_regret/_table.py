@@ -143,17 +143,13 @@ class RegretTable:
 
     def facts(self) -> dict[str, object]:
         """Return the summary, for scripts."""
-        took = {name: self.take[name] for name in ("engine", "schedule", "formulation", "without")}
-        about: dict[str, object] = {
+        rows = self.table.astype(object).where(self.table.notna(), None).to_dict("records")
+        return {
             "sentence": self.sentence,
             "reference": self.reference,
             "worst": self.worst,
-        }
-        rows = self.table.astype(object).where(self.table.notna(), None).to_dict("records")
-        return {
-            **about,
             "proven": self.is_proven,
-            "take": took,
+            "take": {n: self.take[n] for n in ("engine", "schedule", "formulation", "without")},
             "rows": rows,
             "refused": self.refused,
         }
