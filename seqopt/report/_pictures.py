@@ -121,30 +121,27 @@ def steps_picture(
 ) -> Figure:
     """Return a picture of steps of a build, by their numbers from 1, all of one size.
 
-    By default `FRAMES` of them, spread over the build. ``forces``: the network, colored by axial
-    force, instead of bricks and robots; ``magnify``: how many times larger displacements are drawn,
-    0 for not at all; ``arms``: what is known of them in all steps, by default their postures.
+    By default `FRAMES`, spread over the build. ``forces``: the network by axial force, not bricks
+    and robots; ``magnify``: times that displacements are drawn larger, or 0; ``arms``: as known.
     """
     picked, scene = _picked(steps, chosen), engine.network.scene
-    if arms is None:
-        arms = {} if forces else _known_arms(scene, steps)
-    _require_arms(scene, steps, arms)
+    arms = arms if arms is not None or forces else _known_arms(scene, steps)
+    _require_arms(scene, steps, arms or {})
     cell = Cell(scene, arms)
     low, high = box = _build_box(cell)
     figure, panels = _panels(box, len(picked), WIDTH, 0.35)
     want = Want.EDGES | Want.DISPLACEMENTS | Want.BRICKS
     asked = picked if forces or magnify else []
     fields = {at: step_fields(engine, steps[at], want) for at in asked}
-    largest = None
-    if forces:  # of any edge in these steps, N
-        largest = max(float(np.abs(f.edge_force).max(initial=0.0)) for f in fields.values())
+    peaks = (float(np.abs(each.edge_force).max(initial=0.0)) for each in fields.values())
+    largest = max(peaks, default=0.0)  # of any edge in these steps, N
     key: dict[int, Line2D] = {}
     for axes, at in zip(panels, picked, strict=True):
         step, drawn = steps[at], (axes, engine.network, steps[at].bricks, VIEW)
         if forces:
-            how: dict[str, Any] = {"edge_force": fields[at].edge_force[0]}
-            how |= {"displacement": fields[at].displacement[0]} if magnify else {}
-            draw_network(*drawn, magnify=magnify, largest_force=largest, **how)
+            how: dict[str, Any] = {"edge_force": fields[at].edge_force[0], "magnify": magnify}
+            moved = fields[at].displacement[0] if magnify else None
+            draw_network(*drawn, displacement=moved, largest_force=largest, **how)
         else:
             _draw_robots(axes, cell, cell.arms(step, at), VIEW)
             _draw_props(axes, scene, step.bricks, held=bool(step.held), view=VIEW)
@@ -159,7 +156,7 @@ def steps_picture(
             key |= _mark_grips(axes, scene, step.grips)
     handles = [key[robot] for robot in sorted(key)]
     handles += [Line2D([], [], **PROP_MARK, ms=8, label="prop holds")] if scene.props else []
-    handles += [] if largest is None else force_key(largest)
+    handles += force_key(largest) if forces else []
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
