@@ -22,10 +22,7 @@ PAGE = "report.html"  # the page in a folder that a command writes
 
 
 def display(kind: type, way: str) -> Callable[..., Any]:
-    """Return the renderer of a class of values, as ``plot``, loaded on first use.
-
-    Raises `ExtraError` if it needs matplotlib and that is not installed.
-    """
+    """Return the renderer of a class of values, as ``plot``, loaded on first use."""
     try:
         found: Callable[..., Any] = view(kind, way)
     except ModuleNotFoundError as error:

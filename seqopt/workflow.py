@@ -70,8 +70,8 @@ class Search:
         it is done, it leaves its best choice and a bound; with an aim, and of a free schedule it is
         done at any rate.
     time_limit : float, optional
-        Seconds of choosing; the best choice by then has a lower bound. On the command line of the
-        whole command, with proof, verdicts and page: what there was no time for is named; without
+        Seconds that choosing may take, of commands all that they do, with proof, verdicts and page;
+        the best choice by then has a lower bound, and what there was no time for is named; without
         proof, where choosing and computing are one, the moves that were chosen by then.
     workers : int, optional
         Processes to share the work among; pays from about ten seconds (default: {default}).
@@ -458,10 +458,7 @@ def _find_moves(
 
 
 def _find_place(given: _Place | int | str | None, name: str, scene: Scene) -> tuple[Scene, _Place]:
-    """Return where a build begins or ends, and the scene in an order that begins with its bricks.
-
-    A number of bricks with which it begins is a state without grips.
-    """
+    """Return where a build begins or ends, and the scene in an order that begins so."""
     text = str(given)
     try:
         if given is None or isinstance(given, _Place):
@@ -499,10 +496,7 @@ def _of_plan(scene: Scene, path: Path, step: int) -> _Place:
 def _find_start(
     scene: Scene, given: _Place | int | str | None, stands: Standing | Mortar | str | None
 ) -> tuple[Scene, _Place]:
-    """Return where a build begins, and the scene in an order that begins with its bricks.
-
-    With curing mortar it has the ages of bricks in the plan.
-    """
+    """Return where a build begins, and the scene in an order that begins with its bricks."""
     scene, begin = _find_place(given, "begin", scene)
     cures = isinstance(stands, Standing) and stands.curing is not None
     if begin.site is None or not begin.done or not cures:

@@ -37,10 +37,7 @@ from seqopt.workflow import optimize
 
 
 class NamedSteps(NamedTuple):
-    """A closed sequence with its name: its method, its title, or the stem of its file.
-
-    ``notes``: the default that was chosen, if none was requested.
-    """
+    """A closed sequence with its name: its method, its title, or the stem of its file."""
 
     name: str
     steps: tuple[Step, ...]
@@ -100,11 +97,7 @@ def find_steps(
     tell: Tell,
     cache: Path | str | None = None,
 ) -> NamedSteps:
-    """Return the requested closed sequence, or the default one.
-
-    Raises `SceneError`, `StepError` if the method is not applicable to the scene, or robots are
-    named beside a plan.
-    """
+    """Return the requested closed sequence, or the default one."""
     given, named = given_plan(scene, plan, method), robots if isinstance(robots, tuple) else ()
     if robots and (given is not None or method == PUBLISHED):
         raise StepError(
@@ -184,10 +177,7 @@ def find_prover(
     asks: bool,
     stands: Standing | None = None,
 ) -> BuildProver:
-    """Return the prover of stability, with the mortars that a command shows.
-
-    ``stands``: what a plan has to keep, whose mortar it is then.
-    """
+    """Return the prover of stability, with the mortars that a command shows."""
     own = parse_mortar(mortar or "epoxy", "--mortar") if stands is None else stands.mortar
     name = mortar if isinstance(mortar, str) else _mortar_name(own)
     shown = {"dry": Mortar(friction=own.friction), name: own}

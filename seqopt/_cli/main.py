@@ -20,10 +20,7 @@ WATCHER = Later("seqopt._cli.watcher")  # 60 ms: it needs NumPy
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command, by its words or those of the shell, and return its `Status`.
-
-    An error is one line on standard error.
-    """
+    """Run one command, by its words or those of the shell, and return its `Status`."""
     said: list[Request] = []
     try:
         status = _run(sys.argv[1:] if arguments is None else arguments, said)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -125,44 +124,30 @@ def written_to(
     return f"written to {folder}" + f"; {folder / PAGE} shows {what}" * page
 
 
-@dataclass(frozen=True)
 class Output:
-    """Where a command writes, if it does, and what it reads, which it never overwrites.
+    """Where a command writes, if it does, and what it reads, which it never overwrites."""
 
-    ``given``: values in place of a scene, a plan, a schedule; those that are paths count.
-    """
-
-    path: Path | None
-    given: tuple[object, ...]
-
-    @classmethod
-    def of(cls, out: Path | str | None, *given: object) -> Output:
-        """Return where a command writes, by its options."""
-        read = (each.scene if isinstance(each, Built) else each for each in given)
-        return cls(None if out is None else Path(out), tuple(read))
+    def __init__(self, out: Path | str | None, *given: object) -> None:
+        """Take values in place of a scene, a plan, a schedule; those that are paths count."""
+        self.path = None if out is None else Path(out)
+        self._given = [each.scene if isinstance(each, Built) else each for each in given]
 
     def keep_apart(self, *outputs: Path | None) -> None:
         """Raise `FileError` if two outputs are the same file, or one is an input."""
-        named = [Path(each) for each in self.given if isinstance(each, str | Path)]
+        named = [Path(each) for each in self._given if isinstance(each, str | Path)]
         folders = [path for path in named if is_folder(path)]
         inside = [path / name for path in folders for name in ("scene.json", "plan.csv")]
         read = [path for path in (*named, *inside) if str(path) not in builtin_scenes()]
         require_apart([path for path in outputs if path is not None], read)
 
     def require(self, *names: str) -> None:
-        """Raise `FileError`, before anything is computed, if the folder cannot be created.
-
-        Files that will be written there under given names must not be inputs.
-        """
+        """Raise `FileError`, before anything is computed, if the folder cannot be created."""
         if self.path is not None:
             require_folder(self.path)
             self.keep_apart(*(self.path / name for name in names))
 
     def write(self, tell: Tell, files: Callable[[], Mapping[str, bytes | str]]) -> tuple[Path, ...]:
-        """Write the files to the folder, all or none, if there is one; return the paths.
-
-        Raises `FileError` if a file would overwrite what the command reads, or cannot be written.
-        """
+        """Write the files to the folder, all or none, if there is one; return the paths."""
         if self.path is None:
             return ()
         tell("writing the plan")

@@ -168,10 +168,7 @@ class Signature:
     spread: Mapping[str, tuple[Callable[..., Any], Sequence[str], Any]]  # and its default
 
     def call(self, given: Mapping[str, Any]) -> Any:
-        """Call the function with values, or words for them; None means the default.
-
-        Raises `ProblemError` for words that are no choice.
-        """
+        """Call the function with values, or words for them; None means the default."""
         values = {name: each for name, each in given.items() if each is not None}
         values |= {
             n: self.options[n].parse(each) for n, each in values.items() if n in self.options
@@ -202,7 +199,8 @@ class Signature:
             same = SAME.match(text)
             if same and name in self.options:
                 text = signature_of(COMMANDS[same[1]].load()).texts()[name][2]  # noqa: PLW2901
-            out[name] = question, value, text
+            default = self.options[name].default if name in self.options else ""
+            out[name] = question, value, text.replace("{default}", str(default))
         return out
 
     @property
@@ -268,7 +266,7 @@ class Signature:
     def _help(self, option: Option, text: str) -> str:
         """Return the help of an option, with its names and default."""
         text = self._spoken(text).replace("{choices}", ", ".join(option.choices))
-        text = text.replace("{default}", str(option.default)).removesuffix(".")
+        text = text.removesuffix(".")
         if text[1:2].islower() or text[1:2] == " ":
             text = text[:1].lower() + text[1:]
         if names := NAMES.get(option.name):

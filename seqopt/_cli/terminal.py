@@ -103,10 +103,7 @@ def complain(text: str) -> None:
 
 
 def flush() -> None:
-    """Flush standard output.
-
-    Raises `OSError` if it cannot be written; what is left is given up.
-    """
+    """Flush standard output."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()

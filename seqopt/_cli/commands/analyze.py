@@ -106,7 +106,7 @@ def analyze(  # noqa: PLR0913  # every option is a parameter
     $ seqopt analyze my.json --plan plan.csv --out responses.csv
     $ seqopt analyze arch25 --method sequential --json
     """
-    output, archived = Output.of(out, scene, plan), None if fields is None else Path(fields)
+    output, archived = Output(out, scene, plan), None if fields is None else Path(fields)
     output.keep_apart(output.path, archived)
     clock, faults = Clock(time_limit), dict[int, SeqoptError]()
     with clock.needed("reading scene and steps"):

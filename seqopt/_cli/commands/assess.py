@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -113,8 +112,11 @@ def assess(  # noqa: PLR0913  # every option is a parameter
     $ seqopt assess arch25 --method sequential --steps 40:49
     $ seqopt assess arch:span=2,rise=0.8 --map friction --out map
     """
-    output, built = Output.of(out, scene, plan), as_built(scene)
-    steps_of = partial(_steps, scene, plan, method, robots, progress, cache)
+    output, built = Output(out, scene, plan), as_built(scene)
+
+    def steps_of(network: Network) -> NamedSteps:
+        return find_steps(network, scene, plan, method, robots, progress, cache)
+
     if map is not None:
         known = method is not None or given_plan(scene, plan, method) is not None
         held = str(holds or "dry,epoxy").split(",")
@@ -143,18 +145,6 @@ def assess(  # noqa: PLR0913  # every option is a parameter
     if not early:
         return answer
     return replace(answer, failures=(*answer.failures, *early), status=Status.INTERRUPTED)
-
-
-def _steps(
-    scene: BuiltFrom,
-    plan: ShownBuild | Path | str | None,
-    method: str | None,
-    robots: Words | None,
-    tell: Tell,
-    cache: Path | str | None,
-    network: Network,
-) -> NamedSteps:
-    return find_steps(network, scene, plan, method, robots, tell, cache)
 
 
 def _answer(

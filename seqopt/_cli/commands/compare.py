@@ -97,7 +97,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     if reference and not speed:
         raise ProblemError("--reference: it values the plans of --speed; give --speed 60 with it")
     check_reference(reference)
-    built, output = as_built(scene).read(robots), Output.of(out, scene)
+    built, output = as_built(scene).read(robots), Output(out, scene)
     find_postures(built, cache, progress)
     computed = find_engine(build_network(built), engine, mortar, verdicts=stability)
     costs = _choose_criterion(criterion, DEFAULTS["any other"][0])

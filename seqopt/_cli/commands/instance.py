@@ -88,7 +88,7 @@ def instance(
     def answer() -> Answer[Instance]:
         progress("writing the instance")
         to = path or usual
-        Output.of(out, words.get("scene"), words.get("schedule")).keep_apart(to)
+        Output(out, words.get("scene"), words.get("schedule")).keep_apart(to)
         save_instance(found, to)
         limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(found).limited)
         lines = [f"{found!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]

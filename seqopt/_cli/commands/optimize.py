@@ -164,7 +164,7 @@ def find(
     search, words = split_words(asked.words, Search)
     search = words.pop("search", search)
     clock = Clock(search.time_limit)
-    output = Output.of(out, words.get("scene"), words.get("schedule"))
+    output = Output(out, words.get("scene"), words.get("schedule"))
     output.require(*ALWAYS)
     with clock.needed("posing the problem"):
         call = posed(Call(asked.function, {**words, **more()}), verdicts=stability)

@@ -80,13 +80,6 @@ class Found:
         return {own: self.prover(own.network) for own in {*self.value.engines}}
 
     @cached_property
-    def methods(self) -> Mapping[str, pd.DataFrame]:
-        """Plans of fixed methods for comparison, if computed in time."""
-        return self.clock.spare(
-            "fixed methods beside", lambda: method_tables(self.problem.engine)[0], {}
-        )
-
-    @cached_property
     def departures(self) -> dict[str, tuple[Departure, ...]]:
         """Exceeded limits of the linear range, by plan."""
 
@@ -168,7 +161,7 @@ def pareto(  # noqa: PLR0913  # every option is a parameter
     $ seqopt pareto arch25 --aim D_max,steps --time-limit 60 --out front
     $ seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front
     """
-    output = Output.of(out, scene, schedule)
+    output = Output(out, scene, schedule)
     output.require()
     clock = Clock(time_limit)
     words: dict[str, Any] = {
@@ -202,14 +195,15 @@ def _answer(found: Found, pick: str | None, under: Words) -> Answer[Front]:
     front, free, clock = found.value, states_of(found.problem), found.clock
     scene = free.engine.network.scene
     files: Mapping[str, bytes | str] = {}
-    path = found.out.path
+    path, engine, methods = found.out.path, found.problem.engine, dict[str, pd.DataFrame]()
     if path is not None:
-        _ = found.methods
+        beside = "fixed methods beside"
+        methods = clock.spare(beside, lambda: method_tables(engine)[0], methods)
     _ = found.departures
     if path is not None:
         pairs = zip(front.engines, front.steps, strict=True)
         bare = _files(found, [outputs.steps_table(_Picked(own, steps)) for own, steps in pairs], {})
-        files = clock.spare(DETAILS, partial(_front_files, found), bare)
+        files = clock.spare(DETAILS, partial(_front_files, found, methods), bare)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
     if path and not pick:
@@ -285,7 +279,7 @@ def _write_picked(
     write_folder(folder, files)
 
 
-def _front_files(found: Found) -> dict[str, bytes | str]:
+def _front_files(found: Found, methods: Mapping[str, pd.DataFrame]) -> dict[str, bytes | str]:
     """Return the files of a Pareto set by name."""
     front, problem = found.value, found.problem
     engine, free = problem.engine, states_of(problem)
@@ -319,7 +313,7 @@ def _front_files(found: Found) -> dict[str, bytes | str]:
         numbered["order"] = [",".join(map(str, order)) for order in orders]
     files = _files(found, [*tables.values()], summary, numbered)
     page = front_page(engine, front, tables, left, verdicts)
-    drawn = outputs.picture("pareto", lambda charts: charts.front_figure(front, found.methods))
+    drawn = outputs.picture("pareto", lambda charts: charts.front_figure(front, methods))
     return {PAGE: page, **files, **drawn}
 
 

@@ -53,7 +53,7 @@ def reach(
     $ seqopt reach my.json --out reach
     $ seqopt reach my.json --cache postures --json
     """
-    found, output = as_built(scene).read(), Output.of(out, scene)
+    found, output = as_built(scene).read(), Output(out, scene)
     output.require()
     find_postures(found, cache, progress)
     table = reach_table(found) if found.has_arms else reach_without_arms(found)

@@ -110,7 +110,7 @@ def replan(  # noqa: PLR0913  # every option is a parameter
     for name, text in (("at", at), ("robots", robots or "0")):
         if not str(text).isdecimal():
             raise StepError(f"--{name} {text}: give a number")
-    Output.of(out).require(*ALWAYS)
+    Output(out).require(*ALWAYS)
     folder, notes = plan_folder(plan, search.cache, progress, free=True)
     measured = None if changed.measured is None else Path(changed.measured)
     change = Change([*lost], listed(missing), measured, int(at))

@@ -72,7 +72,7 @@ def report(  # noqa: PLR0913  # every option is a parameter
     else:
         own = place == Path(folder)
         path = place / PAGE if own else inputs.file_name(folder, ".html")
-    outputs.Output.of(out, built).keep_apart(path)
+    outputs.Output(out, built).keep_apart(path)
     if figures is not None:
         require_folder(Path(figures))
     trouble = inputs.posture_trouble(found, cache, progress)

@@ -48,7 +48,7 @@ def run(
     """
     if list:
         return _list(progress)
-    output = Output.of(export, scene)
+    output = Output(export, scene)
     output.keep_apart(export)
     found = as_built(scene).read()
     facts = {**scene_facts(found), **_network_facts(build_network(found))}

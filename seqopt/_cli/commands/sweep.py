@@ -59,7 +59,7 @@ def run(
     $ seqopt sweep arch:span=2..3/5,rise=0.7..0.9/3 --schedule free --out designs
     $ seqopt sweep arch25 --over payload=250..400/4 --workers 2 --out payloads
     """
-    output, words = Output.of(out, asked.words.get("scene")), {**asked.words}
+    output, words = Output(out, asked.words.get("scene")), {**asked.words}
     output.require(ROWS)
     workers = words.pop("workers", 1)
     cases = _cases(over, str(words.get("scene", "arch25")))

@@ -75,7 +75,7 @@ def times(  # noqa: PLR0913  # every option is a parameter
     $ seqopt times timed.json --method cantilever --durations rob3:slower=2.5
     $ seqopt times my.json --plan plan.csv --reassign --out faster
     """
-    output = Output.of(out, scene, plan)
+    output = Output(out, scene, plan)
     output.require("plan.csv", "times.csv")
     built, taken = as_built(scene).read(robots), tuple[str, ...]()
     if not (durations or has_durations(built)):
