@@ -27,7 +27,7 @@ from seqopt.sequence.schedule import thin
 from seqopt.sequence.schedule_file import parse_schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict
-from tests.brute_force import FOUR, ONES, allowed, distance, misfit, whole_graph
+from tests.brute_force import FOUR, ONES, allowed, distance, whole_graph
 from tests.builders import small_arch
 
 FOUR_OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node
@@ -301,31 +301,3 @@ def test_candidates_and_states_have_one_optimum(name, scenarios):
     assert {plan.status for plan in found.values()} == {"optimal"}
     other = seqopt.solve(problem.but(limits=[Limit("F_largest", 1e9)]), "minimax")
     assert other.certificate.objective == pytest.approx(found["minimax"].certificate.objective)
-
-
-@cache
-def with_tolerance(name, _grips_of):
-    """The four worst responses of a state and its misfit; None where it is not allowed."""
-    worst = state(name, 0, "", _grips_of)
-    return None if worst is None else np.append(worst, misfit(engines_of(name, 0)[0], *_grips_of))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["free", "three-robot", "modified-sequential", "own"])
-def test_no_plan_of_any_schedule_has_more_tolerance(name):
-    plans = every_path(name, "", lambda *each: with_tolerance(name, each), ("tolerance",))
-    least = min(each[0] for each in plans)
-    asked = engines_of(name, 0)[0], rules_of(name, ""), ONES
-    for formulation in PLANS if np.isfinite(least) else PLANS[:1]:
-        plan = seqopt.solve(seqopt.pose(*asked, "tolerance"), formulation)
-        if formulation.kind is FormulationKind.EXACT:
-            assert plan.objective["tolerance"] == pytest.approx(1 / least, rel=1e-6)
-    if not np.isfinite(least):  # two grips hold one brick, whatever is chosen
-        return
-    for share, exists in ((0.999, True), (1.001, False)):
-        problem = seqopt.pose(*asked, "minmax", [Limit("tolerance", share / least)])
-        if exists:
-            assert seqopt.solve(problem).steps
-        else:
-            with pytest.raises(InfeasibleError):
-                seqopt.solve(problem)

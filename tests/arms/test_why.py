@@ -13,8 +13,6 @@ from seqopt._cli.main import main
 from seqopt.arms import find_postures
 from seqopt.arms._permits import reach_table
 from seqopt.arms._plan_postures import plan_postures
-from seqopt.arms._reached import Site
-from seqopt.arms._tables import _stored_table
 from seqopt.scene.parts import Sphere
 from seqopt.sequence.steps import Step, StepKind
 from tests.arms.boxes import beside_a_wall, boxes
@@ -98,14 +96,6 @@ def test_a_base_of_another_arm_is_named(tmp_path):
     other = replace(first, name="post", arm=arm)
     found = reasons(scene.with_robots(first, other))
     assert any("hits the base of post" in why for why in found.values()), found
-
-
-def test_reasons_are_kept_with_the_table(tmp_path):
-    scene = beside_a_wall(boxes(tmp_path / "arm.urdf", gripper=True), **TOP)
-    table = find_postures(scene, tmp_path / "kept")
-    again = _stored_table(tmp_path / "kept", Site.of(scene), lambda: pytest.fail("computed"))
-    assert again == table
-    assert (again.why != "").all()
 
 
 def test_the_command_lists_nodes_by_reason(tmp_path, capsys):

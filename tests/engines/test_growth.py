@@ -54,18 +54,6 @@ def test_answers_do_not_depend_on_what_was_asked_before(scene, data):
         )
 
 
-@pytest.mark.parametrize("scene", [running_bond(4, 5), half_circle(40).scene])
-def test_brick_counts_backwards(scene, monkeypatch):
-    """Nothing is kept beside the arrays: each count starts anew, or leaves bricks out."""
-    monkeypatch.setattr(compliance, "_KEPT", 0)
-    net = build_network(scene)
-    engine, total = ComplianceEngine(net), len(scene.bricks)
-    for bricks in (total, total - 1, total - 1, total // 2, total // 2 - 1, 3, total - 2):
-        sets = grip_sets(net, bricks, 5)
-        mine, fresh = (e.solve(bricks, sets, Want.ALL) for e in (engine, ComplianceEngine(net)))
-        assert mine == fresh
-
-
 def test_a_chain_without_loops_only_leaves_bricks_out(monkeypatch):
     """Negative control of the test before: a wall does start anew."""
     starts = []

@@ -17,10 +17,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, MechanismError, SceneError
 from seqopt.network.build import build_network
 from tests.builders import six_bricks
-from tests.limit_scenes import softened
 from tests.soft_bodies import SoftBodies
 
-STATES = 200  # random ones, one in two with hands that are moved
 NAMES = ("edge_force", "displacement", "grip_force", "grip_moment", "support", "joint_wrench")
 
 
@@ -57,61 +55,6 @@ def hands_of(ways):
 
 def inner_nodes(net, bricks):
     return [net.index_of_node[n] for b in net.scene.placed[:bricks] for n in b.nodes]
-
-
-def drawn_state(arch, i):
-    """A random state: scene, brick count, nodes, stiffness of hands, and how far they are moved."""
-    rng = np.random.default_rng([i, 7])
-    scene = softened(arch, i)
-    size = 10 ** rng.uniform(3, 9)
-    shift = size if rng.random() < 0.7 else tuple(size * 10 ** rng.uniform(-1, 1, 3))
-    turn = None if rng.random() < 0.6 else 10 ** rng.uniform(1, 7)
-    bricks = int(rng.integers(2, 26))
-    free = [n for b in scene.placed[:bricks] for n in b.nodes if n not in scene.blocked_nodes]
-    nodes = rng.choice(free, min(int(rng.integers(1, 5)), len(free)), replace=False).tolist()
-    if rng.random() < 0.4:  # two on one brick
-        pair = scene.placed[int(rng.integers(1, bricks))].nodes
-        nodes = [*pair, *(n for n in nodes if n not in pair)][:4]
-    moved = 4e-4 * rng.normal(size=(len(nodes), 3)) * (i % 2)
-    return (
-        scene.with_grips(shift, turn),
-        bricks,
-        nodes,
-        hands_of([(shift, turn)] * len(nodes)),
-        moved,
-    )
-
-
-def agree_with_dense(arch, i):
-    """The largest relative difference of a random state's forces, moments and displacements."""
-    scene, bricks, nodes, hands, moved = drawn_state(arch, i)
-    borne, shifts = SoftBodies(scene, bricks).solve(nodes, hands, moved)
-    net = build_network(scene)
-    given = moved[None] if moved.any() else None
-    found = ComplianceEngine(net).solve(bricks, [nodes], Want.ALL, given)
-    own = found.displacement[0, inner_nodes(net, bricks)]
-    out = [far(found.grip_force[0], borne[:, :3]), far(own, shifts)]
-    return max([*out, far(found.grip_moment[0], borne[:, 3:])] if hands[:, 3:].any() else out)
-
-
-@pytest.mark.parametrize("i", range(0, STATES, 40))
-def test_a_dense_solver_agrees(arch25, i):
-    assert agree_with_dense(arch25, i) <= 1e-9
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_a_dense_solver_agrees_on_all_states(arch25):
-    assert max(agree_with_dense(arch25, i) for i in range(STATES)) <= 1e-9
-
-
-def test_the_dense_solver_would_notice(arch25):
-    """Negative control: a tenth softer, or moved a tenth less, is another answer."""
-    scene, bricks, nodes, hands, moved = drawn_state(arch25, 1)
-    solver = SoftBodies(scene, bricks)
-    right = solver.solve(nodes, hands, moved)[0]
-    assert far(solver.solve(nodes, 0.9 * hands, moved)[0], right) > 1e-3
-    assert far(solver.solve(nodes, hands, 0.9 * moved)[0], right) > 1e-3
 
 
 WAYS = {

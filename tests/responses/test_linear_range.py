@@ -242,10 +242,3 @@ def test_commands_say_it_first_and_tell_scripts(capsys, tmp_path, small_soft, wo
 def small_soft(tmp_path):
     save_scene(changed(small_arch(5), stiffness=1e-6), tmp_path / "soft.json")
     return str(tmp_path / "soft.json")
-
-
-def test_a_table_on_standard_output_stays_a_table(capsys, small_soft):
-    assert main(["analyze", small_soft, "--method", "sequential"]) == 0
-    out, err = capsys.readouterr()
-    assert out.startswith("step,type,bricks")
-    assert err.startswith("outside the linear range: ")

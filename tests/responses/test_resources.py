@@ -216,20 +216,6 @@ def test_costs_are_the_same_where_responses_are_not_kept(engine25, loop25, crite
         _ = pose_decisions(engine25, loop25, EQUATIONS, resources=Resources(max_memory=1e5)).sums
 
 
-def test_alternatives_are_those_that_go_with_the_choice_where_responses_are_not_kept(
-    engine25, loop25
-):
-    whole = pose_decisions(engine25, loop25, EQUATIONS)
-    kept = batches._bytes_of_choices(loop25, whole.evaluation.wanted)
-    few = pose_decisions(engine25, loop25, EQUATIONS, resources=Resources(max_memory=kept - 1))
-    every, some = (solve(p, "cascade").alternatives() for p in (whole, few))
-    assert 0 < len(some) < len(every)
-    both = some.merge(every, on=["step", "node", "second_node"], how="left", indicator=True)
-    assert (both["_merge"] == "both").all()
-    for name in ("T_max", "M_sup"):
-        assert both[f"{name}_x"].to_numpy() == pytest.approx(both[f"{name}_y"], nan_ok=True)
-
-
 def test_a_response_that_nobody_asks_for_is_neither_computed_nor_kept(loop25):
     wants = set()
 

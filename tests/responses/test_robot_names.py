@@ -16,7 +16,6 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.decisions import pose_decisions, steps_over
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
-from seqopt.problem.filters import parse_limits
 from seqopt.problem.requirements import Limit, payload_limits
 from seqopt.report.comparison import compare
 from seqopt.responses._choices import CHOICE_RESPONSES
@@ -24,7 +23,7 @@ from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import sequential, three_robot_loop
-from seqopt.study.published import EQUATIONS, WORST_RATIO, find_criterion
+from seqopt.study.published import EQUATIONS, WORST_RATIO
 from tests.builders import six_bricks
 
 NAMES = ["each", "[sup]", "a,b"]
@@ -110,14 +109,6 @@ def test_no_two_robots_share_a_name(first, second):
     taken = {*RESPONSES, *CHOICE_RESPONSES, "F_each", "F_rob", "F_max"}
     assert robot_response(first) not in taken
     assert (robot_response(first) == robot_response(second)) == (first == second)
-
-
-@pytest.mark.parametrize("name", ["a=b", "[sup"])
-def test_words_of_the_command_line(name):
-    text = robot_response(name)
-    assert parse_limits([f"{text}=300"], six_bricks()) == (Limit(text, 300.0),)
-    criterion = find_criterion(f"T_max,{text}=2,M_sup")
-    assert criterion.before == (("T_max", 1.0), (text, 2.0), ("M_sup", 1.0))
 
 
 def test_the_command_line_offers_them(capsys, tmp_path):

@@ -44,8 +44,3 @@ def test_what_is_no_order_gets_one_line(order, said):
     with pytest.raises(SceneError, match=said) as caught:
         seqopt.build_network(small_arch(5), order)
     assert "\n" not in str(caught.value)
-
-
-def test_the_order_is_an_argument_of_the_short_cut():
-    plan = seqopt.optimize(small_arch(5), "free", order="ends")
-    assert plan.problem.scene.build_order == (1, 5, 2, 4, 3)

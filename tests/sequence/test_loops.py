@@ -71,15 +71,6 @@ def test_any_loop_can_be_optimized(count, criterion):
     assert exact.certificate.objective == pytest.approx(plan.certificate.objective, rel=1e-6)
 
 
-def test_the_more_robots_hold_the_less_the_arch_moves():
-    largest = []
-    for count in (2, 3, 5):
-        plan = seqopt.optimize(replace(small_arch(9), robots=anywhere(count)), "loop", "weighted")
-        largest.append(plan.responses()["D_max_1e-3mm"].max())
-    assert largest == sorted(largest, reverse=True)
-    assert largest[-1] < 0.7 * largest[0]
-
-
 def test_too_few_robots_or_bricks_are_counted():
     for bricks, robots, wanted in ((5, 5, "five robots and six"), (2, 3, "three robots and four")):
         scene = replace(small_arch(bricks), robots=anywhere(robots))

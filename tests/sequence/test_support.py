@@ -9,7 +9,6 @@ import pytest
 from experiments.harness.scenes import running_bond
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
-from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.methods import (
     _alternate,
     cantilever,
@@ -125,12 +124,6 @@ def test_that_bricks_lie_along_is_not_enough_where_ends_take_turns():
     network = build_network(replace(from_both_ends(11), robots=anywhere(2)))
     steps = _alternate(network, "cantilever", lies_along(network), ())
     assert grows_from_what_is_held(network, steps)
-
-
-def test_where_nothing_lies_along_the_first_brick_is_held_until_the_end():
-    network = build_network(arch_scene(ArchShape(pitch=(1.2, 0.7, 0.2, -0.3), pattern="LR")))
-    first = set(network.scene.placed[0].nodes)
-    assert all(set(step.held) & first for step in cantilever(network)[:-1])
 
 
 def test_three_robots_hold_an_island_while_they_can():

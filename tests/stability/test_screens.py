@@ -16,7 +16,7 @@ from seqopt.network.build import build_network
 from seqopt.scene.parts import Robot
 from seqopt.stability._held_states import _Known
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Margins, Screen, _decided, held_places
-from seqopt.stability.limit_analysis import CAP, EXACT, Claim, bound, violation
+from seqopt.stability.limit_analysis import EXACT, Claim, bound, violation
 from tests.builders import held, lacking, small_arch
 
 
@@ -69,33 +69,6 @@ def test_a_lie_is_not_believed(arch25, lie):
     assert {1, -1} <= set(truth.tolist())
     assert ((told == truth) | (told == OPEN)).all()
     assert (told == OPEN).any()
-
-
-def test_fakes_give_no_false_verdict(arch25):
-    network, sets = build_network(arch25), pairs_and_triples(4)[::4]
-    truth = Screen(network, DRY).stands(4, sets)
-    odd = [0.0, 1.0, 1e-320, 1e308, -1e308, np.inf, -np.inf, np.nan]
-    for seed in range(15):
-        rng = np.random.default_rng(seed)
-
-        def fake(a, rng=rng):
-            def entries(array):
-                other = np.full_like(array, rng.choice(odd))
-                kinds = (array, other, rng.standard_normal(array.shape), -array)
-                return kinds[rng.integers(len(kinds))]
-
-            return replace(
-                a,
-                claim=list(Claim)[rng.integers(len(Claim))],
-                value=float(rng.choice([a.value, 0.0, -1.0, 1.0, CAP, *odd])),
-                contact_force=entries(a.contact_force),
-                grip_force=entries(a.grip_force),
-                motion=entries(a.motion),
-            )
-
-        with np.errstate(all="ignore"):
-            told = Screen(network, DRY, compiled=liar(fake)).stands(4, sets)
-        assert ((told == truth) | (told == OPEN)).all(), seed
 
 
 def test_few_sets_are_solved(arch25):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import seqopt
@@ -110,19 +109,6 @@ def test_an_age_that_is_made_up_is_refused():
 def test_wrong_ages_get_a_line(ages, said):
     with pytest.raises((SceneError, seqopt.errors.StepError), match=said):
         Site(2, ages=ages)
-
-
-def test_a_chart_and_tables_are_of_what_is_left():
-    engine = engine_of(4, 3)
-    plan = solved(engine, RULES)
-    rest = solved(engine, replace(RULES, begin=Site.after(plan.steps, 2)))
-    table = rest.times()
-    assert table["step"].tolist() == [step.number for step in rest.steps]
-    assert table["step"].iloc[0] == 3
-    assert table["end_s"].iloc[-1] == rest.makespan
-    assert np.isfinite(rest.summary()["makespan"])
-    again = seqopt.GivenSequence(engine, rest.steps)
-    assert again.makespan is None  # where it begins is not known
 
 
 @pytest.mark.slow
