@@ -51,6 +51,14 @@ class _Block(NamedTuple):
     answer: Floats  # (e,): to the loads, z
 
 
+class _Border(NamedTuple):
+    """A front with grips: what they forbid of blocks and how these follow, and the factors."""
+
+    passed: tuple[tuple[Floats, Floats] | None, ...]  # (c, e) and (e, c), of every block
+    factor: Floats
+    pivots: Ints
+
+
 class FrontalFactor:
     """The scaled stiffness of a growing structure, factored brick by brick in build order.
 
@@ -80,7 +88,7 @@ class FrontalFactor:
         while self.bricks < bricks:
             self._add()
             done = self._last[self.front[::6] // 6] <= self.bricks
-            if done.sum() >= self._at_once:
+            if done.sum() >= self._at_once and not done.all():
                 self._eliminate(np.repeat(done, 6))
 
     def _add(self) -> None:
@@ -118,39 +126,53 @@ class FrontalFactor:
         self.matrix = self.matrix[np.ix_(~done, ~done)] - self.matrix[rest].T @ carried
         self.front = self.front[~done]
 
-    def solve(
-        self, load: Floats | None, rows: Floats, corner: Floats, off: Floats
-    ) -> tuple[Floats, Floats]:
+    def border(self, rows: Floats, corner: Floats) -> _Border:
+        """Return the front bordered by grips, factored; a `LinAlgError` if that is singular.
+
+        ``rows`` (c, 6b), ``corner`` (c, c): as the module displays them.
+        """
+        rows, corner, passed = rows.copy(), corner.copy(), list[tuple[Floats, Floats] | None]()
+        for own, front, factor, carried, _ in self.blocks:
+            here = rows[:, own]
+            if not here.any():
+                passed.append(None)
+                continue
+            by_grips = _solved(factor, here.T)
+            corner += here @ by_grips
+            rows[:, front] -= here @ carried
+            passed.append((here, by_grips))
+        here = rows[:, self.front]
+        matrix = np.block([[self.matrix, -here.T], [here, corner]])
+        factor, pivots, singular = linalg.lapack.dgetrf(matrix)
+        if singular:
+            raise np.linalg.LinAlgError("the front is singular")
+        return _Border(tuple(passed), factor, pivots)
+
+    def solve(self, border: _Border, load: Floats | None, off: Floats) -> tuple[Floats, Floats]:
         """Return motions (6b,) and multipliers (c,) under a load (6b,), or under all that acts.
 
-        ``rows`` (c, 6b), ``corner`` (c, c), ``off`` (c,): of grips, as the module displays them.
+        ``off`` (c,): how far grips hold their nodes from where they are without a load.
         """
-        rows, corner, off = rows.copy(), corner.copy(), off.copy()
-        right, passed = None if load is None else load.copy(), []
-        for own, front, factor, carried, z in self.blocks:
-            here, answer = rows[:, own], z
-            if right is not None:
-                answer = _solved(factor, right[own])
-                right[front] -= carried.T @ right[own]
-            by_grips = None
-            if here.any():
-                by_grips = _solved(factor, here.T)
-                corner += here @ by_grips
-                off -= here @ answer
-                rows[:, front] -= here @ carried
-            passed.append((answer, by_grips))
-        here, count = rows[:, self.front], len(rows)
-        pull = self.load if right is None else right[self.front]
-        matrix = np.block([[self.matrix, -here.T], [here, corner]])
-        found = np.linalg.solve(matrix, np.append(pull, off))
-        motion, forces = np.zeros(6 * self.bricks), found[len(found) - count :]
-        motion[self.front] = found[: len(found) - count]
-        for (own, front, *_, carried, _), (answer, by_grips) in zip(
-            reversed(self.blocks), reversed(passed), strict=True
+        right, off, answers = None if load is None else load.copy(), off.copy(), list[Floats]()
+        for (own, front, factor, carried, answer), held in zip(
+            self.blocks, border.passed, strict=True
         ):
+            if right is not None:
+                answers.append(_solved(factor, right[own]))
+                right[front] -= carried.T @ right[own]
+            else:
+                answers.append(answer)
+            if held is not None:
+                off -= held[0] @ answers[-1]
+        pull = self.load if right is None else right[self.front]
+        whole = linalg.lapack.dgetrs(border.factor, border.pivots, np.append(pull, off))[0]
+        motion, forces = np.zeros(6 * self.bricks), whole[len(pull) :]
+        motion[self.front] = whole[: len(pull)]
+        back = [*zip(self.blocks, border.passed, answers, strict=True)]
+        for (own, front, _, carried, _), held, answer in reversed(back):
             motion[own] = answer - carried @ motion[front]
-            if by_grips is not None:
-                motion[own] += by_grips @ forces
+            if held is not None:
+                motion[own] += held[1] @ forces
         return motion, forces
 
 
@@ -206,16 +228,16 @@ def _solve_one(
         width = len(held.force) // max(1, len(columns))
         off = held.force.T @ np.pad(compliance.moved[0], ((0, 0), (0, width - 3))).ravel()
     state, forces = np.zeros(joints + len(parts.load)), np.zeros(len(off))
+    try:
+        border = factor.border(rows * ratio, corner / unit)
+    except np.linalg.LinAlgError as error:
+        raise SolverError(f"{parts.bricks} bricks: {error}") from error
     for count in range(1 + MOST):
         missing = -parts.apply(state[None])[0]
         given = (missing[:joints] + parts.moved) / row
         right = missing[joints:] + parts.load + rows.T @ forces + gap.T @ given
         left = off - rows @ state[joints:] - corner @ forces
-        asked = None if not count else right * ratio * unit
-        try:
-            moved, more = factor.solve(asked, rows * ratio, corner / unit, left)
-        except np.linalg.LinAlgError:
-            break
+        moved, more = factor.solve(border, right * ratio * unit if count else None, left)
         change = np.append(given - parts.stiffness * (gap @ (moved * ratio)), moved * ratio)
         state, forces = state + change, forces + more / unit
         if count and unchanged(parts, state[None], change[None], largest)[0]:
