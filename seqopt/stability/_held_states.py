@@ -97,33 +97,30 @@ class _Known:
     def learn(self, answer: Answer, held: Floats) -> _Known:
         """Keep what an answer proves by itself; a solver's claim is not believed. Return itself.
 
+        A motion that proves nothing with these grips proves no more with fewer.
+
         ``held`` (G,): payload of every grip for which it was found, N; zero for one not held.
         """
-        self._learn_motion(answer.motion)
-        if is_finite(self._assembly, answer):  # forces hold by the assembly's own data
+        assembly, case, motion = self._assembly, self._case, answer.motion
+        size = np.abs(motion).max(initial=0.0)
+        if motion.shape == (len(assembly.centroid), 6) and 0 < size < np.inf:
+            flat = np.ldexp(motion, -np.frexp(size)[1]).ravel()
+            ((low, _), (high, _)), opening = contact_work(assembly, case, flat, (0.0, 1.0))
+            by_load, by_growth = (float(load @ flat) for load in case.loads(assembly))
+            work, growth = by_load - low, by_growth - (high - low)
+            if work > ROUNDING if case.sense is Sense.SMALLEST else growth > 0:
+                closing = LARGEST_FORCE * float(np.maximum(-opening, 0).sum())
+                speed = np.linalg.norm((assembly.grip_map.T @ flat).reshape(-1, 3), axis=1)
+                self._motions.append(_FallingMotion(work, growth, closing, np.append(speed, 0.0)))
+        if is_finite(assembly, answer):  # forces hold by the assembly's own data
             needed, value = np.linalg.norm(answer.grip_force, axis=1), max(answer.value, 0.0)
             needed[needed <= _IDLE] = 0.0
             grip = np.where(needed[:, None] > 0, answer.grip_force, 0.0)
             clean = replace(answer, value=value, grip_force=grip)
-            tight = violation(self._assembly, self._case, clean, held) <= _TIGHT * max(1.0, value)
+            tight = violation(assembly, case, clean, held) <= _TIGHT * max(1.0, value)
             if tight and not grip[held <= 0].any():
                 self._forces.append(_HoldingForces(value, needed))
         return self
-
-    def _learn_motion(self, motion: Floats) -> None:
-        """Keep what counts of a motion (B, 6) if it is finite and proves something."""
-        assembly, case = self._assembly, self._case
-        size = np.abs(motion).max(initial=0.0)
-        if motion.shape != (len(assembly.centroid), 6) or not 0 < size < np.inf:
-            return
-        flat = np.ldexp(motion, -np.frexp(size)[1]).ravel()
-        ((low, _), (high, _)), opening = contact_work(assembly, case, flat, (0.0, 1.0))
-        by_load, by_growth = (float(load @ flat) for load in case.loads(assembly))
-        work, growth = by_load - low, by_growth - (high - low)
-        if work > ROUNDING if case.sense is Sense.SMALLEST else growth > 0:  # else fewer prove none
-            closing = LARGEST_FORCE * float(np.maximum(-opening, 0).sum())
-            speed = np.linalg.norm((assembly.grip_map.T @ flat).reshape(-1, 3), axis=1)
-            self._motions.append(_FallingMotion(work, growth, closing, np.append(speed, 0.0)))
 
     def tightened(self, bracket: Floats, places: Ints, payload: Floats) -> Floats:
         """Return brackets (S, 2) no wider than others, by what is known here; see `bracket`."""
@@ -192,7 +189,8 @@ class HeldStates:
     ``assembly``: its grips are all that may ever be held; ``case``: what is bracketed; ``easier``:
     what a program is asked before that, as forces for a z of zero; ``earlier``: answers to other
     cases of the same assembly, with the payloads they were found for; what they prove here for a z
-    of zero is known, and new ones join them; ``solved``: how many times the program was called.
+    of zero is known, and new ones join them; ``known``: what is proven so far; ``solved``: how many
+    times the program was called.
     """
 
     def __init__(
@@ -206,16 +204,12 @@ class HeldStates:
         self.assembly, self._case, self._compile = assembly, case, compiled
         self._asked = [case] if easier is None else [easier, case]
         self._programs: list[HeldProgram] = []
-        self._known = _Known(assembly, case)
+        self.known = _Known(assembly, case)
         self._tried: set[tuple[bytes, float]] = set()
         self.solved = 0
         self._answers = earlier
         for answer, held in earlier or ():
-            self._known.learn(replace(answer, value=0.0), held)
-
-    def known(self, places: Ints, payload: Floats) -> Floats:
-        """Return proven brackets of z by what is known already; see `bracket`."""
-        return self._known.bracket(places, payload)
+            self.known.learn(replace(answer, value=0.0), held)
 
     def bracket(
         self, places: Ints, payload: Floats, settled: _Settled, wanted: float = 0.0
@@ -226,7 +220,7 @@ class HeldStates:
         for one is asked again for another. The others, and the result: as of
         `seqopt.stability._held_states._Known.bracket`.
         """
-        out = self._known.bracket(places, payload)
+        out = self.known.bracket(places, payload)
         open_ = ~settled(out)
         for row in np.argsort((payload > 0).sum(axis=1), kind="stable").tolist():
             if not open_[row]:
@@ -258,7 +252,7 @@ class HeldStates:
             answer = self._programs[i](held, enough)
             if self._answers is not None:
                 self._answers.append((answer, held))
-            self._known.learn(answer, held)
+            self.known.learn(answer, held)
             if settled(new.learn(answer, held).bracket(places, payload))[0]:
                 break
         return new

@@ -54,36 +54,16 @@ class Balance:
 
     def __init__(self, maps: Sequence[sparse.csr_array]) -> None:
         self._map = sparse.hstack(maps, format="csr")
-        self._transposed = blocks = self._map.T.tobsr((3, 6))
-        bodies = blocks.shape[1] // 6
-        self._owner = np.repeat(np.arange(blocks.shape[0] // 3), np.diff(blocks.indptr))
-        own, each = np.arange(len(self._owner)), np.arange(bodies)
-        both = np.flatnonzero(self._owner[1:] == self._owner[:-1])  # where a force has two bodies
-        first, second = np.concatenate([[own, own], [both, both + 1]], axis=1)
-        meet = np.ones(len(first)), (blocks.indices[first], blocks.indices[second])
-        touching = sparse.csr_array(meet, shape=(bodies, bodies))
-        self._order = reverse_cuthill_mckee(touching + touching.T, symmetric_mode=True)
-        number = np.argsort(self._order)[blocks.indices]
-        low = number[first] < number[second]  # of what is symmetric, the lower half counts
-        first, second = np.where(low, second, first), np.where(low, first, second)
-        place = number[first] * bodies + number[second]
-        order = np.argsort(place, kind="stable")
-        self._first, self._right = first[order], blocks.data[second[order]]
-        # written again and again: new pages cost more
-        self._half, self._left = np.empty((len(own), 6, 3)), np.empty((len(order), 6, 3))
-        self._products = np.empty((len(order), 6, 6))
-        places, starts = np.unique(place[order], return_index=True)
-        terms = np.ones(len(order)), np.arange(len(order)), np.append(starts, len(order))
-        self._sum = sparse.csr_array(terms, shape=(len(places), len(order)))
-        every = np.union1d(places, each * (bodies + 1))  # bodies may be loose
-        self._met = np.searchsorted(every, places)
-        self._blocks = len(every)
-        self._diagonal = np.searchsorted(every, each * (bodies + 1))
-        rows, columns = np.divmod(every, bodies)
-        line = 6 * (rows - columns)[:, None, None] + np.subtract.outer(np.arange(6), np.arange(6))
-        column = np.broadcast_to(6 * columns[:, None, None] + np.arange(6), line.shape)
-        self._lower, self._lines = np.flatnonzero(line >= 0), int(line.max()) + 1
-        self._band = (column * self._lines + line).ravel()[self._lower]
+        self._transposed, blocks = self._map.T.tocsr(), self._map.tobsr((6, 3))
+        bodies, forces = blocks.shape[0] // 6, blocks.shape[1] // 3
+        acts = np.ones(len(blocks.indices)), blocks.indices, blocks.indptr
+        on = sparse.csr_array(acts, shape=(bodies, forces))
+        order = reverse_cuthill_mckee((on @ on.T).tocsr(), symmetric_mode=True)
+        self._order = (6 * order[:, None] + np.arange(6)).ravel()
+        self._ordered = self._map[self._order]
+        self._turned = self._ordered.T.tocsr()
+        rows = np.repeat(np.arange(forces), 3)  # of weights, three of each force
+        self._places = (3 * rows[:, None] + np.arange(3)).ravel(), np.arange(0, 9 * forces + 1, 3)
 
     def wrench(self, force: Floats) -> Floats:
         """Return the wrenches (6B,) of forces (3, N)."""
@@ -98,29 +78,23 @@ class Balance:
 
         It is that of a system with a larger diagonal, corrected once.
         """
-        across = self._transposed.data.transpose(0, 2, 1)
-        np.matmul(across, weight.transpose(2, 0, 1)[self._owner], out=self._half)
-        np.take(self._half, self._first, axis=0, out=self._left, mode="clip")
-        np.matmul(self._left, self._right, out=self._products)
-        block = np.zeros((self._blocks, 6, 6))
-        sums = np.asarray(self._sum @ self._products.reshape(-1, 36))
-        block[self._met] = sums.reshape(-1, 6, 6)
-        regular = _REGULAR * np.abs(block).max()
-        block[self._diagonal] += regular * np.eye(6)
-        lines, bodies = self._lines, len(self._order)
-        flat = np.zeros(6 * bodies * lines)
-        flat[self._band] = block.ravel()[self._lower]
-        band = flat.reshape(6 * bodies, lines).T
+        weights = sparse.csr_array((weight.transpose(2, 0, 1).ravel(), *self._places))
+        system = (self._ordered @ weights @ self._turned).tocoo()
+        line, size = system.row - system.col, len(self._order)
+        lower, lines = line >= 0, int(line.max(initial=0)) + 1  # of what is symmetric
+        band = np.zeros((lines, size), order="F")
+        band[line[lower], system.col[lower]] = system.data[lower]
+        regular = _REGULAR * np.abs(system.data).max()
+        band[0] += regular
         factor = linalg.cholesky_banded(band, lower=True, check_finite=False), True
 
         def solution(right: Floats) -> Floats:
-            given = right.reshape(-1, 6)[self._order].ravel()
+            given, out = right[self._order], np.empty(size)
             found = linalg.cho_solve_banded(factor, given, check_finite=False)
             left = given - linalg.blas.dsbmv(lines - 1, 1.0, band, found, lower=1)
             found += linalg.cho_solve_banded(factor, left + regular * found, check_finite=False)
-            out = np.empty((bodies, 6))
-            out[self._order] = found.reshape(-1, 6)
-            return out.ravel()
+            out[self._order] = found
+            return out
 
         return solution
 

@@ -73,7 +73,7 @@ class TiltedStates:
         """
         survived, least = np.full((len(places), FINE), np.nan), np.full(len(places), np.inf)
         for way, states in self._states.items():
-            low, high = states.known(places, payload).T
+            low, high = states.known.bracket(places, payload).T
             survived[:, way] = np.where(low >= 0, low, np.nan)
             least = np.minimum(least, high)
         asked, rows = np.zeros(survived.shape, dtype=bool), np.arange(len(places) if solve else 0)
@@ -188,7 +188,7 @@ class Screen:
         for own, part, places, loads in held_parts(self.network, bricks, held, payload):
             states = self._upright(part)
             asked = places, loads
-            bracket = states.bracket(*asked, _decided) if solve else states.known(*asked)
+            bracket = states.bracket(*asked, _decided) if solve else states.known.bracket(*asked)
             found = _of_both(bracket[:, 1] <= EXACT, bracket[:, 0] > EXACT)
             rows = np.flatnonzero(found == STANDS) if self.tilt else ()
             if len(rows):

@@ -263,11 +263,7 @@ def _in_worker(parts: bytes, find: _Find[_Found], steps: Sequence[Step]) -> tupl
     return tuple(find(_unpickled(parts), steps))
 
 
-@lru_cache(maxsize=1)
-def _unpickled(parts: bytes) -> PartialAssemblies:
-    """Return what a worker is sent, the same for all chunks of a build."""
-    out: PartialAssemblies = pickle.loads(parts)  # our own, of `by_workers`
-    return out
+_unpickled = lru_cache(maxsize=1)(pickle.loads)  # what a worker is sent, the same for all chunks
 
 
 def _each(
