@@ -11,7 +11,7 @@ import pytest
 import seqopt
 from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines.interface import _NAMES, grip_columns
-from seqopt.engines.rigid._frontal import FrontalSystem
+from seqopt.engines.rigid._frontal import FrontalFactor, FrontalSystem
 from seqopt.engines.rigid._mixed import LAST_CORRECTION, solve_mixed
 from seqopt.engines.rigid.compliance import _LARGE, ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
@@ -60,7 +60,7 @@ def asked(network, bricks, seed, moved=None):
 def test_one_factorization_per_set_agrees(name):
     network = build_network(SCENES[name]())
     system, count = FrontalSystem(network, AT_ONCE), len(network.inner)
-    for bricks in (2, 3 * AT_ONCE, count // 2, count, count - 2):  # the last one begins anew
+    for bricks in (2, count // 2, count, count - 2):  # the last one begins anew
         moved = np.random.default_rng(bricks).normal(size=(3, 2, 3)) * 1e-5
         for far in (None, moved):
             columns, compliance = asked(network, bricks, bricks, far)
@@ -113,3 +113,23 @@ def test_a_mechanism_is_left_to_operators():
         FrontalSystem(network).solve(30, free, compliance, LAST_CORRECTION)
     with pytest.raises(MechanismError):
         ComplianceEngine(network).solve(30, free)
+
+
+@pytest.mark.parametrize(("spoil", "solutions"), [(0.0, 2), (1e-4, 3)])
+def test_corrections_end_before_one_that_would_not_count(monkeypatch, spoil, solutions):
+    network, calls, solve = build_network(SCENES["chain"]()), [], FrontalFactor.solve
+    count = len(network.inner)
+    columns, compliance = asked(network, count, 1)
+
+    def spoiled(*arguments):
+        calls.append(arguments)
+        return tuple(found * (1 + spoil) for found in solve(*arguments))
+
+    monkeypatch.setattr(FrontalFactor, "solve", spoiled)
+    found = FrontalSystem(network, AT_ONCE).solve(count, columns, compliance, LAST_CORRECTION)
+    assert len(calls) == solutions * len(columns)
+    expected = solve_mixed(network, count, columns, compliance)
+    assert apart(found, expected) <= 1e-9
+    monkeypatch.setattr("seqopt.engines.rigid._frontal._MARGIN", 0.0)  # the control
+    found = FrontalSystem(network, AT_ONCE).solve(count, columns, compliance, LAST_CORRECTION)
+    assert (apart(found, expected) > 1e-9) == (spoil > 0)
