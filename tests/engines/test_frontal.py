@@ -60,7 +60,7 @@ def asked(network, bricks, seed, moved=None):
 def test_one_factorization_per_set_agrees(name):
     network = build_network(SCENES[name]())
     system, count = FrontalSystem(network, AT_ONCE), len(network.inner)
-    for bricks in (2, count // 2, count, count - 2):  # the last one begins anew
+    for bricks in (2, 3 * AT_ONCE, count // 2, count, count - 2):  # the last one begins anew
         moved = np.random.default_rng(bricks).normal(size=(3, 2, 3)) * 1e-5
         for far in (None, moved):
             columns, compliance = asked(network, bricks, bricks, far)

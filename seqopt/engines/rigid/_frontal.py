@@ -17,7 +17,8 @@ the growth are those of the bricks times the square of the front. The front of a
 built vault is a course, and has no more bricks when the vault is longer.
 
 Answers are corrected by the residuals of wrenches and motions side by side, as are those of
-`seqopt.engines.rigid._refinement`, until they no longer change.
+`seqopt.engines.rigid._refinement`, until the next correction, by how much the last one shrank,
+would change them no more.
 """
 
 from __future__ import annotations
@@ -25,13 +26,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import GripCompliance
 from seqopt.engines.interface import Fields, _join_sets, no_sets
 from seqopt.engines.rigid._mechanism import Ungripped, share, ungripped_system
-from seqopt.engines.rigid._mixed import Solution, borne, held_rows, respond, unchanged, unscaled
+from seqopt.engines.rigid._mixed import (
+    Solution,
+    borne,
+    held_rows,
+    respond,
+    sizes,
+    unchanged,
+    unscaled,
+)
 from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
@@ -39,6 +48,8 @@ from seqopt.work._threads import one_thread
 
 AT_ONCE = 24  # bricks that are eliminated together: blocks large enough for matrix products
 MOST = 6  # corrections, after which an answer is given up
+_MARGIN = 10.0  # times more than the last correction shrank that the next one may be
+TINY = np.finfo(float).tiny
 
 
 class _Block(NamedTuple):
@@ -188,6 +199,7 @@ class FrontalSystem:
         self._network, self._shared, self._maps = network, share(network), scene_maps(network)
         whole = ungripped_system(network, len(network.inner), self._shared)
         self._factor = FrontalFactor(whole, at_once)
+        self._last: tuple[Ungripped, sparse.csr_array] | None = None  # of the last brick count
 
     def solve(
         self, bricks: int, columns: Ints, compliance: GripCompliance, largest: float
@@ -199,8 +211,10 @@ class FrontalSystem:
         rounding.
         """
         network = self._network
-        parts = ungripped_system(network, bricks, self._shared)
-        motion = ResponseMaps(self._maps, bricks).motion
+        if self._last is None or self._last[0].bricks != bricks:
+            parts = ungripped_system(network, bricks, self._shared)
+            self._last = parts, ResponseMaps(self._maps, bricks).motion
+        parts, motion = self._last
         answers = [no_sets(network, bricks, columns.shape[1])]
         with one_thread():
             self._factor.reach(bricks)
@@ -227,7 +241,7 @@ def _solve_one(
     if compliance.moved is not None:
         width = len(held.force) // max(1, len(columns))
         off = held.force.T @ np.pad(compliance.moved[0], ((0, 0), (0, width - 3))).ravel()
-    state, forces = np.zeros(joints + len(parts.load)), np.zeros(len(off))
+    state, forces, before = np.zeros(joints + len(parts.load)), np.zeros(len(off)), np.inf
     try:
         border = factor.border(rows * ratio, corner / unit)
     except np.linalg.LinAlgError as error:
@@ -240,7 +254,9 @@ def _solve_one(
         moved, more = factor.solve(border, right * ratio * unit if count else None, left)
         change = np.append(given - parts.stiffness * (gap @ (moved * ratio)), moved * ratio)
         state, forces = state + change, forces + more / unit
-        if count and unchanged(parts, state[None], change[None], largest)[0]:
+        size = sizes(parts, change[None])[0]  # the next correction is as much smaller
+        share, before = min(1.0, _MARGIN * np.max(size / np.maximum(before, TINY))), size
+        if count and unchanged(parts, state[None], share * change[None], largest)[0]:
             wrench, twist = unscaled(parts, state[None])
             force = held.force @ (forces * parts.unit)
             return Solution(twist, wrench, *borne(force[None], len(columns), compliance))

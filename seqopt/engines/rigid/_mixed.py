@@ -363,13 +363,13 @@ def unchanged(
     Where nothing moves, as where robots hold every brick at both nodes, what is left is rounding:
     it is measured against the weight. ``largest``: that counts as small.
     """
-    size, change = _sizes(parts, states), _sizes(parts, corrections)
+    size, change = sizes(parts, states), sizes(parts, corrections)
     other = size.reshape(-1, 2, 2).max(axis=2).repeat(2, axis=1)
     least = np.maximum(_EMPTY * other, _LIGHT * np.abs(parts.load).max())
     return np.asarray((change <= largest * np.maximum(size, least)).all(axis=1))
 
 
-def _sizes(parts: Ungripped, states: Floats) -> Floats:
+def sizes(parts: Ungripped, states: Floats) -> Floats:
     """Return the largest force, moment, shift and turn of each state, (S, 4)."""
     both = np.split(states, [len(parts.wrench_unit)], axis=1)
     kinds = [part.reshape(len(states), part.shape[1] // 6, 2, 3) for part in both]
