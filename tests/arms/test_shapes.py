@@ -83,8 +83,6 @@ def test_a_link_with_a_length_and_no_shape_is_refused(tmp_path, link, name):
         ArmModel(Arm(urdf=urdf, position=INSIDE, tool_length=0.2, tool_radius=0.03))
 
 
-
-
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [

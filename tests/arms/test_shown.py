@@ -13,6 +13,7 @@ import seqopt
 from seqopt._cli.main import main
 from seqopt._cli.outputs import task_files
 from seqopt._files import csv_text
+from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_json
 from seqopt.exchange.exports import export_plan, read_folder
@@ -181,3 +182,21 @@ def test_pictures_draw_arms_in_their_postures(plan):
 def test_arms_that_are_given_must_be_of_robots(plan):
     with pytest.raises(ProblemError, match="give one a step, by the name of a robot: crane"):
         steps_picture(plan.engine, plan.steps, 1, arms={"nobody": [None]})
+
+
+def test_bodies_are_those_that_collisions_are_looked_for_with(plan):
+    """The tool ends at the node, and links are where the table of postures has them."""
+    scene = plan.engine.network.scene
+    for robot, own in ((r, _known_arms(scene, plan.steps)[r.name]) for r in scene.robots[:2]):
+        for step, arm in zip(plan.steps, own, strict=True):
+            node = step.grips[scene.robots.index(robot)]
+            if node is None:
+                assert len(arm.bodies) == len(idle_arm(robot.arm).bodies) >= 1
+                continue
+            tip = arm.bodies[-1][len(arm.bodies[-1]) // 2 :].mean(axis=0)
+            np.testing.assert_allclose(tip, scene.node_position(node), atol=1e-5)
+            placed = ArmModel(robot.arm).placed(arm.joints[None], np.array([0.1]))
+            links = arm.bodies[-placed.low.shape[1] :][:-1]
+            for k, points in enumerate(links):
+                np.testing.assert_allclose(points.min(axis=0), placed.low[0, k], atol=1e-9)
+                np.testing.assert_allclose(points.max(axis=0), placed.high[0, k], atol=1e-9)

@@ -242,3 +242,24 @@ def test_commands_say_it_first_and_tell_scripts(capsys, tmp_path, small_soft, wo
 def small_soft(tmp_path):
     save_scene(changed(small_arch(5), stiffness=1e-6), tmp_path / "soft.json")
     return str(tmp_path / "soft.json")
+
+
+@pytest.mark.parametrize("engine", ["auto", "discrete"])
+def test_engines_whose_joints_break_are_asked_for_displacements_alone(arch25, engine):
+    heavy = changed(arch25, density=20.0)
+    made = make_engine(engine, build_network(heavy))
+    table = analyze(made, sequential(made.network)[:3])
+    table.loc[1, "D_max_1e-3mm"] = 6e3
+    (left,) = LinearRange(made).departures(table)
+    assert (left.what, left.steps) == ("displacement", (2,))
+
+
+def test_what_builds_leave_is_said_by_their_steps_alone(soft):
+    made = make_engine("compliance", build_network(soft))
+    names = {"one": sequential(made.network), "two": cantilever(made.network)}
+    names["short"] = names["one"][:3]
+    tables = {name: analyze(made, steps) for name, steps in names.items()}
+    own, other = LinearRange(made).of_steps(names), LinearRange(made).of_builds(tables)
+    assert [*own] == [*other] == ["one"]
+    for name, left in own.items():
+        assert [(d.what, d.steps) for d in left] == [(d.what, d.steps) for d in other[name]]

@@ -110,3 +110,10 @@ def test_a_table_of_props_says_what_each_bears():
     assert steps[row["from_step"] - 1].bricks == 4
     assert steps[row["to_step"]].held == ()
     assert engine.solve(2, [[1]], Want(0)).grip_force.shape == (1, 1, 3)
+
+
+def test_centering_leaves_robots_their_nodes():
+    scene = small_arch(5)
+    nodes = [prop.node for prop in scene.with_centering().props]
+    assert not {*nodes} & {brick.placing_node for brick in scene.placed}
+    assert len(nodes) >= 4

@@ -18,7 +18,7 @@ from seqopt.responses.quantities import RESPONSES, responses_of, support_forces,
 from seqopt.responses.table import analyze, support_columns
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Step, StepKind
-from tests.builders import from_both_sides
+from tests.builders import from_both_sides, small_arch
 
 MOMENT = WeightedSum("moment", (("M_sup", 1.0, 1.0),))
 
@@ -114,3 +114,12 @@ def test_tables_have_columns_per_end(arch):
     assert table.loc[0, "M_sup_Nm"] == table.loc[0, "M_sup_1_Nm"] > 0
     assert table.loc[1, "M_sup_Nm"] == max(table.loc[1, ["M_sup_1_Nm", "M_sup_9_Nm"]])
     assert abs(table.loc[1, "F_sup_N"]) == table.loc[1, ["F_sup_1_N", "F_sup_9_N"]].abs().max()
+
+
+def test_one_end_needs_no_columns_of_its_own():
+    arch = small_arch(3)
+    free = replace(arch, grounds=arch.grounds[:1])
+    table = analyze(
+        ComplianceEngine(build_network(free)), [Step(1, StepKind.PLACE, 1, (1, None, None))]
+    )
+    assert list(table)[-1] == "D_std_1e-3mm"

@@ -181,3 +181,11 @@ def test_a_plan_that_falls_does_not_hold_strictly(strict):
         assert any("does not stand: a, dry: 1 of 1" in each for each in answer.failures) == (
             wrong and strict
         )
+
+
+def test_words_count_what_falls_and_what_is_open():
+    falls, open_ = Verdict.FALLS, Verdict.UNDECIDED
+    assert str(BuildVerdicts("dry", (Verdict.STANDS,) * 2)) == "dry: every step stands"
+    first = BuildVerdicts("epoxy", (falls, falls, open_), 1, "3", "2-3")
+    wanted = "with epoxy: 2 of 3 steps fall; 1 of 3 steps is undecided, first step 1 "
+    assert str(first) == f"{wanted}(brick 3, joint 2-3)"

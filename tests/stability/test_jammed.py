@@ -8,7 +8,7 @@ import pytest
 from experiments.stability.parts.blocks import Blocks, Contact, ring, stack
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability._steps import format_rows, stability_table
+from seqopt.stability._steps import _MARGINS, format_rows, stability_table
 from seqopt.stability.assessment import Verdict, assess
 
 
@@ -51,3 +51,17 @@ def test_what_its_weight_holds_is_not_marked():
         assert not result.jammed, name
         table = stability_table([Step(1, StepKind.PLACE, 1, (None,))], [result])
         assert "jammed" not in format_rows(rows_of(table))
+
+
+def test_the_worst_margin_of_the_steps_is_said():
+    steps = [Step(number, StepKind.PLACE, 1, (None,)) for number in (1, 2)]
+    table = stability_table(steps, [assess(bar(on_the_ground=True), DRY)] * 2)
+    margins = [name for name, *_ in _MARGINS]
+    table[margins] = np.nan
+    assert format_rows(rows_of(table)).endswith("proven 2 by cone program")
+    table["friction_needed"] = [0.0, 0.25]
+    assert format_rows(rows_of(table)).endswith("; friction: needs 0.25 at most (step 2)")
+    table["friction_needed"] = [np.inf, 0.25]
+    table["tilt_survived_deg"] = [7.0, 3.0]
+    said = "; friction: no value is enough (step 1); tilt: survives 3° at least (step 2)"
+    assert format_rows(rows_of(table)).endswith(said)

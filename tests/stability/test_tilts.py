@@ -150,3 +150,11 @@ def test_hulls_of_many_are_those_of_each(known):
     np.testing.assert_allclose(safe, each[:, 0], rtol=1e-12)
     np.testing.assert_allclose(np.cos(angle - each[:, 1]), np.where(np.isnan(safe), np.nan, 1.0))
     assert np.isfinite(safe).any() == (known > 2)
+
+
+def test_directions_of_which_nothing_is_known_are_left_out():
+    angles = 2 * np.pi * np.arange(8) / 8
+    some = np.where(np.arange(8) == 2, np.nan, 1.0)
+    assert hulls(angles, some[None])[0] == pytest.approx(np.sqrt(0.5))
+    half = np.where(np.arange(8) < 5, 1.0, np.nan)
+    assert np.isnan(hulls(angles, half[None])).all()
