@@ -2,7 +2,7 @@
 
 A partial structure and its grips become rigid blocks with faces between them:
 
->>> from seqopt.contact import DRY, EPOXY, find_elastic_limits, step_assembly
+>>> from seqopt.contact import DRY, EPOXY, step_assembly
 >>> from seqopt.network import build_network
 >>> from seqopt.scene import load_scene
 >>> network = build_network(load_scene("arch25"))
@@ -13,24 +13,15 @@ A partial structure and its grips become rigid blocks with faces between them:
 Joints stay elastic as long as the stress on their faces is less than the strength of the mortar:
 
 >>> import numpy as np
+>>> from seqopt.contact._elastic_limits import find_elastic_limits
 >>> wrench = np.zeros((1, 26, 6))
 >>> wrench[0, 0, 0] = 1000.0  # N on the first brick
 >>> [bool(find_elastic_limits(network, m).exceeded(wrench)[0]) for m in (DRY, EPOXY)]
 [True, False]
 """
 
-from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import bare_assembly, step_assembly
+from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 
-__all__ = [
-    "DRY",
-    "EPOXY",
-    "Assembly",
-    "ElasticLimits",
-    "Mortar",
-    "bare_assembly",
-    "find_elastic_limits",
-    "step_assembly",
-]
+__all__ = ["DRY", "EPOXY", "Assembly", "Mortar", "step_assembly"]

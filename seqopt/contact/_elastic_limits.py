@@ -78,19 +78,13 @@ _CHUNK = 1_000_000  # corners of sets whose stress is held at once
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ElasticLimits(FrozenValue):
-    """The faces of a structure and the strength of their mortar; joints in the network's order.
-
-    Attributes
-    ----------
-    assembly : Assembly
-    mortar : Mortar
-    stress : (K, 3, 6) float
-        Compression and shear at the corners for unit wrenches of their joints, Pa/N, Pa/(N m).
-    """
+    """The faces of a structure and the strength of their mortar; joints in the network's order."""
 
     assembly: Assembly
     mortar: Mortar
     stress: Floats
+    """(K, 3, 6): compression and shear at the corners for unit wrenches of their joints, Pa/N and
+    Pa/(N m)."""
 
     def excess(self, wrench: Floats) -> Floats:
         """Return by how much wrenches (S, J, 6) of first joints exceed their limits, (S, J), Pa."""
@@ -112,23 +106,7 @@ class ElasticLimits(FrozenValue):
 
 
 def find_elastic_limits(network: Network, mortar: Mortar) -> ElasticLimits:
-    """Return the elastic limits of a structure's joints.
-
-    Parameters
-    ----------
-    network : Network
-    mortar : Mortar
-        Of all joints.
-
-    Returns
-    -------
-    ElasticLimits
-
-    Raises
-    ------
-    SceneError
-        If the faces of a joint do not overlap.
-    """
+    """Return the elastic limits of a structure whose joints all have one mortar."""
     assembly, where = bare_assembly(network, len(network.inner)), network.springs.position
     bed = face_quadrature(assembly)
     maps = opening_maps(assembly, bed.point, bed.face, where)

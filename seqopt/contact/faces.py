@@ -104,22 +104,7 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
 
 
 def bare_assembly(network: Network, bricks: int) -> Assembly:
-    """Return a partial structure that nobody holds.
-
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-
-    Returns
-    -------
-    Assembly
-
-    Raises
-    ------
-    SceneError
-        If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
-    """
+    """Return a partial structure that nobody holds; raises as `step_assembly`."""
     placed, acting = network.scene.placed, network.springs.acting(bricks)
     contacts = [_contact_at(network, spring) for spring in acting.tolist()]
     return Assembly(
@@ -192,15 +177,13 @@ class _PropGrips(NamedTuple):
 
     What holds both ways is a grip like that of a robot. One that only pushes bears from nothing to
     its capacity along its line, and nothing across it: half the capacity is applied for good, and a
-    grip along the line adds as much or takes it away. ``payload`` (p,): N; ``line`` (p, 3): unit
-    vectors, zero where any direction will do; ``applied`` (B, 6): as of `Assembly`, no rows where
-    none push.
+    grip along the line adds as much or takes it away.
     """
 
     nodes: tuple[int, ...]
-    payload: Floats
-    line: Floats
-    applied: Floats
+    payload: Floats  # (p,); N
+    line: Floats  # (p, 3); unit vectors, zero where any direction will do
+    applied: Floats  # (B, 6); as of `Assembly`, no rows where none push
 
 
 def _prop_grips(network: Network, bricks: int, *, held: bool) -> _PropGrips:

@@ -24,22 +24,11 @@ def point_motion(arm: Floats) -> Floats:
 
 
 def node_motion(network: Network, bricks: int) -> sparse.csr_array:
-    """Return the displacements of the nodes for unit twists of the bricks.
+    """Return the displacements (3n, 6b) of nodes for unit twists of the bricks that stand.
 
     An inner node follows its brick. A joint node lies between two equal springs in series and moves
     by the mean of what it would on either side; one whose spring does not act yet follows the brick
     that is there.
-
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-
-    Returns
-    -------
-    (3n, 6b) sparse
-        Of the n nodes of the partial structure.
     """
     springs = network.springs
     kind = network.node_kind[: network.count_nodes(bricks)]
@@ -106,22 +95,15 @@ def spread(row: Ints, column: Ints, block: Floats, shape: tuple[int, int]) -> sp
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Statics(FrozenValue):
-    """Linear maps from forces to edge and support forces, for the whole scene.
-
-    Attributes
-    ----------
-    edge_of_spring : (E, 3S) sparse
-        Axial edge forces for unit forces that springs exert on their second bodies.
-    edge_of_load : (E, 6B) sparse
-        Axial edge forces for unit forces on the inner nodes, in the order of `Network.inner`.
-    support_of_spring : (G, 6, 6) float
-        Force and moment at the fixed point of every ground end, in the scene's order, for the
-        wrench its spring exerts on its second body.
-    """
+    """Linear maps from forces to edge and support forces, for the whole scene."""
 
     edge_of_spring: sparse.csr_array
+    """(E, 3S): axial edge forces for unit forces that springs exert on their second bodies."""
     edge_of_load: sparse.csr_array
+    """(E, 6B): the same for unit forces on the inner nodes, in the order of `Network.inner`."""
     support_of_spring: Floats
+    """(G, 6, 6): force and moment at the fixed point of every ground end, in the scene's order, for
+    the wrench its spring exerts on its second body."""
 
 
 def build_statics(network: Network) -> Statics:
@@ -129,14 +111,6 @@ def build_statics(network: Network) -> Statics:
 
     A half-edge or a stub carries its spring's force along its own axis. An inner edge carries
     along its axis what reaches its second node: the load there and the half-edges that end there.
-
-    Parameters
-    ----------
-    network : Network
-
-    Returns
-    -------
-    Statics
     """
     axis, kind, spring = network.edge_axis, network.edge_kind, network.edge_spring
     springs = network.springs

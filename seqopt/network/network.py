@@ -19,7 +19,6 @@ from seqopt._showing import Shown, display
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import units
-from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -27,21 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zero, over the brick
-
-
-def _shared_weight(brick: Brick, weight: Floats) -> Floats:
-    """Return forces (2, 3) at a brick's inner nodes that act on it as its weight (3,) does, N."""
-    first, second = (np.subtract(brick.node_position(node), brick.position) for node in brick.nodes)
-    span, middle = 0.5 * (second - first), 0.5 * (first + second)
-    moment = -np.cross(middle, weight)  # of the weight about the middle between the nodes
-    along = abs(float(moment @ span)) / float(np.linalg.norm(span))
-    if along > _OFF_PLANE * max(brick.dimensions) * float(np.linalg.norm(weight)):
-        raise SceneError(
-            f"brick {brick.name}: its weight turns it about the line through its nodes "
-            f"{list(brick.nodes)}; give nodes above, below or on either side of the centroid"
-        )
-    shift = np.cross(moment, span) / (2 * span @ span)
-    return np.stack([0.5 * weight - shift, 0.5 * weight + shift])
 
 
 GROUND = -1  # stands for the ground where a brick's index in build order is expected
@@ -61,45 +45,22 @@ class PartKind(IntEnum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Springs(FrozenValue):
-    """The joints and ground ends of a network, as arrays over springs.
+    """The joints and ground ends of a network, as arrays over springs; in order of `since`."""
 
-    Attributes
-    ----------
-    bodies : (S, 2) int
-        Indices in build order of the bricks they join; `GROUND` first for a ground end.
-    since : (S,) int
-        Brick count from which the spring acts.
-    node : (S,) int
-        Joint node.
-    position, anchor : (S, 3) float
-        m; the anchor of a joint between bricks is its position.
-    axes : (S, 3, 3) float
-        Rows are the unit vectors of the spring's own axes.
-    translational_stiffness, rotational_stiffness : (S, 3) float
-        N/m, N m/rad.
-    support : (G,) int
-        Indices of the springs that are ground ends, in the scene's order.
-    movement : (S, 6) float
-        How the ground moves at the position of a ground end, m and rad; zero for joints.
-    thickness : (S,) float
-        Of joints that say so, m; NaN for others.
-    face : tuple of (m, 3) float
-        Corners of the faces over which bodies touch, of springs that say so, m; no corners for
-        others. Their first axes then point from the first body into the second.
-    """
-
-    bodies: Ints
-    since: Ints
-    node: Ints
-    position: Floats
-    anchor: Floats
-    axes: Floats
-    translational_stiffness: Floats
-    rotational_stiffness: Floats
-    support: Ints
-    movement: Floats
-    thickness: Floats
+    bodies: Ints  # (S, 2); indices in build order of the bricks they join, or `GROUND` first
+    since: Ints  # (S,); brick count from which each acts
+    node: Ints  # (S,); joint nodes
+    position: Floats  # (S, 3); m
+    anchor: Floats  # (S, 3); m; of a joint between bricks its position
+    axes: Floats  # (S, 3, 3); rows are the unit vectors of the spring's own axes
+    translational_stiffness: Floats  # (S, 3); N/m
+    rotational_stiffness: Floats  # (S, 3); N m/rad
+    support: Ints  # (G,); the springs that are ground ends, in the scene's order
+    movement: Floats  # (S, 6); how the ground moves at a ground end, m and rad; zero for joints
+    thickness: Floats  # (S,); of joints that say so, m; NaN for others
     face: tuple[Floats, ...]
+    """Corners (m, 3) of the faces over which bodies touch, m; none of springs that do not say them.
+    With corners, the first axis points from the first body into the second."""
 
     def acting(self, bricks: int) -> Ints:
         """Return the springs (s,) that act on a partial structure, ascending."""
@@ -113,19 +74,16 @@ class Springs(FrozenValue):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Compliances(FrozenValue):
-    """The compliance of every grip by M kinds: of grippers, and of arms behind them.
-
-    ``compliance`` (M, 6, 6): how a node shifts and turns against the hand that holds it for a force
-    and a moment on it, m and rad for N and N m; zero of a rigid grip. ``transmits_moment`` (M,):
-    which kinds bear moments; others let their nodes turn. ``index`` (K, N): the kind of a grip of
-    each kind of robots at each node, -1 where it is not known; one column where nodes do not
-    matter. ``nodes`` (N,): numbers of nodes, ascending.
-    """
+    """The compliance of every grip by M kinds: of grippers, and of arms behind them."""
 
     compliance: Floats
-    transmits_moment: Bools
+    """(M, 6, 6): how a node shifts and turns against the hand that holds it for a force and a
+    moment on it, m and rad for N and N m; zero of a rigid grip."""
+    transmits_moment: Bools  # (M,); which kinds bear moments; others let their nodes turn
     index: Ints
-    nodes: Ints
+    """(K, N): the kind of a grip of each kind of robots at each node, -1 where it is not known; one
+    column where nodes do not matter."""
+    nodes: Ints  # (N,); numbers of nodes, ascending
 
     def at(self, node: Ints, kind: Ints) -> Ints:
         """Return the kinds (S, r) of grips of robots by kind on nodes; (1, 1) if all are equal.
@@ -214,8 +172,20 @@ class Network(Shown, FrozenValue):
         """Share of its brick's weight at every inner node, (2B, 3), N; order of ``inner``."""
         half = np.repeat(0.5 * self.weight, 2, axis=0)
         for i, brick in enumerate(self.scene.placed):
-            if brick.node_offsets is not None:
-                half[2 * i : 2 * i + 2] = _shared_weight(brick, self.weight[i])
+            if brick.node_offsets is None:
+                continue
+            weight, ends = self.weight[i], self.node_position[self.inner[i]] - brick.position
+            span, middle = 0.5 * (ends[1] - ends[0]), 0.5 * (ends[0] + ends[1])
+            moment = -np.cross(middle, weight)  # of the weight about the middle between the nodes
+            along = abs(float(moment @ span)) / float(np.linalg.norm(span))
+            if along > _OFF_PLANE * max(brick.dimensions) * float(np.linalg.norm(weight)):
+                line = f"the line through its nodes {list(brick.nodes)}"
+                raise SceneError(
+                    f"brick {brick.name}: its weight turns it about {line}; give nodes above, "
+                    "below or on either side of the centroid"
+                )
+            shift = np.cross(moment, span) / (2 * span @ span)
+            half[2 * i : 2 * i + 2] += [-shift, shift]
         return frozen(half)
 
     @cached_property

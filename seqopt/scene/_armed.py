@@ -68,12 +68,10 @@ def within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
 
 def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     """Return the nodes of the first bricks that a robot may hold while these stand, in order."""
-    nodes = [node for brick in within_reach(scene, robot)[:bricks] for node in brick]
+    nodes = tuple(node for brick in within_reach(scene, robot)[:bricks] for node in brick)
     if robot.arm is None:
-        return tuple(nodes)
-    until = from_arms("permits")(scene).until[
-        scene.robots.index(robot)
-    ]  # by place: which count ends it
+        return nodes
+    until = from_arms("permits")(scene).until[scene.robots.index(robot)]  # ends, by place
     place = {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
     return tuple(node for node in nodes if until[place[node]] > bricks)
 

@@ -508,22 +508,17 @@ class _GripKinds(FrozenValue):
     Robots of one compliance and payload are one kind; one with an arm whose joints are compliant
     is a kind by itself. Engines are asked about grips by number: that of the node, and for a robot
     of kind k more by k times the span of all node numbers.
-
-    ``compliance`` (K, 6, 6): how a node shifts and turns, m and rad, against the hand that holds
-    it for a force and a moment on it, N and N m; zero where the hand is rigid. ``arms`` (K,):
-    whether the joints of an arm are compliant, too, as `seqopt.arms` knows of every node.
-    ``turns`` (K,): whether grips of a kind bear moments; others let their nodes turn. ``payload``
-    (K,): N. ``of_robot`` (R,): the kind of every robot. ``first``, ``span``: the least node number,
-    and how far apart kinds are.
     """
 
     compliance: Floats
-    arms: Bools
-    turns: Bools
-    payload: Floats
-    of_robot: Ints
-    first: int
-    span: int
+    """(K, 6, 6): how a node shifts and turns, m and rad, against the hand that holds it for a force
+    and a moment on it, N and N m; zero where the hand is rigid."""
+    arms: Bools  # (K,); whether joints of an arm are compliant, as `seqopt.arms` knows of each node
+    turns: Bools  # (K,); whether grips of a kind bear moments; others let their nodes turn
+    payload: Floats  # (K,); N
+    of_robot: Ints  # (R,); the kind of every robot
+    first: int  # least node number
+    span: int  # how far apart kinds are
 
     @cached_property
     def rigid(self) -> bool:
@@ -549,31 +544,6 @@ class _GripKinds(FrozenValue):
         known = (kind >= 0) & (kind < len(self.turns))
         kind = np.where(known, kind, 0)
         return numbers - self.span * kind, kind
-
-
-def _grip_kinds(robots: Sequence[Robot], nodes: Sequence[int]) -> _GripKinds:
-    """Return the kinds of robots; one that is rigid where there is none. ``nodes``: all numbers."""
-    own = (r.name if r.arm and r.arm.joint_stiffness else "" for r in robots)
-    ways = [
-        (r.stiffness, r.rotational_stiffness, r.payload, name)
-        for r, name in zip(robots, own, strict=True)
-    ]
-    kinds = list(dict.fromkeys(ways)) or [(None, None, np.inf, "")]
-    shift, turn, payload, arms = zip(*kinds, strict=True)
-    compliance = np.zeros((len(kinds), 6, 6))
-    for k, given in enumerate(zip(shift, turn, strict=True)):
-        for at, each in zip((0, 3), given, strict=True):
-            if each is not None:
-                compliance[k, range(at, at + 3), range(at, at + 3)] = 1 / np.array(each)
-    return _GripKinds(
-        compliance=compliance,
-        arms=np.array(arms) != "",
-        turns=np.array([each is not None for each in turn]),
-        payload=np.array(payload),
-        of_robot=np.array([kinds.index(way) for way in ways], dtype=np.int64),
-        first=min(nodes),
-        span=max(nodes) - min(nodes) + 1,
-    )
 
 
 _NEAR = 1.0  # of a node from where a prop is said to be, over the smallest side of its brick
@@ -626,12 +596,6 @@ class Prop(Terse):
     def label(self) -> str:
         """What messages call it."""
         return f"prop at {f'node {self.node}' if self.position is None else list(self.position)}"
-
-    @property
-    def as_robot(self) -> Robot:
-        """A robot of the same compliance and payload."""
-        payload = math.nextafter(math.inf, 0) if self.capacity is None else self.capacity
-        return Robot(name=self.label, payload=payload, stiffness=self.stiffness)
 
 
 def _settled_props(props: Sequence[Prop], bricks: Mapping[int, Brick]) -> tuple[Prop, ...]:

@@ -25,7 +25,6 @@ from seqopt.scene.parts import (
     Prop,
     Reach,
     Robot,
-    _grip_kinds,
     _GripKinds,
     _settled_props,
 )
@@ -341,8 +340,29 @@ class Scene(Shown):
     @cached_property
     def grip_kinds(self) -> _GripKinds:
         """Compliance of its robots where they hold, and after them of its props."""
-        holders = [*self.robots, *(prop.as_robot for prop in self.props)]
-        return _grip_kinds(holders, [*self.brick_of_node])
+        soft = (r.name if r.arm and r.arm.joint_stiffness else "" for r in self.robots)
+        own = [
+            (r.stiffness, r.rotational_stiffness, r.payload, name)
+            for r, name in zip(self.robots, soft, strict=True)
+        ]
+        any_force = math.nextafter(math.inf, 0)
+        own += [(p.stiffness, None, p.capacity or any_force, "") for p in self.props]
+        kinds = list(dict.fromkeys(own)) or [(None, None, math.inf, "")]
+        shift, turn, payload, arms = zip(*kinds, strict=True)
+        compliance = np.zeros((len(kinds), 6, 6))
+        for k, given in enumerate(zip(shift, turn, strict=True)):
+            for at, each in zip((0, 3), given, strict=True):
+                if each is not None:
+                    compliance[k, range(at, at + 3), range(at, at + 3)] = 1 / np.array(each)
+        return _GripKinds(
+            compliance=compliance,
+            arms=np.array(arms) != "",
+            turns=np.array([each is not None for each in turn]),
+            payload=np.array(payload),
+            of_robot=np.array([kinds.index(each) for each in own], dtype=np.int64),
+            first=min(self.brick_of_node),
+            span=max(self.brick_of_node) - min(self.brick_of_node) + 1,
+        )
 
     @cached_property
     def held_postures(self) -> HeldPostures | None:

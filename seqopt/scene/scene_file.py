@@ -288,22 +288,21 @@ def _scene_from_dict(document: dict[str, Any]) -> Scene:
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """Return a scene as a document that obeys the schema."""
-    return {"format": "seqopt-scene", "version": _VERSION, **_entry(scene)}
-
-
-def _entry(part: Any) -> dict[str, Any]:
-    """Return the fields of a part of a scene by name, without defaults."""
+    """Return a scene as a document that obeys the schema, without defaults."""
     kinds = {cls: {"kind": kind} for kind, cls in _REACHES.items()}
-    out: dict[str, Any] = {**kinds.get(type(part), {})}
-    for each in fields(part):
-        value = getattr(part, each.name)
-        if value != each.default or each.name in _SAID:
-            several = isinstance(value, tuple) and value and is_dataclass(value[0])
-            out[each.name] = tuple(map(_entry, value)) if several else value
-            if is_dataclass(value):
-                out[each.name] = _entry(value)
-    return out
+
+    def entry(part: Any) -> dict[str, Any]:
+        out: dict[str, Any] = {**kinds.get(type(part), {})}
+        for each in fields(part):
+            value = getattr(part, each.name)
+            if value != each.default or each.name in _SAID:
+                several = isinstance(value, tuple) and value and is_dataclass(value[0])
+                out[each.name] = tuple(map(entry, value)) if several else value
+                if is_dataclass(value):
+                    out[each.name] = entry(value)
+        return out
+
+    return {"format": "seqopt-scene", "version": _VERSION, **entry(scene)}
 
 
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:

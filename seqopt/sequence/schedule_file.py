@@ -82,15 +82,12 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     if steps and (steps[0].kind, steps[0].bricks) != (StepKind.PLACE, 1):  # a part of a plan
         first = max(1, steps[0].number)
     for expected, step in enumerate(steps, start=first):
-        _require_number(f"plan {source}", step.number, expected)
+        if step.number != expected:
+            where = f"plan {source}: step {step.number}"
+            raise StepError(f"{where} should be {expected}; number steps from 1")
     if first > 1 or any(step.kind is StepKind.REMOVE for step in steps):
         return _check_part(scene, steps)
     return check_sequence(scene, steps)
-
-
-def _require_number(where: str, number: int, expected: int) -> None:
-    if number != expected:
-        raise StepError(f"{where}: step {number} should be {expected}; number steps from 1")
 
 
 def _read_steps(scene: Scene, text: str, what: str) -> Iterator[tuple[int, Row, OpenStep]]:
@@ -221,7 +218,9 @@ def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
                     f"{what}: column {column}: no robot of scene {scene.name} is called so; "
                     f"give {', '.join(known)}"
                 )
-        _require_number(at, step.number, len(steps) + 1)
+        if step.number != len(steps) + 1:
+            wanted = f"should be {len(steps) + 1}; number steps from 1"
+            raise StepError(f"{at}: step {step.number} {wanted}")
         if None in row:
             raise StepError(f"{at}: it has more cells than there are columns; leave out the rest")
         try:
@@ -368,39 +367,6 @@ def _what_is_left(schedule: Schedule, done: Sequence[Step], to: Site | None = No
             f"schedule {schedule.method} has {len(schedule.steps)} steps: none is left from "
             f"step {len(done)} to {last}"
         )
-    _require_done(schedule, done)
-    given = _held(schedule, len(done), done[-1].grips) if done else {}
-    if to is not None and to.grips is not None:
-        given |= _held(schedule, last, to.grips)
-    rest = schedule.steps[len(done) : last]
-    left = sorted({move for step in rest for move in step.moves} - {*given})
-    number = {move: k for k, move in enumerate(left)}
-
-    def known(grip: object) -> int | OpenGrip | None:
-        if isinstance(grip, OpenGrip):
-            return given[grip.move] if grip.move in given else OpenGrip(number[grip.move])
-        return grip  # type: ignore[return-value]
-
-    steps = tuple(replace(step, grips=tuple(map(known, step.grips))) for step in rest)
-    held = [{g for s in steps if k in s.moves for g in s.grips} for k in range(len(left))]
-    moves = []
-    for k, move in enumerate(schedule.moves[move] for move in left):
-        free = tuple(node for node in move.candidates if node not in held[k])
-        if not free:
-            raise StepError(f"step {move.step}: others hold every node that {move.robot} may hold")
-        moves.append(replace(move, candidates=free))
-    begin = Site.after(done, done[-1].number) if done else None
-    return replace(schedule, steps=steps, moves=tuple(moves), begin=begin)
-
-
-def _held(schedule: Schedule, count: int, grips: Sequence[int | None]) -> dict[int, int | None]:
-    """Return the nodes of moves that are held after a number of steps."""
-    planned = schedule.steps[count - 1].grips
-    pairs = zip(planned, grips, strict=True)
-    return {grip.move: node for grip, node in pairs if isinstance(grip, OpenGrip)}
-
-
-def _require_done(schedule: Schedule, done: Sequence[Step]) -> None:
     for step, planned in zip(done, schedule.steps, strict=False):
         same = replace(planned, grips=()) == OpenStep(step.number, step.kind, step.bricks, ())
         for node, grip in zip(step.grips, planned.grips, strict=True):
@@ -411,3 +377,24 @@ def _require_done(schedule: Schedule, done: Sequence[Step]) -> None:
                 f"step {step.number} of what was done is none of schedule {schedule.method}; go "
                 "on with the free schedule"
             )
+    held = [(len(done), done[-1].grips)] if done else []  # after how many steps, by whom
+    held += [(last, to.grips)] if to is not None and to.grips is not None else []
+    choice: dict[object, Any] = {
+        grip: node
+        for count, nodes in held
+        for grip, node in zip(schedule.steps[count - 1].grips, nodes, strict=True)
+        if isinstance(grip, OpenGrip)
+    }
+    rest = schedule.steps[len(done) : last]
+    left = sorted({m for step in rest for m in step.moves if OpenGrip(m) not in choice})
+    choice |= {OpenGrip(move): OpenGrip(k) for k, move in enumerate(left)}
+    steps = tuple(replace(s, grips=tuple(choice.get(g, g) for g in s.grips)) for s in rest)
+    moves = []
+    for k, move in enumerate(schedule.moves[move] for move in left):
+        taken = {grip for step in steps if k in step.moves for grip in step.grips}
+        free = tuple(node for node in move.candidates if node not in taken)
+        if not free:
+            raise StepError(f"step {move.step}: others hold every node that {move.robot} may hold")
+        moves.append(replace(move, candidates=free))
+    begin = Site.after(done, done[-1].number) if done else None
+    return replace(schedule, steps=steps, moves=tuple(moves), begin=begin)

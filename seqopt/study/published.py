@@ -121,18 +121,7 @@ STEP_TABLES = {
 
 
 def printed(name: str) -> pd.DataFrame:
-    """Return a printed table.
-
-    Parameters
-    ----------
-    name : str
-        Of its file in ``seqopt/data/paper``, without the suffix.
-
-    Returns
-    -------
-    pandas.DataFrame
-        As printed; the names of the columns say the units.
-    """
+    """Return a table as printed, by the name of its file in ``seqopt/data/paper``."""
     source = resources.files("seqopt").joinpath(f"data/paper/{name}.csv")
     with source.open(encoding="utf-8") as stream:
         return pd.read_csv(stream)
@@ -183,16 +172,7 @@ PRINTED_COLUMN = {"sequential": "sequential", "cantilever": "cantilever", PUBLIS
 
 
 def is_reference_arch(scene: Scene) -> bool:
-    """Return whether a scene is the arch of Bruun et al. as it ships with the package.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    bool
-    """
+    """Return whether a scene is the arch of Bruun et al. as it ships with the package."""
     return scene == load_scene("arch25")
 
 
