@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Real
 from operator import mul
+from typing import Self
 
 import numpy as np
 
@@ -119,6 +120,10 @@ class _Region:
     def covers(self, point: Vector) -> bool:
         """Return whether a point is within reach."""
         return self.lack(point) <= 0
+
+    def longer(self, more: float) -> Self:  # what ends nowhere
+        """Return a reach that is longer, m."""
+        return self
 
 
 @dataclass(frozen=True)

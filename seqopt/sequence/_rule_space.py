@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, frozen
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse
 from seqopt.errors import SolverError, StepError
 from seqopt.network.network import Network
 from seqopt.scene._armed import go_together, within_reach
@@ -134,6 +134,11 @@ class StateRows(Terse):
         """The places of nodes in build order, from 1."""
         return {node: i for i, node in enumerate(node_numbers(self.network), start=1)}
 
+    @cached_property
+    def _at(self) -> Floats:
+        """Positions of nodes (2B + 1, 3), m; the first is for none."""
+        return np.pad(self.network.node_position[self.network.inner.ravel()], ((1, 0), (0, 0)))
+
     def for_arms(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) are feasible for arms at a brick count, (n,)."""
         scene = self.network.scene
@@ -221,12 +226,6 @@ class FreeSpace(StateRows):
     def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves that place the next brick: none of them is a regrip."""
         return ((self.places(level, states), False),)
-
-    @cached_property
-    def _distance(self) -> Floats:
-        """Distances of nodes, (2B + 1, 2B + 1), m; none from or to node 0."""
-        at = self.network.node_position[self.network.inner.ravel()]
-        return frozen(np.pad(np.linalg.norm(at[:, None] - at[None], axis=2), ((1, 0), (1, 0))))
 
     def start(self) -> Ints:
         """Return the initial state, (1, c).
@@ -418,7 +417,10 @@ class FreeSpace(StateRows):
         source, node = np.nonzero(~taken[:, nodes + 1])
         number = nodes[node] + 1
         new = states[source]
-        way = self._distance[-new[:, slot], number] if self.parks else np.zeros(len(new))
+        way = np.zeros(len(new))
+        if self.parks:
+            last = -new[:, slot].astype(np.int64)
+            way = np.linalg.norm(self._at[last] - self._at[number], axis=1) * (last > 0)
         new[:, slot] = number
         return Moves(source, new, way)
 

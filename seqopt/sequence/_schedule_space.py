@@ -121,11 +121,6 @@ class ScheduleSpace(StateRows):
             way = (np.linalg.norm(moved, axis=2) * gone).sum(axis=1)
         return ((Moves(source, after, way), step.kind is StepKind.REPOSITION),)
 
-    @cached_property
-    def _at(self) -> Floats:
-        """Positions of nodes (2B + 1, 3), m, instead of the much larger matrix of distances."""
-        return np.pad(self.network.node_position[self.network.inner.ravel()], ((1, 0), (0, 0)))
-
     def without_choice(self) -> Iterator[tuple[int, Ints]]:
         """Yield the levels, last first, of steps without an open grip, and their state (1, r)."""
         for level, step in reversed([*enumerate(self.rules.steps, start=1)]):

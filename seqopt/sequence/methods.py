@@ -23,7 +23,7 @@ from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network, PartKind
 from seqopt.scene._armed import reachable, within_reach
-from seqopt.scene.parts import Anywhere, Brick, Robot, Side, Sphere
+from seqopt.scene.parts import Brick, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind
@@ -47,7 +47,7 @@ def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str
     """
     points = [scene.node_position(node) for node in scene.placed_nodes]
 
-    def least(reaches: Mapping[str, Side | Sphere]) -> float:
+    def least(reaches: Mapping[str, Reach]) -> float:
         lacks = (reach.lack(point) for reach in reaches.values() for point in points)
         steps = sorted({math.ceil(_MM * lack - 1e-6) / _MM for lack in lacks if lack > 0})
 
@@ -60,8 +60,7 @@ def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str
             return 0.0
         return steps[bisect_left(steps, 1, hi=len(steps) - 1, key=is_enough)]
 
-    limited = {r.name: r.reach for r in scene.robots if r.arm is None}
-    own = {name: reach for name, reach in limited.items() if not isinstance(reach, Anywhere)}
+    own = {robot.name: robot.reach for robot in scene.robots if robot.arm is None}
     alone = {name: more for name, reach in own.items() if (more := least({name: reach}))}
     for name, more in alone.items():
         if isinstance(reach := own[name], Sphere):
@@ -523,35 +522,34 @@ def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) ->
     >>> len(schedule.steps), len(schedule.moves), schedule.moves[0].robot
     (95, 23, 'rob3')
     """
-    network = network_of(network)
-    chosen = _find_robots(network.scene, robots, "modified-sequential", 3)
+    scene = (network := network_of(network)).scene
+    chosen = _find_robots(scene, robots, "modified-sequential", 3)
     plain = sequential(network, robots[:2])
     helpers = chosen[2:] if robots else chosen
     acts, support, moves = list[_Act](), dict[int, _Grip](), 0
+
+    def is_free(robot: int, window: Sequence[Step]) -> bool:
+        held = {node for step in window for node in step.held}
+        idle = all(step.grips[robot] is None for step in window)
+        return idle and bool({*reachable(scene, scene.robots[robot], window[0].bricks)} - held)
+
     for k, step in enumerate(plain):
         given: dict[int, _Grip] = dict(enumerate(step.grips))
         acts.append((step.kind, step.bricks, given | support if step.held else given))
         if step.kind is StepKind.RELEASE:
             continue
         acts.append((StepKind.RELEASE, step.bricks, given))
-        if 1 < step.bricks < len(network.scene.placed):
-            helper = _free(network.scene, plain[k : k + 3], [*support, *helpers])
+        if 1 < step.bricks < len(scene.placed):
+            window = plain[k : k + 3]  # in which the first helper that is free supports
+            helper = next((r for r in (*support, *helpers) if is_free(r, window)), None)
+            if helper is None:
+                raise StepError(
+                    f"brick {scene.placed[step.bricks - 1].name}: no robot is left that reaches a "
+                    "node to support; extend a reach, or name who takes turns and who supports"
+                )
             support, moves = {helper: OpenGrip(moves)}, moves + 1
             acts.append((StepKind.REPOSITION, step.bricks, given | support))
-    return open_schedule("modified-sequential", network, _steps(network.scene, acts))
-
-
-def _free(scene: Scene, window: Sequence[Step], helpers: Sequence[int]) -> int:
-    """Return the first helper free in the given steps that reaches a free node."""
-    held = {node for step in window for node in step.held}
-    for robot in helpers:
-        idle = all(step.grips[robot] is None for step in window)
-        if idle and {*reachable(scene, scene.robots[robot], window[0].bricks)} - held:
-            return robot
-    raise StepError(
-        f"brick {scene.placed[window[0].bricks - 1].name}: no robot is left that reaches a node to "
-        "support; extend a reach, or name who takes turns and who supports"
-    )
+    return open_schedule("modified-sequential", network, _steps(scene, acts))
 
 
 SCHEDULES: dict[str, Callable[..., Schedule]] = {

@@ -13,28 +13,17 @@ import numpy as np
 
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import (
-    check,
-    density,
-    length,
-    letters,
-    one_of,
-    positive,
-    short,
-    sizes,
-    whole_between,
-)
+from seqopt.scene._checks import check, one_of, positive, short, sizes, whole_between
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import require_apart
 from seqopt.scene.library.common import (
     MASONRY,
     JointLaw,
+    Shape,
     _bond_pairs,
     _few_enough,
-    _joint_width,
     _masonry,
     _running_bond,
-    a_law,
 )
 from seqopt.scene.parts import THICKEST
 from seqopt.scene.scene import Scene
@@ -118,7 +107,7 @@ _TRIED = 8  # numbers of bricks, where none is given
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArchForm:
+class ArchForm(Shape):
     """The numbers that shape an arch; lengths in m.
 
     The joints lie on the curve, the first and the last at its springings, which are level. They are
@@ -137,6 +126,7 @@ class ArchForm:
     'circular'
     """
 
+    kind = "arch"
     span: float
     rise: float
     curve: str = "circular"
@@ -148,10 +138,8 @@ class ArchForm:
     law: JointLaw = MASONRY
 
     def __post_init__(self) -> None:
-        check(self, "arch", span=length, rise=length, density=density)
-        check(self, "arch", curve=partial(one_of, known=_CURVES), pattern=letters)
-        check(self, "arch", bricks=partial(whole_between, least=2))
-        check(self, "arch", dimensions=sizes, gap=_joint_width, law=a_law)
+        super().__post_init__()
+        check(self, "arch", curve=partial(one_of, known=_CURVES))
 
     @property
     def line(self) -> _Line:

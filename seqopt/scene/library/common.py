@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields
 from functools import partial
 from heapq import heapify, heappop, heappush
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import MOST_BRICKS, as_float, check, kind_of, positive, stiffness, units
+from seqopt.scene import _checks
+from seqopt.scene._checks import MOST_BRICKS, check, stiffness, units
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.boxes import _spring_fields, as_vector
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
@@ -67,7 +68,36 @@ class JointLaw:
 # of the domes that Bruun et al. built later
 MASONRY = JointLaw(translational=(1.5e9, 1.5e8, 1.5e8))
 DOWN = np.array([0.0, 0.0, -1.0])
-a_law = partial(kind_of, kind=JointLaw)
+
+
+def _joint_width(where: str, value: float) -> float:
+    """Return the width of a joint, which may be none."""
+    return 0.0 if _checks.as_float(value) == 0 else _checks.positive(where, value, "m, or 0")
+
+
+a_law = partial(_checks.kind_of, kind=JointLaw)
+_FIELDS: dict[str, Callable[[str, Any], object]] = {
+    **dict.fromkeys(("span", "rise", "opening", "thickness", "length", "height"), _checks.length),
+    "around": partial(_checks.whole_between, least=3),
+    "bricks": partial(_checks.whole_between, least=2),
+    "corbel": _checks.finite,
+    "density": _checks.density,
+    "dimensions": _checks.sizes,
+    "gap": _joint_width,
+    "law": a_law,
+    "pattern": _checks.letters,
+}
+"""The numbers that shape structures, by name: how each is checked."""
+
+
+class Shape:
+    """Base of the numbers that shape a structure; ``kind``: what messages call it."""
+
+    kind: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        own = {field.name for field in fields(self)}  # type: ignore[arg-type]
+        check(self, self.kind, **{name: of for name, of in _FIELDS.items() if name in own})
 
 
 def _masonry(
@@ -139,11 +169,6 @@ def _few_enough(where: str, bricks: int) -> None:
     """Require a structure of at most `MOST_BRICKS`."""
     if bricks > MOST_BRICKS:
         raise SceneError(f"{where}: {bricks} bricks; give numbers that make at most {MOST_BRICKS}")
-
-
-def _joint_width(where: str, value: float) -> float:
-    """Return the width of a joint, which may be none."""
-    return 0.0 if as_float(value) == 0 else positive(where, value, "m, or 0")
 
 
 def _running_bond(

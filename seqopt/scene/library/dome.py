@@ -12,25 +12,24 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene._checks import check, density, length, whole_between
+from seqopt.scene._checks import check, whole_between
 from seqopt.scene.boxes import as_vector, require_apart
 from seqopt.scene.library.common import (
     DOWN,
     MASONRY,
     JointLaw,
+    Shape,
     _few_enough,
-    _joint_width,
     _masonry,
     _shares,
     _touching_order,
-    a_law,
 )
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class DomeShape:
+class DomeShape(Shape):
     """The numbers that shape a dome, a cap of a sphere with an opening; lengths in m.
 
     ``courses``: rows from the ground to the opening, equally high. ``around``: bricks in the lowest
@@ -47,6 +46,7 @@ class DomeShape:
     1.0
     """
 
+    kind = "dome"
     courses: int
     around: int
     span: float = 2.0
@@ -58,11 +58,9 @@ class DomeShape:
     law: JointLaw = MASONRY
 
     def __post_init__(self) -> None:
-        least = partial(whole_between, least=1), partial(whole_between, least=3)
-        check(self, "dome", courses=least[0], around=least[1])
+        super().__post_init__()
+        check(self, "dome", courses=partial(whole_between, least=1))
         _few_enough("dome", self.courses * self.around)
-        check(self, "dome", span=length, rise=length, opening=length, thickness=length)
-        check(self, "dome", gap=_joint_width, density=density, law=a_law)
         if self.rise > 0.5 * self.span:
             raise SceneError(
                 f"dome: rise is {self.rise:g} m; give at most half of the span, {0.5 * self.span:g}"

@@ -10,17 +10,16 @@ import numpy as np
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import check, density, finite, length, sizes, whole_between
+from seqopt.scene._checks import check, whole_between
 from seqopt.scene.library.common import (
     DOWN,
     MASONRY,
     JointLaw,
+    Shape,
     _bond_pairs,
     _few_enough,
-    _joint_width,
     _masonry,
     _running_bond,
-    a_law,
 )
 from seqopt.scene.scene import Scene
 
@@ -28,7 +27,7 @@ WHOLE = 1e-3  # of a brick: lengths in mm come to whole bricks
 
 
 @dataclass(frozen=True, kw_only=True)
-class WallShape:
+class WallShape(Shape):
     """The numbers that shape a wall.
 
     ``columns``: bricks in a course. ``courses``: every second one is shifted by half a brick.
@@ -43,6 +42,7 @@ class WallShape:
     (0.2, 0.1, 0.06)
     """
 
+    kind = "wall"
     columns: int = 0
     courses: int = 0
     length: float | None = None
@@ -54,18 +54,17 @@ class WallShape:
     law: JointLaw = MASONRY
 
     def __post_init__(self) -> None:
-        count = partial(whole_between, least=1)
-        check(self, "wall", dimensions=sizes, gap=_joint_width, density=density, law=a_law)
+        super().__post_init__()
         self._count("columns", "length", self.dimensions[0])
         self._count("courses", "height", self.dimensions[2])
-        check(self, "wall", columns=count, courses=count)
+        whole = partial(whole_between, least=1)
+        check(self, "wall", columns=whole, courses=whole)
         _few_enough("wall", self.columns * self.courses)
         if self.gap >= 0.5 * self.dimensions[0]:
             raise SceneError(
                 f"wall: gap is {self.gap:g} m, half a brick or more; give less than "
                 f"{0.5 * self.dimensions[0]:g}"
             )
-        check(self, "wall", corbel=finite)
         if abs(self.corbel) >= self.dimensions[1]:
             raise SceneError(
                 f"wall: corbel is {self.corbel:g} m, a brick's width or more, and courses would "
@@ -83,7 +82,6 @@ class WallShape:
             return
         if getattr(self, name):
             raise SceneError(f"wall: {name} and {extent} are both given; give one")
-        check(self, "wall", **{extent: length})
         count = (value + self.gap) / (each + self.gap)
         if abs(count - round(count)) > WHOLE or round(count) < 1:
             near = sorted({max(1, math.floor(count)), math.floor(count) + 1})
