@@ -32,7 +32,7 @@ BAD = {
     # schedules, formulations, criteria, limits
     "optimize ARCH --formulation overlap_dp --schedule ring": "schedule 'ring' does not exist",
     "optimize ARCH --schedule three-robot --robots rob1,rob2": "three-robot takes three",
-    "optimize ARCH --formulation beam --option depth=3": "--option depth=3: beam has seconds",
+    "optimize ARCH --formulation beam --option depth=3": "--option depth=3: beam has width",
     "optimize ARCH --formulation beam --option width=wide": "width is 'wide'; give an int",
     "optimize ARCH --criteria T_max=heavy": "'heavy' is not a positive",
     "optimize ARCH --limit T_max": "--limit T_max",
