@@ -12,12 +12,12 @@ import math
 import pickle
 import threading
 from collections import Counter
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import reduce
 from itertools import groupby
 from operator import or_
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from seqopt.responses.quantities import (
     EXTREMES,
     PROP_EXCESS,
     _excess_of,
-    _with_props,
     lengths,
     require_finite,
     robot_response,
@@ -97,7 +96,8 @@ def answer(engine: Engine, block: Block) -> Answers:
     asked = [CHOSEN_BY[name] for name in block.names if name in CHOSEN_BY]
     want = reduce(or_, (r.needs for r in asked), Want.SCREEN if block.screen else Want(0))
     before = Counter(tally_of(engine))
-    grips, robots = _with_props(block.grips, block.props), block.grips.shape[1]
+    sets, robots = block.grips.shape
+    grips = np.hstack([block.grips, np.tile(np.array(block.props, dtype=np.int64), (sets, 1))])
     if isinstance(engine, ComplianceEngine) and set(block.names) <= EXTREMES.keys():
         with one_thread():
             found = engine._extremes(block.bricks, grips, want, compiled=block.compiled)
@@ -189,21 +189,8 @@ class StepChoices(FrozenValue):
     responses: Mapping[str, Floats]
 
 
-class Wanted(Protocol):
-    """Which responses a move needs."""
-
-    def __call__(self, bricks: int) -> Set[str]:
-        """Return the names of the responses that a move needs.
-
-        Parameters
-        ----------
-        bricks : int
-            Bricks placed when the move is made.
-
-        Returns
-        -------
-        set of str
-        """
+Wanted: TypeAlias = Callable[[int], Set[str]]
+"""Returns the names of the responses that a move needs, given the bricks placed when it is made."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

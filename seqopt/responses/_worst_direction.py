@@ -44,11 +44,11 @@ def worst_rates(own: Floats, influence: Floats, most: Floats) -> tuple[Floats, F
     ``direction`` (n, 3): unit vectors along which they become so first.
     """
     rate, direction = np.full(len(own), np.inf), np.tile([1.0, 0.0, 0.0], (len(own), 1))
+    vectors = _Vectors.of(own, influence, most)
     rows = np.flatnonzero(np.linalg.norm(own, axis=1) < most)
     for start in range(0, len(rows), _AT_ONCE):
         part = rows[start : start + _AT_ONCE]
-        one = _Vectors(own[part], _side_by_side(influence[part]), most[part])
-        rate[part], direction[part] = _search(one)
+        rate[part], direction[part] = _search(vectors.some(part))
     return rate, direction
 
 
@@ -60,9 +60,9 @@ def proven_rates(
     ``direction`` (n, 3): estimates of the worst ones; else as `worst_rates`.
     """
     low, high = np.full((2, len(own)), np.inf)
+    vectors = _Vectors.of(own, influence, most)
     for i in np.flatnonzero(np.linalg.norm(own, axis=1) < most):
-        one = _Vectors(own[i : i + 1], _side_by_side(influence[i : i + 1]), most[i : i + 1])
-        low[i], high[i], _ = _bracket(one, direction[i : i + 1])
+        low[i], high[i], _ = _bracket(vectors.some(np.array([i])), direction[i : i + 1])
     return low, high
 
 
@@ -79,6 +79,12 @@ class _Vectors(NamedTuple):
     influence: Floats  # (n, 3, 3r); all directions of all grips side by side
     most: Floats  # (n,)
 
+    @classmethod
+    def of(cls, own: Floats, influence: Floats, most: Floats) -> _Vectors:
+        n, r = influence.shape[:2]
+        wide = np.ascontiguousarray(influence.transpose(0, 2, 1, 3).reshape(n, 3, 3 * r))
+        return cls(own, wide, most)
+
     def some(self, rows: Ints) -> _Vectors:
         return _Vectors(*(each[rows] for each in self))
 
@@ -93,17 +99,12 @@ class _Vectors(NamedTuple):
         return np.asarray(np.sqrt(np.square(self.pulls(u)).sum(axis=3)).sum(axis=2) / room)
 
 
-def _side_by_side(influence: Floats) -> Floats:
-    n, r = influence.shape[:2]
-    return np.ascontiguousarray(influence.transpose(0, 2, 1, 3).reshape(n, 3, 3 * r))
-
-
 def _search(vectors: _Vectors) -> tuple[Floats, Floats]:
     """Return rates (n,) and directions (n, 3): from one start where it is proven optimal.
 
     Elsewhere from several, and if no bound is tight, by spherical triangles.
     """
-    sphere = _sphere()
+    sphere = np.unique(_triangles(2).reshape(-1, 3).round(12), axis=0)
     every = np.broadcast_to(sphere, (len(vectors.own), *sphere.shape))
     starts = sphere[np.argsort(-vectors.rates(every), axis=1, kind="stable")[:, :_BEST]]
     rate, direction = _climb(vectors, starts[:, 0])
@@ -241,11 +242,6 @@ def _quartered(triangles: Floats) -> Floats:
 
 
 @cache
-def _sphere() -> Floats:
-    """Return unit vectors (v, 3) in all directions."""
-    return np.unique(_triangles(2).reshape(-1, 3).round(12), axis=0)
-
-
 def _triangles(times: int) -> Floats:
     """Return triangles (t, 3, 3) that cover the sphere: of an octahedron, quartered."""
     signs = np.array([[i, j, k] for i in (1, -1) for j in (1, -1) for k in (1, -1)], dtype=float)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid._extremes import Extremes
 from seqopt.errors import SolverError
@@ -264,11 +264,6 @@ def responses_of(network: Network, fields: Fields) -> dict[str, Floats]:
 
 
 EXCESS_COLUMN = "prop_excess_N"
-
-
-def _with_props(grips: Ints, props: Sequence[int]) -> Ints:
-    """Return grip sets (S, r) with the grips of props, by number, after those of robots."""
-    return np.hstack([grips, np.tile(np.array(props, dtype=np.int64), (len(grips), 1))])
 
 
 def _excess_of(props: Sequence[Prop], force: Floats) -> Floats:
