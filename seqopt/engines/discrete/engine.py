@@ -25,7 +25,7 @@ from seqopt.engines.discrete._system import Held, Settled, System, build_system,
 from seqopt.engines.interface import Fields, OpeningEngine
 from seqopt.engines.rigid._mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond
-from seqopt.errors import SeqoptError, SolverError
+from seqopt.errors import SolverError
 from seqopt.network._mechanics import build_statics, node_motion, point_motion
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -55,32 +55,31 @@ class DiscreteEngine(OpeningEngine):
         if bricks not in self._systems:
             self._systems[bricks] = build_system(network, bricks, self._mortar, self._bed)
         system = self._systems[bricks]
-        springs = _springs(network, system, columns, compliance)
+        nodes, springs = network.inner.ravel()[columns], list[_Spring]()
+        for grip, ways, flexibility, offset in grip_springs(compliance, len(columns)):
+            body = int(columns[grip] // 2)
+            arm = network.node_position[nodes[grip]] - network.centroid[body]
+            every = np.vstack([point_motion(arm), np.eye(6)[3:]]) * system.unit[:6]
+            stiffness = np.asarray(np.linalg.inv(flexibility), float)
+            springs.append(_Spring(grip, body, ways, every[ways], stiffness, offset))
         held = self._hold(system, columns, compliance, springs)
         found = settle(held)
-        if not found.rests:
-            raise _not_at_rest(network, held, found, columns)
-        return _fields(network, held, found, columns, springs)
+        if found.rests:
+            return _fields(network, held, found, columns, springs)
+        if held.gone(found):
+            moved = (system.unit * held.moved(found.motion))[: 6 * bricks]
+            said = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or "
+            raise mechanism_error(network, moved, said + "friction")
+        names = ", ".join(str(network.node_name[node]) for node in nodes) or "nothing"
+        raise SolverError(
+            f"{bricks} bricks held at {names}: the discrete elements neither came to rest nor "
+            "became unstable; assess the step's stability to learn whether there is an equilibrium"
+        )
 
     def _hold(
         self, system: System, columns: Ints, compliance: GripCompliance, springs: list[_Spring]
     ) -> Held:
         return _held_nodes(self._network, system, columns, compliance, springs)
-
-
-def _not_at_rest(network: Network, held: Held, found: Settled, columns: Ints) -> SeqoptError:
-    """Return the error of a structure that did not come to rest: it went, or was not followed."""
-    system = held.system
-    if held.gone(found):
-        moved = system.unit * held.moved(found.motion)
-        said = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or "
-        return mechanism_error(network, moved[: 6 * system.bricks], said + "friction")
-    nodes = network.inner.ravel()[columns]
-    names = ", ".join(str(network.node_name[n]) for n in nodes) or "nothing"
-    return SolverError(
-        f"{system.bricks} bricks held at {names}: the discrete elements neither came to rest nor "
-        "became unstable; assess the step's stability to learn whether there is an equilibrium"
-    )
 
 
 class _Spring(NamedTuple):
@@ -101,20 +100,6 @@ class _Spring(NamedTuple):
     def force(self, twist: Floats) -> Floats:
         """Return its wrench (w,) on a body that is moved by a scaled twist (6,)."""
         return np.asarray(self.stiffness @ (self.far - self.motion @ twist))
-
-
-def _springs(
-    network: Network, system: System, columns: Ints, compliance: GripCompliance
-) -> list[_Spring]:
-    """Return the compliant grips of one set as springs."""
-    nodes, out = network.node_position[network.inner.ravel()[columns]], []
-    for grip, ways, flexibility, offset in grip_springs(compliance, len(columns)):
-        body = int(columns[grip] // 2)
-        shift = point_motion(nodes[grip] - network.centroid[body])
-        every = np.vstack([shift, np.eye(6)[3:]]) * system.unit[:6]
-        stiffness = np.asarray(np.linalg.inv(flexibility), float)
-        out.append(_Spring(grip, body, ways, every[ways], stiffness, offset))
-    return out
 
 
 def _held_nodes(

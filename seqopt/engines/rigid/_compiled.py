@@ -163,7 +163,7 @@ def _extremes_outside(carried: Floats, edges: Edges, part: Part) -> tuple[float,
 def _pull_bricks(
     tension: Floats, carried: Floats, edges: Edges, part: Part, at: Ints, force: Floats
 ) -> None:
-    """Find the forces of inner edges (b,)."""
+    """Find the forces of inner edges (b,); two grips on one share what is between them."""
     for b in range(part.bricks):
         total = part.at_second[b]
         for k in range(edges.start[b], edges.start[b + 1]):
@@ -174,11 +174,6 @@ def _pull_bricks(
         for a in range(3):
             along = part.axis[at[i] // 2, a] * (at[i] % 2)
             tension[at[i] // 2] += along * force[3 * i + a]
-
-
-@_compiled()
-def _share_pairs(tension: Floats, part: Part, at: Ints, force: Floats) -> None:
-    """Let each of two grips on one brick take the force at its own node, in place."""
     for second in range(1, len(at)):
         for first in range(second):
             brick = at[first] // 2
@@ -262,7 +257,6 @@ def reduce_sets(
         found[3, s] = _most_moment(carried, ends)
         least, most = _extremes_outside(carried, edges, part)
         _pull_bricks(tension, carried, edges, part, columns[s], force[s])
-        _share_pairs(tension, part, columns[s], force[s])
         for b in range(part.bricks):
             least, most = min(least, tension[b]), max(most, tension[b])
         found[0, s], found[1, s] = least, most

@@ -63,20 +63,6 @@ def _as_rows(each: Floats) -> Floats:
     return np.ascontiguousarray(each.reshape(len(each), each.shape[1] * each.shape[2]).T)
 
 
-def _brace(system: Floats, pairs: Pairs, width: int) -> None:
-    """Give the force between two grips on one brick a flexibility, so that there is one answer.
-
-    ``width``: unknowns of each grip.
-    """
-    count, sets = system.shape[1:]
-    blocks = system.reshape(count // width, width, count // width, width, sets)[:, :3, :, :3]
-    trace = np.einsum("ririt->t", blocks)[pairs.sets]
-    block = (trace[:, None] * pairs.axis)[:, :, None] * pairs.axis[:, None]
-    rows = np.array([pairs.first, pairs.second, pairs.second])
-    columns = np.array([pairs.first, pairs.second, pairs.first])
-    blocks[rows, :, columns, :, pairs.sets] += np.array([block, block, -block])
-
-
 def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tuple[Floats, Floats]:
     """Solve S positive definite systems of k unknowns in place, the batch along the last axis.
 
@@ -182,32 +168,19 @@ def _doubts(
         own += (root * size).sum(axis=0)
         own *= scale
         if isinstance(operator, ComplianceOperator) and not compliance.rigid:
-            own = _with_compliance(operator, own, size, root / scale, compliance)
+            flexibility, nodes = root / scale, len(own) - operator.loose
+            given, softer = np.zeros_like(own), np.zeros_like(own)
+            if compliance.moved is not None:
+                given[:nodes] += _as_rows(_offsets(operator, np.abs(compliance.moved)))
+            if compliance.matrix is not None:
+                parts = np.abs(compliance.transmitted)
+                yielded = np.einsum("srij,srj->sri", parts, operator.by_grip(size.T))
+                given[:nodes] += _as_rows(yielded)
+                softer[:nodes] = _as_rows(np.diagonal(parts, axis1=2, axis2=3))
+            own = (own * flexibility + given) / (flexibility + softer)
         own /= found.pivot
         most = size.max(axis=0, initial=np.finfo(float).tiny)
         return np.asarray(own.max(axis=0, initial=0.0) / most)
-
-
-def _with_compliance(
-    operator: ComplianceOperator,
-    own: Floats,
-    size: Floats,
-    flexibility: Floats,
-    compliance: GripCompliance,
-) -> Floats:
-    """Return errors of forces (k, S), as of `_doubts`, with compliant and moved grips.
-
-    ``size`` (k, S): of the forces, N; ``flexibility`` (k, S): the diagonal, m/N.
-    """
-    given, softer = np.zeros_like(own), np.zeros_like(own)
-    nodes = len(own) - operator.loose
-    if compliance.moved is not None:
-        given[:nodes] += _as_rows(_offsets(operator, np.abs(compliance.moved)))
-    if compliance.matrix is not None:
-        parts = np.abs(compliance.transmitted)
-        given[:nodes] += _as_rows(np.einsum("srij,srj->sri", parts, operator.by_grip(size.T)))
-        softer[:nodes] = _as_rows(np.diagonal(parts, axis1=2, axis2=3))
-    return np.asarray((own * flexibility + given) / (flexibility + softer))
 
 
 def _offsets(operator: ComplianceOperator, moved: Floats) -> Floats:
@@ -290,8 +263,15 @@ def _solved(
         pairs = pairs.only(pairs.rigid(compliance, sets, nodes // operator.width))
     if off is not None:
         system[-1, : len(off)] -= off
-    if len(pairs.sets):
-        _brace(system[:nodes, :nodes], pairs, operator.width)
+    if len(pairs.sets):  # the force between two on one brick gets a flexibility
+        width, grips = operator.width, nodes // operator.width
+        whole = system[:nodes, :nodes].reshape(grips, width, grips, width, sets)
+        blocks = whole[:, :3, :, :3]
+        trace = np.einsum("ririt->t", blocks)[pairs.sets]
+        block = (trace[:, None] * pairs.axis)[:, :, None] * pairs.axis[:, None]
+        first = np.array([pairs.first, pairs.second, pairs.second])
+        second = np.array([pairs.first, pairs.second, pairs.first])
+        blocks[first, :, second, :, pairs.sets] += np.array([block, block, -block])
     return _solve_positive(system, operator.loose, scale)
 
 

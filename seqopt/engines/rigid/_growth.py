@@ -58,18 +58,6 @@ def grow_tree(network: Network) -> SpanningTree:
     return SpanningTree(spring, parent)
 
 
-def _compliances(network: Network, first: int) -> Floats:
-    """Return the compliances (s, 6, 6) of the first springs, m/N and rad/(N m)."""
-    springs, out = network.springs, np.zeros((first, 6, 6))
-    axes, parts = (
-        springs.axes[:first],
-        (springs.translational_stiffness, springs.rotational_stiffness),
-    )
-    for own, stiffness in zip((slice(3), slice(3, 6)), parts, strict=True):
-        out[:, own, own] = axes.transpose(0, 2, 1) / stiffness[:first, None] @ axes
-    return out
-
-
 TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
 _AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
 _LEAST = 4  # times as many, from which on one more thread pays
@@ -115,7 +103,14 @@ class Growth:
         counts = np.arange(len(tree.spring) + 1)
         # how many springs act on as many bricks
         self._acting = np.searchsorted(network.springs.since, counts, side="right").tolist()
-        self._compliance = _compliances(network, self._acting[-1])
+        springs, first = network.springs, self._acting[-1]
+        self._compliance = np.zeros((first, 6, 6))  # of springs, m/N and rad/(N m)
+        for own, given in (
+            (slice(3), springs.translational_stiffness),
+            (slice(3, 6), springs.rotational_stiffness),
+        ):
+            axes = springs.axes[:first]
+            self._compliance[:, own, own] = axes.transpose(0, 2, 1) / given[:first, None] @ axes
         self._shift = network.springs.movement[: self._acting[-1]]
         center = network.centroid[: len(tree.spring)]
         self._own_arm = _carried(center - network.springs.position[tree.spring])
@@ -232,19 +227,14 @@ class Growth:
                 self.twist[0, mine] = own @ self._shift[spring]
         self.twist[rows, mine] = flexibility
         self.wrench[rows, self._of(spring)] = -own
-        self._load(brick)
-        self._tie(np.array([spring]), self._ties)
-
-    def _load(self, brick: int) -> None:
-        """Add the weight of a brick, and loads that begin with it."""
-        k, pulls = 6, [(brick, self._network.weight[brick])]
+        pulls = [(brick, self._network.weight[brick])]  # and loads that begin with it
         begun = self._network.applied(brick + 1, before=brick)
-        for other in np.flatnonzero(begun.any(axis=1)).tolist():
-            pulls.append((other, begun[other]))
+        pulls += [(body, begun[body]) for body in np.flatnonzero(begun.any(axis=1)).tolist()]
         for body, pull in pulls:
-            rows = slice(1 + k * body, 1 + k * body + len(pull))
-            for weighed, answer in zip(self._answers(0), self._answers(rows), strict=True):
+            loaded = self._answers(slice(1 + k * body, 1 + k * body + len(pull)))
+            for weighed, answer in zip(self._answers(0), loaded, strict=True):
                 weighed[:] += pull @ answer
+        self._tie(np.array([spring]), self._ties)
 
     def _of(self, spring: int) -> slice:
         """Return the columns of a spring's wrenches."""

@@ -117,7 +117,13 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
     raw = (springs.stiffness[acting] / lever**2).ravel()
     unit = float(np.median(raw[raw > 0])) if raw.any() else 1.0
     stiffness, twist_unit = raw / unit, np.tile(1 / lever, bricks)
-    gap = _scaled_gap(shared, acting, twist_unit, lever)
+    gap, rows = shared.gap, 6 * len(acting)
+    if rows and acting[-1] + 1 != len(acting):  # those that act are not the first
+        gap = gap[(6 * acting[:, None] + np.arange(6)).ravel()]
+    starts = gap.indptr[: rows + 1]
+    at = gap.indices[: starts[-1]]
+    lengths = np.repeat(np.tile(lever, len(acting)), np.diff(starts)) * twist_unit[at]
+    scaled = gap.data[: starts[-1]] * lengths, at, starts  # all components made lengths
     size, own = 6 * bricks, shared.inner.indices[: 36 * bricks]
     nodes = shared.inner.data[: 36 * bricks] * twist_unit[own], own, shared.inner.indptr[: size + 1]
     inner: sparse.csr_array = sparse.csr_array(nodes, shape=(size, size))
@@ -129,7 +135,7 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
         bricks=bricks,
         inner=inner,
         statics=shared.statics,
-        deformation=gap,
+        deformation=sparse.csr_array(scaled, shape=(rows, size)),
         stiffness=stiffness,
         load=inner.T @ weight / unit + applied * twist_unit / unit,
         moved=row * (shared.moved[acting] * lever).ravel(),
@@ -138,18 +144,6 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
         wrench_unit=unit * np.tile(lever, len(acting)),
         unit=unit,
     )
-
-
-def _scaled_gap(shared: Shared, acting: Ints, unit: Floats, lever: Floats) -> sparse.csr_array:
-    """Return the deformation (6s, 6b) of the acting springs, all components made lengths."""
-    rows, part = 6 * len(acting), shared.gap
-    if rows and acting[-1] + 1 != len(acting):  # those that act are not the first
-        part = part[(6 * acting[:, None] + np.arange(6)).ravel()]
-    indptr = part.indptr[: rows + 1]
-    indices = part.indices[: indptr[-1]]
-    data = part.data[: indptr[-1]] * np.repeat(np.tile(lever, len(acting)), np.diff(indptr))
-    data *= unit[indices]
-    return sparse.csr_array((data, indices, indptr), shape=(rows, len(unit)))
 
 
 _UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied

@@ -109,9 +109,16 @@ def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
     none = sparse.csr_array((0, 6 * parts.bricks))
     if tied and firm.all():
         return none
-    label, first = _clusters(parts, firm)
-    if not len(first):
+    bodies = parts.network.springs.bodies[parts.acting[firm]]
+    ends, count = np.where(bodies == GROUND, parts.bricks, bodies), parts.bricks + 1
+    tied_pairs = sparse.coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(count, count))
+    _, group_of = csgraph.connected_components(tied_pairs, directed=False)
+    loose = np.flatnonzero(group_of[:-1] != group_of[-1])  # by firm springs; the ground is last
+    if not len(loose):
         return none
+    _, lead, own = np.unique(group_of[loose], return_index=True, return_inverse=True)
+    label, first = np.full(parts.bricks, -1), loose[lead]
+    label[loose] = own
     center = parts.network.centroid[: parts.bricks]
     each = np.zeros((parts.bricks, 6, len(first), 6))  # twists where groups move as one
     for group, lead in enumerate(first):
@@ -128,23 +135,6 @@ def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
     rows = sparse.lil_array((int(weak.sum()), 6 * parts.bricks))
     rows[:, held] = np.linalg.pinv((rigid @ modes[weak].T)[held])
     return sparse.csr_array(rows)
-
-
-def _clusters(parts: Ungripped, firm: Bools) -> tuple[Ints, Ints]:
-    """Return which group of firmly tied bricks each belongs to, and their first bricks.
-
-    The group that is tied to the ground is -1 and has no first brick here.
-    """
-    bodies = parts.network.springs.bodies[parts.acting[firm]]
-    ends = np.where(bodies == GROUND, parts.bricks, bodies)
-    size = parts.bricks + 1
-    tied = sparse.coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(size, size))
-    _, label = csgraph.connected_components(tied, directed=False)
-    loose = np.flatnonzero(label[:-1] != label[-1])
-    _, first, own = np.unique(label[loose], return_index=True, return_inverse=True)
-    out = np.full(parts.bricks, -1)
-    out[loose] = own
-    return out, loose[first]
 
 
 _TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
@@ -231,7 +221,16 @@ class Refinement:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, shared)
         self.held = _hold_loose(self.parts, tied=tied)
-        self.inner = _loaded(self.parts)
+        size = 6 * bricks
+        self.inner = self.parts.inner  # loads on scaled twists, (l, 6b), as of `load_rows`
+        if network.scene.grip_kinds.turns.any():
+            turned = np.zeros((3 * bricks, size))
+            turns = (6 * np.arange(bricks)[:, None] + np.arange(3, 6)).ravel()
+            turned[np.arange(3 * bricks), turns] = network.lever
+            moments = sparse.csr_array(turned * self.parts.twist_unit)
+            both = sparse.vstack([self.parts.inner, moments], format="csr")
+            rows = np.arange(size).reshape(-1, 6), size + np.arange(size // 2).reshape(-1, 3)
+            self.inner = sparse.csr_array(both[np.hstack(rows).ravel()])
 
     @cached_property
     def own(self) -> ComplianceOperator:
@@ -274,19 +273,6 @@ class Refinements:
         if self._last is None or self._last.bricks != bricks:
             self._last = Refinement(self._network, bricks, self._shared, tied=tied)
         return self._last
-
-
-def _loaded(parts: Ungripped) -> sparse.csr_array:
-    """Return the loads on scaled twists, (l, 6b), in the numbering of `load_rows`."""
-    network, size = parts.network, 6 * parts.bricks
-    if not network.scene.grip_kinds.turns.any():
-        return parts.inner
-    turned = np.zeros((3 * parts.bricks, size))
-    turns = (6 * np.arange(parts.bricks)[:, None] + np.arange(3, 6)).ravel()
-    turned[np.arange(3 * parts.bricks), turns] = network.lever
-    both = sparse.vstack([parts.inner, sparse.csr_array(turned * parts.twist_unit)], format="csr")
-    each = np.hstack([np.arange(size).reshape(-1, 6), size + np.arange(size // 2).reshape(-1, 3)])
-    return sparse.csr_array(both[each.ravel()])
 
 
 class _Asked(NamedTuple):

@@ -75,11 +75,7 @@ class ResponseMaps(FrozenValue):
 
     def count(self, name: str) -> int:
         """Return how many numbers a field has."""
-        return self._counts[name] * prod(SHAPES[name])
-
-    @cached_property
-    def _counts(self) -> dict[str, int]:
-        return _counts_of_fields(self.scene.network, self.bricks)
+        return _counts_of_fields(self.scene.network, self.bricks)[name] * prod(SHAPES[name])
 
     def apply(self, name: str, states: Floats, out: Floats | None = None) -> Floats:
         """Return a field of states, edge forces without those of loads on the inner edges.
