@@ -134,11 +134,6 @@ class Curing(Terse):
     Before the first point there is no bond. No points at all: it never cures. ``joints``: names of
     joints, as ``5-6``, and points of their own. Raises `SceneError` if ages or shares do not rise,
     or the last share is not 1.
-
-    >>> Curing(((300.0, 0.4), (900.0, 1.0))).share(600.0)
-    0.4
-    >>> _find_curing("15min").share(90.0)
-    0.1
     """
 
     points: Points = ()
@@ -215,11 +210,6 @@ def _find_curing(given: Curing | str | Iterable[str]) -> Curing:
     ``15min`` (or ``s``, ``h``) has full bond after that and before a share in proportion, counted
     from below at `SHARES`; ``5min=0.4,15min=1`` what is reached when; ``never``; before any of
     these the name of a joint and a colon, as ``5-6:30min``.
-
-    >>> _find_curing("never").share(1e9)
-    0.0
-    >>> _find_curing("5min=0.4,15min=1 1-2:1h").points_of("1-2")[-1]
-    (3600.0, 1.0)
     """
     if isinstance(given, Curing):
         return given

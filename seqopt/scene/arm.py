@@ -249,10 +249,6 @@ def _durations_in_words(
 
     ``names``: of the robots; ``given``: their own; ``texts``: as `EXAMPLE`, for one robot with its
     name and a colon before; ``slower=2`` among the words multiplies what it has by then.
-
-    >>> found = _durations_in_words(["a", "b"], [None, None], [EXAMPLE, "b:slower=2.5"])
-    >>> [each.release for each in found]
-    [5.0, 12.5]
     """
     out = list(given)
     for text in texts:

@@ -212,16 +212,6 @@ def _find_overlaps(
     """Yield pairs of solids that interpenetrate by more than either's tolerance, m.
 
     ``progress``: called with how far it is.
-
-    Examples
-    --------
-    >>> from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
-    >>> one, other = (
-    ...     Polyhedron(tuple((x + at, y, z) for x, y, z in BOX_CORNERS), BOX_FACES)
-    ...     for at in (0, 1.8)
-    ... )
-    >>> [str(found) for found in _find_overlaps([one, other], [0.1, 0.1])]
-    ['by 200 mm (their bounds by 200 mm along x, 2e+03 mm along y, 2e+03 mm along z)']
     """
     bounds = [_bounds_of(solid.points) for solid in solids]
     faces: dict[int, list[_Face]] = {}

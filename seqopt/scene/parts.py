@@ -267,12 +267,10 @@ class Brick(Terse):
                 given = short(self.node_offsets)
                 raise SceneError(f"{what} are {given}; give two different points")
             settle(self, node_offsets=points)
-        if self.shape is not None:
-            self._check_shape(where, kind_of(f"{where}: shape", self.shape, Polyhedron))
-
-    def _check_shape(self, where: str, shape: Polyhedron) -> None:
-        """Require a shape about the centroid that extends as far as the dimensions say."""
-        slack = _SAME_PLACE * max(self.dimensions)
+        if self.shape is None:
+            return
+        shape, slack = kind_of(f"{where}: shape", self.shape, Polyhedron), max(self.dimensions)
+        slack *= _SAME_PLACE
         off = math.hypot(*shape.centroid.tolist())
         if not off <= slack:
             raise SceneError(

@@ -505,12 +505,6 @@ def free_space(
     ``caps``: force limits of grips besides payloads, by robot, N; ``parks``: whether states track
     the positions of free robots, for their travel; ``timed``: whether durations of robots matter;
     ``worlds``: scenes of scenarios, in which robots must carry their bricks as well.
-
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> space = free_space(network, FreeRules())
-    >>> space.places(0, space.start()).states.tolist()  # node 0 of its first brick is blocked
-    [[2, 0, 0], [0, 2, 0], [0, 0, 2]]
     """
     kinds = sort_robots(network, rules, caps, timed=timed, worlds=worlds)
     rules = rules.begun(network.scene)

@@ -382,11 +382,6 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
 
     A move lasts from its placing to the release after the next placing, which it shares with the
     move after it; its candidates are the nodes of the brick that it places.
-
-    >>> import seqopt
-    >>> schedule = _two_robot_loop(seqopt.build_network(seqopt.load_scene("arch25")))
-    >>> [(step.kind.value, step.moves) for step in schedule.steps[1:4]]
-    [('place', (0, 1)), ('release', (1,)), ('place', (1, 2))]
     """
     network = network_of(network)
     every = {*network.scene.build_order}

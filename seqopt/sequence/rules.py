@@ -356,10 +356,6 @@ def with_robots(scene: Scene, count: int) -> Scene:
 
     Further robots reach every node, have the largest payload of the scene's own, and the compliance
     and durations of the first of them.
-
-    >>> import seqopt
-    >>> [robot.name for robot in with_robots(seqopt.load_scene("arch25"), 4).robots]
-    ['rob1', 'rob2', 'rob3', 'rob4']
     """
     if not isinstance(count, Integral) or not 1 <= count <= MOST_ROBOTS:
         raise StepError(f"{short(count)} robots: the free schedule takes one to {MOST_ROBOTS}")

@@ -88,13 +88,7 @@ class Hold:
 
 
 def holds(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Hold, ...]:
-    """Return every grip of a sequence or schedule with its steps, by robot, then by step.
-
-    >>> import seqopt
-    >>> scene = seqopt.load_scene("arch25")
-    >>> holds(scene, seqopt.sequential(seqopt.build_network(scene)))[0]
-    Hold(robot=0, first=1, last=2, node=1, move=None, places=1)
-    """
+    """Return every grip of a sequence or schedule with its steps, by robot, then by step."""
     out = []
     for robot in range(len(scene.robots)):
         grips = [(step.grips[robot], step) for step in steps]
@@ -189,11 +183,12 @@ class Schedule(Shown):
 
         What ranks or compares candidates of moves needs that; what chooses states does not.
         """
-        if (step := self._crowded) is not None:
-            raise StepError(
-                f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
-                "for costs of moves at most two neighboring ones can be; give an aim"
-            )
+        for step in self.steps:
+            if step.moves and step.moves[-1] - step.moves[0] > 1:
+                raise StepError(
+                    f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
+                    "for costs of moves at most two neighboring ones can be; give an aim"
+                )
 
     def described(self, scene: Scene) -> dict[str, object]:
         """Return the rules, for a summary: there are none."""
@@ -234,12 +229,7 @@ class Schedule(Shown):
     @property
     def has_pairs(self) -> bool:
         """Whether at most two moves, consecutive ones, share a step, so that moves form layers."""
-        return self._crowded is None
-
-    @property
-    def _crowded(self) -> OpenStep | None:
-        """The first step shared by more than two moves, or by moves that are not consecutive."""
-        return next((s for s in self.steps if s.moves and s.moves[-1] - s.moves[0] > 1), None)
+        return all(step.moves[-1] - step.moves[0] <= 1 for step in self.steps if step.moves)
 
     def __repr__(self) -> str:
         counts = [len(move.candidates) for move in self.moves]
@@ -296,15 +286,7 @@ def thin(schedule: Schedule, rule: str) -> Schedule:
 
 
 def islands(network: Network, bricks: int) -> tuple[frozenset[int], ...]:
-    """Return the bricks of every part of a partial structure without joints to a ground end.
-
-    >>> from dataclasses import replace
-    >>> import seqopt
-    >>> scene = seqopt.arch_scene(seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V"))
-    >>> middle_first = seqopt.build_network(replace(scene, build_order=(2, 3, 1, 4)))
-    >>> islands(middle_first, 2), islands(middle_first, 3)
-    ((frozenset({2, 3}),), ())
-    """
+    """Return the bricks of every part of a partial structure without joints to a ground end."""
     springs, placed = network.springs, network.scene.placed
     at_once = springs.stiffness.any(axis=1) & (springs.since == springs.bodies[:, 1] + 1)
     if len(np.unique(springs.bodies[at_once, 1])) == len(placed):  # each to what stood before

@@ -91,9 +91,6 @@ def find_criterion(criterion: Criterion | str, where: str = "criterion") -> Crit
     """Return a criterion: itself, by name of `seqopt.CRITERIA`, or ranks, as ``T_max,M_sup=2``.
 
     A weight is 1 by default; ``where``: for messages.
-
-    >>> find_criterion("T_max,F_move=2").before
-    (('T_max', 1.0), ('F_move', 2.0))
     """
     if not isinstance(criterion, str):
         return criterion
@@ -270,12 +267,7 @@ class Published(NamedTuple):
 
 
 def published_about(scene: Scene) -> Published | None:
-    """Return what is printed about a scene; None of all but the arch of Bruun et al.
-
-    >>> import seqopt
-    >>> published_about(seqopt.load_scene("chain:bricks=9")) is None
-    True
-    """
+    """Return what is printed about a scene; None of all but the arch of Bruun et al."""
     if not is_reference_arch(scene):
         return None
     return Published(published_plan(scene), printed_maxima(), IRREGULARITIES)
