@@ -7,6 +7,7 @@ given, so that many are valued in one batch; those that it left out are found al
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -18,6 +19,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph._orders import order_rules, upward
 from seqopt.graph.formulation import Solution
 from seqopt.graph.graph import Graph, LabelProof
+from seqopt.graph.instance import PEAK, SUM, TIME, _Target
 from seqopt.graph.paths import (
     FAILS,
     PASSES,
@@ -27,14 +29,13 @@ from seqopt.graph.paths import (
     lexicographic_bounds,
     potentials,
     reached,
-    tied,
 )
 from seqopt.graph.states.states import States
-from seqopt.judge._bounds import Book, Closed, SumBook, TwinBook, is_beyond, kept_below, limit_below
+from seqopt.judge._bounds import Book, Closed, TwinBook, is_beyond, limit_below
 from seqopt.judge._rule_moves import RuleTables, Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator
 from seqopt.judge._twin import twin_of
-from seqopt.judge.arithmetic import budget_bounds
+from seqopt.judge.arithmetic import Stage, budget_bounds, next_stage, only_below, sum_books
 from seqopt.network.build import build_network
 from seqopt.problem.amounts import NONE
 from seqopt.problem.resources import StepArrays
@@ -54,37 +55,22 @@ class TooManyPartsError(ProblemError):
 class OneSchedule:
     """The states of one schedule, a part for every level.
 
-    ``evaluator``: of its states; ``levels``: after the start.
+    ``evaluator``: of its states; ``evaluators``: all that evaluated states so far; ``first``: the
+    part in which builds begin; ``levels``: after the start.
     """
 
     def __init__(self, problem: States) -> None:
         self.evaluator = StateEvaluator(problem)
-        tables = self.evaluator.tables
+        self.evaluators, tables = [self.evaluator], self.evaluator.tables
+        self.first: Any = tables.first
         self.levels = range(max(1, tables.first), tables.last + 1)
-
-    @property
-    def first(self) -> Any:
-        """The part in which builds begin."""
-        return self.evaluator.tables.first
-
-    def least(self) -> tuple[float, ...]:
-        """Return lower bounds of goals that are known before anything is rebuilt."""
-        return self.evaluator.least()
 
     def at(self, part: Any) -> tuple[int, StateEvaluator]:
         """Return the level of a part, and the evaluator of its states."""
         return part, self.evaluator
 
-    def evaluators(self) -> tuple[StateEvaluator, ...]:
-        """Return all that evaluated states so far."""
-        return (self.evaluator,)
-
-    def to_part(self, part: Any, evaluator: StateEvaluator, states: Ints) -> Ints:
-        """Return states that are passed from part to part as rows of one."""
-        return states
-
-    def from_part(self, part: Any, states: Ints) -> Ints:
-        """Return rows of a part as they are passed on."""
+    def renumbered(self, part: Any, states: Ints, *, back: bool = False) -> Ints:
+        """Return rows of a part as they are passed on from part to part, or back."""
         return states
 
     def onward(self, part: Any, found: Reachable) -> Iterator[tuple[Any, Transitions]]:
@@ -101,38 +87,30 @@ class AllOrders(OneSchedule):
     def __init__(self, problem: States) -> None:
         self._problem = replace(upward(problem), resources=problem.resources.alone())
         self._rules, scene = order_rules(problem), problem.network.scene
-        self.evaluator = StateEvaluator(replace(self._problem, orders=None))
+        super().__init__(replace(self._problem, orders=None))
         self._known = dict[Key, StateEvaluator]()
-        self.levels = range(max(1, len(self._rules.stands)), len(scene.bricks) + 1)
+        stands = self._rules.stands
+        self.first = frozenset(stands), stands[-1] if stands else 0
+        self.levels = range(max(1, len(stands)), len(scene.bricks) + 1)
         self._nodes = {brick.name: brick.nodes for brick in scene.bricks}
         own = (node for name in scene.build_order for node in self._nodes[name])
         self._place = {node: place for place, node in enumerate(own, start=1)}
-
-    @property
-    def first(self) -> Key:
-        stands = self._rules.stands
-        return frozenset(stands), stands[-1] if stands else 0
 
     def at(self, part: Key) -> tuple[int, StateEvaluator]:
         if part not in self._known:
             if len(self._known) > MOST:  # the start is looked at too
                 raise TooManyPartsError(f"more than {MOST} sets of bricks; nothing is proven")
             self._known[part] = StateEvaluator(self._problem.at(self._order(part)))
+            self.evaluators.append(self._known[part])
         return len(part[0]), self._known[part]
 
-    def evaluators(self) -> tuple[StateEvaluator, ...]:
-        return self.evaluator, *self._known.values()
-
-    def to_part(self, part: Key, evaluator: StateEvaluator, states: Ints) -> Ints:
-        rows = self._renumbered(self._order(part), states, back=True)
-        return evaluator.tables.in_order(rows)
-
-    def from_part(self, part: Key, states: Ints) -> Ints:
-        return self._renumbered(self._order(part), states)
+    def renumbered(self, part: Key, states: Ints, *, back: bool = False) -> Ints:
+        rows = self._renumbered(self._order(part), states, back=back)
+        return self._known[part].tables.in_order(rows) if back else rows
 
     def onward(self, part: Key, found: Reachable) -> Iterator[tuple[Key, Transitions]]:
         problem, (stand, _) = self._problem, part
-        own = self.from_part(part, found.states)
+        own = self.renumbered(part, found.states)
         for brick in self._rules.next_bricks(stand) if len(own) else ():
             order = self._order(part, brick)
             worlds = tuple(in_order(scene, order) for scene in problem.worlds)
@@ -197,7 +175,7 @@ class Rebuilt:
     def _go_on(self, part: Any, level: int, found: Reachable, count: int) -> None:
         """Add the successors of states, whose numbers begin at a count, and within a start."""
         within = [(part, move) for move in found.onward if move.level == level and not count]
-        within = [(p, m._replace(states=self._space.from_part(p, m.states))) for p, m in within]
+        within = [(p, m._replace(states=self._space.renumbered(p, m.states))) for p, m in within]
         for to, move in [*within, *self._space.onward(part, found)]:
             arrivals = self._coming.setdefault(move.level, {}).setdefault(to, [])
             arrivals.append((move.source + count, move))
@@ -206,10 +184,8 @@ class Rebuilt:
         """Add the states of a part that are reached, and the moves to them."""
         level, evaluator = self._space.at(part)
         none = evaluator.tables.start()[:0]
-        coming = [
-            (source, move._replace(states=self._space.to_part(part, evaluator, move.states)))
-            for source, move in coming
-        ]
+        rows = (self._space.renumbered(part, move.states, back=True) for _, move in coming)
+        coming = [(s, m._replace(states=own)) for (s, m), own in zip(coming, rows, strict=True)]
         entries = [none, self._hint.get(level, none), *(move.states for _, move in coming)]
         limited = np.isfinite(self._asked.steps)
         far = np.full(len(entries[1]), np.inf if limited else 0.0)
@@ -246,6 +222,15 @@ class Rebuilt:
         """Return by state the index of its part, (n,)."""
         return np.repeat(np.arange(len(self.states)), [*map(len, self.states)])
 
+    def may_stand(self, states: Ints, margins: Sequence[float]) -> Bools:
+        """Return which states, by number, are not proven to fall; where builds begin all stand."""
+        firsts, out = np.cumsum([0, *map(len, self.states)]), np.ones(len(states), dtype=bool)
+        part = np.searchsorted(firsts, states, side="right") - 1
+        for k in np.unique(part[part > 0]).tolist():
+            rows = self.states[k][states[part == k] - firsts[k]]
+            out[part == k] = self.evaluators[k].may_stand(self.levels[k], rows, margins)
+        return out
+
 
 class Proof:
     """Lower bounds of all plans of a problem, and whether there is any plan.
@@ -258,15 +243,14 @@ class Proof:
 
     def __init__(self, problem: States, hint: Hint | None = None) -> None:
         self._space = OneSchedule(problem) if problem.orders is None else AllOrders(problem)
-        self.evaluator = self._space.evaluator
-        given = hint if problem.orders is None else None
-        self._hint = {} if given is None else as_rows(problem, self.evaluator, given)
-        self.states = 0
+        self.evaluator, self.states = self._space.evaluator, 0
+        given = (hint or {}) if problem.orders is None else {}
+        self._hint = as_rows(problem, self.evaluator, given)
 
     @property
     def models(self) -> int:
         """How many models the proof solved."""
-        return sum(each.models for each in self._space.evaluators())
+        return sum(each.models for each in self._space.evaluators)
 
     def rebuilt(self, asked: Filter, *, hinted: bool = True) -> Rebuilt:
         """Return the states that pass a filter."""
@@ -277,7 +261,7 @@ class Proof:
 
         ``values``: of every goal; bounds of margins mean nothing. Infinite where there is no plan.
         """
-        least = self._space.least()
+        least = self.evaluator.least()
         if not self._leaves_room(values, least):
             self.states = 1  # a cut before the end alone
             return least
@@ -296,7 +280,7 @@ class Proof:
         first = self.evaluator.problem.goals[0]
         if not first.is_peak or first.margins:
             return False
-        if not self._leaves_room((value,), self._space.least()):
+        if not self._leaves_room((value,), self.evaluator.least()):
             return True
         return self._reaches_no_end((value,))
 
@@ -336,11 +320,14 @@ class Proof:
         bounds: Callable[[Graph], tuple[float, ...]],
     ) -> tuple[float, ...]:
         """Return bounds of paths; states of a better one that are proven to fall are left out."""
-        graph = rebuilt.graph()
+        graph, margins = rebuilt.graph(), values[: self.evaluator.margins]
+        demanded = bool(self.evaluator.demands(margins))
         while True:
-            out = bounds(graph)
-            better = self._leaves_room(values, out)
-            fallen = self._fallen(rebuilt, graph, values) if better else ()
+            out, fallen = bounds(graph), np.zeros(0, dtype=np.int64)
+            if demanded and self._leaves_room(values, out):
+                with suppress(InfeasibleError):
+                    path = np.array(lexicographic(graph).path, dtype=np.int64)
+                    fallen = path[~rebuilt.may_stand(path, margins)]
             if not len(fallen):
                 self.states = int(reached(graph).sum())
                 return out
@@ -360,11 +347,13 @@ class Proof:
         return budget_bounds(rebuilt.graph(), values, claimed, (caps, multipliers))
 
     def label_bounds(self, values: Sequence[float], found: Solution) -> tuple[float, ...]:
-        """Return bounds of plans with resources, by labels that are claimed."""
+        """Return bounds of plans with resources, by labels that are claimed.
+
+        Raises `SolverError` if labels are given that do not prove what is claimed.
+        """
         rebuilt = self.rebuilt(Filter(values, exact=True))
-        by_labels = label_bounds(self.evaluator, rebuilt, values, found)
-        margins = tuple(values[: self.evaluator.margins])
-        return self._where_states_stand(rebuilt, values, lambda g: (*margins, *by_labels(g)))
+        by_labels = _LabelBounds(self.evaluator, rebuilt, values, found)
+        return self._where_states_stand(rebuilt, values, by_labels.bounds)
 
     def is_impossible(self, margins: Sequence[float] = ()) -> bool:
         """Return whether no plan is feasible, or none in which all states have such margins.
@@ -390,22 +379,18 @@ class Proof:
         Which are asked is of no account: without those that fall, no end may be reached.
         """
         rebuilt = self.rebuilt(Filter(), hinted=False)
-        graph, parts = rebuilt.graph(), rebuilt.part_of()
-        starts = np.searchsorted(parts, np.arange(len(rebuilt.states)))
+        graph, firsts = rebuilt.graph(), np.cumsum([0, *map(len, rebuilt.states)])
         known = np.zeros(graph.states, dtype=np.int64)
         known[0] = PASSES
 
-        def states(part: int, rows: Ints) -> tuple[int, Ints, Sequence[float]]:
-            return rebuilt.levels[part], rebuilt.states[part][rows - starts[part]], margins
+        def ask(_: int, states: Ints) -> Ints:
+            return np.where(rebuilt.may_stand(states, margins), PASSES, FAILS)
 
-        def ask(part: int, rows: Ints) -> Ints:
-            may = rebuilt.evaluators[part].may_stand(*states(part, rows))
-            return np.where(may, PASSES, FAILS)
+        def known_before(part: int, states: Ints) -> Ints:
+            rows = rebuilt.states[part][states - firsts[part]]
+            return rebuilt.evaluators[part].known_to_stand(rebuilt.levels[part], rows, margins)
 
-        def known_before(part: int, rows: Ints) -> Ints:
-            return rebuilt.evaluators[part].known_to_stand(*states(part, rows))
-
-        _lazy_path(graph, parts, known, ask, known_before)
+        _lazy_path(graph, rebuilt.part_of(), known, ask, known_before)
         left = reached(graph, (known != FAILS)[graph.target])
         self.states = max(self.states, int(left.sum()))
         return not graph.ends[left].any()
@@ -414,24 +399,6 @@ class Proof:
         """Return whether bounds leave room for a better plan, in goals that are no margins."""
         room = [not b >= v - BELOW * abs(v) for v, b in zip(values, bounds, strict=False)]
         return any(room[self.evaluator.margins :])
-
-    def _fallen(self, rebuilt: Rebuilt, graph: Graph, values: Sequence[float]) -> Ints:
-        """Return the states of the best path that are proven to fall."""
-        margins, none = values[: self.evaluator.margins], np.zeros(0, dtype=np.int64)
-        if not self.evaluator.demands(margins):
-            return none
-        try:
-            path = np.array(lexicographic(graph).path)
-        except InfeasibleError:
-            return none
-        out, first = [none], 0
-        parts = zip(rebuilt.evaluators, rebuilt.levels, rebuilt.states, strict=True)
-        for evaluator, level, rows in parts:
-            own = path[(path >= first) & (path < first + len(rows))]
-            if len(own):
-                out.append(own[~evaluator.may_stand(level, rows[own - first], margins)])
-            first += len(rows)
-        return np.concatenate(out)
 
 
 def as_rows(problem: States, evaluator: StateEvaluator, hint: Hint) -> dict[int, Ints]:
@@ -451,79 +418,115 @@ def as_rows(problem: States, evaluator: StateEvaluator, hint: Hint) -> dict[int,
     return out
 
 
-def label_bounds(
-    evaluator: StateEvaluator, rebuilt: Any, values: Sequence[float], found: Solution
-) -> Callable[[Graph], tuple[float, ...]]:
-    """Return lower bounds of the goals after those about margins, by labels, on rebuilt subgraphs.
+class _LabelBounds:
+    """Bounds on the goals of a build by labels, each where those before it are at their values.
 
-    ``rebuilt``: states, as of `seqopt.judge._proof.Rebuilt`; ``values``: of all goals; ``found``:
-    what is claimed, with labels. The function raises `SolverError` if labels are given that do not
-    prove what is claimed.
-    """
-    rows = _LabeledRows(evaluator, rebuilt, values, found)
-    return lambda graph: _GoalProofs(rows, graph, values, found).bounds()
-
-
-class _LabeledRows:
-    """The states that a better build could pass, by number, in the columns of the judge.
-
-    ``level`` (n,); ``rows`` (n, c); ``timed``: the same in time, if that counts.
+    The states that a better build could pass are those rebuilt, in the columns of the judge.
     """
 
     def __init__(
-        self, evaluator: StateEvaluator, rebuilt: Any, values: Sequence[float], found: Solution
+        self, evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: Solution
     ) -> None:
-        self.evaluator, self._rebuilt = evaluator, rebuilt
-        self._margins = values[: evaluator.margins]
-        tables, problem = evaluator.tables, evaluator.problem
-        self.level = np.array(rebuilt.parts)[rebuilt.part_of()]
-        self.rows = np.concatenate([own[:, : tables.robots] for own in rebuilt.states])
+        problem, team = evaluator.problem, evaluator.tables.team
+        self._evaluator, self._rebuilt, self._values, self._found = (
+            evaluator,
+            rebuilt,
+            values,
+            found,
+        )
         columns = [r for kind in problem.space.kinds for r in kind.robots]
-        self._columns = [columns.index(r) for r in tables.team]  # of the search
+        self._columns = [columns.index(r) for r in team]  # of the search
         clocks = (goal.twin.clocks for goal in problem.goals if goal.in_time)
-        self.timed = next((make(evaluator, rebuilt, found.motions) for make in clocks), None)
+        self._timed = next((make(evaluator, rebuilt, found.motions) for make in clocks), None)
 
-    def clock(self, graph: Graph, proof: LabelProof, most: float, *, strict: bool) -> Any:
-        """Return the book of time, and which moves its arcs are."""
-        assert self.timed is not None
-        wide = proof.prices.ndim == 2 and proof.prices.shape[1] == 1 + len(self._columns)
-        if not wide:
-            raise SolverError("there is no multiplier for every robot")
-        prices = proof.prices[:, [0, *(1 + c for c in self._columns)]]
-        return self.timed.clock(graph, prices, most, strict=strict)
+    def bounds(self, graph: Graph) -> tuple[float, ...]:
+        """Return lower bounds of the aims in a subgraph; those about margins are their values."""
+        problem, values = self._evaluator.problem, self._values
+        kinds = [TIME if g.in_time else PEAK if g.is_peak else SUM for g in problem.goals]
+        goals = [_Target(problem.names[k], kind, (k,)) for k, kind in enumerate(kinds)]
+        aims, stage = len(problem.aims), Stage(graph, ())
+        for goal, cap in zip(goals[aims:], problem.budgets, strict=True):
+            stage = next_stage(stage, goal, cap)
+        cures = self._timed is not None and self._timed.cures
+        plain, proofs = not (problem.budgets or cures or problem.paths), iter(self._found.proofs)
+        out = [*values[: self._evaluator.margins]]
+        for goal, value in zip(goals[len(out) : aims], values[len(out) :], strict=False):
+            plain &= goal.kind != TIME
+            if plain:  # potentials and cuts do without labels
+                proven = cut if goal.kind == PEAK else potentials
+                bound, kept = proven(stage.graph, goal.columns[0], value)
+                stage = stage._replace(graph=stage.graph.only(kept))
+            else:
+                proof = next(proofs, None)
+                bound = -np.inf if proof is None else self._by_labels(stage, goal, proof)
+                stage = next_stage(stage, goal, value)
+            out.append(bound)
+        return tuple(out)
 
-    def twins(self, graph: Graph, move: Ints) -> list[Book]:
+    def _by_labels(self, stage: Stage, goal: _Target, proof: LabelProof) -> float:
+        """Return the bound of a goal that labels prove, or multipliers alone."""
+        k, of_time = goal.columns[0], goal.kind == TIME
+        claimed = min(self._found.bound[k], self._values[k])
+        if not np.isfinite(claimed):
+            return -np.inf
+        graph = only_below(stage.graph, goal, claimed)
+        books, move, least = list[Book](), np.arange(len(graph.source)), -np.inf
+        if self._timed is not None:
+            if proof.prices.ndim != 2 or proof.prices.shape[1] != 1 + len(self._columns):
+                raise SolverError("there is no multiplier for every robot")
+            prices = proof.prices[:, [0, *(1 + c for c in self._columns)]]
+            most = limit_below(claimed) if of_time else stage.time
+            clock, move = self._timed.clock(graph, prices, most, strict=of_time)
+            books, least = [clock], min(clock.bound, claimed) if of_time else least
+        books += sum_books(stage._replace(graph=graph), goal, claimed, move)
+        closed = Closed(graph, move, [*books, *self._twins(graph, move)])
+        if closed.is_proof(self._labels(proof, closed.width), self._fallen):
+            return claimed
+        if len(proof.labels):
+            raise SolverError(
+                f"{goal.name}: labels do not prove that no build is below {claimed:.9g}"
+            )
+        return least
+
+    def _twins(self, graph: Graph, move: Ints) -> list[Book]:
         """Return the books of the problem's own resources on some moves of a graph."""
-        problem, tables = self.evaluator.problem, self.evaluator.tables
-        nodes = np.full((len(self.rows), len(problem.network.scene.robots)), NONE)
-        nodes[:, list(tables.team)] = tables.nodes[self.rows.clip(min=0)]
-        bricks = np.array([tables.bricks_at(k) if k else 0 for k in range(tables.last + 1)])
+        problem, tables = self._evaluator.problem, self._evaluator.tables
+        rows = np.concatenate([own[:, : tables.robots] for own in self._rebuilt.states])
+        nodes = np.full((len(rows), len(problem.network.scene.robots)), NONE)
+        nodes[:, list(tables.team)] = tables.nodes[rows.clip(min=0)]
+        bricks = np.array([tables.bricks_at(k) if k else 0 for k in self._rebuilt.levels])
         source, target = graph.source[move], graph.target[move]
-        steps = StepArrays(bricks[self.level[target]], nodes[source], nodes[target])
+        stands = bricks[self._rebuilt.part_of()[target]]
+        steps = StepArrays(stands, nodes[source], nodes[target])
         return [TwinBook(each.twin, steps) for each in problem.paths if each.twin is not None]
 
-    def labels(self, proof: LabelProof, width: int) -> tuple[Ints, Floats]:
+    def _fallen(self, states: Ints) -> Bools:
+        """Return which states of some numbers are proven to fall; where it begins none is."""
+        margins = self._values[: self._evaluator.margins]
+        if not self._evaluator.demands(margins):
+            return np.zeros(len(states), dtype=bool)
+        return ~self._rebuilt.may_stand(states, margins)
+
+    def _labels(self, proof: LabelProof, width: int) -> tuple[Ints, Floats]:
         """Return labels (N, width) by the numbers of their states, as far as there are such.
 
         Entries of robots that could change places are sorted, and with them their readiness.
         """
-        count, tables = len(self._columns), self.evaluator.tables
+        count, tables = len(self._columns), self._evaluator.tables
         states, values = proof.states, proof.labels
         if len(states) and (states.ndim != 2 or states.shape[1] < 1 + count):
             raise SolverError("labels are none of this build: they have other columns")
+        none = np.zeros(0, dtype=np.int64)
         if len(states) != len(values) or values.shape[1:] != (width,):
-            return np.zeros(0, dtype=np.int64), np.zeros((0, width))
+            return none, np.zeros((0, width))
         order = [0, *(1 + c for c in self._columns)]
         states = states[:, [*order, *range(1 + count, states.shape[1])]]
-        if self.timed is not None:
+        if self._timed is not None:
             values = values[:, [*order, *range(1 + count, width)]]
-            values = self.timed.in_order(states[:, 1 : 1 + count], values)
+            values = self._timed.in_order(states[:, 1 : 1 + count], values)
         entries = tables.in_order(states[:, 1:].astype(tables.start().dtype))
-        none = np.zeros(0, dtype=np.int64)
-        numbers, labels = [none], [none]  # where builds begin a state may come twice
-        firsts = np.cumsum([0, *map(len, self._rebuilt.states)])
-        pairs = zip(self._rebuilt.parts, self._rebuilt.states, firsts[:-1], strict=True)
-        for level, rows, first in pairs:
+        numbers, labels, first = [none], [none], 0  # where builds begin a state may come twice
+        for level, rows in zip(self._rebuilt.levels, self._rebuilt.states, strict=True):
             own = np.flatnonzero(states[:, 0] == level)
             if len(own) and len(rows):
                 codes, wanted = tables.codes(rows), tables.codes(entries[own])
@@ -532,89 +535,7 @@ class _LabeledRows:
                 same = codes[at] == wanted
                 numbers.append(first + at[same])
                 labels.append(own[same])
+            first += len(rows)
         number, label = np.concatenate(numbers), np.concatenate(labels)
         known = np.isfinite(values[label]).all(axis=1)
         return number[known], values[label[known]]
-
-    def fallen(self, states: Ints) -> Bools:
-        """Return which states of some numbers are proven to fall; where it begins none is."""
-        out = np.zeros(len(states), dtype=bool)
-        if not self.evaluator.demands(self._margins):
-            return out
-        for level in np.unique(self.level[states]).tolist():
-            own = np.flatnonzero((self.level[states] == level) & (states > 0))
-            out[own] = ~self.evaluator.may_stand(level, self.rows[states[own]], self._margins)
-        return out
-
-
-class _GoalProofs:
-    """Bounds on the goals of a build in time, each where those before it are at their values."""
-
-    def __init__(
-        self, rows: _LabeledRows, graph: Graph, values: Sequence[float], found: Solution
-    ) -> None:
-        self._rows, self._graph, self._values, self._found = rows, graph, values, found
-        problem = rows.evaluator.problem
-        self._aims = len(problem.aims)
-        self._is_time = [goal.in_time for goal in problem.goals]
-        self._time, self._sums = np.inf, list[tuple[int, float]]()
-        for k, cap in zip(range(self._aims, len(values)), problem.budgets, strict=True):
-            self._cap(k, tied(cap))
-        cures = rows.timed is not None and rows.timed.cures
-        self._filtered = not (problem.budgets or cures or problem.paths)
-
-    def _cap(self, k: int, most: float) -> None:
-        """Let builds take no more of a goal from now on."""
-        if self._is_time[k]:
-            self._time = min(self._time, most)
-        elif self._graph.peaks[k]:
-            self._graph = self._graph.only(self._graph.amounts[:, k] <= most)
-        else:
-            self._sums.append((k, most))
-
-    def bounds(self) -> tuple[float, ...]:
-        """Return lower bounds of the aims after those about margins."""
-        proofs, out = iter(self._found.proofs), list[float]()
-        for k in range(self._rows.evaluator.margins, self._aims):
-            value = self._values[k]
-            if self._filtered and not self._is_time[k]:
-                proven = cut if self._graph.peaks[k] else potentials
-                bound, kept = proven(self._graph, k, value)
-                self._graph = self._graph.only(kept)
-                out.append(bound)
-                continue
-            self._filtered = False
-            proof = next(proofs, None)
-            out.append(-np.inf if proof is None else self._by_labels(k, proof))
-            self._cap(k, tied(value))
-        return tuple(out)
-
-    def _by_labels(self, k: int, proof: LabelProof) -> float:
-        """Return the bound of a goal that labels prove, or multipliers alone."""
-        claimed, graph = min(self._found.bound[k], self._values[k]), self._graph
-        if not np.isfinite(claimed):
-            return -np.inf
-        columns = [column for column, _ in self._sums]
-        caps = [self._time, *(most for _, most in self._sums)]
-        strict = [False] * len(caps)
-        if self._is_time[k]:
-            caps[0], strict[0] = limit_below(claimed), True
-        elif graph.peaks[k]:
-            graph = graph.only(kept_below(graph.amounts[:, k], claimed))
-        else:
-            columns, strict = [*columns, k], [*strict, True]
-            caps.append(limit_below(claimed))
-        books, move = list[Book](), np.arange(len(graph.source))
-        if self._rows.timed is not None:
-            clock, move = self._rows.clock(graph, proof, caps[0], strict=strict[0])
-            books.append(clock)
-        if columns:
-            limits = np.array(caps[1:]), np.array(strict[1:])
-            books.append(SumBook(graph, move, graph.amounts[:, columns], limits))
-        closed = Closed(graph, move, [*books, *self._rows.twins(graph, move)])
-        if closed.is_proof(self._rows.labels(proof, closed.width), self._rows.fallen):
-            return claimed
-        if len(proof.labels):
-            goal = self._rows.evaluator.problem.names[k]
-            raise SolverError(f"{goal}: labels do not prove that no build is below {claimed:.9g}")
-        return min(clock.bound, claimed) if self._is_time[k] else -np.inf

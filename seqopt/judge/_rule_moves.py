@@ -45,19 +45,47 @@ class _Tables:
     """Places of nodes, and the checks of rows of them that rules and schedules share.
 
     ``nodes`` (p,): by place; -1 of none; ``team``: robots of the columns, by index; ``robots``: how
-    many; ``parks``: whether it counts where a free robot was last.
+    many; ``groups``: those that could change places, by index: their entries are sorted;
+    ``parks``: whether it counts where a free robot was last.
     """
 
-    def __init__(self, scene: Scene, team: tuple[int, ...], *, parks: bool) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        team: tuple[int, ...],
+        groups: Sequence[Sequence[int]] = (),
+        *,
+        parks: bool,
+    ) -> None:
         self.team, self.robots, self._parks = team, len(team), parks
+        self._groups = [[team.index(robot) for robot in group] for group in groups]
         nodes = [node for brick in scene.placed for node in brick.nodes]
         self.nodes = np.array([-1, *nodes])
         self._at = np.array([[np.nan] * 3, *(scene.node_position(node) for node in nodes)])
         self._place = {node: place for place, node in enumerate(self.nodes.tolist())}
         self._postures = posture_rules(scene, team)
 
-    def _row(self, held: Grips, stays: Grips) -> Ints:
-        """Return the row (1, robots) of nodes held, or held last where that counts."""
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Columns of robots that could change places; those of others alone."""
+        alone = {*range(self.robots)} - {column for group in self._groups for column in group}
+        return (*(tuple(group) for group in self._groups), *((column,) for column in sorted(alone)))
+
+    def codes(self, states: Ints) -> Ints:
+        """Return a number for every state (n, c) that no other one of its level has, (n,)."""
+        shift = len(self.nodes) if self._parks else 0
+        weights = np.cumprod([1, *[len(self.nodes) + shift] * self.robots], dtype=np.int64)
+        weights = weights[: states.shape[1]]
+        return np.asarray(states @ weights + shift * weights[: self.robots].sum())
+
+    def in_order(self, states: Ints) -> Ints:
+        """Sort the entries of robots that could change places in states (n, c); return these."""
+        for group in self._groups:
+            states[:, group] = np.sort(states[:, group], axis=1)[:, ::-1]
+        return states
+
+    def row(self, held: Grips, stays: Grips = ()) -> Ints:
+        """Return the row (1, robots) of nodes that robots hold, or held last where that counts."""
         out: Ints = np.zeros((1, self.robots), dtype=np.int32)
         for column, robot in enumerate(self.team):
             if (node := held[robot]) is not None:
@@ -96,23 +124,19 @@ class _Tables:
 
 
 class RuleTables(_Tables):
-    """A book of rules for many states at once; a level is a brick count.
-
-    ``groups``: robots that could change places, by index: the entries of these are sorted.
-    """
+    """A book of rules for many states at once; a level is a brick count."""
 
     def __init__(
         self, book: RuleBook, groups: Sequence[tuple[int, ...]], *, parks: bool = False
     ) -> None:
         scene = book.network.scene
-        super().__init__(scene, book.team, parks=parks)
+        super().__init__(scene, book.team, groups, parks=parks)
         self._book, self._rules = book, book.rules.begun(scene)
         self.first, self.last = book.span
         self._top = 0  # of a take-down: one more than the bricks at its begin, which is level 1
         if self._rules.takes_down:
             self._top = self.first + 1
             self.first, self.last = 1, self._top - self.last
-        self._groups = [[book.team.index(r) for r in group] for group in groups]
         self._least = self._rules.fewest_grips(scene)
         self._propped = np.isin(self.nodes, [prop.node for prop in scene.props])  # by place
         self._limited = self._rules.regrips is not None
@@ -142,16 +166,10 @@ class RuleTables(_Tables):
             self._known[bricks] = reach, newest, loose
         return self._known[bricks]
 
-    @property
-    def groups(self) -> tuple[tuple[int, ...], ...]:
-        """Columns of robots that could change places; those of others alone."""
-        alone = {*range(self.robots)} - {column for group in self._groups for column in group}
-        return (*(tuple(group) for group in self._groups), *((column,) for column in sorted(alone)))
-
     def start(self) -> Ints:
         """Return the state (1, c) in which the build begins."""
         _, held, regrips = self._book.start
-        row = self._row(held, self._rules.begin.stays if self._rules.begin else ())
+        row = self.row(held, self._rules.begin.stays if self._rules.begin else ())
         if self._limited:
             row = np.pad(row, ((0, 0), (0, 1)))
             row[0, -1] = min(regrips, self._rules.regrips or 0)
@@ -163,28 +181,43 @@ class RuleTables(_Tables):
 
     def successors(self, level: int, states: Ints) -> Iterator[Transitions]:
         """Yield the successors of states (n, c) that the rules allow, by kind of step."""
-        rows, bricks = np.arange(len(states)), self.bricks_at(level)
+        rows, bricks, begin = np.arange(len(states)), self.bricks_at(level), self._rules.begin
         keeps = rows[self.keep(bricks, states)] if bricks else rows
         if bricks:
-            yield from self._regripped(level, states, keeps)
+            begins = begin is not None and level == self.first and not self._is_let_go(level)
+            able = rows if begins else keeps
+            if self._limited:
+                able = able[states[able, -1] < self._rules.regrips]
+            yield from self._taken(level, states, able, self._places(bricks)[0], regrip=True)
             yield from self._released(level, states)
-        if level < self.last:
-            yield from (self._removed if self._top else self._placed)(level, states, keeps)
+        if level < self.last and self._top:
+            yield from self._removed(level, states, keeps)
+        elif level < self.last:
+            newest = zip(self.team, self._newest(bricks + 1), strict=True)
+            wanted = [own if self._book.places(robot, bricks + 1) else [] for robot, own in newest]
+            yield from self._taken(level + 1, states, keeps, wanted, regrip=False)
 
-    def _regripped(self, level: int, states: Ints, keeps: Ints) -> Iterator[Transitions]:
-        """Yield successors in which a free robot takes hold of a brick that stands."""
-        bricks, begin = self.bricks_at(level), self._rules.begin
-        begins = begin is not None and level == self.first and not self._is_let_go(level)
-        able = np.arange(len(states)) if begins else keeps
-        if self._limited:
-            able = able[states[able, -1] < self._rules.regrips]
-        for robot in self._takers():
-            wanted = self._places(bricks)[0][robot]
-            source, after, distance = self._taken(states, able, robot, wanted)
-            after[:, self.robots :] += 1
+    def _taken(
+        self, level: int, states: Ints, rows: Ints, wanted: Sequence[Sequence[int]], *, regrip: bool
+    ) -> Iterator[Transitions]:
+        """Yield successors in which a free robot takes one of the places wanted of it.
+
+        Of robots that could change places it is the last, if it is free. ``level``: of the
+        successors; ``regrip``: whether the brick stands already; otherwise the robot places it.
+        """
+        first = {robot for group in self._groups for robot in group[:-1] if not self._parks}
+        bricks = self.bricks_at(level)
+        for robot in (
+            robot for robot in range(self.robots) if robot not in first and wanted[robot]
+        ):
+            free = rows[states[rows, robot] <= 0]
+            held = states[free, : self.robots]
+            source, after, distance = self._take(states, free, robot, wanted[robot], held)
+            after[:, self.robots :] = after[:, self.robots :] + 1 if regrip else 0
             ok = self._postures.allow(bricks, after)
-            held = self.in_order(after[ok])
-            yield Transitions(level, source[ok], held, regrip=True, distance=distance[ok])
+            if not regrip:
+                ok &= self.keep(bricks, after)
+            yield Transitions(level, source[ok], self.in_order(after[ok]), regrip, distance[ok])
 
     def _released(self, level: int, states: Ints) -> Iterator[Transitions]:
         """Yield successors in which one robot lets go, or at the end all."""
@@ -200,18 +233,6 @@ class RuleTables(_Tables):
             after = states[source]
             after[:, : self.robots] = 0
             yield self._without_way(level, source, after)
-
-    def _placed(self, level: int, states: Ints, keeps: Ints) -> Iterator[Transitions]:
-        """Yield successors in which a free robot places the next brick."""
-        bricks = self.bricks_at(level) + 1
-        for robot in self._takers():
-            if self._book.places(self.team[robot], bricks):
-                wanted = self._newest(bricks)[robot]
-                source, after, distance = self._taken(states, keeps, robot, wanted)
-                after[:, self.robots :] = 0
-                ok = self.keep(bricks, after) & self._postures.allow(bricks, after)
-                held = self.in_order(after[ok])
-                yield Transitions(level + 1, source[ok], held, regrip=False, distance=distance[ok])
 
     def _removed(self, level: int, states: Ints, keeps: Ints) -> Iterator[Transitions]:
         """Yield successors in which a robot takes the newest brick away that it alone holds."""
@@ -232,18 +253,6 @@ class RuleTables(_Tables):
     def _without_way(self, level: int, source: Ints, after: Ints) -> Transitions:
         none = np.zeros(len(source))
         return Transitions(level, source, self.in_order(after), regrip=False, distance=none)
-
-    def _taken(
-        self, states: Ints, rows: Ints, robot: int, wanted: Sequence[int]
-    ) -> tuple[Ints, Ints, Floats]:
-        """Return successors in which a robot that is free takes a place that nobody holds."""
-        free = rows[states[rows, robot] <= 0]
-        return self._take(states, free, robot, wanted, states[free, : self.robots])
-
-    def _takers(self) -> Iterator[int]:
-        """Yield the robots of which one could take a grip: of a group the last, if it is free."""
-        first = {robot for group in self._groups for robot in group[:-1] if not self._parks}
-        yield from (robot for robot in range(self.robots) if robot not in first)
 
     def _is_let_go(self, level: int) -> bool:
         """Return whether robots let go one by one there, and only so, under all rules.
@@ -303,10 +312,6 @@ class RuleTables(_Tables):
             every = [*every, (np.ones(1, dtype=bool), f"arms cannot hold {held} together")]
         return next((words for broken, words in every if broken[0]), "")
 
-    def row(self, grips: Grips) -> Ints:
-        """Return the row (1, robots) of nodes that the robots of a scene hold."""
-        return self._row(grips, ())
-
     def ends(self, level: int, states: Ints) -> Bools:
         """Return which states (n, c) end the build."""
         if level < self.last:
@@ -319,19 +324,6 @@ class RuleTables(_Tables):
             return self.keep(self.bricks_at(level), states)
         both = self.in_order(np.concatenate([grips, self.row(site.grips)]))
         return np.asarray((both[:-1] == both[-1]).all(axis=1))
-
-    def codes(self, states: Ints) -> Ints:
-        """Return a number for every state (n, c) that no other one of its brick count has."""
-        shift = len(self.nodes) if self._parks else 0
-        bases = [len(self.nodes) + shift] * self.robots + [2 + (self._rules.regrips or 0)]
-        weights = np.cumprod([1, *bases[: states.shape[1] - 1]], dtype=np.int64)
-        return np.asarray(states @ weights + shift * weights[: self.robots].sum())
-
-    def in_order(self, states: Ints) -> Ints:
-        """Sort the entries of robots that could change places in states (n, c); return these."""
-        for group in self._groups:
-            states[:, group] = np.sort(states[:, group], axis=1)[:, ::-1]
-        return states
 
 
 class ScheduleTables(_Tables):
@@ -353,7 +345,6 @@ class ScheduleTables(_Tables):
         self._schedule, self.first, self.last = schedule, 0, len(schedule.steps)
         self._heavy = unbearable((scene, *worlds), schedule.steps, schedule.begin)
         self._before = schedule.steps[0].number - 1
-        self.groups = tuple((column,) for column in self.team)
         self._holds = {
             (hold.robot, number): hold
             for hold in holds(scene, schedule.steps)
@@ -363,7 +354,7 @@ class ScheduleTables(_Tables):
     def start(self) -> Ints:
         """Return the state before the first step, (1, robots) int."""
         site, none = self._schedule.begin, (None,) * self.robots
-        return self._row(none, none) if site is None else self._row(site.grips or none, site.stays)
+        return self.row(none) if site is None else self.row(site.grips or none, site.stays)
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand after so many steps."""
@@ -417,15 +408,6 @@ class ScheduleTables(_Tables):
     def ends(self, level: int, states: Ints) -> Bools:
         """Return which states (n, robots) end the build: all after the last step."""
         return np.full(len(states), level == self.last)
-
-    def codes(self, states: Ints) -> Ints:
-        """Return a number for every state that no other one of its step has, (n,)."""
-        base = 2 * len(self.nodes)
-        return np.asarray((states + len(self.nodes)) @ base ** np.arange(self.robots))
-
-    def in_order(self, states: Ints) -> Ints:
-        """Return states as they are: no two robots could change places."""
-        return states
 
 
 def check_free(

@@ -7,7 +7,8 @@ visited, on which only the time depends.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 
@@ -21,7 +22,7 @@ from seqopt.graph.states.states import States
 from seqopt.judge._proof import BELOW, Hint, Proof, TooManyPartsError
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._states import largest_load
-from seqopt.judge._step_checks import check_props, check_shape, proven_margins, require_margin
+from seqopt.judge._step_checks import check_props, check_shape, proven_margins
 from seqopt.judge._twin import PathTwin, exceeds, own_values, twin_of
 from seqopt.judge.certificate import Basis, Certificate
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
@@ -59,28 +60,31 @@ def judge_schedule(
     step breaks a rule.
     """
     own, aims = ordered(problem, selection.order), len(problem.aims)
-    values = _as_claimed(own, selection, steps)
+    values, none = _as_claimed(own, selection, steps), (-np.inf,) * len(problem.goals)
     for goal, spent, cap in zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True):
         if not spent <= cap + TOLERANCE * cap:
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
-    twin = next((goal.twin for goal in problem.goals if goal.in_time), None)
-    proves_time = twin is not None and bool(np.isfinite(selection.bound).any())
-    by_labels = problem.is_timed or bool(problem.paths)
-    proves = proves_time or (bool(selection.proofs) and not problem.is_timed)
+    by_labels, proves = problem.is_timed or bool(problem.paths), bool(selection.proofs)
+    if problem.is_timed:
+        proves = _path_twin(problem) is not None and bool(np.isfinite(selection.bound).any())
     is_claimed = not proves and (selection.stopped or by_labels)
-    none = (-np.inf,) * len(values)
-    if is_claimed or not _has_twins(problem):  # bounds are claimed alone
-        bounds = _with_counts(problem, twin, values, none)
-        if selection.stopped not in ENDED and not by_labels:
-            bounds = _first_bound(problem, selection, bounds)
-        gap = _gap(problem.aims, values, bounds)
-        left = gap if is_claimed else _gap(problem.aims, values, selection.bound)
-        return Certificate(values, bounds, gap, left, basis=Basis.REBUILT)
     try:
-        return _proven(problem, selection, values, hint, exact=exact)
+        if not is_claimed and _has_twins(problem):
+            return _proven(problem, selection, values, hint, exact=exact)
     except TooManyPartsError:
         left = _gap(problem.goals, values, _closed(values, selection.bound))
         return Certificate(values, none, np.inf, left)
+    bounds = _with_counts(problem, values, none)  # bounds are claimed alone
+    first = replace(problem, budgets=(), goals=problem.goals[:1])
+    is_sought = selection.stopped not in ENDED and not by_labels and _has_twins(first)
+    if is_sought and np.isfinite(least := selection.bound[0]):
+        with suppress(TooManyPartsError):
+            if not Proof(first).bounds_first(least):
+                raise SolverError(f"{least:.9g} is promised as the least; a plan has less")
+            bounds = (least, *bounds[1:])
+    gap = _gap(problem.aims, values, bounds)
+    left = gap if is_claimed else _gap(problem.aims, values, selection.bound)
+    return Certificate(values, bounds, gap, left, basis=Basis.REBUILT)
 
 
 def ordered(problem: States, order: Order) -> States:
@@ -99,46 +103,41 @@ def ordered(problem: States, order: Order) -> States:
     return problem.at(order)
 
 
-def _first_bound(problem: States, selection: Solution, bounds: Bounds) -> Bounds:
-    """Return bounds with the claimed bound of the first goal, where it can be proven.
-
-    Raises `SolverError` if a plan is better.
-    """
-    least, alone = selection.bound[0], replace(problem, budgets=(), goals=problem.goals[:1])
-    if not np.isfinite(least) or not _has_twins(alone):
-        return bounds
-    try:
-        if not Proof(alone).bounds_first(least):
-            raise SolverError(f"{least:.9g} is promised as the least; a plan has less")
-    except TooManyPartsError:
-        return bounds
-    return (least, *bounds[1:])
-
-
 def _proven(
     problem: States, selection: Solution, values: Bounds, hint: Hint | None, *, exact: bool
 ) -> Certificate:
     """Return the certificate of values with proven bounds."""
-    aims = len(problem.aims)
-    twin = next((goal.twin for goal in problem.goals if goal.in_time), None)
+    budgets, aims = problem.budgets, len(problem.aims)
     proof, claimed = Proof(_weighed(problem, selection), hint), selection.bound
     margins = _margin_bounds(problem, proof, values)
-    if twin is not None or problem.paths:
+    if problem.is_timed or problem.paths:
         found = proof.label_bounds(values, selection)
-    elif problem.budgets:
-        found = proof.budget_bounds(values, claimed, _multipliers(problem, selection))
+    elif budgets:
+        multipliers = selection.prices
+        if len(multipliers) < aims or any(len(each) < len(budgets) for each in multipliers):
+            raise SolverError("there is no multiplier for every budget and goal")
+        found = proof.budget_bounds(values, claimed, multipliers)
     else:
         found = proof.bounds(values) if len(margins) < len(values) else margins
-    bounds = _closed(values, (*margins, *found[len(margins) :]))
-    if twin is not None:
-        bounds = _with_counts(problem, twin, values, bounds)
-    elif not (problem.totals or problem.paths):
-        _require_promised(problem, bounds, values if exact and not problem.budgets else claimed)
+    bounds = _with_counts(problem, values, _closed(values, (*margins, *found[len(margins) :])))
+    if not (problem.is_timed or problem.totals or problem.paths):
+        promised = values if exact and not budgets else claimed
+        for goal, bound, least in zip(problem.aims, bounds, promised, strict=False):
+            off, lower = TOLERANCE if budgets else BELOW, f"promised below {least:.9g}"
+            if not goal.margins and not bound >= least - off * abs(least):
+                if budgets:
+                    raise SolverError(f"{goal}: no plan within budgets is {lower}")
+                raise SolverError(f"{goal}: {least:.9g} is promised as the least; a plan has less")
         claimed = bounds
     claimed = _closed(values, tuple(map(max, bounds, claimed)))
     gap, left = (_gap(problem.goals, values, each) for each in (bounds, claimed))
     bounds = (*bounds, *values[aims:])
     return Certificate(values, bounds, gap, left, {}, proof.states, proof.models, Basis.REBUILT)
+
+
+def _path_twin(problem: States) -> PathTwin | None:
+    """Return the twin of the goal that is about times; None if there is none."""
+    return next((goal.twin for goal in problem.goals if goal.in_time), None)
 
 
 def _closed(values: Sequence[float], bounds: Sequence[float]) -> Bounds:
@@ -184,27 +183,9 @@ def _margin_bounds(problem: States, proof: Proof, values: Bounds) -> Bounds:
     return tuple(out)
 
 
-def _multipliers(problem: States, selection: Solution) -> Sequence[Sequence[float]]:
-    """Return the claimed multipliers of budgets, goal by goal."""
-    found, budgets = selection.prices, len(problem.budgets)
-    if len(found) < len(problem.aims) or any(len(each) < budgets for each in found):
-        raise SolverError("there is no multiplier for every budget and goal")
-    return found
-
-
-def _require_promised(problem: States, bounds: Bounds, promised: Sequence[float]) -> None:
-    """Raise a `SolverError` if a proven bound, except one of margins, is below the claimed one."""
-    for goal, bound, least in zip(problem.aims, bounds, promised, strict=False):
-        if not goal.margins and not bound >= least - BELOW * abs(least):
-            if not problem.budgets:
-                raise SolverError(f"{goal}: {least:.9g} is promised as the least; a plan has less")
-            if not bound >= least - TOLERANCE * abs(least):
-                raise SolverError(f"{goal}: no plan within budgets is promised below {least:.9g}")
-
-
-def _with_counts(problem: States, twin: PathTwin | None, values: Bounds, bounds: Bounds) -> Bounds:
+def _with_counts(problem: States, values: Bounds, bounds: Bounds) -> Bounds:
     """Return bounds of the first goals, raised to the combinatorial bound of makespans."""
-    if twin is None:
+    if (twin := _path_twin(problem)) is None:
         return bounds
     least = twin.least(problem.network, problem.rules)
     return tuple(
@@ -259,31 +240,22 @@ def plan_values(
     the largest, but distances, which are those of the scene itself. Raises `SolverError` if a step
     exceeds a limit, is not proven to stand, or has less of a margin.
     """
+    moves = _moves(problem, steps)  # these are as they are planned
     if problem.each:
         found = [plan_values(each, steps, claimed) for each in problem.each]
         if problem.totals:
             return (problem.over.value(np.array(found)[:, 0]),)
-        moves = _moves(problem, steps)  # these are as they are planned
         pairs = zip(problem.goals, zip(*found, strict=True), strict=True)
         return tuple(max(v) if g.moves is None else _value(g, (), moves) for g, v in pairs)
-    check_props(problem.engine, steps)
-    check_shape(problem.engine, steps, problem.limits)
-    table = _analyzed(problem.engine, steps)
-    forces = _forces(problem, table)
-    columns = _state_columns(problem, steps, table) | {LARGEST: forces.max(axis=1)}
-    for limit in problem.limits:
-        if limit.response in columns and exceeds(limit, columns[limit.response]).any():
-            at = int(np.argmax(columns[limit.response])) + 1
-            raise SolverError(f"step {at} exceeds the limit on {limit.label}")
-    _check_forces(problem, forces, steps)
-    levels = [*_by_bricks(problem, columns, forces, steps)]
-    _check_filters(problem, levels, steps)
-    _check_resources(problem, steps)
-    margins, moves, out = proven_margins(problem, steps), _moves(problem, steps), list[float]()
+    levels, out = _states(problem, steps), list[float]()
+    fault = _first_fault(problem.paths, _held(problem, steps)) if problem.paths else None
+    if fault is not None:
+        number = steps[fault[1]].number
+        raise SolverError(f"the resource {fault[0]} is not kept up to step {number}")
+    margins = proven_margins(problem, steps, claimed)
     for k, goal in enumerate(problem.goals):
         if goal.margins is not None:
-            require_margin(goal.name, claimed[k], margins[goal.name])
-            out.append(claimed[k])
+            out.append(margins[goal.name])
         elif goal.in_time:
             known = goal.twin is not None
             out.append(goal.twin.value(problem, steps, starts) if known else claimed[k])
@@ -295,43 +267,6 @@ def plan_values(
 Levels = Sequence[tuple[Ints, StateArrays]]  # rows of steps, and the states that they lead to
 
 
-def _check_forces(problem: States, forces: Floats, steps: Sequence[Step]) -> None:
-    """Raise a `SolverError` if a robot holds with more than its payload, or a limit of its own."""
-    robots = problem.network.scene.robots
-    most = np.array([largest_load(problem, r, stand=False) for r in range(len(robots))])
-    for row, robot in np.argwhere(forces > most + TOLERANCE * most).tolist():
-        raise SolverError(
-            f"step {steps[row].number}: {robots[robot].name} holds {forces[row, robot]:.6g} N, "
-            f"more than the {most[robot]:.6g} N that are allowed"
-        )
-
-
-def _check_filters(problem: States, levels: Levels, steps: Sequence[Step]) -> None:
-    """Raise a `SolverError` if a state does not pass a filter, by its own function or its twin."""
-    for each in problem.filters:
-        for rows, states in levels:
-            refused = ~each.proven(states) | each.refuted_again(states)
-            if refused.any():
-                number = steps[rows[np.flatnonzero(refused)[0]]].number
-                raise SolverError(f"step {number} does not pass the filter {each.name}")
-
-
-def _check_resources(problem: States, steps: Sequence[Step]) -> None:
-    """Raise a `SolverError` if a plan does not keep a resource, by its twin or itself."""
-    if not problem.paths:
-        return
-    site, scene = problem.rules.begin, problem.network.scene
-    first = (None,) * len(scene.robots) if site is None else site.holds(scene)
-    every = [first, *(step.grips for step in steps)]
-    nodes = np.array([[NONE if n is None else n for n in grips] for grips in every])
-    bricks = np.array([step.bricks for step in steps])
-    if (
-        wrong := _first_fault(problem.paths, StepArrays(bricks, nodes[:-1], nodes[1:]))
-    ) is not None:
-        number = steps[wrong[1]].number
-        raise SolverError(f"the resource {wrong[0]} is not kept up to step {number}")
-
-
 def _value(goal: Amount, levels: Levels, moves: MoveArrays) -> float:
     """Return the value of an amount of states or moves of a plan, by its twin if it has one."""
     values = own_values(goal)
@@ -341,45 +276,65 @@ def _value(goal: Amount, levels: Levels, moves: MoveArrays) -> float:
     return float(costs.max() if goal.is_peak else costs.sum())
 
 
-def _state_columns(problem: States, steps: Sequence[Step], table: _Columns) -> dict[str, Floats]:
-    """Return responses (n,) by name, SI units, of the columns of `seqopt.analyze`."""
+def _states(problem: States, steps: Sequence[Step]) -> Levels:
+    """Return the states that steps lead to, with as many bricks each, and their responses.
 
-    def column(name: str) -> Floats:
-        return np.asarray(table[name], dtype=float)
-
-    out = dict[str, Floats]()
-    for name in problem.named:
-        if name == "C_max":
-            out[name] = np.maximum(0.0, -column("F_min_N"))
-        elif name == PROP_EXCESS:
-            out[name] = column(EXCESS_COLUMN)
-        elif is_tolerance(name):
-            out[name] = misfits_along({COLUMN: tolerances_along(problem.engine, steps, name)})
-        elif name != LARGEST:
-            out[name] = column(CHOSEN_BY[name].column) / CHOSEN_BY[name].scale
+    The empty site, where a take-down ends, is none: nothing is taken of it. Raises `SolverError` if
+    a step exceeds a limit or a payload, or does not pass a filter, by its own function or its twin.
+    """
+    check_props(problem.engine, steps)
+    check_shape(problem.engine, steps, problem.limits)
+    table, robots = _analyzed(problem.engine, steps), problem.network.scene.robots
+    each_force = [table[force_column(robot)] for robot in robots]  # NaN where one holds nothing
+    forces = np.nan_to_num(np.abs(np.array(each_force, dtype=float).T))
+    columns = _responses(problem, steps, table) | {LARGEST: forces.max(axis=1)}
+    for limit in problem.limits:
+        if limit.response in columns and exceeds(limit, columns[limit.response]).any():
+            at = int(np.argmax(columns[limit.response])) + 1
+            raise SolverError(f"step {at} exceeds the limit on {limit.label}")
+    most = np.array([largest_load(problem, r, stand=False) for r in range(len(robots))])
+    for row, robot in np.argwhere(forces > most + TOLERANCE * most).tolist():
+        raise SolverError(
+            f"step {steps[row].number}: {robots[robot].name} holds {forces[row, robot]:.6g} N, "
+            f"more than the {most[robot]:.6g} N that are allowed"
+        )
+    held = _held(problem, steps)
+    able, free = np.ones(len(steps), dtype=bool), np.full(forces.shape, np.inf)
+    every = StateArrays(0, held.after, columns, forces, free, able, problem.criterion, held.after)
+    rows = [np.flatnonzero(held.bricks == k) for k in np.unique(held.bricks[held.bricks > 0])]
+    out = [(own, every.only(own)._replace(bricks=int(held.bricks[own[0]]))) for own in rows]
+    for each in problem.filters:
+        for own, states in out:
+            refused = own[~each.proven(states) | each.refuted_again(states)]
+            if len(refused):
+                number = steps[refused[0]].number
+                raise SolverError(f"step {number} does not pass the filter {each.name}")
     return out
 
 
-def _forces(problem: States, table: _Columns) -> Floats:
-    """Return the sizes (n, robots) of the forces of grips, N; zero where a robot holds nothing."""
-    every = [table[force_column(robot)] for robot in problem.network.scene.robots]
-    return np.asarray(np.nan_to_num(np.abs(np.column_stack(every).astype(float))))
+def _responses(problem: States, steps: Sequence[Step], table: _Columns) -> dict[str, Floats]:
+    """Return responses (n,) by name, SI units, of the columns of `seqopt.analyze`."""
+    out = dict[str, Floats]()
+    for name in problem.named:
+        if name == "C_max":
+            out[name] = np.maximum(0.0, -np.asarray(table["F_min_N"], dtype=float))
+        elif name == PROP_EXCESS:
+            out[name] = np.asarray(table[EXCESS_COLUMN], dtype=float)
+        elif is_tolerance(name):
+            out[name] = misfits_along({COLUMN: tolerances_along(problem.engine, steps, name)})
+        elif name != LARGEST:
+            chosen = CHOSEN_BY[name]
+            out[name] = np.asarray(table[chosen.column], dtype=float) / chosen.scale
+    return out
 
 
-def _by_bricks(
-    problem: States, columns: Mapping[str, Floats], forces: Floats, steps: Sequence[Step]
-) -> Iterator[tuple[Ints, StateArrays]]:
-    """Yield the rows of steps with as many bricks, and the states that they lead to.
-
-    The empty site, where a take-down ends, is none: nothing is taken of it.
-    """
-    bricks = np.array([step.bricks for step in steps])
-    nodes = np.array([[NONE if n is None else n for n in step.grips] for step in steps])
-    most, able = np.full(nodes.shape, np.inf), np.ones(len(steps), dtype=bool)
-    every = StateArrays(0, nodes, columns, forces, most, able, problem.criterion, nodes)
-    for stand in sorted({*bricks.tolist()} - {0}):
-        rows = np.flatnonzero(bricks == stand)
-        yield rows, every.only(rows)._replace(bricks=stand)
+def _held(problem: States, steps: Sequence[Step]) -> StepArrays:
+    """Return the bricks that stand after steps, and the nodes held before and after them."""
+    site, scene = problem.rules.begin, problem.network.scene
+    first = (None,) * len(scene.robots) if site is None else site.holds(scene)
+    every = [first, *(step.grips for step in steps)]
+    nodes = np.array([[NONE if n is None else n for n in grips] for grips in every])
+    return StepArrays(np.array([step.bricks for step in steps]), nodes[:-1], nodes[1:])
 
 
 def _moves(problem: States, steps: Sequence[Step]) -> MoveArrays:

@@ -16,7 +16,7 @@ from seqopt.graph.states.states import States
 from seqopt.judge._rule_moves import RuleTables, ScheduleTables, Transitions
 from seqopt.judge._step_checks import props_that_hold
 from seqopt.judge._twin import exceeds, own_values, twin_of
-from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
+from seqopt.problem.amounts import LARGEST, NONE, MoveArrays, StateArrays
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import Standing, StandingSets
@@ -87,18 +87,12 @@ def _ask_engine(problem: States, bricks: int, grips: Ints, *, low_precision: boo
         if len(left):
             fit[left] = ~each.refuted_again(seen.only(left))
     seen = seen._replace(possible=fit)
-    values = np.column_stack([state_values(goal, seen) for goal in problem.goals])
+    own = [own_values(goal) if goal.states is not None else None for goal in problem.goals]
+    zeros = np.zeros(len(grips))  # of what is not about states
+    values = np.column_stack([zeros if value is None else value(seen) for value in own])
     if problem.spares and bricks == len(problem.network.inner) and not grips.shape[1]:
         values[:] = 0.0  # the whole that nobody holds, where a take-down begins
     return Answers(values, forces, fit & np.isfinite(values).all(axis=1), len(grips))
-
-
-def state_values(goal: Amount, states: StateArrays) -> Floats:
-    """Return the values (n,) of a goal in states with so many bricks; zero if not about states."""
-    values = own_values(goal)
-    if goal.states is None or values is None:
-        return np.zeros(len(states.possible))
-    return np.asarray(values(states))
 
 
 class Filter(NamedTuple):
@@ -139,21 +133,31 @@ class StateEvaluator:
     """
 
     def __init__(self, problem: States) -> None:
-        self.problem = problem
-        robots = range(len(problem.network.scene.robots))
+        self.problem, scene, rules = problem, problem.network.scene, problem.rules
+        robots = range(len(scene.robots))
         most, own = (
             [largest_load(problem, r, stand=stand) for r in robots] for stand in (False, True)
         )
-        self.tables = _tables(problem, most)
+        self.tables: Tables
+        if isinstance(rules, Schedule):
+            asked = rules, problem.network
+            self.tables = ScheduleTables(*asked, parks=problem.parks, worlds=problem.worlds)
+        else:
+            book = RuleBook(problem.network, rules, problem.worlds)
+            groups = interchangeable(book, most, timed=problem.is_timed)
+            self.tables = RuleTables(book, groups, parks=problem.parks)
+        team, nodes, kinds = list(self.tables.team), self.tables.nodes, scene.grip_kinds
         self.margins = sum(goal.margins is not None for goal in problem.goals)
-        self._most = np.array([most[r] for r in self.tables.team])
-        self._payload, self._loads = np.array([own[r] for r in self.tables.team]), np.array(own)
-        kinds, nodes = problem.network.scene.grip_kinds, self.tables.nodes
+        self._most, self._loads = np.array(most)[team], np.array(own)
+        self._payload = self._loads[team]
         more = [kind * kinds.span for kind in range(len(kinds.turns))]
         self._numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
-        self._beyond = len(nodes) * kinds.of_robot[list(self.tables.team)]
+        self._beyond = len(nodes) * kinds.of_robot[team]
         self._standing = dict[Standing, tuple[StandingSets, ...]]()
-        self._exact = not _six_digits_do(problem)
+        ratios = isinstance(problem.criterion, WorstRatio)
+        of_states = (goal for goal in problem.goals if goal.states is not None)
+        peaks = all(goal.has_few_digits and (ratios or not goal.of_criterion) for goal in of_states)
+        self._exact = not peaks or bool(problem.limits or problem.filters)  # six digits do not do
         self.models = 0  # how often the engine was asked of a grip set, in any scenario
 
     def least(self) -> tuple[float, ...]:
@@ -316,23 +320,18 @@ class StateEvaluator:
 
         Six digits are enough where no value or payload that decides is close.
         """
-        exact = asked.exact or self._exact or len(grips) <= FEW
-        found = self._asked(bricks, grips, below, low_precision=not exact)
+        exact, goals = asked.exact or self._exact or len(grips) <= FEW, len(self.problem.goals)
+        *found, models = ask(self.problem, bricks, grips, below, low_precision=not exact)
+        out = np.column_stack(found)
         if not exact:
-            goals = len(self.problem.goals)
-            close = _near(found[:, goals:-1], self._most)
+            close = _near(out[:, goals:-1], self._most)
             for k, value in enumerate(asked.values):
                 if self.problem.goals[k].is_peak:
-                    close |= _near(found[:, [k]], np.array([value]))
-            found[close] = self._asked(bricks, grips[close], below)
-        return found
-
-    def _asked(
-        self, bricks: int, grips: Ints, below: float, *, low_precision: bool = False
-    ) -> Floats:
-        *found, models = ask(self.problem, bricks, grips, below, low_precision=low_precision)
+                    close |= _near(out[:, [k]], np.array([value]))
+            *found, more = ask(self.problem, bricks, grips[close], below)
+            out[close], models = np.column_stack(found), models + more
         self.models += models
-        return np.column_stack(found)
+        return out
 
     def amounts(self, values: Floats, found: Transitions) -> Floats:
         """Return the values (m, g) of goals of moves to states with such values."""
@@ -352,16 +351,6 @@ def largest_load(problem: States, robot: int, *, stand: bool) -> float:
     return float(most * (1 + LIMIT_TOLERANCE))
 
 
-def _tables(problem: States, most: Sequence[float]) -> Tables:
-    """Return the rule book of rules or a schedule; ``most``: payloads, N."""
-    if isinstance(problem.rules, Schedule):
-        own = problem.rules, problem.network
-        return ScheduleTables(*own, parks=problem.parks, worlds=problem.worlds)
-    book = RuleBook(problem.network, problem.rules, problem.worlds)
-    groups = interchangeable(book, most, timed=problem.is_timed)
-    return RuleTables(book, groups, parks=problem.parks)
-
-
 def interchangeable(
     book: RuleBook, most: Sequence[float], *, timed: bool = False
 ) -> list[tuple[int, ...]]:
@@ -378,14 +367,6 @@ def interchangeable(
         key = (book.reached[r, last], nodes, may, most[r], grip, arm, takes)
         groups.setdefault(key, []).append(r)
     return [tuple(group) for group in groups.values() if len(group) > 1]
-
-
-def _six_digits_do(problem: States) -> bool:
-    """Return whether single-precision responses suffice for the goals of states."""
-    ratios = isinstance(problem.criterion, WorstRatio)
-    of_states = [goal for goal in problem.goals if goal.states is not None]
-    peaks = all(goal.has_few_digits and (ratios or not goal.of_criterion) for goal in of_states)
-    return peaks and not problem.limits and not problem.filters
 
 
 def _near(values: Floats, bounds: Floats) -> Bools:

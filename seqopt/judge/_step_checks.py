@@ -88,35 +88,38 @@ def check_shape(engine: Engine, steps: Sequence[Step], limits: Sequence[Limit]) 
                 )
 
 
-def proven_margins(problem: States, steps: Sequence[Step]) -> dict[str, float]:
-    """Return the worst margins of a plan, as goals count them; every step must stand as demanded.
+def proven_margins(
+    problem: States, steps: Sequence[Step], claimed: Sequence[float]
+) -> dict[str, float]:
+    """Return the margins of a plan, as claimed if they are; every step must stand as demanded.
 
-    Margins are found only where they are asked for: ``bond`` (Pa), ``friction``, and how far
-    ``tilt`` is from a right angle (rad); NaN where nothing is proven of a step. A `SolverError`
-    names the step that is not proven to stand.
+    ``claimed``: by goal, if any is. Worst margins are found only where they are asked for: ``bond``
+    (Pa), ``friction``, and how far ``tilt`` is from a right angle (rad). A `SolverError` names the
+    step that is not proven to stand, or a margin that is worse by more than its proven width.
     """
-    standing, has_margins = problem.standing, any(goal.margins for goal in problem.goals)
-    if not (has_margins or (standing and standing.tilt)):
-        if standing is not None:
-            verdicts = step_verdicts(problem.network, steps, standing.mortar)
-            for step, verdict in zip(steps, verdicts, strict=True):
-                if verdict is not Verdict.STANDS:
-                    raise _falls(step, verdict.value)
-        return {}
-    results = certified(problem, steps)
-    for step, result in zip(steps, results, strict=True):
-        tilted = standing is not None and result.tilt < standing.tilt - SURE
-        if standing is not None and (tilted or result.verdict is not Verdict.STANDS):
-            raise _falls(step, f"{result.verdict.value}, tilt survived {result.tilt:.4g} rad")
-    return {
-        "bond": float(np.max([result.bond for result in results])),
-        "friction": float(np.max([result.friction for result in results])),
-        "tilt": float(pi / 2 - np.min([result.tilt for result in results])),
-    }
-
-
-def _falls(step: Step, what: str) -> SolverError:
-    return SolverError(f"step {step.number} is not proven to stand as demanded: {what}")
+    standing = problem.standing
+    said, stand = list[str](), list[bool]()
+    results: tuple[Stability, ...] = ()
+    if any(goal.margins for goal in problem.goals) or (standing and standing.tilt):
+        results = certified(problem, steps)
+        said = [f"{each.verdict.value}, tilt survived {each.tilt:.4g} rad" for each in results]
+        least = (standing or Standing()).tilt - SURE
+        stand = [r.verdict is Verdict.STANDS and not r.tilt < least for r in results]
+    elif standing is not None:
+        verdicts = step_verdicts(problem.network, steps, standing.mortar)
+        said, stand = [v.value for v in verdicts], [v is Verdict.STANDS for v in verdicts]
+    for step, what, does in zip(steps, said, stand, strict=bool(said)):
+        if standing is not None and not does:
+            raise SolverError(f"step {step.number} is not proven to stand as demanded: {what}")
+    worst = {"bond": [r.bond for r in results], "friction": [r.friction for r in results]}
+    worst["tilt"] = [pi / 2 - result.tilt for result in results]
+    out = {}
+    for k, name in [(k, goal.name) for k, goal in enumerate(problem.goals) if goal.margins]:
+        proven = float(np.max(worst[name]))
+        out[name] = claimed[k] if claimed else proven
+        if not proven <= out[name] + slack(name, out[name]):
+            raise SolverError(f"{name} is {proven:.6g}, not {out[name]:.6g} as claimed")
+    return out
 
 
 def certified(problem: States, steps: Sequence[Step]) -> tuple[Stability, ...]:
@@ -127,9 +130,3 @@ def certified(problem: States, steps: Sequence[Step]) -> tuple[Stability, ...]:
             (result,) = each_stability(problem.network, [step], mortar, MARGINS)
             problem.certified[step.bricks, step.grips] = result
     return tuple(problem.certified[step.bricks, step.grips] for step in steps)
-
-
-def require_margin(name: str, claimed: float, proven: float) -> None:
-    """Raise a `SolverError` if a margin is worse than claimed by more than its proven width."""
-    if not proven <= claimed + slack(name, claimed):
-        raise SolverError(f"{name} is {proven:.6g}, not {claimed:.6g} as claimed")

@@ -64,15 +64,6 @@ def _criterion(states: StateArrays) -> Floats:
     return np.where(able, costs, np.inf)
 
 
-def _response(name: str, states: StateArrays) -> Floats:
-    return states.responses[name]
-
-
-def _none(states: StateArrays) -> Floats:
-    """Return zeros: margins are found by the cone program, step by step."""
-    return np.zeros(len(states.possible))
-
-
 TWINS = {
     "minmax": Twin(_criterion),
     "sum": Twin(_criterion),
@@ -90,7 +81,9 @@ def twin_of(amount: Amount) -> Twin | None:
     if amount.name in TWINS:
         return TWINS[amount.name]
     if amount.name in BUILT_IN or is_tolerance(amount.name):
-        return Twin(_none if amount.margins else partial(_response, amount.responses[0]))
+        if amount.margins:  # the cone program finds them, step by step
+            return Twin(lambda states: np.zeros(len(states.possible)))
+        return Twin(lambda states: states.responses[amount.responses[0]])
     if amount.twin is None or amount.in_time:
         return None
     return Twin(partial(amount.checked, amount.twin))

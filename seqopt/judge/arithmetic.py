@@ -51,39 +51,44 @@ def judge_path(instance: Instance, answer: Answer) -> Certificate:
     Raises `SolverError` if the path does not lead from node 0 to an end, exceeds a cap or is worth
     something else than is claimed; or if a bound is higher than what is to prove it.
     """
-    path = _walked(instance, answer)
-    values = tuple(_value(instance, goal, path) for goal in instance.goals)
+    arcs, acts = _walked(instance, answer)
+    sums, ends = instance.amounts[arcs].sum(axis=0), 0.0
+    if instance.timed is not None and instance.asks_time:
+        twin = path_twin()
+        ends = np.nan if twin is None else twin.path_value(instance.timed, arcs, acts)
+    values, spent = list[float](), dict[str, float]()
+    for goal in instance.goals:
+        own = sums[list(goal.columns)]
+        if goal.kind == PEAK:
+            own = instance.amounts[arcs][:, list(goal.columns)].max(initial=0.0)
+        value = _target_sums(goal, own) if goal.kind == TAIL else np.sum(own)
+        values.append(ends if goal.kind == TIME else float(value))
     for goal, value, claimed in zip(instance.goals, values, answer.values, strict=False):
         if claimed is not None and not abs(value - claimed) <= TOLERANCE * abs(value):
             raise SolverError(f"{goal.name} is {value:.9g}, not {claimed:.9g} as claimed")
-    spent = _spent(instance, path)
+    for cap in instance.caps:
+        spent[cap.name] = took = ends if cap.column is None else float(sums[cap.column])
+        if not took <= cap.most + TOLERANCE * abs(cap.most):
+            raise OverCapError(f"{cap.name} is {took:.9g}, more than the {cap.most:g} allowed")
     found = _bounds(instance, values, answer.bounds)
     gaps = [
         max((v - b) / (abs(v) or 1.0) for v, b in zip(values, each, strict=True)) for each in found
     ]
-    return Certificate(values, found[0], gaps[0], gaps[1], spent, instance.nodes)
+    return Certificate(tuple(values), found[0], gaps[0], gaps[1], spent, instance.nodes)
 
 
-class _Walk(NamedTuple):
-    """Arcs of a path, and its makespan in an instance in time."""
-
-    arcs: Ints
-    ends: float
-
-
-def _walked(instance: Instance, answer: Answer) -> _Walk:
-    """Return a path that leads from the start to an end, or say where it breaks."""
-    acts = None
-    if answer.what == "acts":
-        if instance.timed is None:
-            raise SolverError("acts: no times are asked of this instance; give nodes or arcs")
-        acts = _in_range(answer.numbers, len(instance.timed.move), "act")
-        arcs = instance.timed.move[acts]
-    elif answer.what == "arcs":
-        arcs = _in_range(answer.numbers, instance.arcs, "arc")
-    else:
-        arcs = _arcs_of(instance, _in_range(answer.numbers, instance.nodes, "node"))
-    at = 0
+def _walked(instance: Instance, answer: Answer) -> tuple[Ints, Ints | None]:
+    """Return arcs from the start to an end, and acts if these are given; or say where it breaks."""
+    timed, numbers, what = instance.timed, answer.numbers, answer.what
+    if what == "acts" and timed is None:
+        raise SolverError("acts: no times are asked of this instance; give nodes or arcs")
+    counts = {"arcs": instance.arcs, "nodes": instance.nodes}
+    count = len(timed.move) if what == "acts" and timed is not None else counts[what]
+    if len(wrong := numbers[(numbers < 0) | (numbers >= count)]):
+        raise SolverError(f"{what[:-1]} {wrong[0]} does not exist; they are 0 to {count - 1}")
+    arcs, at = _arcs_of(instance, numbers) if what == "nodes" else numbers, 0
+    if what == "acts" and timed is not None:
+        arcs = timed.move[numbers]
     for step, arc in enumerate(arcs.tolist(), start=1):
         if instance.source[arc] != at:
             where = f"{instance.source[arc]} to {instance.target[arc]}"
@@ -94,20 +99,9 @@ def _walked(instance: Instance, answer: Answer) -> _Walk:
     if not instance.ends[at]:
         raise SolverError(f"the path stops at node {at}, where none may end")
     every = instance.steps if instance.resources else None
-    if every is not None and (wrong := _first_fault(instance.resources, every.only(arcs))):
-        raise SolverError(f"the resource {wrong[0]} is not kept up to step {wrong[1] + 1}")
-    ends = 0.0
-    if instance.timed is not None and instance.asks_time:
-        twin = path_twin()
-        ends = np.nan if twin is None else twin.path_value(instance.timed, arcs, acts)
-    return _Walk(arcs, ends)
-
-
-def _in_range(numbers: Ints, count: int, what: str) -> Ints:
-    wrong = numbers[(numbers < 0) | (numbers >= count)]
-    if len(wrong):
-        raise SolverError(f"{what} {wrong[0]} does not exist; they are 0 to {count - 1}")
-    return numbers
+    if every is not None and (fault := _first_fault(instance.resources, every.only(arcs))):
+        raise SolverError(f"the resource {fault[0]} is not kept up to step {fault[1] + 1}")
+    return arcs, numbers if what == "acts" else None
 
 
 def _arcs_of(instance: Instance, nodes: Ints) -> Ints:
@@ -128,63 +122,33 @@ def _arcs_of(instance: Instance, nodes: Ints) -> Ints:
     return np.asarray(order[at])
 
 
-def _value(instance: Instance, goal: _Target, path: _Walk) -> float:
-    own: Floats = instance.amounts[path.arcs][:, list(goal.columns)]
-    if goal.kind in (TIME, PEAK):
-        return path.ends if goal.kind == TIME else float(own.max(initial=0.0))
-    return _target_sums(goal, own.sum(axis=0)) if goal.kind == TAIL else float(own.sum())
-
-
-def _spent(instance: Instance, path: _Walk) -> dict[str, float]:
-    """Return the use of caps by a path; a `SolverError` names one that it exceeds."""
-    out = {}
-    for cap in instance.caps:
-        own = path.ends
-        if cap.column is not None:
-            own = float(instance.amounts[path.arcs, cap.column].sum())
-        if not own <= cap.most + TOLERANCE * abs(cap.most):
-            raise OverCapError(f"{cap.name} is {own:.9g}, more than the {cap.most:g} allowed")
-        out[cap.name] = own
-    return out
-
-
 def _bounds(
     instance: Instance, values: Sequence[float], claims: Sequence[Claim]
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the proven and the claimed lower bounds of all goals."""
+    """Return the proven and the claimed lower bounds of all goals.
+
+    Raises `SolverError` if a claimed bound is above the value of a path, or above the proven one.
+    """
     if len(claims) > len(values):
         raise SolverError(f"there are {len(claims)} bounds for {len(values)} goals")
     stage, out, said = first_stage(instance), list[float](), list[float]()
     for k, (goal, value) in enumerate(zip(instance.goals, values, strict=True)):
-        claim = claims[k] if k < len(claims) else Claim()
+        claim, slack = claims[k] if k < len(claims) else Claim(), ABOVE * abs(value)
         bound = proven(instance, stage, goal, claim, value)
         proofs = claim.potentials, claim.cut, claim.weights, claim.shares, claim.labels
         bare = not claim.prices and all(proof is None for proof in proofs)
-        _require_modest(goal, claim, (value, bound), bare=bare)
-        if not bound < value - BELOW * abs(value):
-            bound = value
-        out.append(bound)
-        claimed = claim.value if bare and claim.value is not None else bound
-        said.append(min(value, max(bound, claimed)))
+        high, claimed = f"a bound of {claim.value or 0:.9g} is claimed", claim.value
+        if bound > value + slack:
+            raise SolverError(f"{goal.name}: the bound {bound:.9g} is above the path's {value:.9g}")
+        if claimed is not None and claimed > value + slack:
+            raise SolverError(f"{goal.name}: {high}; the path takes {value:.9g}")
+        if claimed is not None and not bare and claimed > bound + slack:
+            raise SolverError(f"{goal.name}: {high}, and {bound:.9g} is proven")
+        out.append(bound if bound < value - BELOW * abs(value) else value)
+        low = claimed if bare and claimed is not None else out[-1]
+        said.append(min(value, max(out[-1], low)))
         stage = next_stage(stage, goal, value)
     return tuple(out), tuple(said)
-
-
-def _require_modest(goal: _Target, claim: Claim, found: tuple[float, float], *, bare: bool) -> None:
-    """Raise an error if a claimed bound is above the value of a path, or above the proven one."""
-    value, bound = found
-    if bound > value + ABOVE * abs(value):
-        raise SolverError(f"{goal.name}: the bound {bound:.9g} is above the path's {value:.9g}")
-    if claim.value is None:
-        return
-    if claim.value > value + ABOVE * abs(value):
-        raise SolverError(
-            f"{goal.name}: a bound of {claim.value:.9g} is claimed; the path takes {value:.9g}"
-        )
-    if not bare and claim.value > bound + ABOVE * abs(value):
-        raise SolverError(
-            f"{goal.name}: a bound of {claim.value:.9g} is claimed, and {bound:.9g} is proven"
-        )
 
 
 Labels = tuple[Ints, Floats]  # nodes (N,), and values (N, 1 + c + q)
@@ -211,10 +175,11 @@ class Claim(FrozenValue):
 
 
 class Stage(NamedTuple):
-    """State between goals: the arcs that are left, and caps on sums of columns."""
+    """State between goals: the arcs that are left, caps on sums of columns, and one of the time."""
 
     graph: Graph
     limited: tuple[tuple[str, int, float], ...]
+    time: float = np.inf
 
 
 def first_stage(instance: Instance) -> Stage:
@@ -231,7 +196,29 @@ def next_stage(stage: Stage, goal: _Target, value: float) -> Stage:
     if goal.kind == SUM:
         more = (goal.name, goal.columns[0], tied(value))
         return stage._replace(limited=(*stage.limited, more))
-    return stage  # what is left out of account makes a bound no higher
+    time = tied(value) if goal.kind == TIME else np.inf
+    return stage._replace(time=min(stage.time, time))  # what is left out makes a bound no higher
+
+
+def only_below(graph: Graph, goal: _Target, value: float) -> Graph:
+    """Return the arcs that paths below a value of a goal may take."""
+    if goal.kind != PEAK:
+        return graph
+    return graph.only(kept_below(graph.amounts[:, goal.columns[0]], value))
+
+
+def sum_books(stage: Stage, goal: _Target, value: float, move: Ints) -> list[Book]:
+    """Return the book of limited sums; that of a goal stays below a value.
+
+    ``move``: of arcs, as of `SumBook`.
+    """
+    limited = [(column, most, False) for _, column, most in stage.limited]
+    if goal.kind == SUM:
+        limited.append((goal.columns[0], limit_below(value), True))
+    if not limited:
+        return []
+    columns, most, strict = (np.array(each) for each in zip(*limited, strict=True))
+    return [SumBook(stage.graph, move, stage.graph.amounts[:, columns], (most, strict))]
 
 
 def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value: float) -> float:
@@ -264,22 +251,13 @@ def _by_labels(instance: Instance, stage: Stage, goal: _Target, claim: Claim) ->
     twins = [each.twin for each in instance.resources if each.twin is not None]
     if claim.value is None or len(twins) < len(instance.resources):
         return -np.inf  # without a twin nothing is proven
-    graph, (column,) = stage.graph, goal.columns
-    limited = [(c, most) for _, c, most in stage.limited]
-    strict = [False] * len(limited)
-    codes = instance.source.astype(np.int64) * instance.nodes + instance.target
-    if goal.kind == PEAK:
-        graph = graph.only(kept_below(graph.amounts[:, column], claim.value))
-    else:
-        limited, strict = [*limited, (column, limit_below(claim.value))], [*strict, True]
+    graph = only_below(stage.graph, goal, claim.value)
     move = np.arange(len(graph.source))
+    codes = instance.source.astype(np.int64) * instance.nodes + instance.target
     own = graph.source.astype(np.int64) * graph.states + graph.target
     steps = instance.steps.only(np.searchsorted(codes, own))
-    books: list[Book] = [TwinBook(twin, steps) for twin in twins]
-    if limited:
-        most = np.array([cap for _, cap in limited]), np.array(strict)
-        books = [SumBook(graph, move, graph.amounts[:, [c for c, _ in limited]], most), *books]
-    closed = Closed(graph, move, books)
+    books = sum_books(stage._replace(graph=graph), goal, claim.value, move)
+    closed = Closed(graph, move, [*books, *(TwinBook(twin, steps) for twin in twins)])
     state, values = claim.labels
     values = values if len(values) else np.zeros((0, closed.width))
     named = len(state) == 0 or (state.min() >= 0 and state.max() < instance.nodes)
@@ -305,13 +283,12 @@ def _sum(
     stage: Stage, costs: Floats, claim: Claim, limited: Sequence[tuple[float, int, float]]
 ) -> float:
     """Return the Lagrangian bound of a sum, by the given potentials or the judge's own."""
-    back = 0.0
+    graph, given, back = stage.graph, claim.potentials, 0.0
     for price, column, most in limited:
-        costs = costs + price * stage.graph.amounts[:, column]
+        costs = costs + price * graph.amounts[:, column]
         back += price * most
-    given = claim.potentials
-    least = least_sum(stage.graph, costs) if given is None else _kept(stage.graph, costs, given)
-    return least - back - ROUNDING * stage.graph.states * abs(back)
+    least = least_sum(graph, costs) if given is None else _kept(graph, costs, given)
+    return least - back - ROUNDING * graph.states * abs(back)
 
 
 def _kept(graph: Graph, costs: Floats, potentials: Floats) -> float:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import chain, combinations, islice
 
 import numpy as np
@@ -34,7 +34,7 @@ from seqopt.graph.states.states import States
 from seqopt.judge._bounds import is_kept, least_within
 from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.network.network import Network
-from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, Amount, worst
+from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.filters import IGNORED, STANDING
 from seqopt.problem.requirements import Excess, Limit, overloads
 from seqopt.problem.standing import Standing
@@ -51,7 +51,7 @@ from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_check import RuleBook, unbearable
 from seqopt.sequence.methods import _enough_reach
-from seqopt.sequence.rules import FREE, FreeRules
+from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import OpenStep, loads
 from seqopt.sequence.steps import Step
 
@@ -121,7 +121,8 @@ def confirmed(
     the stability of some states is undecided.
     """
     end, capped = time.perf_counter() + seconds, problem.goals[len(problem.aims) :]
-    goals = (*STEPS, *_of_criterion(problem), *capped)
+    own = (goal for goal in problem.aims if goal.of_criterion)  # whose values may be infinite
+    goals = (*STEPS, *own, *capped)
     steps = replace(_with_any_margin(problem), goals=goals)
     try:
         hint = None
@@ -161,22 +162,22 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
             pairs = zip(problem.goals[-len(spent) :], spent, strict=True)
             one = ", ".join(f"{goal} {value:.6g}" for goal, value in pairs)
             return SolverError(f"formulation {name} {ALLOWED}: {one}")
-    words, proven = [], False
+    said, proven = list[str](), False
     for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
-        if problem.goals[k].in_time:  # what it is at best takes a search
-            twin = problem.goals[k].twin
-            least = -np.inf if twin is None else twin.least(problem.network, problem.rules)
-            if least > tied(cap):
-                proven = True
-                words.append(f"makespan is at least {least:.6g} s, and {cap:g} s are allowed")
-                continue
-            words.append(f"{cap:g} s of makespan are allowed; --aim makespan finds the least")
+        goal = problem.goals[k]
+        if not goal.in_time:
+            least = distances(graph, graph.amounts[:, k])[graph.ends].min()
+            alone = " by itself" if least <= tied(cap) else ""
+            said.append(f"{goal} is at least {least:.6g}{alone}, and {cap:g} is allowed")
             continue
-        least = distances(graph, graph.amounts[:, k])[graph.ends].min()
-        alone = " by itself" if least <= tied(cap) else ""
-        words.append(f"{problem.goals[k]} is at least {least:.6g}{alone}, and {cap:g} is allowed")
+        least = -np.inf if goal.twin is None else goal.twin.least(problem.network, problem.rules)
+        if least > tied(cap):
+            said.append(f"makespan is at least {least:.6g} s, and {cap:g} s are allowed")
+            proven = True
+        else:  # what it is at best takes a search
+            said.append(f"{cap:g} s of makespan are allowed; --aim makespan finds the least")
     proven = proven or Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
-    why = f"{problem.title}: no plan is within all budgets; {', '.join(words)}"
+    why = f"{problem.title}: no plan is within all budgets; {', '.join(said)}"
     return InfeasibleError(why) if proven else claimed(name, why, exact=exact)
 
 
@@ -187,11 +188,6 @@ def _with_any_margin(problem: States) -> States:
     return problem
 
 
-def _of_criterion(problem: States) -> tuple[Amount, ...]:
-    """Return the goals evaluated by the criterion, whose values may be infinite."""
-    return tuple(goal for goal in problem.aims if goal.of_criterion)
-
-
 def _why_impossible(problem: States, seconds: float = np.inf) -> str:
     """Return one line: the brick at which all builds stop, and remedies found within ``seconds``.
 
@@ -200,28 +196,32 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
     """
     engine = getattr(problem.engine, "rigid", problem.engine)
     problem = _with_any_margin(replace(problem, engine=engine))
-    look = Look(time.perf_counter() + seconds)
+    look, finished = Look(time.perf_counter() + seconds), False
     where = "no plan is allowed"
     try:
         steps = replace(problem, goals=STEPS)
-        if _of_criterion(problem) and barred(steps) is None and look(steps).whole:
-            return f"{problem.title}: criterion {problem.criterion.name} allows no plan"
-        state = barred(steps)
-        finished = state is not None and _is_bare_end(problem, *state)
-        if state is None:
-            where = _where(problem, look(steps).reached)
+        if (state := barred(steps)) is not None:
+            whole = problem.space.bricks_at(state[0]) == len(problem.network.inner)
+            finished = whole and not problem.space.grips(state[1]).any()
+            where = _describe_barred(problem, *state, finished=finished)
         else:
-            where = _describe_barred(problem, *state)
+            found = look(steps)
+            if found.whole and any(goal.of_criterion for goal in problem.aims):
+                return f"{problem.title}: criterion {problem.criterion.name} allows no plan"
+            where = _where(problem, found.reached)
         return f"{problem.title}: {where}{Remedies(problem, look).said(finished=finished)}"
     except LateError:
         return f"{problem.title}: {where}; time was over before it was known what helps, give more"
 
 
-def _describe_barred(problem: States, level: int, state: Ints) -> str:
-    """Describe the infeasible state that every plan passes, and the violated constraint."""
+def _describe_barred(problem: States, level: int, state: Ints, *, finished: bool) -> str:
+    """Describe the infeasible state that every plan passes, and the violated constraint.
+
+    ``finished``: whether it is the finished structure without grips.
+    """
     each, falls = problem.each or (problem,), False
     what = f"step {level} of {problem.space.levels}, in which no grip is open,"
-    if _is_bare_end(problem, level, state):
+    if finished:
         what = "the finished structure, which nobody holds,"
     for one in each:
         if not one.values(level, state)[1].all():
@@ -231,12 +231,6 @@ def _describe_barred(problem: States, level: int, state: Ints) -> str:
     how = "does not stand" if falls else "is not proven to stand"
     demand = next(iter(problem.demands), None)
     return f"{what} {how}{'' if demand is None else f' {demand.said}'}"
-
-
-def _is_bare_end(problem: States, level: int, state: Ints) -> bool:
-    """Return whether a state is the finished structure without grips."""
-    whole = problem.space.bricks_at(level) == len(problem.network.inner)
-    return whole and not problem.space.grips(state).any()
 
 
 def _describe_excess(problem: States, level: int, state: Ints) -> str:
@@ -287,16 +281,16 @@ class Look:
         return StandingLook(replace(problem, goals=STEPS, standing=None, settled=()), self.tell)
 
 
-LOOK = Look()
 OF_ROBOTS = ("rules", "arms")  # filters that leave the finished structure as it is
 
 
-def worst_least(problem: States, response: str, look: Look = LOOK) -> float:
+def worst_least(problem: States, response: str, look: Look | None = None) -> float:
     """Return the least peak of a response over all plans, SI units; infinite if infeasible.
 
     ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``.
     """
-    found = look(replace(problem, goals=(BUILT_IN.get(response) or worst(response),)))
+    asked = replace(problem, goals=(BUILT_IN.get(response) or worst(response),))
+    found = (look or Look())(asked)
     return least_peak(found.graph().graph, 0) if found.whole else np.inf
 
 
@@ -305,19 +299,14 @@ class Remedy:
     """A relaxation that makes the problem feasible.
 
     ``name``: the constraint; ``enough``: returns the least sufficient relaxation in words, empty
-    if robots would carry more than all loads; ``rules``: as command-line words, if it is of rules.
+    if robots would carry more than all loads; ``rules``: as command-line words, if it is of rules;
+    ``of_arms``: whether it asks for other arms.
     """
 
     name: str
     enough: Callable[[], str]
     rules: tuple[str, ...] = ()
     of_arms: bool = False
-
-    def beside(self, rule: str) -> Remedy:
-        """Return the remedy combined with a relaxed rule."""
-        name, rules = f"{rule} together with {self.name}", (rule, *self.rules)
-        typed = f"{name} (--rule {' --rule '.join(rules)})" if self.rules else name
-        return Remedy(name, lambda: typed, rules if self.rules else ())
 
 
 @dataclass(frozen=True)
@@ -334,7 +323,16 @@ class Remedies:
         """
         ways = [*self._alone(finished=finished)]
         if not finished and all(way.of_arms for way in ways):  # of the same arms two rules ask less
-            ways += islice(self._in_pairs(ways), 1)
+            (rules,) = (each for each in self.problem.every_filter if each.name == "rules")
+            pairs = (
+                (f"{text} together with {other.name}", (text, *other.rules), bool(other.rules))
+                for text, problem in rules.ways(self.problem)
+                for other in Remedies(problem, self.look)._alone()
+                if not (ways and other.of_arms)
+            )
+            for name, both, of_rules in islice(pairs, 1):
+                typed = f"{name} (--rule {' --rule '.join(both)})" if of_rules else name
+                ways.append(Remedy(name, partial(str, typed)))
         if not ways and finished:  # no robot can do anything about it
             return "; no robot helps: it needs more bond or friction, less load, or other limits"
         if not ways:
@@ -347,19 +345,29 @@ class Remedies:
     def _alone(self, *, finished: bool = False) -> Iterator[Remedy]:
         """Yield every single relaxation that suffices; of each rule, and of arms, only the least.
 
-        ``finished``: as of `said`; rules, arms and reaches are then left out.
+        Then reaches and softer grips with which a plan exists. ``finished``: as of `said`; rules,
+        arms and reaches are then left out. Payloads are not asked where no state is held within
+        them, and every robot bears its brick.
         """
+        problem, scene = self.problem, self.problem.network.scene
+        kept = problem.rules.keeps_payloads(stands=False) and problem.demands
+        idle = () if kept or _unbearable(problem) else ("payload",)
         done = set[tuple[str, str]]()
-        for each in self.problem.every_filter:
-            if (finished and each.name in OF_ROBOTS) or each.name in self._idle:
+        for each in problem.every_filter:
+            if each.name in (*idle, *(OF_ROBOTS if finished else ())):
                 continue
-            for text, problem in each.ways(self.problem):
+            for text, relaxed in each.ways(problem):
                 key = each.name, text.partition("=")[0] * (each.name == "rules")
-                if key not in done and self.look.exists(problem):
+                if key not in done and self.look.exists(relaxed):
                     done.add(key)
-                    yield self._remedy(each.name, text, problem)
-        if not finished:
-            yield from (Remedy(words, partial(str, words)) for words in self._in_other_scenes())
+                    yield self._remedy(each.name, text, relaxed)
+        if finished or problem.scenarios or recipe_of(problem.engine) is None:
+            return
+        if not scene.has_arms:
+            reaches = _enough_reach(scene, self._exists_in)
+            yield from (Remedy(words, partial(str, words)) for words in reaches)
+        if ground_moves(scene) and (soft := self._softer()):
+            yield Remedy(soft, partial(str, soft))
 
     def _remedy(self, name: str, text: str, relaxed: States) -> Remedy:
         """Return the remedy of a filter, whose relaxation in words is known to suffice."""
@@ -373,30 +381,13 @@ class Remedies:
         enough |= {"stands": self._enough_bond, "payload": self._enough_payload}
         return Remedy(text, enough.get(name, partial(str, text)), of_arms=name == "arms")
 
-    def _in_other_scenes(self) -> Iterator[str]:
-        """Yield reaches and softer grips with which a plan exists, in words."""
-        scene = self._scene
-        if self.problem.scenarios or recipe_of(self.problem.engine) is None:
-            return
-        if not scene.has_arms:
-            yield from _enough_reach(scene, self._exists_in)
-        if ground_moves(scene) and (soft := self._softer()):
-            yield soft
-
-    def _in_pairs(self, alone: list[Remedy]) -> Iterator[Remedy]:
-        """Yield pairs of a relaxed rule and a remedy; other arms only if insufficient alone."""
-        (rules,) = (each for each in self.problem.every_filter if each.name == "rules")
-        for text, problem in rules.ways(self.problem):
-            for other in Remedies(problem, self.look)._alone():
-                if not (alone and other.of_arms):
-                    yield other.beside(text)
-
     def _payload_if_ignored(self, problem: States) -> str:
         """Return the least payload, as the peak force of a problem without payloads; in words."""
         held = worst_least(problem, LARGEST, self.look)
         if held > whole_load(problem.network):
             return self._softer()
-        return _describe_payload(max(held, _heaviest(self.problem)))
+        said = _payload_text(max(held, _heaviest(self.problem)))
+        return f"a payload of {said} N (--payload {said})"
 
     def _softer(self) -> str:
         """Describe the stiffest sufficient grips; empty if none suffice."""
@@ -427,7 +418,7 @@ class Remedies:
         def exists(payload: float) -> bool:
             return self.look.exists(self.problem.carrying(payload))
 
-        low = min(robot.payload for robot in self._scene.robots)
+        low = min(robot.payload for robot in self.problem.network.scene.robots)
         high = 2 * low
         while not exists(high):
             low, high = high, 2 * high
@@ -436,11 +427,11 @@ class Remedies:
         while most - least > 1:
             middle = (least + most) // 2
             least, most = (least, middle) if exists(middle * step) else (middle, most)
-        if self._is_free and most * step > max(
-            whole_load(self.problem.network), _heaviest(self.problem)
-        ):
+        is_free, loaded = self.problem.rules.method == FREE, whole_load(self.problem.network)
+        if is_free and most * step > max(loaded, _heaviest(self.problem)):
             return ""
-        return _describe_payload(most * step)
+        said = _payload_text(most * step)
+        return f"a payload of {said} N (--payload {said})"
 
     def _enough_limit(self, limit: Limit) -> str:
         """Return the least feasible bound of all limits with a label, in words."""
@@ -451,7 +442,8 @@ class Remedies:
             return bears if limit.label == PROP_EXCESS else f"no limit on {limit.label}"
         rest = tuple(each for each in self.problem.limits if each not in found)
         least = worst_least(replace(self.problem, limits=rest), name, self.look)
-        forces = (LARGEST, *(robot_response(r.name) for r in self._scene.robots))
+        robots = self.problem.network.scene.robots
+        forces = (LARGEST, *(robot_response(r.name) for r in robots))
         if name in forces and least > whole_load(self.problem.network):
             return self._softer()
         if is_tolerance(limit.label):
@@ -459,66 +451,38 @@ class Remedies:
         most = _rounded_up(found[0].shown(least))
         return f"{limit.label}={most:.6g} instead of {found[0].shown(bound):g}"
 
-    @property
-    def _is_free(self) -> bool:
-        return self.problem.rules.method == FREE
-
-    @cached_property
-    def _idle(self) -> tuple[str, ...]:
-        """Payloads where no state is held within them, and every robot bears its brick."""
-        kept = self.problem.rules.keeps_payloads(stands=False)
-        asked = (kept and self.problem.demands) or _unbearable(self.problem)
-        return () if asked else ("payload",)
-
-    @property
-    def _scene(self) -> Scene:
-        return self.problem.network.scene
-
     def _exists_in(self, scene: Scene) -> bool:
         return self.look.exists(self.problem.in_scene(scene))
-
-
-def _describe_payload(newton: float) -> str:
-    said = _payload_text(newton)
-    return f"a payload of {said} N (--payload {said})"
 
 
 def _unbearable(problem: States) -> dict[int, str]:
     """Return the steps in which a robot cannot bear its brick, and why; of rules there are none."""
     steps: Sequence[OpenStep] = getattr(problem.rules, "steps", ())
-    return unbearable(_scenes(problem), steps, problem.rules.begin)
-
-
-def _scenes(problem: States) -> tuple[Scene, ...]:
-    return problem.network.scene, *problem.worlds
+    return unbearable((problem.network.scene, *problem.worlds), steps, problem.rules.begin)
 
 
 def _heaviest(problem: States) -> float:
     """Return the heaviest brick of a build by rules, with the tool of any robot of the team, N."""
-    rules, scenes = problem.free_rules, _scenes(problem)
-    bricks = slice(*sorted(rules.span(scenes[0])))
-    pairs = ((scene, scene.robots[r]) for scene in scenes for r in rules.team(scenes[0]))
-    return max(float(loads(scene, robot)[bricks].max()) for scene, robot in pairs)
+    rules, scene = problem.free_rules, problem.network.scene
+    bricks, team = slice(*sorted(rules.span(scene))), rules.team(scene)
+    every = (loads(s, s.robots[r])[bricks] for s in (scene, *problem.worlds) for r in team)
+    return max(float(own.max()) for own in every)
 
 
 def _where(problem: States, reached: int) -> str:
-    """Name the step or the brick at which builds stop, and the load there."""
-    if problem.rules.method == FREE:
-        return _where_rules_stop(problem, problem.free_rules, reached)
-    heavy = "".join(f": in step {n} {why}" for n, why in [*_unbearable(problem).items()][:1])
-    last = problem.space.levels
-    return f"step {reached + 1} of {last} has no state that is allowed{heavy}"
+    """Name the step or the brick at which builds stop, and the load there.
 
-
-def _where_rules_stop(problem: States, rules: FreeRules, reached: int) -> str:
-    """Name the brick that is never placed or removed, and the next that is too heavy."""
+    By rules it is the brick that is never placed or removed, and the next that is too heavy.
+    """
     placed, space = problem.network.scene.placed, problem.space
-    end, down = space.bricks_at(space.levels), rules.takes_down
+    if problem.rules.method != FREE:
+        heavy = "".join(f": in step {n} {why}" for n, why in [*_unbearable(problem).items()][:1])
+        return f"step {reached + 1} of {space.levels} has no state that is allowed{heavy}"
+    rules, end = problem.free_rules, space.bricks_at(space.levels)
     if reached == space.levels:
         return f"after brick {placed[end - 1].name} the build cannot end"
-    at = space.bricks_at(reached) + (not down)
-    left = range(at, end, -1) if down else range(at, end + 1)
-    done = "removed" if down else "placed"
+    down, at = rules.takes_down, space.bricks_at(reached) + (not rules.takes_down)
+    left, done = (range(at, end, -1), "removed") if down else (range(at, end + 1), "placed")
     where = f"brick {placed[at - 1].name} ({at} of {len(placed)}) is never {done}"
     book = RuleBook(problem.network, rules, problem.worlds)
     for bricks in left:

@@ -31,27 +31,24 @@ def find_states(problem: States, formulation: Formulation, run: Run) -> Found:
     formulation.require_options(run.options)
     if run.lazy:  # it is at any rate
         require_proof(run.proof)
-    with keep(problem.resources.executor, problem.resources.workers):
-        return _found(problem, formulation, run)
-
-
-def _found(problem: States, formulation: Formulation, run: Run) -> Found:
     start = time.perf_counter()
     told = {} if run.progress is None else {"progress": run.progress}
     limit = {"seconds": run.left} if isfinite(run.left) else {}
-    with run.clock.needed("finding a first plan"):
-        options = {**run.options, **told, **limit}
-        selection = _selected(formulation, problem, options, explain=run.explains)
-    selection = replace(selection, stopped=run.clock.why(selection.stopped))
-    solved = time.perf_counter()
-    if run.proof and run.progress is not None:
-        run.progress("proving that no plan is better")
-    twin = replace(problem)  # which knows nothing that was computed for the search
-    steps = steps_in_hands(ordered(twin, selection.order).space, selection.states, selection.grips)
-    hint = dict(enumerate(selection.visited, start=twin.space.first))
-    exact = formulation.kind is FormulationKind.EXACT
-    judge = partial(judge_schedule, twin, selection, steps, hint, exact=exact)
-    selection, certificate = proven(selection, judge, run)
+    with keep(problem.resources.executor, problem.resources.workers):
+        with run.clock.needed("finding a first plan"):
+            options = {**run.options, **told, **limit}
+            selection = _selected(formulation, problem, options, explain=run.explains)
+        selection = replace(selection, stopped=run.clock.why(selection.stopped))
+        solved = time.perf_counter()
+        if run.proof and run.progress is not None:
+            run.progress("proving that no plan is better")
+        twin = replace(problem)  # which knows nothing that was computed for the search
+        space = ordered(twin, selection.order).space
+        steps = steps_in_hands(space, selection.states, selection.grips)
+        hint = dict(enumerate(selection.visited, start=twin.space.first))
+        exact = formulation.kind is FormulationKind.EXACT
+        judge = partial(judge_schedule, twin, selection, steps, hint, exact=exact)
+        selection, certificate = proven(selection, judge, run)
     problem.certified.update(twin.certified)
     seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
     return Found(selection, certificate, steps, seconds)

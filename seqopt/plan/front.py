@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -24,7 +24,7 @@ from seqopt.judge._schedules import ordered, plan_values
 from seqopt.plan._answers import PROOF, called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
 from seqopt.plan.pose import states_of
-from seqopt.plan.solve import INTERRUPTED, RANGE, keeping, leaves
+from seqopt.plan.solve import RANGE, best_within, leaves
 from seqopt.problem.amounts import REGRIPS, STEPS
 from seqopt.problem.problem import Problem
 from seqopt.responses._grip_sets import Moved, most_moved
@@ -73,7 +73,9 @@ class FrontProblem:
                     f"{', '.join(self.names)}"
                 )
         self._round = np.array([(rounding or {}).get(name, 0.0) for name in self.names])
-        self._rounding = rounding
+        self._rounding, self._known = rounding, dict[Order, States]()
+        peaks = [goal.is_peak for goal in problem.goals]
+        self._counted = None if all(peaks) else peaks.index(False)  # adds up: it constrains paths
 
     def __repr__(self) -> str:
         return f"<FrontProblem of {self._problem}>"
@@ -88,13 +90,17 @@ class FrontProblem:
         return tuple(map(str, self._problem.goals))
 
     @cached_property
-    def _known(self) -> dict[Order, States]:
-        return {}
-
-    @cached_property
     def _explored(self) -> tuple[Visited, Space]:
         """All feasible states, and their space; raises `InfeasibleError` if no build ends."""
-        found = explore(self._problem, tell=_require_memory)
+
+        def tell(found: Explorer) -> None:
+            if found.nbytes > free_memory():
+                raise ProblemError(
+                    "pareto: the states do not fit the memory; give an order, or rules with fewer "
+                    "states"
+                )
+
+        found = explore(self._problem, tell=tell)
         if not found.whole:
             raise confirmed(self._problem, "the search")
         found.refine()
@@ -104,18 +110,9 @@ class FrontProblem:
         amounts[:, peaks] = _rounded_up(amounts[:, peaks], self._round[peaks])
         return Visited(replace(graph, amounts=amounts), states), found.space
 
-    @property
-    def _visited(self) -> Visited:
-        return self._explored[0]
-
-    @property
-    def _counted(self) -> int | None:
-        """Index of the goal that adds up over moves, if any: its bound constrains paths."""
-        return next((k for k, goal in enumerate(self._problem.goals) if not goal.is_peak), None)
-
     def best_below(self, bounds: Floats) -> Solution | None:
         """Return a non-dominated plan with values below bounds (k,), SI units, if there is any."""
-        graph = self._below(bounds)
+        graph, (visited, space) = self._below(bounds), self._explored
         if not graph.ends[reached(graph)].any():
             return None
         point = np.zeros(len(bounds))
@@ -123,13 +120,13 @@ class FrontProblem:
             graph, point[k] = keep_best(graph, k)
             if not point[k] < bounds[k]:
                 return None
-        order, states = self._explored[1].path(self._visited.of(fewest_moves(graph)))
+        order, states = space.path(visited.of(fewest_moves(graph)))
         values = tuple(point.tolist())
         return Solution(states, values, values, order=order)
 
     def _below(self, bounds: Floats) -> Graph:
         """Return the subgraph of the moves to states whose peaks are all below bounds."""
-        graph = self._visited.graph
+        graph = self._explored[0].graph
         return graph.only(((graph.amounts < bounds) | ~np.array(graph.peaks)).all(axis=1))
 
     def is_empty_below(self, bounds: Floats) -> bool:
@@ -157,14 +154,6 @@ class FrontProblem:
         if plan.order not in self._known:
             self._known[plan.order] = ordered(self._problem, plan.order)
         return self._known[plan.order]
-
-
-def _require_memory(found: Explorer) -> None:
-    """Raise a `ProblemError` if the explored states exceed the free memory."""
-    if found.nbytes > free_memory():
-        raise ProblemError(
-            "pareto: the states do not fit the memory; give an order, or rules with fewer states"
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -195,12 +184,6 @@ class Front(Terse):
         return (
             f"<Front: {outside}{len(self.table)} plans, {whole}; {', '.join(map(str, self.table))}>"
         )
-
-
-def _moved(front: Front) -> tuple[Moved, ...]:
-    """Return the largest displacement of every plan, over the limit of the linear range."""
-    pairs = zip(front.engines, front.steps, strict=True)
-    return tuple(most_moved(engine, steps, {}) for engine, steps in pairs)
 
 
 def find_front(
@@ -235,27 +218,24 @@ def find_front(
             posed = FrontProblem(states, rounding)
         left = max(0.0, end - time.perf_counter())
         front = _front_of(posed, formulation, left, progress, watch)
-        return replace(front, moved=watch.spare(RANGE, partial(_moved, front), ()))
 
-    front = measured(problem)
-    if problem.says_range or not front.moved:
-        return front
-    farthest = max(front.moved, key=lambda each: each.share)
-    if front.stopped == INTERRUPT:
-        return replace(front, beyond=INTERRUPTED * leaves(farthest))
-    try:  # all of its plans keep the range, or none can
-        kept, why = keeping(front, farthest, lambda: measured(problem.within_range(1.0)))
-    except KeyboardInterrupt:
-        kept, why = replace(front, stopped=INTERRUPT), INTERRUPTED
-    return replace(kept, beyond=why)
+        def largest() -> tuple[Moved, ...]:
+            pairs = zip(front.engines, front.steps, strict=True)
+            return tuple(most_moved(engine, steps, {}) for engine, steps in pairs)
+
+        return replace(front, moved=watch.spare(RANGE, largest, ()))
+
+    def farthest(front: Front) -> Moved | None:  # all of its plans keep the range, or none can
+        return max(front.moved, key=lambda each: each.share, default=None)
+
+    return best_within(problem, measured, farthest, lambda front: replace(front, stopped=INTERRUPT))
 
 
 def _front_of(
     problem: FrontProblem, formulation: Formulation, seconds: float, progress: Tell, clock: Clock
 ) -> Front:
     """Return the Pareto set of a problem, its points recomputed, with the proof of completeness."""
-    start = time.perf_counter()
-    name = formulation.name
+    start, name = time.perf_counter(), formulation.name
     limit = min(seconds, clock.left)
     solve = partial(formulation.solve, problem.anew(), seconds=limit, progress=progress)
     with clock.needed("finding a first plan"):
@@ -265,24 +245,33 @@ def _front_of(
     points = np.array([plan.objective for plan in chosen])
     with readable(name):
         plans = tuple(map(problem.steps, chosen))
-    for point, plan in zip(points, chosen, strict=True):
+    for i, (point, plan) in enumerate(zip(points, chosen, strict=True)):
         values = problem.values(plan)
         if not (np.abs(values - point) <= TOLERANCE * np.abs(point)).all():
             raise SolverError(
                 f"the values of a plan are {values.tolist()}, not {point.tolist()} as claimed"
             )
-    for i, point in enumerate(points):
         if (np.delete(points, i, axis=0) <= point).all(axis=1).any():
             raise SolverError(f"the point {point.tolist()} is dominated by another one")
+
+    def complete() -> bool:
+        bounds = upper_bounds(points)
+        for bound in with_progress("proving that no plan is missing", bounds, progress):
+            if not problem.is_empty_below(bound):
+                raise SolverError(f"the set lacks a point below {bound.tolist()}")
+        return True
+
     stopped = clock.why(chosen[0].stopped)
     if not stopped:
-        complete = partial(_require_complete, problem, points, progress)
-        whole = clock.spare(PROOF, lambda: complete() or True, otherwise=False)
+        whole = clock.spare(PROOF, complete, otherwise=False)
         stopped = "" if whole else clock.left_out[PROOF]
     spent = {"solve": solved - start, "verify": time.perf_counter() - solved}
+    counts = {"steps": [len(steps) for steps in plans]}
+    counts["regrips"] = [sum(s.kind is StepKind.REPOSITION for s in steps) for steps in plans]
+    table = pd.DataFrame(points, columns=[*problem.names])
+    table = table.assign(**{name: own for name, own in counts.items() if name not in table})
     engines = tuple(map(problem.engine, chosen))
-    found_points = _table(problem, points, plans)
-    return Front(found_points, plans, engines, not stopped, spent, stopped=stopped)
+    return Front(table, plans, engines, not stopped, spent, stopped=stopped)
 
 
 def _found(name: str, problem: FrontProblem, solve: Callable[[], object]) -> list[Solution]:
@@ -300,14 +289,6 @@ def _found(name: str, problem: FrontProblem, solve: Callable[[], object]) -> lis
     if not problem.is_empty_below(np.full(len(problem.names), np.inf)):
         raise SolverError(f"formulation {name} found no plan, and some are allowed")
     raise InfeasibleError("pareto: no plan is within the limits; relax one")
-
-
-def _require_complete(problem: FrontProblem, points: Floats, progress: Tell) -> None:
-    """Raise a `SolverError` if a plan is below an upper bound of the non-dominated region."""
-    bounds = upper_bounds(points)
-    for bound in with_progress("proving that no plan is missing", bounds, progress):
-        if not problem.is_empty_below(bound):
-            raise SolverError(f"the set lacks a point below {bound.tolist()}")
 
 
 def upper_bounds(points: Floats) -> Floats:
@@ -331,18 +312,6 @@ def upper_bounds(points: Floats) -> Floats:
         if not kept or not (np.array(kept) >= corner).all(axis=1).any():
             kept.append(corner)
     return np.array(kept)
-
-
-def _table(problem: FrontProblem, points: Floats, plans: Sequence[Sequence[Step]]) -> pd.DataFrame:
-    table = pd.DataFrame(points, columns=[*problem.names])
-    counts = {
-        "steps": [len(steps) for steps in plans],
-        "regrips": [sum(s.kind is StepKind.REPOSITION for s in steps) for steps in plans],
-    }
-    for name, column in counts.items():
-        if name not in table:
-            table[name] = column
-    return table
 
 
 def pick(table: pd.DataFrame, least: str, under: Mapping[str, float] | None = None) -> int:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from itertools import pairwise
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -45,10 +45,6 @@ from seqopt.responses.table import (
 from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
 from seqopt.stability._steps import stability_table
-
-if TYPE_CHECKING:
-    from seqopt.graph._decision_search import Windows
-
 
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
@@ -119,7 +115,7 @@ class Plan(ShownBuild):
     beyond: str = ""
 
     def __repr__(self) -> str:
-        what = f"{self.scene_name!r}, {self.method!r}, " if self.steps else ""
+        what = f"{self.engine.network.scene.name!r}, {self.method!r}, " if self.steps else ""
         count = f"{len(self.steps)} steps" if self.steps else f"{len(self.nodes)} nodes"
         outside = f"{OUTSIDE}: " if self.outside else ""
         return f"Plan({outside}{what}by {self.formulation.name}: {count}, {self._value})"
@@ -175,11 +171,6 @@ class Plan(ShownBuild):
     def standing(self) -> Standing | None:
         """The demand that every state stands, if there was one."""
         return self.graph.standing
-
-    @property
-    def scene_name(self) -> str:
-        """The name of the scene."""
-        return self.engine.network.scene.name
 
     @property
     def method(self) -> str:
@@ -238,11 +229,6 @@ class Plan(ShownBuild):
         return self.selection.trace
 
     @property
-    def among(self) -> str:
-        """Which candidates were considered, in words; empty for all."""
-        return self._of_scene.among
-
-    @property
     def status(self) -> Status:
         """Optimality status of the plan, among the candidates that were considered.
 
@@ -293,16 +279,16 @@ class Plan(ShownBuild):
         """How many different models were solved."""
         if self.looked_at is not None:
             return self.looked_at
-        own = self.graph.models if self.search is None else self._window_models
+        own = self.graph.models
+        if self.search is not None:
+            own = window_models(self.decisions.schedule, self.choice)
         return own + self.selection.effort[1]
 
     @property
     def models_needed(self) -> int:
         """How many different models the formulation needs: fewer for window searches."""
-        return self._window_models if self.formulation.windowed == () else self.models
-
-    @property
-    def _window_models(self) -> int:
+        if self.formulation.windowed != ():
+            return self.models
         return window_models(self.decisions.schedule, self.choice)
 
     @property
@@ -363,17 +349,33 @@ class Plan(ShownBuild):
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
-        if not self.steps:
-            return self._summary_of_costs()
-        graph, proof, scene = self._of_scene, self.certificate, self.engine.network.scene
+        proof = self.certificate
+        if not self.steps:  # a path through an instance, or given costs
+            known: dict[str, object] = getattr(self.problem, "facts_of", dict)()
+            spent = {} if proof is None else dict(proof.spent)
+            whole = {**self._named(), **known, **self._answer(), "budgets": spent}
+            return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}
+        graph, scene = self._of_scene, self.engine.network.scene
         asked = self.problem if isinstance(self.problem, Problem) else graph
         in_proof = None if proof is None or self.gap is None else proof.models or self.models
+        of_order: dict[str, object] = {}
+        if self.order:
+            least, proven = self._order_bound()
+            of_order = {
+                "order": [*self.order],
+                "orders": self.problem.orders.value,  # type: ignore[union-attr]  # one was sought
+                "order_status": str(self.status),
+                "order_bound": least if isfinite(least) else None,
+                "order_bound_proven": proven,
+                "order_evaluated": self.selection.effort[0],
+                "order_stopped": self.stopped,
+            }
         return {
             "scene": scene.name,
             "schedule": self.method,
             **self._named(),
             **graph.described(self.formulation.aim, _said_limits(asked.limits)),
-            "candidates": f"heuristic: {self.among}" if self.among else "all",
+            "candidates": f"heuristic: {graph.among}" if graph.among else "all",
             **self._answer(),
             "budgets": graph.spent(self.objective, self.selection),
             "steps": len(self.steps),
@@ -389,53 +391,44 @@ class Plan(ShownBuild):
             "models_in_six_digits": graph.six_digit_models,
             "models_in_proof": in_proof,  # all where costs are given
             "states_in_proof": 0 if proof is None else proof.states,
-            **self._of_order(),
+            **of_order,
             "seconds": dict(self.seconds),
             **provenance(self.engine),
         }
 
-    def _summary_of_costs(self) -> dict[str, object]:
-        """Return the summary of a path through an instance, or of given costs."""
-        known: dict[str, object] = getattr(self.problem, "facts_of", dict)()
-        spent = {} if self.certificate is None else dict(self.certificate.spent)
-        whole = {**self._named(), **known, **self._answer(), "budgets": spent}
-        return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}
-
     def brief(self) -> dict[str, object]:
         """Return the entries of the summary that need no responses."""
-        own = {"scene": self.scene_name, "schedule": self.method, **self._named()}
+        own = {"scene": self.engine.network.scene.name, "schedule": self.method, **self._named()}
         return {**own, **self._answer(), "steps": len(self.steps)}
 
     def _named(self) -> dict[str, object]:
         return {"formulation": self.formulation.name, "kind": self.formulation.kind.value}
 
     def _answer(self) -> dict[str, object]:
-        """Return the entries of a summary about values and what is proven of them."""
-        proof, names = self.certificate, self.graph.names_of(self.formulation.aim)
+        """Return the entries of a summary about values and what is proven of them.
+
+        The bound of a search that stopped early is the one that it claims.
+        """
+        proof, names, claimed = self.certificate, self.goals, self.selection.bound
+        bounds: tuple[float, ...] = () if proof is None else proof.bounds
+        if proof is None and self.objective:  # of a search without models nothing is known
+            bounds = claimed
+        elif proof is not None and self.stopped and not isfinite(proof.gap):
+            bounds = tuple(map(max, claimed, bounds))
+        found = self.in_display_units(self.graph.bounded(bounds))
         rests_on = () if proof is None else self.graph.bounded(proof.rests_on)
         narrowed = self.graph.among and "optimal" in self.status
-        claimed = None if proof is None or self.gap is None else _known_gap(proof.claimed_gap)
+        left = None if proof is None or self.gap is None else _known_gap(proof.claimed_gap)
         return {
             "status": f"{self.status} among these" if narrowed else str(self.status),
             "ended": self.ended.value,
             "stopped": self.stopped,
             "objective": self.objective,
-            "bound": self._bounds(),
+            "bound": {name: bound if isfinite(bound) else None for name, bound in found.items()},
             "bound_rests_on": dict(zip(names, map(str, rests_on), strict=False)),
             "gap": self.gap,
-            "claimed_gap": claimed,
+            "claimed_gap": left,
         }
-
-    def _bounds(self) -> dict[str, float | None]:
-        """Return the lower bound of each goal; the claimed one if the search stopped early."""
-        proof, chosen = self.certificate, self.selection
-        bounds: tuple[float, ...] = () if proof is None else proof.bounds
-        if proof is None and self.objective:  # of a search without models nothing is known
-            bounds = chosen.bound
-        elif proof is not None and chosen.stopped and not isfinite(proof.gap):
-            bounds = tuple(map(max, chosen.bound, bounds))
-        found = self.in_display_units(self.graph.bounded(bounds))
-        return {name: bound if isfinite(bound) else None for name, bound in found.items()}
 
     def _order_bound(self) -> tuple[float, bool]:
         """Return the lower bound of the first goal over all orders, and whether that is proven."""
@@ -443,21 +436,6 @@ class Plan(ShownBuild):
         if proof is None or not isfinite(proof.bounds[0]):
             return claimed, False
         return proof.bounds[0], True
-
-    def _of_order(self) -> dict[str, object]:
-        """Return the entries of a summary about the optimized order, if one was sought."""
-        if not self.order:
-            return {}
-        bound, proven = self._order_bound()
-        return {
-            "order": [*self.order],
-            "orders": self.problem.orders.value,  # type: ignore[union-attr]  # one was sought
-            "order_status": str(self.status),
-            "order_bound": bound if isfinite(bound) else None,
-            "order_bound_proven": proven,
-            "order_evaluated": self.selection.effort[0],
-            "order_stopped": self.stopped,
-        }
 
     @property
     def order_bound_said(self) -> str:
@@ -480,10 +458,24 @@ class Plan(ShownBuild):
         """
         if not self.graph.candidates:
             return self.grips()
-        table = _moves_table(self.decisions, self.choice, self.grips())
-        if self.formulation.aim is None or self.graph.scenarios:
+        schedule, nodes = self.decisions.schedule, self.decisions.nodes(self.choice)
+        moves, brick_of = schedule.moves, schedule.scene.brick_of_node
+        held = {(row["robot"], row["from_step"]): row for row in self.grips().to_dict("records")}
+        own = [held[move.robot, move.step] for move in moves]
+        columns = {
+            "move": range(1, len(moves) + 1),
+            "step": [move.step for move in moves],
+            "to_step": [row["to_step"] for row in own],
+            "bricks": [move.bricks for move in moves],
+            "robot": [move.robot for move in moves],
+            "brick": [brick_of[node].name for node in nodes],
+            "node": nodes,
+            "largest_force_N": [row["largest_force_N"] for row in own],
+            "candidates": [len(move.candidates) for move in moves],
+        }
+        table, aim = pd.DataFrame(columns), self.formulation.aim
+        if aim is None or self.graph.scenarios:
             return table
-        aim = self.formulation.aim
         return table.join(_move_costs(self.decisions, self.choice, aim, self.search))
 
     def alternatives(self) -> pd.DataFrame:
@@ -492,16 +484,27 @@ class Plan(ShownBuild):
         Result: a row per choice, by step; ``second_node`` where two moves are open. SI units. Where
         the responses of all choices are not kept, those that go with the plan's choices before.
         """
-        parts = []
-        for choices, before in _looked_at(self.decisions, self.choice, self.search):
-            table = _choice_table(self.decisions, choices)
+        problem, parts = self.decisions, []
+        looked: list[tuple[StepChoices, int | None]] = []  # and the node of an earlier move
+        if self.search is None and not problem.evaluation.streams:
+            looked = [(choices, None) for choices in problem.evaluation.steps]
+        else:
+            nodes, found = (
+                problem.nodes(self.choice),
+                self.search or Windows(problem, [*self.choice]),
+            )
+            for k in range(len(problem.schedule.moves)):
+                pair = ((c, nodes[k - 1] if len(c.moves) == 2 else None) for c in found.row(k))
+                looked += pair
+        for choices, before in looked:
+            table = _choice_table(problem, choices)
             columns = ["node", "second_node"] if before is None else ["second_node"]
             columns = columns[: table.index.nlevels]
-            nodes = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
+            rows = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
             if before is not None:
-                nodes.insert(0, "node", before)
-            nodes.insert(0, "step", choices.step.number)
-            parts.append(pd.concat([nodes, table.reset_index(drop=True)], axis=1))
+                rows.insert(0, "node", before)
+            rows.insert(0, "step", choices.step.number)
+            parts.append(pd.concat([rows, table.reset_index(drop=True)], axis=1))
         return pd.concat(parts).sort_values("step", kind="stable", ignore_index=True)
 
 
@@ -523,30 +526,6 @@ def _move_costs(
     return pd.DataFrame(rows)
 
 
-def _moves_table(problem: Decisions, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:
-    """Return the choice, a row per move, as of `seqopt.plan.plan.Plan.table` without costs.
-
-    ``grips``: of the plan, as of `seqopt.responses.table.grips_table`.
-    """
-    moves, nodes = problem.schedule.moves, problem.nodes(choice)
-    brick_of = problem.schedule.scene.brick_of_node
-    held = {(row["robot"], row["from_step"]): row for row in grips.to_dict("records")}
-    own = [held[move.robot, move.step] for move in moves]
-    return pd.DataFrame(
-        {
-            "move": range(1, len(moves) + 1),
-            "step": [move.step for move in moves],
-            "to_step": [row["to_step"] for row in own],
-            "bricks": [move.bricks for move in moves],
-            "robot": [move.robot for move in moves],
-            "brick": [brick_of[node].name for node in nodes],
-            "node": nodes,
-            "largest_force_N": [row["largest_force_N"] for row in own],
-            "candidates": [len(move.candidates) for move in moves],
-        }
-    )
-
-
 def _choice_table(problem: Decisions, choices: StepChoices) -> pd.DataFrame:
     """Return responses and cost of every choice of a step, by its nodes, SI units."""
     axes = next(iter(choices.responses.values())).ndim
@@ -555,16 +534,3 @@ def _choice_table(problem: Decisions, choices: StepChoices) -> pd.DataFrame:
     index = pd.MultiIndex.from_product([move.candidates for move in moves], names=names)
     columns: Mapping[str, Floats] = {**choices.responses, "cost": problem.step_costs(choices)}
     return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
-
-
-def _looked_at(
-    problem: Decisions, choice: tuple[int, ...], search: Windows | None
-) -> Iterator[tuple[StepChoices, int | None]]:
-    """Yield the evaluated steps and, if the earlier move is fixed, its node."""
-    if search is None and not problem.evaluation.streams:
-        yield from ((each, None) for each in problem.evaluation.steps)
-        return
-    nodes, found = problem.nodes(choice), search or Windows(problem, [*choice])
-    for k in range(len(problem.schedule.moves)):
-        for choices in found.row(k):
-            yield choices, nodes[k - 1] if len(choices.moves) == 2 else None

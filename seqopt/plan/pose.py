@@ -126,8 +126,22 @@ def states_of(problem: Problem) -> States:
 
 
 def _of_moves(problem: Problem) -> States:
-    """Return the graph of candidates of moves; over scenarios with limits that hold in all."""
-    _require_moves(problem)
+    """Return the graph of candidates of moves; over scenarios with limits that hold in all.
+
+    Raises a `ProblemError` for goals and constraints that candidates of moves do not support.
+    """
+    why = {
+        "orders": problem.orders is not None,
+        f"aim {', '.join(map(str, problem.goals))}": problem.goals not in ((), (SUM,), (MINMAX,)),
+        "stands": problem.stands is not None,
+        f"filter {', '.join(map(str, problem.filters))}": bool(problem.filters),
+        f"resource {', '.join(map(str, problem.paths))}": bool(problem.paths),
+    }
+    if (name := next((name for name, asked in why.items() if asked), None)) is not None:
+        raise ProblemError(
+            f"{name}: it is about states of the build, not about candidates alone; take "
+            "schedule_search or another formulation of states"
+        )
     budgets = parse_budgets(problem.budgets)
     if problem.scenarios and budgets:
         raise ProblemError(
@@ -139,23 +153,6 @@ def _of_moves(problem: Problem) -> States:
     decisions = pose_decisions(*asked, also, problem.resources)
     found = of_decisions(replace(decisions, budgets=budgets))
     return over_scenarios(found, problem.scenarios, problem.over) if problem.scenarios else found
-
-
-def _require_moves(problem: Problem) -> None:
-    """Raise a `ProblemError` for goals and constraints that candidates of moves do not support."""
-    of_states = problem.goals not in ((), *((goal,) for goal in AIMS.values()))
-    why = {
-        "orders": problem.orders is not None,
-        f"aim {', '.join(map(str, problem.goals))}": of_states,
-        "stands": problem.stands is not None,
-        f"filter {', '.join(map(str, problem.filters))}": bool(problem.filters),
-        f"resource {', '.join(map(str, problem.paths))}": bool(problem.paths),
-    }
-    for name in (name for name, asked in why.items() if asked):
-        raise ProblemError(
-            f"{name}: it is about states of the build, not about candidates alone; take "
-            "schedule_search or another formulation of states"
-        )
 
 
 def _of_states(problem: Problem) -> States:

@@ -40,13 +40,14 @@ from seqopt.scene._armed import check_postures
 from seqopt.scene.arm import from_arms
 from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.steps import Step
-from seqopt.work.progress import INTERRUPT, Clock
+from seqopt.work.progress import INTERRUPT
 
 RANGE = "how far it leaves the linear range"  # what it is called where there was no time for it
 NONE_KEEPS = "no plan keeps it"
 UNKNOWN = "whether any plan keeps it is not known"
 INTERRUPTED = f"{UNKNOWN} (interrupted)"
 Kept = TypeVar("Kept")
+Measured = TypeVar("Measured", bound=Any)  # a plan, or a Pareto set
 EFFORT = ("seconds", "max_memory")  # of any formulation; responses have a memory of their own
 
 
@@ -128,9 +129,24 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
             return _chosen(graph, found, how)
 
         plan = solved(asked)
-        return from_arms("with_postures")(asked, plan, solved) if asked.scene.has_arms else plan
+        if asked.scene.has_arms:
+            plan = from_arms("with_postures")(asked, plan, solved)
+        known = {} if plan.search is None or plan.graph.scenarios else plan.search.fields
 
-    return replace(_best_within(problem, best, run.clock), problem=problem)
+        def largest() -> Moved | None:
+            engines = plan.graph.scenarios or (plan.engine,)
+            each = (most_moved(engine, plan.steps, known) for engine in engines)
+            return max(each, key=lambda moved: moved.share)
+
+        moved = run.clock.spare(RANGE, largest, None)
+        if moved is None and run.clock.left_out[RANGE] == INTERRUPT:
+            return interrupted(plan)
+        return replace(plan, moved=moved)
+
+    def interrupted(plan: Plan) -> Plan:
+        return replace(plan, selection=replace(plan.selection, stopped=INTERRUPT))
+
+    return replace(best_within(problem, best, lambda p: p.moved, interrupted), problem=problem)
 
 
 def _fitting(problem: Problem, formulation: Formulation) -> tuple[bool, Formulation]:
@@ -302,41 +318,26 @@ def keeping(found: Kept, moved: Moved, again: Callable[[], Kept]) -> tuple[Kept,
         return found, f"{UNKNOWN} ({message_of(error)})"
 
 
-def _measured(plan: Plan, clock: Clock) -> Plan:
-    """Return a plan with its largest displacement, if it can be computed in time."""
-    known = {} if plan.search is None or plan.graph.scenarios else plan.search.fields
-    engines = plan.graph.scenarios or (plan.engine,)
+def best_within(
+    problem: Problem,
+    measured: Callable[[Problem], Measured],
+    farthest: Callable[[Measured], Moved | None],
+    interrupted: Callable[[Measured], Measured],
+) -> Measured:
+    """Return the best result within the linear range, or the best of all if none is feasible.
 
-    def largest() -> Moved | None:
-        each = (most_moved(engine, plan.steps, known) for engine in engines)
-        return max(each, key=lambda moved: moved.share)
-
-    moved = clock.spare(RANGE, largest, None)
-    if moved is None and clock.left_out[RANGE] == INTERRUPT:
-        return _interrupted(plan)
-    return replace(plan, moved=moved)
-
-
-def _interrupted(plan: Plan) -> Plan:
-    """Return a plan marked as stopped by an interrupt."""
-    return replace(plan, selection=replace(plan.selection, stopped=INTERRUPT))
-
-
-def _best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:
-    """Return the best plan within the linear range, or the best of all if none is feasible.
-
-    ``solved``: solves the problem, with or without the constraint; ``clock``: shared by both
-    solves. If the second is interrupted, the first plan is returned.
+    ``measured``: solves the problem, with or without the constraint; ``farthest``: displacements of
+    a result, if known; ``interrupted``: marks one as stopped by an interrupt. If the second solve
+    is interrupted, the first result is returned.
     """
-    plan = _measured(solved(problem), clock)
-    if problem.says_range or plan.moved is None:
-        return plan
-    if plan.ended is End.INTERRUPTED:
-        return replace(plan, beyond=INTERRUPTED * leaves(plan.moved))
+    found = measured(problem)
+    moved = farthest(found)
+    if problem.says_range or moved is None:
+        return found
+    if found.stopped == INTERRUPT:
+        return replace(found, beyond=INTERRUPTED * leaves(moved))
     try:
-        found, why = keeping(
-            plan, plan.moved, lambda: _measured(solved(problem.within_range(1.0)), clock)
-        )
+        kept, why = keeping(found, moved, lambda: measured(problem.within_range(1.0)))
     except KeyboardInterrupt:
-        found, why = _interrupted(plan), INTERRUPTED
-    return replace(found, beyond=why)
+        kept, why = interrupted(found), INTERRUPTED
+    return replace(kept, beyond=why)

@@ -11,12 +11,12 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Curing
 from seqopt.errors import SolverError
 from seqopt.graph.graph import Graph, TimedGraph
-from seqopt.graph.instance import Instance
+from seqopt.graph.instance import TIME, Instance, _Target
 from seqopt.graph.paths import _to_go
-from seqopt.judge._bounds import Book, Closed, SumBook, is_beyond_limits, limit_below
+from seqopt.judge._bounds import Book, Closed, is_beyond_limits, limit_below
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
-from seqopt.judge.arithmetic import Claim, Labels, Stage, _sum
+from seqopt.judge.arithmetic import Claim, Labels, Stage, _sum, sum_books
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.sequence.schedule import Schedule
@@ -209,18 +209,12 @@ def claimed_time(
         raise SolverError("potentials of a time: give the shares that they are for as well")
     shares = _shares(timed.sizes.astype(float), claim.shares)
     if claim.labels is not None and claim.value is not None:
-        columns = np.array([c for _, c, _ in stage.limited], dtype=np.int64)
-        most = np.array([most for *_, most in stage.limited])
-        _require_labels(instance, claim.labels, len(columns))
+        _require_labels(instance, claim.labels, len(stage.limited))
         acts = acts_of_instance(timed, stage.graph, kept)
         multipliers = np.column_stack([shares[:, 0], shares[:, 1:][:, timed.kinds]])
         clock = Clock(acts, multipliers, limit_below(claim.value), strict=True)
-        books: list[Book] = [clock]
-        if len(columns):
-            limits = most, np.zeros(len(columns), dtype=bool)
-            amounts = stage.graph.amounts[:, columns]
-            books.append(SumBook(stage.graph, acts.move, amounts, limits))
-        closed = Closed(stage.graph, acts.move, books)
+        books = sum_books(stage, _Target("", TIME), claim.value, acts.move)
+        closed = Closed(stage.graph, acts.move, [clock, *books])
         state, values = claim.labels
         own = values[:, 1 : 1 + acts.count]
         since = alike_in_order(acts.groups, acts.entries[state], own)

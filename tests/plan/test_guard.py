@@ -87,7 +87,7 @@ def says_empty(problem):
 
 
 def infinite(problem):
-    amounts = problem._visited.graph.amounts
+    amounts = problem._explored[0].graph.amounts
     amounts.flags.writeable = True
     amounts[:] = np.inf
 

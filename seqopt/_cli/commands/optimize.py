@@ -294,7 +294,7 @@ def _proof(plan: Plan) -> str:
     looked = f"{models:,} model{'s' * (models != 1)}"
     looked += f" and {states:,} state{'s' * (states != 1)}" if states else ""
     looked += " prove it" + f", {plan.models:,} models were searched" * bool(proof.models)
-    other = "no other plan among these" if plan.among else "no other plan"
+    other = "no other plan among these" if plan.graph.among else "no other plan"
     other = f"{OUTSIDE}, where {other}" if plan.is_far else other
     better = (
         "is better" if plan.gap <= TOLERANCE else f"is better by more than {100 * plan.gap:.3g} %"
