@@ -480,7 +480,12 @@ class _LabelBounds:
             books, least = [clock], min(clock.bound, claimed) if of_time else least
         books += sum_books(stage._replace(graph=graph), goal, claimed, move)
         closed = Closed(graph, move, [*books, *self._twins(graph, move)])
-        if closed.is_proof(self._labels(proof, closed.width), self._fallen):
+        margins = self._values[: self._evaluator.margins]
+
+        def fallen(states: Ints) -> Bools:
+            return ~self._rebuilt.may_stand(states, margins)
+
+        if closed.is_proof(self._labels(proof, closed.width), fallen):
             return claimed
         if len(proof.labels):
             raise SolverError(
@@ -499,13 +504,6 @@ class _LabelBounds:
         stands = bricks[self._rebuilt.part_of()[target]]
         steps = StepArrays(stands, nodes[source], nodes[target])
         return [TwinBook(each.twin, steps) for each in problem.paths if each.twin is not None]
-
-    def _fallen(self, states: Ints) -> Bools:
-        """Return which states of some numbers are proven to fall; where it begins none is."""
-        margins = self._values[: self._evaluator.margins]
-        if not self._evaluator.demands(margins):
-            return np.zeros(len(states), dtype=bool)
-        return ~self._rebuilt.may_stand(states, margins)
 
     def _labels(self, proof: LabelProof, width: int) -> tuple[Ints, Floats]:
         """Return labels (N, width) by the numbers of their states, as far as there are such.

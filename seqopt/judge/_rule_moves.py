@@ -367,27 +367,21 @@ class ScheduleTables(_Tables):
         if level == self.last or number in self._heavy:
             return
         source, after, distance = np.arange(len(states)), states, np.zeros(len(states))
-        for robot in range(self.robots):
-            hold = self._holds.get((robot, number))
+        now = [self._holds.get((robot, number)) for robot in range(self.robots)]
+        for robot, hold in enumerate(now):
             if hold is None:
                 after = self._let_go(after, robot)
             elif hold.first == number:
-                rows, others = np.arange(len(after)), self._held_by_others(after, robot, number)
-                wanted = self._wanted(hold)
-                row, after, more = self._take(after, rows, robot, wanted, others)
+                held = after.copy()  # by others: robots before, and those that go on
+                for other, own in enumerate(now):
+                    if own is None or (other >= robot and own.first == number):
+                        held[:, other] = 0
+                rows, wanted = np.arange(len(after)), self._wanted(hold)
+                row, after, more = self._take(after, rows, robot, wanted, held)
                 source, distance = source[row], distance[row] + more
         ok = self._postures.allow(self.bricks_at(level + 1), after)
         regrip = self._schedule.steps[level].kind is StepKind.REPOSITION
         yield Transitions(level + 1, source[ok], after[ok], regrip, distance[ok])
-
-    def _held_by_others(self, states: Ints, robot: int, number: int) -> Ints:
-        """Return places that others already hold in a step: robots before, and those that go on."""
-        out = np.delete(states, robot, axis=1)
-        for column, other in enumerate(r for r in range(self.robots) if r != robot):
-            hold = self._holds.get((other, number))
-            if hold is None or (other > robot and hold.first == number):
-                out[:, column] = 0
-        return out
 
     def _wanted(self, hold: Hold) -> list[int]:
         """Return the places that a hold may take."""

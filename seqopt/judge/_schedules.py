@@ -24,7 +24,7 @@ from seqopt.judge._rule_moves import check_free
 from seqopt.judge._states import largest_load
 from seqopt.judge._step_checks import check_props, check_shape, proven_margins
 from seqopt.judge._twin import PathTwin, exceeds, own_values, twin_of
-from seqopt.judge.certificate import Basis, Certificate
+from seqopt.judge.certificate import TOLERANCE, Basis, Certificate
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.resources import StepArrays, _first_fault
 from seqopt.problem.standing import _size, slack
@@ -38,7 +38,6 @@ from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
 
 ENDED = ("time", "memory", "interrupt")  # searches that were stopped: no bound is proven
-TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what the engine says
 Bounds = tuple[float, ...]
 
 

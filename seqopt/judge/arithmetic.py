@@ -224,25 +224,51 @@ def sum_books(stage: Stage, goal: _Target, value: float, move: Ints) -> list[Boo
 def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value: float) -> float:
     """Return the lower bound of a goal by the proof of a claim, or by the judge's own without one.
 
-    ``value``: of a path; no higher bound is sought.
+    ``value``: of a path; no higher bound is sought. Where sums are capped and no potentials given,
+    the judge finds multipliers itself, from those claimed on; where paths have a node on every
+    level, partial paths close what these leave open.
 
     Raises `SolverError` where a potential, a weight or a share is dual infeasible.
     """
-    limited = _caps_with_multipliers(stage, claim)
+    known = {name: (column, most) for name, column, most in stage.limited}
+    for name, price in claim.prices.items():
+        if name not in known:
+            said = ", ".join(known) or "there are none"
+            raise SolverError(f"price of {name!r}: it is no cap or sum before; give {said}")
+        if not price >= 0 or not np.isfinite(price):
+            raise SolverError(f"price of {name!r} is {price:g}; give a number from 0")
+    limited = [(price, *known[name]) for name, price in claim.prices.items()]
     if instance.resources and claim.labels is not None and goal.kind in (SUM, PEAK):
         return _by_labels(instance, stage, goal, claim)
     if goal.kind == PEAK:
         return _peak(stage, goal, claim, limited)
-    if goal.kind == SUM:
-        costs = stage.graph.amounts[:, goal.columns[0]]
-        if stage.limited and claim.potentials is None:
-            return _capped_sum(instance, stage, costs, claim, value)
-    elif goal.kind == TAIL:
-        costs = stage.graph.amounts[:, list(goal.columns)] @ _weights(goal, claim)
-    else:
+    if goal.kind == TIME:
         twin = path_twin()
         return -np.inf if twin is None else twin.claimed(instance, stage, claim, limited)
-    return _sum(stage, costs, claim, limited)
+    costs = stage.graph.amounts[:, list(goal.columns)] @ _weights(goal, claim)
+    if goal.kind == TAIL or not stage.limited or claim.potentials is not None:
+        return _sum(stage, costs, claim, limited)
+    caps, by_parts = [(c, most) for _, c, most in stage.limited], instance.is_layered
+    begin = [claim.prices.get(name, 0.0) for name, *_ in stage.limited]
+    bound, prices = least_within(stage.graph, costs, caps, value, prices=begin, laid_down=by_parts)
+    found = [(price, *cap) for price, cap in zip(prices.tolist(), caps, strict=True)]
+    checked = _sum(stage, costs, Claim(), found)
+    return max(checked, bound) if by_parts else checked
+
+
+def _weights(goal: _Target, claim: Claim) -> Floats:
+    """Return weights of the columns of a tail that prove a bound, or say why they do not."""
+    count, weights = len(goal.columns), claim.weights
+    if weights is None or goal.kind != TAIL:
+        return np.full(count, 1 / count)
+    if weights.shape != (count,) or not (weights >= 0).all():
+        raise SolverError(f"weights: give {count} numbers from 0")
+    if weights.sum() > 1 + 1e-9 or weights.max() > goal.most * (1 + 1e-9):
+        raise SolverError(
+            f"weights: they add up to {weights.sum():.9g}, the largest is {weights.max():.9g}; at "
+            f"most 1 in all and {goal.most:.9g} each prove a bound"
+        )
+    return weights
 
 
 def _by_labels(instance: Instance, stage: Stage, goal: _Target, claim: Claim) -> float:
@@ -265,18 +291,6 @@ def _by_labels(instance: Instance, stage: Stage, goal: _Target, claim: Claim) ->
     if fits and closed.is_proof((state, values), lambda states: np.zeros(len(states), dtype=bool)):
         return claim.value
     raise SolverError(f"{goal.name}: labels do not prove that no path is below {claim.value:.9g}")
-
-
-def _caps_with_multipliers(stage: Stage, claim: Claim) -> list[tuple[float, int, float]]:
-    """Return multipliers with their columns and caps."""
-    known = {name: (column, most) for name, column, most in stage.limited}
-    for name, price in claim.prices.items():
-        if name not in known:
-            said = ", ".join(known) or "there are none"
-            raise SolverError(f"price of {name!r}: it is no cap or sum before; give {said}")
-        if not price >= 0 or not np.isfinite(price):
-            raise SolverError(f"price of {name!r} is {price:g}; give a number from 0")
-    return [(price, *known[name]) for name, price in claim.prices.items()]
 
 
 def _sum(
@@ -308,23 +322,6 @@ def _kept(graph: Graph, costs: Floats, potentials: Floats) -> float:
             f"{costs[worst]:.9g}, less than the {second[worst] - first[worst]:.9g} between them"
         )
     return float(potentials[graph.ends].min(initial=np.inf))
-
-
-def _capped_sum(
-    instance: Instance, stage: Stage, costs: Floats, claim: Claim, value: float
-) -> float:
-    """Return the lower bound of a sum by multipliers that the judge finds, from those claimed on.
-
-    Where paths have a node on every level, partial paths close what these leave open.
-    """
-    limited, known = [(c, most) for _, c, most in stage.limited], claim.prices
-    begin, by_parts = [known.get(name, 0.0) for name, *_ in stage.limited], instance.is_layered
-    bound, prices = least_within(
-        stage.graph, costs, limited, value, prices=begin, laid_down=by_parts
-    )
-    pairs = zip(prices.tolist(), limited, strict=True)
-    checked = _sum(stage, costs, Claim(), [(price, *cap) for price, cap in pairs])
-    return max(checked, bound) if by_parts else checked
 
 
 def budget_bounds(
@@ -404,19 +401,3 @@ def _left(graph: Graph, column: int, inside: Ints) -> float:
         raise SolverError("cut: name nodes with node 0 among them, and no end")
     leaving = within[graph.source] & ~within[graph.target]
     return float(graph.amounts[leaving, column].min(initial=np.inf))
-
-
-def _weights(goal: _Target, claim: Claim) -> Floats:
-    """Return weights of the columns of a tail that prove a bound, or say why they do not."""
-    count = len(goal.columns)
-    if claim.weights is None:
-        return np.full(count, 1 / count)
-    weights = claim.weights
-    if weights.shape != (count,) or not (weights >= 0).all():
-        raise SolverError(f"weights: give {count} numbers from 0")
-    if weights.sum() > 1 + 1e-9 or weights.max() > goal.most * (1 + 1e-9):
-        raise SolverError(
-            f"weights: they add up to {weights.sum():.9g}, the largest is {weights.max():.9g}; at "
-            f"most 1 in all and {goal.most:.9g} each prove a bound"
-        )
-    return weights

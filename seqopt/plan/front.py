@@ -21,6 +21,7 @@ from seqopt.graph.space import Space
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import States
 from seqopt.judge._schedules import ordered, plan_values
+from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._answers import PROOF, called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
 from seqopt.plan.pose import states_of
@@ -34,7 +35,6 @@ from seqopt.sequence.steps import Step, StepKind
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import INTERRUPT, Clock, Tell, with_progress
 
-TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
 DIGITS = 9  # after the first
 EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
 

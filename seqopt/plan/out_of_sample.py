@@ -8,6 +8,7 @@ each single scenario (wait and see), which is a lower bound.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.decision_costs import LayeredCosts, ScenarioCosts, best_in_order
+from seqopt.graph.decision_costs import ScenarioCosts, best_in_order
 from seqopt.graph.states.states import States, over_scenarios
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Aim
@@ -76,7 +77,8 @@ def judge_unseen(plan: Plan, scenes: States | Scenarios | Sequence[Scene]) -> Tr
         raise ProblemError("the plan was not chosen over scenarios; pose with scenarios")
     aim = graph.over.aim
     known = ScenarioCosts(own.sums, own.peaks, 0, 0.0)
-    chosen = best_choice(aim.costs(own), aim)
+    costs = aim.costs(own)
+    chosen = best_in_order([(costs, aim), (costs, Aim.SUM)])
     if not isinstance(scenes, States):
         some = scenes.scenes if isinstance(scenes, Scenarios) else scenes
         scenes = over_scenarios(replace(graph, scenarios=()), some, graph.over)
@@ -90,17 +92,11 @@ def judge_unseen(plan: Plan, scenes: States | Scenarios | Sequence[Scene]) -> Tr
     return Trial(plan, graph, chosen, pd.DataFrame(rows))
 
 
-def best_choice(costs: LayeredCosts, aim: Aim) -> tuple[int, ...]:
-    """Return an optimal choice; among those of least peak one of least sum."""
-    return best_in_order([(costs, aim), (costs, Aim.SUM)])
-
-
 def _row(costs: ScenarioCosts, aim: Aim, choices: Sequence[tuple[int, ...]]) -> dict[str, float]:
     """Return total and peak cost of the three plans in a scenario."""
-    try:
-        best = best_choice(aim.costs(costs), aim)
-    except InfeasibleError:
-        best = None
+    best, layered = None, aim.costs(costs)
+    with suppress(InfeasibleError):
+        best = best_in_order([(layered, aim), (layered, Aim.SUM)])
     out: dict[str, float] = {}
     for name, choice in zip(PLANS, (*choices, best), strict=True):
         out[f"{name}_total"] = np.inf if choice is None else costs.sums.cost(choice)

@@ -358,18 +358,6 @@ class Plan(ShownBuild):
         graph, scene = self._of_scene, self.engine.network.scene
         asked = self.problem if isinstance(self.problem, Problem) else graph
         in_proof = None if proof is None or self.gap is None else proof.models or self.models
-        of_order: dict[str, object] = {}
-        if self.order:
-            least, proven = self._order_bound()
-            of_order = {
-                "order": [*self.order],
-                "orders": self.problem.orders.value,  # type: ignore[union-attr]  # one was sought
-                "order_status": str(self.status),
-                "order_bound": least if isfinite(least) else None,
-                "order_bound_proven": proven,
-                "order_evaluated": self.selection.effort[0],
-                "order_stopped": self.stopped,
-            }
         return {
             "scene": scene.name,
             "schedule": self.method,
@@ -391,7 +379,7 @@ class Plan(ShownBuild):
             "models_in_six_digits": graph.six_digit_models,
             "models_in_proof": in_proof,  # all where costs are given
             "states_in_proof": 0 if proof is None else proof.states,
-            **of_order,
+            **self._of_order(),
             "seconds": dict(self.seconds),
             **provenance(self.engine),
         }
@@ -436,6 +424,21 @@ class Plan(ShownBuild):
         if proof is None or not isfinite(proof.bounds[0]):
             return claimed, False
         return proof.bounds[0], True
+
+    def _of_order(self) -> dict[str, object]:
+        """Return the entries of a summary about the optimized order, if one was sought."""
+        if not self.order:
+            return {}
+        bound, proven = self._order_bound()
+        return {
+            "order": [*self.order],
+            "orders": self.problem.orders.value,  # type: ignore[union-attr]  # one was sought
+            "order_status": str(self.status),
+            "order_bound": bound if isfinite(bound) else None,
+            "order_bound_proven": proven,
+            "order_evaluated": self.selection.effort[0],
+            "order_stopped": self.stopped,
+        }
 
     @property
     def order_bound_said(self) -> str:
