@@ -33,7 +33,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import TIED, _to_go, distances, least_sum, tied
+from seqopt.graph.paths import _to_go, distances, least_sum, tied
 from seqopt.problem.resources import Resource, StepArrays
 
 MIXTURES = 80  # multipliers that are tried
@@ -381,8 +381,3 @@ class Closed:
 def limit_below(value: float) -> float:
     """Return the least that is no better than a value."""
     return value - BETTER * abs(value)
-
-
-def kept_below(amounts: Floats, value: float) -> Bools:
-    """Return which amounts are less than a value, not by rounding alone."""
-    return np.asarray(amounts + TIED * np.abs(amounts) < value)

@@ -13,15 +13,7 @@ from seqopt.errors import SolverError
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
 from seqopt.graph.paths import ROUNDING, TIED, cut, least_sum, tied
-from seqopt.judge._bounds import (
-    Book,
-    Closed,
-    SumBook,
-    TwinBook,
-    kept_below,
-    least_within,
-    limit_below,
-)
+from seqopt.judge._bounds import Book, Closed, SumBook, TwinBook, least_within, limit_below
 from seqopt.judge._twin import path_twin
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.problem.resources import _first_fault
@@ -201,10 +193,11 @@ def next_stage(stage: Stage, goal: _Target, value: float) -> Stage:
 
 
 def only_below(graph: Graph, goal: _Target, value: float) -> Graph:
-    """Return the arcs that paths below a value of a goal may take."""
+    """Return the arcs that paths below a value of a goal may take, not below by rounding alone."""
     if goal.kind != PEAK:
         return graph
-    return graph.only(kept_below(graph.amounts[:, goal.columns[0]], value))
+    amounts = graph.amounts[:, goal.columns[0]]
+    return graph.only(amounts + TIED * np.abs(amounts) < value)
 
 
 def sum_books(stage: Stage, goal: _Target, value: float, move: Ints) -> list[Book]:

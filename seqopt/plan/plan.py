@@ -335,27 +335,25 @@ class Plan(ShownBuild):
         """Return the summary of the plan, ready for JSON; its keys are the same for all plans.
 
         Result: names of scene, schedule, formulation and criterion, ``aims``; ``candidates``, all
-        or a choice of them; ``status``; by aim ``objective``, ``bound`` and what that
-        rests on (``bound_rests_on``: rebuilt, given or claimed); then the ``gap`` and the
-        ``claimed_gap``; of every one of the ``budgets`` what is there, spent, and what one more
-        unit would save; ``limits``, ``rules``, ``scenarios``, what ``stands``; how it ``ended`` and
-        what ``stopped`` it; ``steps``, ``steps_before_release`` without those that let all go at
-        the end, ``regrips``, ``makespan`` (s, if it is known how long robots take),
-        ``idle_robots``, which never grip; limits of the linear range that are left, which model was
-        ``enough``, what is known of ``arms``, and payloads that are exceeded;
-        ``models_evaluated``, ``models_in_six_digits`` of them, ``models_in_proof`` (None without
-        one), ``states_in_proof``, ``seconds``;
-        of an order that was sought ``order``, ``orders`` (among which), ``order_status``,
-        ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
-        ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
+        or a choice of them; ``status``; by aim ``objective``, ``bound`` and ``bound_rests_on``
+        (rebuilt, given or claimed); then the ``gap`` and the ``claimed_gap``; of every one of the
+        ``budgets`` what is there, spent, and what one more unit would save; ``limits``, ``rules``,
+        ``scenarios``, what ``stands``; how it ``ended`` and what ``stopped`` it; ``steps``,
+        ``steps_before_release`` without those that let all go at the end, ``regrips``, ``makespan``
+        (s, if it is known how long robots take), ``idle_robots``, which never grip; limits of the
+        linear range that are left, which model was ``enough``, what is known of ``arms``, and
+        payloads that are exceeded; ``models_evaluated``, ``models_in_six_digits`` of them,
+        ``models_in_proof`` (None without one), ``states_in_proof``, ``seconds``; of an order that
+        was sought ``order``, ``orders`` (among which), ``order_status``, ``order_bound`` (on the
+        first aim, of any order), ``order_bound_proven``, ``order_evaluated`` and ``order_stopped``;
+        the ``engine`` and ``versions``.
         """
-        proof = self.certificate
         if not self.steps:  # a path through an instance, or given costs
             known: dict[str, object] = getattr(self.problem, "facts_of", dict)()
-            spent = {} if proof is None else dict(proof.spent)
+            spent = dict(getattr(self.certificate, "spent", {}))
             whole = {**self._named(), **known, **self._answer(), "budgets": spent}
             return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}
-        graph, scene = self._of_scene, self.engine.network.scene
+        graph, proof, scene = self._of_scene, self.certificate, self.engine.network.scene
         asked = self.problem if isinstance(self.problem, Problem) else graph
         in_proof = None if proof is None or self.gap is None else proof.models or self.models
         return {
