@@ -171,7 +171,7 @@ class Request:
 
 def request(words: Sequence[str]) -> Request:
     """Parse words into a command and its options; a wrong word ends the program."""
-    helps = bool({ALL, "-h", "--help"} & {*words})
+    helps = any(word.startswith(("-h", "--h")) for word in words)  # argparse takes it shortened
     values = vars(parser(named_command(words), helps=helps).parse_args(words))
     printed = {name: values.pop(name) for name in PRINTED if name in values}
     name = values.pop("command")

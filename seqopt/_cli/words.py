@@ -393,24 +393,24 @@ def with_grips(grips: float | str, scene: Scene) -> Scene:
 
     ``turning=1e4`` after a comma is the rotational stiffness.
     """
-    text = str(grips)
-    where = f"--grips {short(text)[1:-1]}"
-    shift, *rest = text.split(",")
-    ways: list[tuple[float, ...] | None] = [None, None]
-    for at, word in enumerate((shift, *(part.removeprefix("turning=") for part in rest))):
-        if at > 1 or (at and word == rest[0]):
-            raise SceneError(f"{where}: give a stiffness, and after a comma turning=STIFFNESS")
+    where = f"--grips {short(str(grips))[1:-1]}"
+    shift, comma, rest = str(grips).partition(",")
+    turning = rest.removeprefix("turning=")
+    if comma and (turning == rest or "," in rest):
+        raise SceneError(f"{where}: give a stiffness, and after a comma turning=STIFFNESS")
+
+    def numbers(word: str) -> tuple[float, ...]:
         try:
-            numbers = [float(number) for number in word.split("x")]
+            found = [float(number) for number in word.split("x")]
         except ValueError:
-            numbers = []
-        if at == 0 and word == "rigid":
-            continue
-        if len(numbers) not in (1, 3):
+            found = []
+        if len(found) not in (1, 3):
             raise SceneError(f"{where}: {word!r} is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5")
-        ways[at] = (*numbers,) * (3 // len(numbers))
+        return (*found,) * (3 // len(found))
+
+    ways: Any = (None if shift == "rigid" else numbers(shift), numbers(turning) if comma else None)
     try:
-        return scene.with_grips(*ways)  # type: ignore[arg-type]
+        return scene.with_grips(*ways)
     except SceneError as error:
         raise SceneError(f"{where}: {str(error).partition(': ')[2]}") from None
 

@@ -9,11 +9,13 @@ import pytest
 
 import seqopt
 from seqopt import doors
+from seqopt._cli.arguments import request
 from seqopt._cli.main import main
 from seqopt._cli.signatures import signature_of
 from seqopt._cli.words import HIDDEN
 from seqopt._registry import COMMANDS
 from seqopt.scene.scene_file import save_scene
+from seqopt.workflow import Part
 from tests.builders import small_arch
 
 UNLIKE = ("seconds", "models_paper_count", "stability")  # of one run, or added by the command
@@ -111,3 +113,38 @@ def test_what_functions_take_is_written_once():
         taken = {*inspect.signature(function).parameters} - {"progress"}
         assert taken <= {*known.options, *known.spread}
         assert {*known.options} <= {*known.texts(), *HIDDEN}, name
+
+
+def test_words_that_make_a_value_stand_beside_it(arch):
+    """As `grips` of a scene; what nothing is made of is refused."""
+    soft = seqopt.load_scene(arch).with_grips(1e6)
+    own, same = (
+        doors.analyze(scene, method="cantilever", **words)
+        for scene, words in ((soft, {}), (arch, {"grips": 1e6}))
+    )
+    assert own.equals(same)
+    assert not own.equals(doors.analyze(arch, method="cantilever"))
+    with pytest.raises(TypeError, match="unexpected keyword argument 'grip'"):
+        doors.analyze(arch, grip=1e6)
+
+
+def test_a_build_begins_where_python_says(arch):
+    plan = seqopt.optimize(arch, Part(schedule="free", begin=2))
+    assert (plan.steps[0].bricks, plan.problem.moves.begin.bricks) == (2, 2)
+    assert seqopt.optimize(arch, "free").steps[0].bricks == 1
+    with pytest.raises(seqopt.SeqoptError, match=r"^direction take-down: it goes with schedule="):
+        seqopt.optimize(arch, Part(direction="take-down"))
+
+
+def test_help_is_what_docstrings_say():
+    compared, chosen = (signature_of(each).texts() for each in (seqopt.compare, seqopt.optimize))
+    assert "reference : str, optional" in inspect.getdoc(seqopt.compare)
+    assert compared["reference"][2].startswith("With ``speed``: the engine that values plans")
+    assert compared["mortar"] == ("Parameters", "optional", chosen["mortar"][2])
+    assert "(default: auto)" in compared["engine"][2]
+
+
+def test_messages_about_parameters_name_options():
+    said = request(["optimize"]).spoken
+    assert said("limit x: none; give schedule='free'") == "--limit x: none; give --schedule free"
+    assert said("brick 3: name='x'") == "brick 3: name='x'"

@@ -30,6 +30,7 @@ BAD = {
     "analyze --method published --robots rob1,rob2": "--robots rob1,rob2: a plan",
     "assess --method sequential --mortar glue": "--mortar glue: give epoxy, dry",
     # schedules, formulations, criteria, limits
+    "optimize ARCH --mortar glue": "--mortar glue: give epoxy, dry",
     "optimize ARCH --formulation overlap_dp --schedule ring": "schedule 'ring' does not exist",
     "optimize ARCH --schedule three-robot --robots rob1,rob2": "three-robot takes three",
     "optimize ARCH --formulation beam --option depth=3": "--option depth=3: beam has width",
