@@ -38,19 +38,6 @@ def plain(text: str) -> str:
     return text[1:] if text.startswith(_MARK) and harmless(text) != text else text
 
 
-def _harmless_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table with `harmless` names of columns and strings; numbers are unchanged."""
-
-    def safe(value: object) -> object:
-        return harmless(value) if isinstance(value, str) else value
-
-    columns = [column for _, column in table.items()]
-    for k, column in enumerate(columns):
-        if not pd.api.types.is_numeric_dtype(column.dtype):
-            columns[k] = column.map(safe)
-    return (pd.concat(columns, axis=1) if columns else table).rename(columns=safe)
-
-
 _LARGEST_INPUT = 64_000_000  # bytes; a scene of 100,000 bricks has 40 million
 HIDDEN = ".seqopt-"  # start of the names of what is not complete yet
 
@@ -138,8 +125,14 @@ def write_text(path: Path, text: str) -> None:
 
 def csv_text(table: pd.DataFrame, digits: int = 6) -> str:
     """Return a table as CSV, without its index, rounded to ``digits``; no cell begins a formula."""
-    safe = _harmless_table(table)
-    return str(safe.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
+
+    def safe(value: object) -> object:
+        return harmless(value) if isinstance(value, str) else value
+
+    numeric = pd.api.types.is_numeric_dtype
+    columns = [c if numeric(c.dtype) else c.map(safe) for _, c in table.items()]
+    told = (pd.concat(columns, axis=1) if columns else table).rename(columns=safe)
+    return str(told.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 
 
 def rows_text(rows: Sequence[Mapping[str, object]], digits: int = 6) -> str:
@@ -151,14 +144,14 @@ def rows_text(rows: Sequence[Mapping[str, object]], digits: int = 6) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([harmless(name) for name in rows[0]] if rows else [])
-    writer.writerows([_cell(value, digits) for value in row.values()] for row in rows)
+
+    def cell(value: object) -> object:
+        if isinstance(value, float):
+            return "" if math.isnan(value) else f"{value:.{digits}g}"
+        return "" if value is None else harmless(value) if isinstance(value, str) else value
+
+    writer.writerows(map(cell, row.values()) for row in rows)
     return text.getvalue()
-
-
-def _cell(value: object, digits: int) -> object:
-    if isinstance(value, float):
-        return "" if math.isnan(value) else f"{value:.{digits}g}"
-    return "" if value is None else harmless(value) if isinstance(value, str) else value
 
 
 def write_bytes(path: Path, content: bytes | str) -> None:

@@ -104,8 +104,9 @@ class Search:
     def parse_options(self, formulation: Formulation) -> dict[str, Any]:
         """Return the options of a formulation; words are typed by those of its ``solve``."""
         known, given = formulation.options, self.options
-        pairs = given.items() if isinstance(given, Mapping) else (_pair(each) for each in given)
-        out = dict[str, Any](pairs)
+        worded = () if isinstance(given, Mapping) else given
+        out: dict[str, Any] = {n: v for n, _, v in (each.partition("=") for each in worded)}
+        out |= given if isinstance(given, Mapping) else {}
         for name, value in out.items():
             where = f"option {name}={value}"
             if isinstance(value, str) and name not in known:
@@ -126,11 +127,6 @@ class Search:
     def memory(self) -> float | None:
         """The memory that it may take, bytes."""
         return _parse_size(self.max_memory) if isinstance(self.max_memory, str) else self.max_memory
-
-
-def _pair(text: str) -> tuple[str, str]:
-    name, _, value = text.partition("=")
-    return name, value
 
 
 def _parse_size(text: str) -> float:

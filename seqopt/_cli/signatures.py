@@ -250,7 +250,7 @@ class Signature:
 
     @property
     def _foreign(self) -> bool:
-        return not self.function.__module__.startswith("seqopt.")
+        return _is_foreign(self.function)
 
     def _spoken(self, text: str) -> str:
         """Return a text of a docstring as the command line says it: parameters are options."""
@@ -269,9 +269,13 @@ class Signature:
         text = text.removesuffix(".")
         if text[1:2].islower() or text[1:2] == " ":
             text = text[:1].lower() + text[1:]
-        if names := NAMES.get(option.name):
+        if (names := NAMES.get(option.name)) and not self._foreign:
             text += f"; names: {', '.join(names())}"
         return text.replace("%", "%%")
+
+
+def _is_foreign(function: Callable[..., Any]) -> bool:
+    return not function.__module__.startswith("seqopt.")
 
 
 @cache
@@ -280,12 +284,16 @@ def signature_of(function: Callable[..., Any]) -> Signature:
     function = inspect.unwrap(function)
     own, home = inspect.signature(function).parameters, vars(sys.modules[function.__module__])
     options, spread = dict[str, Option](), dict[str, tuple[Any, Sequence[str], Any]]()
+    foreign = _is_foreign(function)
     for each in own.values():
         default = MISSING if each.default is each.empty else each.default
         kind = each.annotation  # evaluated alone: what is returned may load pandas
         kind = eval(kind, home) if isinstance(kind, str) else kind
-        option, more = _option(each.replace(annotation=kind), default)
-        kind = more.get("call") or SPREAD.get((function.__name__, each.name), SPREAD.get(each.name))
+        how = {} if foreign else dict(HOW.get(each.name, {}))
+        option, more = _option(each.replace(annotation=kind), default, how)
+        spreads = SPREAD.get((function.__name__, each.name), SPREAD.get(each.name))
+        spreads = None if foreign and kind is not spreads else spreads  # names are of seqopt alone
+        kind = more.get("call") or spreads
         if kind is None or kind is function:
             if each.name != "progress":
                 options[each.name] = option
@@ -301,9 +309,11 @@ def signature_of(function: Callable[..., Any]) -> Signature:
     return Signature(function, options, spread)
 
 
-def _option(parameter: inspect.Parameter, default: Any) -> tuple[Option, dict[str, Any]]:
-    """Return the option of a parameter, and what its annotation says beside its types."""
-    more, kinds, left = dict(HOW.get(parameter.name, {})), set[Any](), [parameter.annotation]
+def _option(
+    parameter: inspect.Parameter, default: Any, more: dict[str, Any]
+) -> tuple[Option, dict[str, Any]]:
+    """Return the option of a parameter, and ``more``, with what its annotation says."""
+    kinds, left = set[Any](), [parameter.annotation]
     while left:
         kind = left.pop()
         if get_origin(kind) is Annotated:

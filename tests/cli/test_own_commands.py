@@ -149,5 +149,8 @@ def test_a_function_is_registered_as_a_command(capsys, tmp_path):
     assert "arguments are required: DIR" in command(capsys, "count")[2]
     with pytest.raises(ProblemError, match="this name has a meaning already"):
         seqopt.register(doors.Command("scene", count))
+    own = doors.Command("say", lambda scene="arch25", *, engine="x": f"{scene} {engine}")
+    seqopt.register(own)  # what these words mean elsewhere is not meant
+    assert command(capsys, "say", "mine", "--engine", "own")[1] == "mine own\n"
     seqopt.register(doors.Command("five", lambda: 5))
     assert "it returns int; return a text, a table or an Answer" in command(capsys, "five")[2]
