@@ -14,7 +14,7 @@ import numpy as np
 from seqopt.errors import SceneError
 from seqopt.exchange._content import GROUND, MOST_CORNERS, UNITS, UPS, Content, FileBlock, Given
 from seqopt.exchange._meshes import Repaired, repair_shape
-from seqopt.exchange.contacts import _Contacts, _find_contacts, _widest_gap, face_ground, face_joint
+from seqopt.exchange.contacts import _find_contacts, _Held, _widest_gap, face_ground, face_joint
 from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
 from seqopt.scene.boxes import _find_overlaps, block_brick
 from seqopt.scene.library.common import MASONRY, JointLaw, _mobile_robots, _touching_order, a_law
@@ -53,8 +53,8 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         said += [f"{text}: {count}" for text, count in total.items()]
         bricks = _bricks(content, given, blocks, supports, said)
         sunk, lines = _interpenetrating(content, given, blocks, bricks)
-        touching = _find_contacts(content, given, blocks, bricks)
-        said = [*lines, *said, *touching.said]
+        touching, found = _find_contacts(content, given, blocks, bricks)
+        said = [*lines, *said, *found]
         law = a_law("law", given.law or content.law or MASONRY)
         origin = "as given" if given.law else "of the file" if content.law else "by default"
         along, across, _ = law.translational
@@ -181,26 +181,25 @@ def block_numbers(keys: Sequence[str]) -> list[int]:
 
 
 def _springs(
-    touching: _Contacts, bricks: Mapping[int, Brick], law: JointLaw
+    touching: Sequence[_Held], bricks: Mapping[int, Brick], law: JointLaw
 ) -> tuple[tuple[Joint, ...], tuple[Ground, ...]]:
-    made: list[Joint | Ground] = []
-    for (a, b), face in touching.faces:
+    joints, grounds = list[Joint](), list[Ground]()
+    for (a, b), face in touching:
         last = bricks[b]
         if a == GROUND:
-            made.append(face_ground(last.name, face, law, _STUB * min(last.dimensions)))
+            grounds.append(face_ground(last.name, face, law, _STUB * min(last.dimensions)))
         else:
-            made.append(face_joint((bricks[a].name, last.name), face, law))
-    grounds = tuple(spring for spring in made if isinstance(spring, Ground))
+            joints.append(face_joint((bricks[a].name, last.name), face, law))
     if not grounds:
         raise SceneError(
             "no block stands on the ground: none is marked as a support, and none has a level face "
             "at the bottom; name supports"
         )
-    return tuple(spring for spring in made if isinstance(spring, Joint)), grounds
+    return tuple(joints), tuple(grounds)
 
 
 def _order(
-    touching: _Contacts,
+    touching: Sequence[_Held],
     content: Content,
     bricks: Mapping[int, Brick],
     sunk: Collection[int],
@@ -215,15 +214,12 @@ def _order(
     courses = [content.blocks[i].course for i in places]
     known = None not in courses
     heights = [round(bricks[i].position[2], 6) for i in places]
-    said.append(
-        "blocks are placed by the file's courses"
-        if known
-        else "blocks are placed from the bottom up"
-    )
+    how = "by the file's courses" if known else "from the bottom up"
+    said.append(f"blocks are placed {how}")
     order = _touching_order(
         [(c or 0.0 if known else 0.0, h) for c, h in zip(courses, heights, strict=True)],
-        [(row[a], row[b]) for (a, b), _ in touching.faces if a != GROUND],
-        [row[b] for (a, b), _ in touching.faces if a == GROUND],
+        [(row[a], row[b]) for (a, b), _ in touching if a != GROUND],
+        [row[b] for (a, b), _ in touching if a == GROUND],
     )
     lost = sorted({*range(len(places))} - {*order})
     if lost:

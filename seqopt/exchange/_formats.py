@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from seqopt._files import read_bytes, read_text
+from seqopt._files import read_text
 from seqopt._registry import Part, registered
 from seqopt.errors import SceneError
 from seqopt.exchange._compas_models import (
@@ -22,10 +22,8 @@ from seqopt.exchange._compas_shapes import kind, payload
 from seqopt.exchange._content import Content, assembly_json
 from seqopt.exchange._mesh_files import read_3dm, read_glb, read_mesh, read_obj, write_obj
 from seqopt.exchange._tables import plan_csv, plan_json, read_boxes
-from seqopt.exchange._tasks import Task, tasks_csv, tasks_in_postures, tasks_json
+from seqopt.exchange._tasks import tasks_csv, tasks_in_postures, tasks_json
 from seqopt.scene._checks import short
-from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step
 
 _NEVER = ("nodes", "joints", "ground ends", "robots", "loads")  # what files of blocks are without
 _MESHED = ".glb or .obj, every block a closed mesh with a name"
@@ -93,14 +91,6 @@ class Format(Part):
         return [*BUILT_IN]
 
 
-def _of_text(read: Callable[[str, str], Content], path: Path) -> Content:
-    return read(read_text(path), str(path))
-
-
-def _of_bytes(read: Callable[[bytes, str], Content], path: Path) -> Content:
-    return read(read_bytes(path), str(path))
-
-
 def _document(form: str | None, path: Path) -> Content:
     """Return the content of a JSON document, by default of the format that it looks like."""
     source = str(path)
@@ -128,25 +118,24 @@ def sniffed(document: Any, source: str) -> str:
     raise SceneError(f"{source}: no assembly that is known; give one of {', '.join(readable())}")
 
 
-def _tasks(
-    scene: Scene,
-    steps: Sequence[Step],
-    distance: float | None = None,
-    text: Callable[[Scene, Iterable[Task]], str] = tasks_json,
-) -> str:
-    return text(scene, tasks_in_postures(scene, steps, distance))
-
-
 JSON = Format("", ("json",), partial(_document, None))  # of COMPAS, whichever it is
 BUILT_IN = {
     each.name: each
     for each in (
         Format("csv", write=plan_csv),
         Format("json", write=plan_json),
-        Format("tasks", write=_tasks, takes=("distance",)),
+        Format(
+            "tasks",
+            write=lambda scene, steps, distance=None: tasks_json(
+                scene, tasks_in_postures(scene, steps, distance)
+            ),
+            takes=("distance",),
+        ),
         Format(
             "tasks_csv",
-            write=partial(_tasks, text=lambda _, tasks: tasks_csv(tasks)),
+            write=lambda scene, steps, distance=None: tasks_csv(
+                tasks_in_postures(scene, steps, distance)
+            ),
             takes=("distance",),
         ),
         Format(
@@ -156,18 +145,17 @@ BUILT_IN = {
             takes=("source",),
         ),
         *(Format(n, read=partial(_document, n)) for n in [*DOCUMENTS][1:]),
-        Format("boxes", ("csv",), partial(_of_text, read_boxes)),
+        Format("boxes", ("csv",), lambda path: read_boxes(read_text(path), str(path))),
         Format(
             "obj",
             ("obj",),
-            partial(_of_text, read_obj),
+            lambda path: read_obj(read_text(path), str(path)),
             lambda scene, _: write_obj(scene),
             lost=("densities", "the order", *_NEVER, "steps"),
         ),
-        Format("3dm", ("3dm",), partial(_of_bytes, read_3dm)),
-        Format("glb", ("glb",), partial(_of_bytes, read_glb)),
-        Format("ply", ("ply",), partial(_of_bytes, partial(read_mesh, form="ply"))),
-        Format("stl", ("stl",), partial(_of_bytes, partial(read_mesh, form="stl"))),
+        Format("3dm", ("3dm",), read_3dm),
+        Format("glb", ("glb",), read_glb),
+        *(Format(n, (n,), partial(read_mesh, form=n)) for n in ("ply", "stl")),
     )
 }
 
@@ -187,18 +175,12 @@ def writable() -> list[str]:
     return [name for name, each in formats().items() if each.write]
 
 
-def of_ending(path: Path) -> Format | None:
-    """Return the format of a file by the end of its name, if one is known."""
-    suffix = path.suffix.lower().removeprefix(".")
-    every = (*formats().values(), JSON)
-    return next((each for each in every if each.read and suffix in each.endings), None)
-
-
 def read_file(path: Path, form: str | None = None) -> Content:
     """Return the content of a file, in the format of a name; by default in that of its ending."""
-    found = of_ending(path) if form is None else formats().get(form)
+    suffix, known = path.suffix.lower().removeprefix("."), formats()
+    fitting = (each for each in (*known.values(), JSON) if each.read and suffix in each.endings)
+    found = next(fitting, None) if form is None else known.get(form)
     if found is None or found.read is None:
-        suffix = path.suffix.lower().removeprefix(".")
         remedies = (said for endings, said in _INSTEAD.items() if suffix in endings.split())
         if form is None and (remedy := next(remedies, "")):
             raise SceneError(f"{path}: a .{suffix} cannot be read; {remedy}")

@@ -15,11 +15,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from seqopt._files import parse_json
+from seqopt._files import parse_json, read_bytes
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import LARGEST, UNITS, Content, FileBlock, moved
@@ -36,14 +37,6 @@ _NEEDS = {  # packages and the extra that brings them
     "3dm": ("rhino3dm", "cad"),
 }
 _UNIT_NAMES = {"millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
-
-
-def known_unit(name: str, source: str) -> str:
-    """Return the unit of length, one of `UNITS`, that a file names: millimeter, inches, feet."""
-    plain = {"inches": "inch", "feet": "foot"}.get(name.lower(), name.lower().removesuffix("s"))
-    if plain not in _UNIT_NAMES:
-        raise SceneError(f"{source}: its unit is {name}; save it in one of {', '.join(UNITS)}")
-    return _UNIT_NAMES[plain]
 
 
 def require_reader(form: str, source: str) -> None:
@@ -88,27 +81,32 @@ def write_obj(scene: Scene) -> str:
     return "\n".join(lines) + "\n"
 
 
-def read_mesh(content: bytes, source: str, form: str) -> Content:
+def read_mesh(path: Path, form: str) -> Content:
     """Return the blocks of a ``ply`` or ``stl`` file, for which trimesh is needed."""
-    vertices, faces = _arrays(_loaded(content, source, form, "load_mesh"), source)
+    source = str(path)
+    vertices, faces = _arrays(_loaded(path, form, "load_mesh"), source)
     if form == "stl":  # it repeats the vertices of every triangle
         vertices, place = np.unique(vertices, axis=0, return_inverse=True)
         faces = place.reshape(-1)[faces]
     return mesh_content(vertices, faces.tolist(), source)
 
 
-def read_glb(content: bytes, source: str) -> Content:
+def read_glb(path: Path) -> Content:
     """Return the blocks of a ``glb`` file, named as its nodes, each where it stands.
 
     It is in m, and y is up there, by the definition of glTF.
     """
-    found = _loaded(content, source, "glb", "load_scene")
+    source, found = str(path), _loaded(path, "glb", "load_scene")
     return replace(object_content(_nodes(found, source), source), usual_unit="m", up="y")
 
 
 def _nodes(scene: Any, source: str) -> Iterator[FileBlock]:
     """Yield the meshes of a scene of trimesh, in the order of their names and numbers."""
     above, world = scene.graph.transforms.parents, scene.graph.base_frame
+
+    def counted(name: str) -> list[tuple[int, str]]:  # stone_2 before stone_10
+        return [(int(part or 0), text) for text, part in re.findall(r"(\D*)(\d*)", name)]
+
     for name in sorted(scene.graph.nodes_geometry, key=counted):
         matrix, own = scene.graph[name]
         if not hasattr(scene.geometry[own], "faces"):
@@ -116,11 +114,6 @@ def _nodes(scene: Any, source: str) -> Iterator[FileBlock]:
         vertices, faces = _arrays(scene.geometry[own], source)
         group = "" if above.get(name) in (None, world) else str(above[name])
         yield FileBlock(str(name), moved(vertices, matrix), faces.tolist(), group=group)
-
-
-def counted(name: str) -> list[tuple[int, str]]:
-    """Return the natural sort key of a name: stone_2 before stone_10."""
-    return [(int(part or 0), text) for text, part in re.findall(r"(\D*)(\d*)", name)]
 
 
 def _arrays(mesh: Any, source: str) -> tuple[Floats, Ints]:
@@ -134,8 +127,9 @@ def _arrays(mesh: Any, source: str) -> tuple[Floats, Ints]:
     return vertices, faces
 
 
-def _loaded(content: bytes, source: str, form: str, loader: str) -> Any:
-    """Return what trimesh makes of bytes; what it logs is for those who asked for logs."""
+def _loaded(path: Path, form: str, loader: str) -> Any:
+    """Return what trimesh makes of a file; what it logs is for those who asked for logs."""
+    content, source = read_bytes(path), str(path)
     require_reader(form, source)
     logging.getLogger("trimesh").addHandler(_UNASKED)
     joined = {"merge_primitives": True} if form == "glb" else {}  # of several materials
@@ -193,13 +187,18 @@ _SAME = 1e-4  # by how much faces and edges may bend, over the size; Rhino joins
 _Solid = tuple[Floats, list[Sequence[int]]]
 
 
-def read_3dm(content: bytes, source: str) -> Content:
+def read_3dm(path: Path) -> Content:
     """Return the closed objects that are visible in a file of Rhino."""
+    content, source = read_bytes(path), str(path)
     require_reader("3dm", source)
     file = import_module("rhino3dm").File3dm.FromByteArray(content)
     if file is None:
         raise SceneError(f"{source}: no 3dm file that can be read")
-    unit = str(file.Settings.ModelUnitSystem).rsplit(".", 1)[-1]
+    named = str(file.Settings.ModelUnitSystem).rsplit(".", 1)[-1]  # as inches, feet
+    plain = {"inches": "inch", "feet": "foot"}.get(named.lower(), named.lower().removesuffix("s"))
+    unit = _UNIT_NAMES.get(plain)
+    if unit is None and named not in ("None", "Unset"):
+        raise SceneError(f"{source}: its unit is {named}; save it in one of {', '.join(UNITS)}")
     left = Counter[str]()
     solids = [*_objects(file, source, left)]
     said = [f"{count} objects are left out: {what}" for what, count in left.items()]
@@ -207,11 +206,7 @@ def read_3dm(content: bytes, source: str) -> Content:
         why = "; ".join(said) or "it is empty"
         raise SceneError(f"{source}: no closed mesh or solid is visible; {why}")
     found = object_content(solids, source)
-    return replace(
-        found,
-        unit=None if unit in ("None", "Unset") else known_unit(unit, source),
-        said=(*found.said, *said),
-    )
+    return replace(found, unit=unit, said=(*found.said, *said))
 
 
 def _objects(file: Any, source: str, left: Counter[str]) -> Iterator[FileBlock]:
@@ -289,13 +284,6 @@ def _flat(where: str, solid: Any) -> _Solid | None:
     return points, faces
 
 
-def _mesh(where: str, mesh: Any) -> _Solid:
-    """Return a mesh; a triangle of Rhino names its last corner twice."""
-    sides = (mesh.Faces[i] for i in range(len(mesh.Faces)))
-    rows = [mesh.Vertices[i] for i in range(len(mesh.Vertices))]
-    return _points(where, rows), [[*dict.fromkeys(side)] for side in sides]
-
-
 def _points(where: str, rows: Sequence[Any]) -> Floats:
     found = np.array([(row.X, row.Y, row.Z) for row in rows], dtype=float).reshape(-1, 3)
     if not (np.abs(found) <= LARGEST).all():
@@ -304,7 +292,11 @@ def _points(where: str, rows: Sequence[Any]) -> Floats:
 
 
 _READERS: dict[str, Callable[[str, Any], _Solid]] = {
-    "Mesh": _mesh,
+    "Mesh": lambda where, shape: (
+        _points(where, [shape.Vertices[i] for i in range(len(shape.Vertices))]),
+        # a triangle of Rhino names its last corner twice
+        [[*dict.fromkeys(shape.Faces[i])] for i in range(len(shape.Faces))],
+    ),
     "Extrusion": lambda where, shape: _polysurface(where, shape.ToBrep(True)),  # noqa: FBT003  # in faces without kinks
     "Brep": _polysurface,
 }

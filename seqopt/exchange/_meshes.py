@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from seqopt._later import Later
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.exchange._content import MOST_BLOCKS, MOST_CORNERS, Content, FileBlock
@@ -18,9 +18,7 @@ from seqopt.scene._checks import short
 from seqopt.scene.boxes import _bounds_of, as_vectors
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
 
-if TYPE_CHECKING:
-    import networkx as nx
-
+NX, SPATIAL = Later("networkx"), Later("scipy.spatial")  # 0.3 and 0.2 s, for imports alone
 _Polygons = Sequence[Sequence[int]]
 _Edges = frozenset[tuple[int, int]]
 _Loop = tuple[int, ...]
@@ -61,11 +59,9 @@ def _split_blocks(vertices: Floats, faces: _Polygons) -> list[list[int]]:
 
 def _united(vertices: Floats) -> Ints:
     """Return one number for all vertices in one place."""
-    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
-
     points, place = np.unique(vertices, axis=0, return_inverse=True)
     reach = _WELD * float(np.ptp(points, axis=0).max(initial=0.0))
-    pairs = KDTree(points).query_pairs(reach, output_type="ndarray")
+    pairs = SPATIAL.KDTree(points).query_pairs(reach, output_type="ndarray")
     return _linked(len(points), pairs)[place.reshape(-1)]
 
 
@@ -177,12 +173,10 @@ def without_repeats(content: Content) -> Content:
     blocks = [block for block in content.blocks if len(block.vertices)]
     if content.faces or len(blocks) < 2:
         return content
-    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
-
     bounds = np.array([_bounds_of(block.vertices).reshape(6) for block in blocks])
     near = _WELD * float(np.ptp(bounds))
     first = dict[str, str]()
-    for i, j in sorted(KDTree(bounds).query_pairs(near)):
+    for i, j in sorted(SPATIAL.KDTree(bounds).query_pairs(near)):
         one, other = blocks[i], blocks[j]
         alike = one.support == other.support and same_points(one.vertices, other.vertices, _WELD)
         if alike and one.key not in first:
@@ -199,11 +193,9 @@ def same_points(some: Floats, others: Floats, share: float) -> bool:
 
     ``share``: by which rounding moves a point, over the size of the set and its distance.
     """
-    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
-
     near = share * float(np.abs(others).max() + np.ptp(others, axis=0).max())
     pairs = ((some, others), (others, some))
-    return all(bool(np.max(KDTree(a).query(b)[0]) <= near) for a, b in pairs)
+    return all(bool(np.max(SPATIAL.KDTree(a).query(b)[0]) <= near) for a, b in pairs)
 
 
 _CUT = "faces that are not flat are cut into triangles"
@@ -286,29 +278,19 @@ def _flat(points: Floats, face: _Loop, size: float, mended: Counter[str]) -> lis
     return [(a, b, c) for a, b, c in fans([face]).tolist()]
 
 
-def _beside(faces: list[_Loop]) -> nx.Graph[int]:
-    """Return which faces meet in an edge, two alone, and whether one of them must be turned."""
-    import networkx as nx  # noqa: PLC0415  # slow to import, for this only
-
-    meeting = defaultdict(list)
+def _agreeing(points: Floats, faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
+    """Return faces turned so that they agree which side is outside, and that it is outside."""
+    meeting, turned = defaultdict(list), dict[int, bool]()
     for i, face in enumerate(faces):
         for a, b in edges(face):
             meeting[frozenset((a, b))].append((i, a < b))
-    beside: nx.Graph[int] = nx.empty_graph(len(faces))
+    beside = NX.empty_graph(len(faces))  # faces that meet in an edge, two alone
     for (i, up), (j, too) in (meet for meet in meeting.values() if len(meet) == 2):
         beside.add_edge(i, j, turns=up == too)
-    return beside
-
-
-def _agreeing(points: Floats, faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
-    """Return faces turned so that they agree which side is outside, and that it is outside."""
-    import networkx as nx  # noqa: PLC0415  # slow to import, for this only
-
-    beside, turned = _beside(faces), dict[int, bool]()
     for start in beside:
         if start not in turned:
             turned[start] = False
-            for i, j in nx.bfs_edges(beside, start):
+            for i, j in NX.bfs_edges(beside, start):
                 turned[j] = turned[i] ^ beside[i][j]["turns"]
     out = [face[::-1] if turned[i] else face for i, face in enumerate(faces)]
     spokes = points - points.mean(axis=0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cache
 
@@ -19,7 +19,7 @@ import pandas as pd
 from seqopt._files import csv_text
 from seqopt.arms._plan_postures import plan_postures
 from seqopt.errors import ExtraError, SceneError
-from seqopt.exchange._compas_shapes import Document, compas_frame, mesh_data, typed
+from seqopt.exchange._compas_shapes import compas_frame, mesh_data, typed
 from seqopt.exchange._grip_frames import Frame, Held, brick_frame, hold
 from seqopt.scene._armed import PlanPostures
 from seqopt.scene._checks import positive
@@ -67,6 +67,10 @@ class Task:
     posture: tuple[float, ...] | None = None  # values of the arm's joints
 
 
+_DOES = {  # whose grip changes, by the kind of the step and whether it ends without one
+    (StepKind.PLACE, False): (Action.PICK, Action.PLACE),
+    (StepKind.REMOVE, True): (Action.REMOVE, Action.STORE),
+}
 _SAID = ("robot", "block", "node", "built")
 _DIGITS = 9  # of numbers in a table: a micrometer in a kilometer
 FRAMES = ("block_frame", "grip", "approach", "retreat", "grip_in_block")
@@ -117,12 +121,19 @@ def plan_tasks(
             node = old if new is None else new
             if node is None:
                 continue
-            for action in _actions(step, old, new):
+            other = Action.RELEASE if new is None else Action.REPOSITION
+            actions = _DOES.get((step.kind, new is None), (other,))
+            for action in actions if old != new else (Action.HOLD,):
                 held, joints = found(robot, node), None
                 at = step.number - 1 - (action is Action.RELEASE)  # it lets go as it held
                 row = None if postures is None else postures.steps[at][r]
                 if postures is not None and row is not None:
-                    held = _in_posture(scene, node, held, postures.table.axes[row])
+                    brick, axes = scene.brick_of_node[node], postures.table.axes[row]
+                    tool = Frame(held.grip.point, as_vector(axes[:, 0]), as_vector(axes[:, 1]))
+                    out = -tool.axes[2]
+                    half = 0.5 * float(np.abs(brick.frame @ out) @ np.array(brick.dimensions))
+                    depth = half - float(np.subtract(tool.point, brick.position) @ out)
+                    held = replace(held, grip=tool, depth=depth)
                     own = postures.table.joints[row]
                     joints = tuple(own[np.isfinite(own)].tolist())
                 tasks.append(_task(scene, step, action, (robot, node, held), far, joints))
@@ -139,26 +150,6 @@ def tasks_in_postures(
     except (ExtraError, SceneError):
         found = None
     return plan_tasks(scene, steps, distance, found)
-
-
-def _actions(step: Step, old: int | None, new: int | None) -> tuple[Action, ...]:
-    """Return what a robot does whose grip a step changes from one node to another, or leaves."""
-    if old == new:
-        return (Action.HOLD,)
-    if new is None:
-        away = (Action.REMOVE, Action.STORE)
-        return away if step.kind is StepKind.REMOVE else (Action.RELEASE,)
-    return (Action.PICK, Action.PLACE) if step.kind is StepKind.PLACE else (Action.REPOSITION,)
-
-
-def _in_posture(scene: Scene, node: int, held: Held, axes: np.ndarray) -> Held:
-    """Return a grip with a tool whose axes (3, 3) are those of an arm, as columns."""
-    brick = scene.brick_of_node[node]
-    tool = Frame(held.grip.point, as_vector(axes[:, 0]), as_vector(axes[:, 1]))
-    outward = -tool.axes[2]
-    half = 0.5 * float(np.abs(brick.frame @ outward) @ np.array(brick.dimensions))
-    depth = half - float(np.subtract(tool.point, brick.position) @ outward)
-    return Held(held.block, tool, depth, held.away)
 
 
 def _task(
@@ -222,22 +213,20 @@ def tasks_json(scene: Scene, tasks: Iterable[Task]) -> str:
             }
             for robot in scene.robots
         ],
-        "tasks": [_row(task) for task in tasks],
+        "tasks": [
+            {
+                "step": task.step,
+                "type": task.kind.value,
+                "action": task.action.value,
+                **{name: getattr(task, name) for name in _SAID},
+                **{name: compas_frame(getattr(task, name)) for name in FRAMES},
+                "depth": round(task.depth, _DIGITS),
+                "posture": task.posture,
+            }
+            for task in tasks
+        ],
     }
     return json.dumps(whole, ensure_ascii=False) + "\n"
-
-
-def _row(task: Task) -> Document:
-    """Return a task with the frames of COMPAS; what there is not is null."""
-    return {
-        "step": task.step,
-        "type": task.kind.value,
-        "action": task.action.value,
-        **{name: getattr(task, name) for name in _SAID},
-        **{name: compas_frame(getattr(task, name)) for name in FRAMES},
-        "depth": round(task.depth, 9),
-        "posture": task.posture,
-    }
 
 
 def tasks_csv(tasks: Iterable[Task]) -> str:

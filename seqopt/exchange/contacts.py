@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
+from seqopt._later import Later
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import GROUND, Content, Given
@@ -24,6 +24,7 @@ from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes, polygon_moments
 from seqopt.work.progress import Progress, Tell
 
+SHAPELY = Later("shapely")  # an extra
 _Shape = Polyhedron | Surface
 _THIN_PIECE = 1e-6  # by which the hull of what is convex may be larger, over its area
 _GRAIN = 1e-9  # length to which corners are rounded, over the size of what overlaps
@@ -31,20 +32,19 @@ _GRAIN = 1e-9  # length to which corners are rounded, over the size of what over
 
 def _convex_pieces(polygons: Sequence[Any]) -> Iterator[Floats]:
     """Yield the convex pieces of a union of polygons: corners (m, 2), counterclockwise, m."""
-    shapely = import_module("shapely")
     size = max((max(abs(x) for x in polygon.bounds) for polygon in polygons), default=1.0)
     grain = _GRAIN * size
     try:
-        whole = shapely.unary_union(list(polygons), grid_size=grain).simplify(grain)
+        whole = SHAPELY.unary_union(list(polygons), grid_size=grain).simplify(grain)
         for part in _polygons(whole):
             if part.is_empty:
                 continue
             if _is_convex(part):
                 yield _corners(part)
                 continue
-            triangles = [*shapely.constrained_delaunay_triangles(part).geoms]
+            triangles = [*SHAPELY.constrained_delaunay_triangles(part).geoms]
             yield from map(_corners, _merged(triangles, grain))
-    except import_module("shapely.errors").ShapelyError as error:  # they are too degenerate
+    except SHAPELY.errors.ShapelyError as error:  # they are too degenerate
         raise SceneError(f"a face where blocks touch cannot be cut: {short(error, 80)}") from error
 
 
@@ -55,8 +55,7 @@ def _polygons(shape: Any) -> list[Any]:
 
 def _valid(corners: Floats) -> Any:
     """Return corners (m, 2) as a polygon, or polygons where they cross themselves."""
-    shapely = import_module("shapely")
-    return shapely.make_valid(shapely.Polygon(corners))
+    return SHAPELY.make_valid(SHAPELY.Polygon(corners))
 
 
 def _merged(pieces: list[Any], grain: float) -> list[Any]:
@@ -84,7 +83,7 @@ def _is_convex(polygon: Any) -> bool:
 
 def _corners(polygon: Any) -> Floats:
     """Return the corners of the hull of a polygon that is convex but for rounding."""
-    hull = import_module("shapely").geometry.polygon.orient(polygon.convex_hull)
+    hull = SHAPELY.geometry.polygon.orient(polygon.convex_hull)
     return np.array(hull.exterior.coords)[:-1]
 
 
@@ -94,6 +93,7 @@ _MOST_PAIRS = 300_000  # of blocks that are near each other
 _SLIVER = 1e-6  # overlap treated as zero, over the smaller of two faces
 
 _Plane = tuple[Floats, Floats, list[Any]]  # origin, axes, and polygons in it
+_Facets = tuple[list[Floats], Floats, Floats]  # corners of faces, normals outward, and middles
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,15 +103,6 @@ class _TouchingFace(FrozenValue):
     blocks: tuple[int, int]  # places of the blocks, ascending
     corners: Floats  # (m, 3); once around, m
     normal: Floats  # (3,); unit vector from the first block into the second
-
-
-@dataclass(frozen=True)
-class _Facets:
-    """The faces of a block: corners, unit normals outward, and middles."""
-
-    corners: tuple[Floats, ...]
-    normal: Floats
-    middle: Floats
 
 
 def _require_polygons() -> None:
@@ -134,68 +125,59 @@ def touching_faces(
     """
     _require_polygons()
     gap = positive("gap", gap, "m")
+    facets = list[_Facets]()
     for shape in shapes:
         if not hasattr(shape, "points") or not hasattr(shape, "faces"):
             raise SceneError(f"shapes: {short(shape)} is not a shape; give each as Polyhedron(...)")
-    return tuple(_found(shapes, gap, Progress("finding faces", len(shapes), progress)))
-
-
-def _found(shapes: Sequence[_Shape], gap: float, course: Progress) -> Iterator[_TouchingFace]:
-    """Yield the faces over which blocks touch, pair by pair."""
-    facets, done = list[_Facets](), 0
-    for shape in shapes:
-        corners = tuple(shape.points[list(face)] for face in shape.faces)
+        corners = [shape.points[list(face)] for face in shape.faces]
         normals = units(np.array([normal_of(face) for face in corners]))
-        facets.append(_Facets(corners, normals, np.array([face.mean(axis=0) for face in corners])))
-    bounds = [_bounds_of(shape.points) for shape in shapes]
-    for tries, (i, j) in enumerate(_near_pairs(bounds, gap)):
+        facets.append((corners, normals, np.array([face.mean(axis=0) for face in corners])))
+    course, done = Progress("finding faces", len(shapes), progress), 0
+    out = list[_TouchingFace]()
+    near = _near_pairs([_bounds_of(shape.points) for shape in shapes], gap)
+    for tries, (i, j) in enumerate(near):
         course.add(i - done)
         done = i
         if tries == _MOST_PAIRS:
             raise SceneError(f"more than {_MOST_PAIRS} pairs of blocks are in one place; part them")
-        for polygons, (origin, axes) in _overlaps(facets[i], facets[j], gap):
+        for origin, axes, polygons in _overlaps(facets[i], facets[j], gap):
             for piece in _convex_pieces(polygons):
-                yield _TouchingFace((i, j), origin + piece @ axes[1:], axes[0])
+                out.append(_TouchingFace((i, j), origin + piece @ axes[1:], axes[0]))
+    return tuple(out)
 
 
-def _overlaps(first: _Facets, second: _Facets, gap: float) -> Iterator[tuple[list[Any], Any]]:
-    """Yield overlaps of the faces of two blocks, plane by plane, with the origins and axes."""
+def _overlaps(first: _Facets, second: _Facets, gap: float) -> list[_Plane]:
+    """Return the planes in which faces of two blocks overlap, with the overlaps."""
+    (corners, normals, middles), (others, against, ends) = first, second
     planes: list[_Plane] = []
-    against = first.normal @ second.normal.T < -_OPPOSED
-    step = second.middle[None] - first.middle[:, None]
-    apart = np.abs(np.einsum("kmi,ki->km", step, first.normal))
-    wide = np.linalg.norm(step, axis=2)
-    for k, m in np.argwhere(against & (apart <= gap + (1 - _OPPOSED**2) ** 0.5 * wide)):
-        normal = first.normal[k] - second.normal[m]
+    step = ends[None] - middles[:, None]
+    apart = np.abs(np.einsum("kmi,ki->km", step, normals))
+    near = apart <= gap + (1 - _OPPOSED**2) ** 0.5 * np.linalg.norm(step, axis=2)
+    for k, m in np.argwhere((normals @ against.T < -_OPPOSED) & near):
+        normal = normals[k] - against[m]
         normal /= np.linalg.norm(normal)
-        middle = 0.5 * (first.middle[k] + second.middle[m])
-        same = next(
-            (
-                plane
-                for plane in planes
-                if normal @ plane[1][0] > _LEVEL
-                and abs((middle - plane[0]) @ plane[1][0]) <= 0.5 * gap
-            ),
-            None,
+        middle = 0.5 * (middles[k] + ends[m])
+        same = (
+            plane
+            for plane in planes
+            if normal @ plane[1][0] > _LEVEL and abs((middle - plane[0]) @ plane[1][0]) <= 0.5 * gap
         )
-        origin, axes, known = (middle, plane_axes(normal), []) if same is None else same
-        known += _overlap(first.corners[k], second.corners[m], (origin, axes), gap)
-        if same is None and known:
-            planes.append((origin, axes, known))
-    for origin, axes, polygons in planes:
-        yield polygons, (origin, axes)
+        plane = next(same, (middle, plane_axes(normal), []))
+        overlap = _overlap(corners[k], others[m], plane[:2], gap)
+        planes += [plane] if overlap and not plane[2] else []
+        plane[2].extend(overlap)
+    return planes
 
 
 def _overlap(first: Floats, second: Floats, plane: tuple[Floats, Floats], gap: float) -> list[Any]:
     """Return the overlap of two faces (m, 3), seen along a normal, if they are near all over it."""
-    shapely = import_module("shapely")
     origin, axes = plane
     seen = [(face - origin) @ axes.T for face in (first, second)]
     one, other = (_valid(face[:, 1:]) for face in seen)
     common = one.intersection(other)
     if not common.area > _SLIVER * min(one.area, other.area):
         return []
-    points = shapely.get_coordinates(common)
+    points = SHAPELY.get_coordinates(common)
     heights = []  # of each face's plane, over the points
     for face in seen:
         normal, middle = normal_of(face), face.mean(axis=0)
@@ -256,13 +238,6 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> _FlatFace:
     )
 
 
-def _fields(face: _FlatFace, law: JointLaw) -> dict[str, Any]:
-    """Return what a joint and a ground end over a face have in common."""
-    stiffness = law.stiffness(face.area, face.moments)
-    fields = _spring_fields(face.center, face.axes[0], face.axes[1], stiffness)
-    return {**fields, "face": tuple((x, y) for x, y in face.corners.tolist())}
-
-
 def face_joint(bricks: tuple[int, int], face: _FlatFace, law: JointLaw) -> Joint:
     """Return the joint of two bricks over a face whose normal points into the second."""
     return Joint(bricks=bricks, **_fields(face, law))
@@ -274,27 +249,26 @@ def face_ground(brick: int, face: _FlatFace, law: JointLaw, stub: float = _STUB)
     return Ground(brick=brick, anchor=anchor, **_fields(face, law))
 
 
+def _fields(face: _FlatFace, law: JointLaw) -> dict[str, Any]:
+    """Return what a joint and a ground end over a face have in common."""
+    stiffness = law.stiffness(face.area, face.moments)
+    fields = _spring_fields(face.center, face.axes[0], face.axes[1], stiffness)
+    return {**fields, "face": tuple((x, y) for x, y in face.corners.tolist())}
+
+
 _OFF = 0.05  # of a face from a block that it joins, over the size of the block
 _ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
 
 _Held = tuple[tuple[int, int], _FlatFace]
 
 
-@dataclass(frozen=True)
-class _Contacts:
-    """Where blocks touch: faces whose normals point into the second.
-
-    Places are those of the file; the ground is -1 and comes first.
-    """
-
-    faces: tuple[_Held, ...]
-    said: tuple[str, ...]
-
-
 def _find_contacts(
     content: Content, given: Given, blocks: Sequence[Repaired], bricks: Mapping[int, Brick]
-) -> _Contacts:
-    """Return where blocks touch each other and the ground, which those not built belong to."""
+) -> tuple[list[_Held], list[str]]:
+    """Return faces where blocks touch, their normals into the second; and how they were found.
+
+    Places are those of the file; the ground, which blocks not built belong to, comes first.
+    """
     _require_polygons()
     solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]
     gap = _widest_gap(given, bricks)
@@ -306,11 +280,18 @@ def _find_contacts(
         touching = touching_faces(facets, gap, given.progress)
         found = [(f.blocks, flat_face(f.corners, f.normal)) for f in touching]
         said = [f"faces are found where blocks are no more than {1e3 * gap:.3g} mm apart"]
-    faces = [held for pair, face in found for held in _on_ground(pair, face, bricks)]
+    faces = list[_Held]()
+    for pair, face in found:
+        a, b = (i if i in bricks else GROUND for i in pair)
+        if b == GROUND != a:
+            turned = flat_face(face.center + face.corners @ face.axes[1:], -face.axes[0])
+            faces.append(((GROUND, a), turned))
+        elif b != GROUND:
+            faces.append(((a, b), face))
     if len(bricks) == len(solids):
         faces += _standing(bricks, facets, gap)
         said.append("no supports are named: blocks with a face at the lowest level stand there")
-    return _Contacts(tuple(faces), tuple(said))
+    return faces, said
 
 
 def _widest_gap(given: Given, bricks: Mapping[int, Brick]) -> float:
@@ -319,20 +300,9 @@ def _widest_gap(given: Given, bricks: Mapping[int, Brick]) -> float:
     return TOLERATED * thinnest if given.gap is None else positive("gap", given.gap, "m")
 
 
-def _on_ground(pair: tuple[int, int], face: _FlatFace, bricks: Mapping[int, Brick]) -> list[_Held]:
-    """Return a face between blocks, supports among them as the ground; none between supports."""
-    a, b = (i if i in bricks else GROUND for i in pair)
-    if a == b == GROUND:
-        return []
-    if b == GROUND:
-        turned = flat_face(face.center + face.corners @ face.axes[1:], -face.axes[0])
-        return [((GROUND, a), turned)]
-    return [((a, b), face)]
-
-
 def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list[str]:
     """Say how far faces of a file lie off the blocks that they join; too far is an error."""
-    shapely, farthest = import_module("shapely"), 0.0
+    farthest = 0.0
     sides = {
         i: [flat_face(facets[i].points[list(face)]) for face in facets[i].faces]
         for i in {i for face in content.faces for i in face.blocks}
@@ -342,7 +312,7 @@ def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list
             away = np.full(len(held.corners), np.inf)
             for side in sides[i]:
                 seen = (held.corners - side.center) @ side.axes.T
-                beside = shapely.distance(_valid(side.corners), shapely.points(seen[:, 1:]))
+                beside = SHAPELY.distance(_valid(side.corners), SHAPELY.points(seen[:, 1:]))
                 away = np.minimum(away, np.hypot(seen[:, 0], beside))
             off = float(away.max(initial=0.0))
             if off > max(gap, _OFF * float(np.ptp(facets[i].points, axis=0).max())):
@@ -373,29 +343,30 @@ def _into(corners: Floats, normal: Floats, first: _Shape, second: _Shape) -> Flo
     """Return the normal of a face that points from the first block into the second."""
     middle = corners.mean(axis=0)
     step = _ASIDE * np.linalg.norm(np.ptp(corners, axis=0)) * normal
-    ahead = _holds(second, middle + step) + _holds(first, middle - step)
-    behind = _holds(second, middle - step) + _holds(first, middle + step)
-    if ahead == behind:  # a thin block, or one that is not where its face is
+    votes = 0
+    for solid, side in ((second, 1), (first, -1)):
+        if isinstance(solid, Polyhedron):
+            ahead, behind = (
+                solid.contains(middle + side * step),
+                solid.contains(middle - side * step),
+            )
+            votes += ahead - behind
+    if votes == 0:  # a thin block, or one that is not where its face is
         toward = second.points.mean(axis=0) - first.points.mean(axis=0)
         return normal if toward @ normal >= 0 else -normal
-    return normal if ahead > behind else -normal
-
-
-def _holds(solid: _Shape, point: Floats) -> bool:
-    return isinstance(solid, Polyhedron) and solid.contains(point)
+    return normal if votes > 0 else -normal
 
 
 def _standing(bricks: Mapping[int, Brick], solids: Sequence[_Shape], gap: float) -> Iterator[_Held]:
     """Yield the faces of blocks at the lowest level, their normals into the blocks."""
     level = min(float(solids[i].points[:, 2].min()) for i in bricks)
-    shapely = import_module("shapely")
     for i in bricks:
         low = []
         for face in solids[i].faces:
             corners = solids[i].points[list(face)]
             flat = flat_face(corners)
             if flat.axes[0] @ DOWN > _OPPOSED and corners[:, 2].max() <= level + gap:
-                low.append(shapely.Polygon(corners[:, :2]))
+                low.append(SHAPELY.Polygon(corners[:, :2]))
         for piece in _convex_pieces(low) if low else ():
             height = np.full((len(piece), 1), level)
             yield (GROUND, i), flat_face(np.hstack([piece, height]), -DOWN)
