@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,38 +46,20 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
 
-@dataclass(frozen=True)
-class _Element:
-    """An element of a model."""
+def _placed(source: str, held: Entry, elements: dict[str, tuple[str, Entry]]) -> dict[str, Floats]:
+    """Return the transformation of every element, groups too, to the model's world.
 
-    where: str  # what to call it in messages
-    kind: str  # the last part of what it says that it is, in small letters
-    guid: str  # its identifier
-    held: Entry  # what it holds
-    matrix: Floats  # (4, 4); from its own coordinates to those of the model's world
-
-
-def _elements(source: str, held: Entry) -> list[_Element]:
-    """Return the elements of a model, groups too, each where COMPAS places it.
-
-    Its transformation is relative to its parent in the tree, and the first of them to the model's.
+    Its own is relative to its parent in the tree, and the first of them to the model's.
     """
-    rows = [*by_guid(f"{source}: elements", entry(source, held, "elements"))]
-    named = {guid: f"{source}: element {i}" for i, (guid, _) in enumerate(rows)}
-    inner = {guid: held_by(named[guid], item) for guid, item in rows}
-    placed: dict[str | None, Floats] = {
-        None: transformation_of(f"{source}: transformation", held.get("transformation"))
-    }
+    world = transformation_of(f"{source}: transformation", held.get("transformation"))
+    placed = dict[str, Floats]()
     for guid, parent in _tree(source, held):
-        if guid not in inner or guid in placed:
+        if guid not in elements or guid in placed:
             why = "occurs twice" if guid in placed else "is not there"
             raise SceneError(f"{source}: element {short(guid)} of the tree {why}")
-        placed[guid] = placed[parent] @ _own(named[guid], inner[guid])
-    for guid in inner.keys() - placed.keys():
-        placed[guid] = placed[None] @ _own(named[guid], inner[guid])
-    return [
-        _Element(named[guid], kind(item), guid, inner[guid], placed[guid]) for guid, item in rows
-    ]
+        placed[guid] = (world if parent is None else placed[parent]) @ _own(*elements[guid])
+    lost = {guid: world @ _own(*elements[guid]) for guid in elements.keys() - placed.keys()}
+    return placed | lost
 
 
 def by_guid(where: str, found: Any) -> Iterator[tuple[str, Entry]]:
@@ -119,12 +101,16 @@ def read_assembly(document: Any, source: str) -> Content:
         node = common | mapping(source, nodes[key])
         blocks.append(_node_block(f"{source}: block {key}", key, node, meshes))
     place = {key: i for i, key in enumerate(keys)}
-    faces = [
-        FileFace((place[a], place[b]), corners)
-        for a, b, where, held in _edges(source, mapping(f"{source}: edge", graph.get("edge") or {}))
-        for corners in _interfaces(where, held if isinstance(held, dict) else {})
-        if a in place and b in place
-    ]
+    faces = list[FileFace]()
+    for a, b, where, held in _edges(source, mapping(f"{source}: edge", graph.get("edge") or {})):
+        own = held if isinstance(held, dict) else {}
+        found = listing(where, own.get("interfaces") or [])  # under the key of some version
+        found = [own["interface"]] if not found and own.get("interface") else found
+        if own.get("interface_points"):
+            found = [{"points": own["interface_points"]}]
+        corners = [points(where, entry(where, payload(face), "points")) for face in found]
+        both = a in place and b in place
+        faces += [FileFace((place[a], place[b]), each) for each in corners if both]
     said = [f"{len(nodes) - len(keys)} nodes have no block"] if len(keys) < len(nodes) else []
     return Content(tuple(blocks), tuple(faces), said=tuple(said))
 
@@ -162,17 +148,6 @@ def _edges(source: str, found: Entry) -> Iterator[tuple[str, str, str, Any]]:
             yield a, b, f"{source}: edge {a}-{b}", held
 
 
-def _interfaces(where: str, held: Entry) -> Iterator[Floats]:
-    """Yield the corners of the faces on an edge, under whichever key its version uses."""
-    found = listing(where, held.get("interfaces") or [])
-    if not found and held.get("interface"):
-        found = [held["interface"]]
-    if held.get("interface_points"):
-        found = [{"points": held["interface_points"]}]
-    for face in found:
-        yield points(where, entry(where, payload(face), "points"))
-
-
 def read_model(document: Any, source: str) -> Content:
     """Return the content of a block model, or of a problem about one."""
     held = held_by(source, document)
@@ -185,60 +160,44 @@ def read_model(document: Any, source: str) -> Content:
                 f"{source}: the problem does not hold its model; give the model itself"
             )
         held = held_by(f"{source}: model", held["model"])
-    elements = _elements(source, held)
+    rows = [*by_guid(f"{source}: elements", entry(source, held, "elements"))]
+    where = [f"{source}: element {i}" for i in range(len(rows))]
+    elements = {g: (at, held_by(at, item)) for at, (g, item) in zip(where, rows, strict=True)}
+    placed = _placed(source, held, elements)
     items = by_guid(f"{source}: materials", held.get("materials") or [])
     found = {guid: held_by(source, item).get("density") for guid, item in items}
     densities = {
         g: number(f"{source}: density", value) for g, value in found.items() if value is not None
     }
-    kept = {i: e for i, e in enumerate(elements) if e.kind != "group"}
-    blocks = [_block(str(i), element, densities) for i, element in kept.items()]
-    if len(kept) < len(elements):
-        said.append(f"{len(elements) - len(kept)} groups only place what is in them")
-    known: dict[str, int | None] = {element.guid: None for element in elements}
-    known |= {element.guid: k for k, element in enumerate(kept.values())}
-    place = _places(source, held, known)
-    faces = tuple(
-        FileFace((entry(source, place, a), entry(source, place, b)), corners)
-        for a, b, corners in _contacts(source, held)
-    )
-    return Content(tuple(blocks), faces, law=law, said=tuple(said))
+    blocks, place = list[FileBlock](), dict[str, int | None]()  # of elements; of groups none
+    for i, (guid, item) in enumerate(rows):
+        place[guid] = None if kind(item) == "group" else len(blocks)
+        if place[guid] is not None:
+            at, own = elements[guid]
+            vertices, faces = solid_of_element(at, own)
+            density = densities.get(str(own.get("material")))
+            about: Any = {"support": own.get("is_support") is True, "density": density}
+            blocks.append(FileBlock(str(i), moved(vertices, placed[guid]), faces, **about))
+    if len(blocks) < len(rows):
+        said.append(f"{len(rows) - len(blocks)} groups only place what is in them")
+    contacts = tuple(_contacts(source, held, place))
+    return Content(tuple(blocks), contacts, law=law, said=tuple(said))
 
 
-def _block(key: str, element: _Element, densities: dict[str, float]) -> FileBlock:
-    where, held = element.where, element.held
-    vertices, faces = solid_of_element(where, held)
-    return FileBlock(
-        key,
-        moved(vertices, element.matrix),
-        faces,
-        support=held.get("is_support") is True,
-        density=densities.get(str(held.get("material"))),
-    )
-
-
-def _places(source: str, held: Entry, known: dict[str, int | None]) -> dict[str, int]:
-    """Return the places of the blocks of the graph's nodes; groups have none."""
-    nodes = mapping(source, mapping(source, held.get("graph") or {}).get("node") or {})
-    out = {}
-    for key, node in nodes.items():
+def _contacts(source: str, held: Entry, known: dict[str, int | None]) -> Iterator[FileFace]:
+    """Yield the faces where blocks touch; ``known``: places of elements, none of groups."""
+    graph, place = mapping(source, held.get("graph") or {}), dict[str, int]()
+    for key, node in mapping(source, graph.get("node") or {}).items():
         element = mapping(f"{source}: node {key}", node).get("element")
         if str(element) not in known:
             raise SceneError(f"{source}: node {key} is of element {element}, which is not there")
-        place = known[str(element)]
-        if place is not None:
-            out[key] = place
-    return out
-
-
-def _contacts(source: str, held: Entry) -> Iterator[tuple[str, str, Floats]]:
-    """Yield the keys of blocks that touch, and the corners of each face."""
-    graph = mapping(source, held.get("graph") or {})
+        if (at := known[str(element)]) is not None:
+            place[key] = at
     for a, b, where, item in _edges(source, mapping(source, graph.get("edge") or {})):
         for face in listing(where, mapping(where, item or {}).get("contacts") or []):
             corners = points(where, held_by(where, face).get("points") or [])
             if len(corners) > 2:  # of points and edges nothing is carried over a face
-                yield a, b, corners
+                yield FileFace((entry(source, place, a), entry(source, place, b)), corners)
 
 
 def _law(source: str, held: Any) -> JointLaw | None:

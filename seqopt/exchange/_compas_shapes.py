@@ -42,7 +42,10 @@ def kind(value: Any) -> str:
 
 
 def solid_of(where: str, value: Any) -> _Solid:
-    """Return the vertices (V, 3) and faces of a mesh, a polyhedron or a box."""
+    """Return the vertices (V, 3) and faces of a mesh, a polyhedron or a box.
+
+    Vertices and faces of a mesh have keys.
+    """
     held = payload(value)
     if isinstance(held, dict) and {"xsize", "ysize", "zsize"} <= set(held):
         size = [number(f"{where}: {key}", held[key]) for key in ("xsize", "ysize", "zsize")]
@@ -52,11 +55,6 @@ def solid_of(where: str, value: Any) -> _Solid:
         rows = [point(f"{where}: a vertex", row) for row in listing(where, held["vertices"])]
         sides = listing(where, entry(where, held, "faces"))
         return np.array(rows).reshape(-1, 3), [_corners(where, side, None) for side in sides]
-    return _halfedge(where, held)
-
-
-def _halfedge(where: str, held: Any) -> _Solid:
-    """Return a mesh whose vertices and faces have keys."""
     vertex = mapping(f"{where}: vertex", entry(where, held, "vertex"))
     face = mapping(f"{where}: face", entry(where, held, "face"))
     place = {key: i for i, key in enumerate(vertex)}
