@@ -58,11 +58,11 @@ def solid_of(where: str, value: Any) -> _Solid:
     vertex = mapping(f"{where}: vertex", entry(where, held, "vertex"))
     face = mapping(f"{where}: face", entry(where, held, "face"))
     place = {key: i for i, key in enumerate(vertex)}
-    rows = [
+    xyz = [
         [number(f"{where}: vertex {key}", mapping(where, v).get(axis, 0.0)) for axis in "xyz"]
         for key, v in vertex.items()
     ]
-    return np.array(rows).reshape(-1, 3), [
+    return np.array(xyz).reshape(-1, 3), [
         _corners(f"{where}: face {key}", side, place) for key, side in face.items()
     ]
 

@@ -158,11 +158,11 @@ def _overlaps(first: _Facets, second: _Facets, gap: float) -> list[_Plane]:
         normal /= np.linalg.norm(normal)
         middle = 0.5 * (middles[k] + ends[m])
         same = (
-            plane
-            for plane in planes
-            if normal @ plane[1][0] > _LEVEL and abs((middle - plane[0]) @ plane[1][0]) <= 0.5 * gap
+            each
+            for each in planes
+            if normal @ each[1][0] > _LEVEL and abs((middle - each[0]) @ each[1][0]) <= 0.5 * gap
         )
-        plane = next(same, (middle, plane_axes(normal), []))
+        plane: _Plane = next(same, (middle, plane_axes(normal), []))
         overlap = _overlap(corners[k], others[m], plane[:2], gap)
         planes += [plane] if overlap and not plane[2] else []
         plane[2].extend(overlap)

@@ -111,7 +111,7 @@ def _arrays(document: dict[str, Any], archive: Archive) -> dict[str, np.ndarray]
     """Return the arrays that a document declares, after checks of shape and type."""
     nodes, arcs, timed = document["nodes"], document["arcs"], document["timed"]
     of = {f"amount_{k}": column["of"] for k, column in enumerate(document["columns"])}
-    shapes = {name: (nodes if kind == "nodes" else arcs,) for name, kind in of.items()}
+    shapes: dict[str, tuple[int, ...]] = {n: (document[kind],) for n, kind in of.items()}
     shapes |= {"alone": (arcs, 2)} if document.get("alone", False) else {}
     whole = {"source": (arcs,), "target": (arcs,), "ends": (None,), "states": (nodes, None)}
     more = [f"timed_{name}" for name in TIMED] if timed else []

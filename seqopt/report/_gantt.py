@@ -109,7 +109,7 @@ def _lanes(
     With ``times`` over seconds: from a grip's own act, or from the start, up to letting go.
     """
     (first, last), begins, count = shown, steps[0].number, len(scene.robots)
-    ends: Floats = np.arange(len(steps) + 1) + begins - 0.5  # before and after every step
+    ends = np.arange(len(steps) + 1, dtype=float) + begins - 0.5  # before and after every step
     if times is not None:
         ends = np.array([0.0, *(time.end for time in times)])
     left, right = float(ends[first - begins]), float(ends[last - begins + 1])

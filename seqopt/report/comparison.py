@@ -192,7 +192,7 @@ def compare(
 
 def _table(
     scene: Scene,
-    rows: Mapping[str, dict[str, object]],
+    rows: dict[str, dict[str, object]],
     tables: Mapping[str, pd.DataFrame],
     left: Iterable[str],
     verdicts: Mapping[str, Sequence[BuildVerdicts]],
