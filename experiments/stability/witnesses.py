@@ -12,8 +12,7 @@ at seven densities. Each is judged by us (the plain verdict, proven from forces 
 - RBE of compas_cra: forces with the least tension, judged by the largest tension over the mean
   weight of a free block: up to 3e-5 it stands, from 1e-3 it falls; between the two, its own
   constraints without tension are put to a linear program (column ``no_tension``);
-- LMGC90: one simulated second from rest, for convex blocks only, in a process of its own;
-- CRA of compas_cra, recorded but no witness: it decides another question, see below.
+- LMGC90: one simulated second from rest, for convex blocks only, in a process of its own.
 
 A witness that is undecided is counted and agrees with nobody. If we are undecided where a witness
 is not, the claim fails. Times are medians of runs in turn in one process without imports; ours
@@ -24,12 +23,11 @@ Differences, and who is right:
 - A block on a slope of 30° that points into a corner of RBE's friction octagon stands for RBE with
   friction 0.555. It slides at 0.577 = tan 30°: RBE is wrong, by the octagon's 8 %.
 - A and H of compas_cra are blocks that hang between two walls by friction alone. Forces that hold
-  them up exist, which is all that we and RBE ask; but nothing builds them up: they fall in LMGC90
-  and CRA rejects them. "Stands" means that forces exist, not that they will arise.
+  them up exist, which is all that we and RBE ask; but nothing builds them up: they fall in LMGC90.
+  "Stands" means that forces exist, not that they will arise.
 
 RBE's tension alone does not do: less is left in curve-3-blocks with friction 0.05, which lacks a
-little bond, than in the shelves, which stand by RBE's own constraints. CRA fails on the shelves
-too, and decides one arch by its density alone, which scales every force alike.
+little bond, than in the shelves, which stand by RBE's own constraints.
 
 Inputs: compas_cra, ``pip install "seqopt[witness]"``; LMGC90 (compas_lmgc90) in this or another
 Python. Command: ``python -m experiments witnesses [--quick] [--lmgc90 PYTHON]``.
@@ -45,9 +43,16 @@ import pandas as pd
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
 from experiments.stability.parts import witness_cra
 from experiments.stability.parts.blocks import ring, stack
-from experiments.stability.parts.witness_cra import SAMPLES, force_only, sample_scene
+from experiments.stability.parts.witness_cra import (
+    SAMPLES,
+    Scene,
+    arch,
+    force_only,
+    incline,
+    sample_scene,
+    scene_of,
+)
 from experiments.stability.parts.witness_lmgc90 import moved_by, python_with_lmgc90
-from experiments.stability.parts.witness_scenes import Scene, arch, incline, scene_of
 from seqopt.contact.mortar import Mortar
 from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
@@ -99,16 +104,15 @@ class Trial:
     scene: Scene
     friction: float
     density: float | None = None
-    coupled: bool = False
 
 
 def sample_trials(names: list[str]) -> list[Trial]:
     out = []
     for name in names:
         scene, friction = sample_scene(name), SAMPLES[name].friction
-        out.append(Trial("sample", name, scene, friction, coupled=name != LARGEST))
+        out.append(Trial("sample", name, scene, friction))
         if name in AT_ONE:
-            out.append(Trial("sample", f"{name}, density 1", scene, friction, 1.0, coupled=True))
+            out.append(Trial("sample", f"{name}, density 1", scene, friction, 1.0))
         for less in ASIDE.get(name, ()):
             out.append(Trial("sample", f"{name}, friction {less:g}", scene, less))
     return out
@@ -143,21 +147,21 @@ def timed(trial: Trial) -> tuple[tuple[Verdict, float], float]:
     return ours(trial), time.perf_counter() - start
 
 
-def row_of(trial: Trial, python: str | None, *, aside: bool) -> dict[str, object]:
-    """Return what all say about a trial; aside, CRA is asked as well."""
+def row_of(trial: Trial, python: str | None) -> dict[str, object]:
+    """Return what all say about a trial."""
     (verdict, lacking), seconds = timed(trial)
     word = force_only(trial.scene, trial.friction, trial.density)
     undecided = word.verdict is Verdict.UNDECIDED
     convex = trial.density is None and all(solid.convex for solid in trial.scene.solids)
     exact = witness_cra.without_tension(trial.scene, trial.friction).value if undecided else ""
-    asked = trial.scene, trial.friction, trial.density
-    cra = witness_cra.coupled(*asked) if aside and trial.coupled else ""
     row = {"group": trial.group, "case": trial.name, "blocks": len(trial.scene.solids)}
     row |= {"contacts": len(trial.scene.touches), "friction": trial.friction}
     row |= {"density": trial.density or np.nan, "ours": verdict.value, "lacking_bond": lacking}
     row |= {"seconds": seconds, "rbe": word.verdict.value, "tension": word.tension}
-    row |= {"rbe_seconds": word.seconds, "no_tension": exact, "cra": cra}
-    return row | {"lmgc90": moved_by(python, *asked[:2]) if python and convex else ""}
+    row |= {"rbe_seconds": word.seconds, "no_tension": exact}
+    return row | {
+        "lmgc90": moved_by(python, trial.scene, trial.friction) if python and convex else ""
+    }
 
 
 def race(trials: list[Trial], rounds: int) -> pd.DataFrame:
@@ -217,7 +221,7 @@ def trials(*, quick: bool) -> list[Trial]:
     freed += [without_a_support("A")]
     # 25 blocks of thickness 1 on a span of 10, the outer two fixed
     ends = scene_of(ring(25, 5.5, 1.0), {0, 24})
-    dense = [Trial("density", f"25 at {x:g}", ends, 0.84, x, coupled=True) for x in DENSITIES]
+    dense = [Trial("density", f"25 at {x:g}", ends, 0.84, x) for x in DENSITIES]
     return [*sample_trials(samples), *freed, *built_trials(), *dense]
 
 
@@ -227,7 +231,7 @@ def experiment(options: Options) -> Finding:
     witnesses = ["rbe", "lmgc90"] if python else ["rbe"]
     all_trials = trials(quick=quick)
     times = race([t for t in all_trials if t.name in (LARGEST, "bridge")], 1 if quick else 5)
-    table = pd.DataFrame([row_of(t, python, aside=not quick) for t in all_trials])
+    table = pd.DataFrame([row_of(t, python) for t in all_trials])
     report(table, witnesses)
     print(times.to_string(index=False, float_format="%.3g"))
     ratio = None if quick else times.loc[times["case"] == LARGEST, "ratio"].max()

@@ -12,11 +12,11 @@ from experiments.stability import witnesses
 from experiments.stability.parts.witness_cra import (
     SAMPLES,
     force_only,
+    incline,
     sample_scene,
     without_tension,
 )
 from experiments.stability.parts.witness_lmgc90 import python_with_lmgc90
-from experiments.stability.parts.witness_scenes import incline
 from experiments.stability.witnesses import (
     Trial,
     built_trials,
@@ -34,7 +34,7 @@ def table():
     """What a few cases look like when all agree, with an LMGC90 that says what we say."""
     shown = [t for t in built_trials() if t.group in ("incline", "stack")]
     shown += [t for t in sample_trials(["A"]) if t.name == "A"]
-    table = pd.DataFrame([row_of(trial, None, aside=False) for trial in shown])
+    table = pd.DataFrame([row_of(trial, None) for trial in shown])
     wedged = table["case"] == "A"
     table["lmgc90"] = table["ours"].where(~wedged, Verdict.FALLS.value)
     return table

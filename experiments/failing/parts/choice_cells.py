@@ -17,25 +17,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from dataclasses import fields as dataclass_fields
 from functools import partial
 from itertools import pairwise, product
 from typing import NamedTuple
 from unittest.mock import patch
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from experiments.harness.scenes import half_circle
 from formulations import solvers
 from seqopt.arrays import Floats
-from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import Formulation, FormulationKind, formulations
-from seqopt.network.network import Network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, Limit
@@ -179,32 +175,6 @@ def arch(size: Size, criterion: Criterion, limits: tuple[Limit, ...] = ()) -> Co
     return of_layers(pose_decisions(engine, three_robot_loop(engine.network), criterion, limits))
 
 
-def flat(size: Size, _: Rng) -> Costs:
-    """Return a problem in which all possible choices respond equally."""
-    engine = Even(ComplianceEngine(half_circle(size.bricks)))
-    return of_layers(pose_decisions(engine, three_robot_loop(engine.network), EQUATIONS))
-
-
-class Even:
-    """An engine whose answers are all alike."""
-
-    def __init__(self, engine: Engine) -> None:
-        self.engine = engine
-
-    @property
-    def network(self) -> Network:
-        """The engine's network."""
-        return self.engine.network
-
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
-        """Return fields of sevens."""
-        fields = self.engine.solve(bricks, grips, want)
-        sevens = {
-            f.name: np.full_like(getattr(fields, f.name), 7.0) for f in dataclass_fields(fields)
-        }
-        return Fields(**sevens)
-
-
 def tight(size: Size, _: Rng) -> Costs:
     """Return a problem whose limit is the least force with which it can be built."""
     least, __ = enumerated(arch(size, FORCE), Aim.PEAK)
@@ -213,7 +183,6 @@ def tight(size: Size, _: Rng) -> Costs:
 
 CASES: dict[str, Case] = {
     "ranks tie after rounding": lambda size, _: arch(size, COARSE),
-    "flat criterion": flat,
     "equal costs": lambda size, _: costs(size.sizes, lambda shape: np.full(shape, 5.0)),
     "all costs zero": lambda size, _: costs(size.sizes, np.zeros),
     "equal but for rounding": rounded,

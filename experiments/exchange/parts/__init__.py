@@ -1,1 +1,0 @@
-"""What claims about assemblies of others rest on."""
