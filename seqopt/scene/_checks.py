@@ -73,7 +73,7 @@ def settle(value: object, **content: object) -> None:
 def check(value: Any, where: str, **checks: Callable[[str, Any], object]) -> None:
     """Set fields of a frozen value to results of checks, which get the name of the field.
 
-    A field that is None by default may be left out: then it is not checked.
+    A field whose default is None may be left out: then it is not checked.
     """
     known = {field.name: field.default for field in fields(value)}
     for name, checked in checks.items():
