@@ -62,36 +62,27 @@ def what_was_enough(
     below, joint, number, build = min(each, key=lambda one: np.nan_to_num(one[0], nan=np.inf))
     known = not (staged or np.isnan(below))
     step = f"step {number}{f' of {build}' if len(builds) > 1 else ''}" if known else ""
-    return Enough(
-        type(engine).__name__ if recipe is None else recipe.name,
-        _others(within, below if known else np.nan, f"{joint} in {step}"),
-        joint if known else "",
-        step,
-        below if known else None,
-        tuple(_left_out(within, builds, staged=staged)),
-    )
-
-
-def _others(within: LinearRange, below: float, where: str) -> str:
-    """Describe what more detailed engines would change; ``below``: margin to the limits, Pa."""
-    engine = within.engine
+    where, unknown = f"{joint} in {step}", "what discrete elements would change is not known: "
     if isinstance(engine, OpeningEngine):
-        return "none is more detailed"
-    if not isinstance(engine, _KNOWN):
-        return "what another one would change is not known"
-    if np.isnan(below):
+        others = "none is more detailed"
+    elif not isinstance(engine, _KNOWN):
+        others = "what another one would change is not known"
+    elif not known:
         unchecked = "; ".join(within.unchecked) or str(getattr(engine, "unchecked", ""))
-        why = unchecked or "steps build on earlier ones"
-        return f"what discrete elements would change is not known: {why}"
-    if below >= 0:
+        others = unknown + (unchecked or "steps build on earlier ones")
+    elif below >= 0:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
         own = f" {_with_mortar(_mortar_name(within.mortar))}"  # whose limits they are
         own = "" if isinstance(engine, AutoEngine) else own
-        return f"discrete elements{own} would change nothing in these steps: {close}"
-    if isinstance(engine, AutoEngine):
-        return "discrete elements were taken where joints open, elsewhere they change nothing"
-    asks = f"{where} leaves its limits; the engine discrete says it"
-    return f"what discrete elements would change is not known: {asks}"
+        others = f"discrete elements{own} would change nothing in these steps: {close}"
+    elif isinstance(engine, AutoEngine):
+        others = "discrete elements were taken where joints open, elsewhere they change nothing"
+    else:
+        others = f"{unknown}{where} leaves its limits; the engine discrete says it"
+    name = type(engine).__name__ if recipe is None else recipe.name
+    left_out = tuple(_left_out(within, builds, staged=staged))
+    margin = below if known else None
+    return Enough(name, others, joint if known else "", step, margin, left_out)
 
 
 def _left_out(

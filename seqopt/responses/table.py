@@ -161,25 +161,6 @@ class LinearRange:
         self._measured(*tables.values())
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
-    def of_steps(self, builds: Mapping[str, Sequence[Step]]) -> dict[str, tuple[Departure, ...]]:
-        """Return the limits that builds exceed, from their steps: each state is computed once."""
-        states, shift = _distinct(builds.values()), RESPONSES["D_max"]
-        fields = _each_fields(self.engine, states.values(), Want.DISPLACEMENTS)
-        moved = {
-            state: shift.of(self._network, found)[0] * shift.scale if state[0] else 0.0
-            for state, found in zip(states, fields, strict=True)
-        }
-        robots, tables = self._network.scene.robots, dict[str, _Columns]()
-        for name, steps in builds.items():
-            nodes = zip(*(step.grips for step in steps), strict=True)
-            tables[name] = {
-                "step": [step.number for step in steps],
-                "bricks": [step.bricks for step in steps],
-                shift.column: [moved[step.bricks, step.grips] for step in steps],
-                **{f"{robot.name}_node": held for robot, held in zip(robots, nodes, strict=True)},
-            }
-        return self.of_builds(tables)
-
     def closest(self, table: _Columns) -> tuple[float, str, int]:
         """Return the joint closest to its elastic limits: margin, Pa, name and step.
 

@@ -80,13 +80,22 @@ class Found:
         return {own: self.prover(own.network) for own in {*self.value.engines}}
 
     @cached_property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Responses of the steps of every plan."""
+        each: dict[str, pd.DataFrame] = {}
+        for own, builds in _by_engine(self.value).items():
+            each |= zip(builds, _analyze_builds(own, [*builds.values()]), strict=True)
+        return {name: each[name] for name in _names(self.value)}
+
+    @cached_property
     def departures(self) -> dict[str, tuple[Departure, ...]]:
         """Exceeded limits of the linear range, by plan."""
 
         def departures() -> dict[str, tuple[Departure, ...]]:
             left: dict[str, tuple[Departure, ...]] = {}
             for own, builds in _by_engine(self.value).items():
-                left |= LinearRange(own).of_steps(builds)
+                own_tables = {name: self.tables[name] for name in builds}
+                left |= LinearRange(own).of_builds(own_tables)
             return {name: left[name] for name in _names(self.value) if name in left}
 
         return self.clock.spare("which points leave the linear range", departures, {})
@@ -284,13 +293,11 @@ def _front_files(found: Found, methods: Mapping[str, pd.DataFrame]) -> dict[str,
     front, problem = found.value, found.problem
     engine, free = problem.engine, states_of(problem)
     found.tell("analyzing plans")
-    each: dict[str, pd.DataFrame] = {}
+    tables = found.tables
     verdicts: dict[str, tuple[BuildVerdicts, ...]] = {}
     for own, builds in _by_engine(front).items():
-        each |= zip(builds, _analyze_builds(own, [*builds.values()]), strict=True)
         verdicts |= found.provers[own].of_builds(builds)
     found.tell("drawing and writing the page")
-    tables = {name: each[name] for name in _names(front)}
     left = found.departures
     summary = {
         "outside_linear_range": list(builds_in_words(left)),
