@@ -47,18 +47,6 @@ def test_two_robots_build_by_themselves(capsys, words, says):
         assert (status, FEW in err.splitlines()) == (0, says), err
 
 
-def test_who_is_lost_changes_the_usual_rule(capsys, tmp_path):
-    out = tmp_path / "out"
-    words = ("optimize", WALL, "--schedule", "free", "--no-stability", "--out", out)
-    assert run(capsys, *words)[0] == 0
-    again = ("replan", out, "--at", "1", "--lost", "rob3", "--no-stability")
-    status, _, err = run(capsys, *again)
-    assert (status, FEW in err) == (0, True), err
-    status, _, err = run(capsys, *again, "--rule", "least_grips=2")
-    assert status == 3
-    assert "it becomes possible with least_grips=1" in err
-
-
 def test_a_limit_that_helps_has_three_digits_and_does_help():
     engine = seqopt.make_engine("auto", seqopt.load_scene(WALL))
 

@@ -30,13 +30,6 @@ def test_a_device_is_no_output(capsys):
     assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
 
 
-def test_two_outputs_are_two_files(capsys, tmp_path):
-    path = tmp_path / "out"
-    words = ("analyze", "--method", "sequential", "--out", path, "--fields", path)
-    assert "two outputs go there" in refused(capsys, *words)
-    assert not path.exists()
-
-
 def test_an_input_is_not_overwritten(capsys, tmp_path):
     scene, plan = tmp_path / "plan.csv", tmp_path / "steps.csv"  # a scene under an output's name
     assert main(["scene", "--export", str(scene)]) == 0

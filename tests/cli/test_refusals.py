@@ -70,6 +70,7 @@ BAD = {
     f"{FREE} --stands dry --rule payload=ignored": "holds up anything",
     f"{FREE} --aim minmax,tilt": "name bond, friction and tilt before all others",
     f"{FREE} --budget travel=0.8": "give travel=3.5m, makespan=600s, regrips=2",
+    "optimize ARCH --formulation labels --budget steps_over:T_max=3": "give travel=0.8",
     f"{FREE} --direction takedown": "did you mean take-down?",
     f"{FREE} --direction take-down --keep 1..2": "--keep is no more; --to 12 leaves the first",
     f"{FREE} --direction take-down --to 5": "cannot end with 5; give fewer",

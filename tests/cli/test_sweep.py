@@ -28,14 +28,17 @@ def without_time(path):
 
 def test_every_row_is_what_one_problem_has(tmp_path, capsys):
     out = tmp_path / "s"
-    assert told("chain:bricks=7..8/2", "--over", "payload=300..500/2", "--out", str(out)) == 0
+    assert (
+        told("wall:columns=2,courses=1..2/2", "--over", "payload=300..500/2", "--out", str(out))
+        == 0
+    )
     assert "4 problems: 4 optimal" in capsys.readouterr().out
     rows = pd.read_csv(out / "sweep.csv")
-    assert list(zip(rows["bricks"], rows["payload"], strict=True)) == [
-        (bricks, payload) for bricks in (7, 8) for payload in (300, 500)
+    assert list(zip(rows["courses"], rows["payload"], strict=True)) == [
+        (courses, payload) for courses in (1, 2) for payload in (300, 500)
     ]
     for _, row in rows.iterrows():
-        plan = free(f"chain:bricks={row['bricks']:.0f}")
+        plan = free(f"wall:columns=2,courses={row['courses']:.0f}")
         assert row["F_largest"] == pytest.approx(plan.objective["F_largest"], rel=1e-8)
         assert row["F_largest_bound"] == pytest.approx(row["F_largest"], rel=1e-8)
         assert (row["steps"], row["status"]) == (len(plan.steps), "optimal")
@@ -46,7 +49,7 @@ def test_every_row_is_what_one_problem_has(tmp_path, capsys):
 def test_a_sweep_that_was_interrupted_goes_on_where_it_ended(tmp_path, workers):
     """Rows that are there are kept as they are, the others are the same as without an end."""
     whole, part = tmp_path / "whole", tmp_path / "part"
-    words = ["chain:bricks=7..9/3", "--out"]
+    words = ["wall:columns=2,courses=1..3/3", "--out"]
     assert told(*words, str(whole)) == 0
     assert told(*words, str(part)) == 0
     lines = (part / "sweep.csv").read_text().splitlines()
@@ -59,11 +62,11 @@ def test_a_sweep_that_was_interrupted_goes_on_where_it_ended(tmp_path, workers):
 
 
 def test_a_problem_without_a_plan_is_a_row_that_says_why(capsys):
-    assert told("chain:bricks=7..8/2", "--over", "payload=1,400") == 0
+    assert told("wall:columns=2,courses=1..2/2", "--over", "payload=1,400") == 0
     rows = capsys.readouterr().out
     assert rows.count("infeasible") == 2
     assert rows.count("optimal") == 2
-    assert told("chain:bricks=7..8/2", "--over", "payload=1") == 3
+    assert told("wall:columns=2,courses=1..2/2", "--over", "payload=1") == 3
 
 
 def test_ranges_are_even_or_in_proportion():
@@ -76,19 +79,19 @@ def test_ranges_are_even_or_in_proportion():
 
 
 def test_scenes_of_ones_own_and_any_function(tmp_path):
-    scenes = [seqopt.load_scene(f"chain:bricks={count}") for count in (7, 8)]
+    scenes = [seqopt.load_scene(f"wall:columns=2,courses={count}") for count in (1, 2)]
     path = tmp_path / "rows.csv"
     found = sweep(scenes, free, mortars=["dry"], out=path)
     again = sweep(scenes, lambda scene: pytest.fail("it is known"), mortars=["dry"], out=path)
     assert list(found["scene"]) == [scene.name for scene in scenes]
     assert {*found["falls_dry"]} <= {*range(20)}
     assert list(again["F_largest"]) == pytest.approx(list(found["F_largest"]), rel=1e-8)
-    with pytest.raises(ProblemError, match="it has columns scene, not bricks"):
-        sweep("chain:bricks=7..8/2", free, out=path)
+    with pytest.raises(ProblemError, match="it has columns scene, not courses"):
+        sweep("wall:columns=2,courses=1..2/2", free, out=path)
     other = sweep([replace(scenes[0], name="other")], free, mortars=["dry"], out=path)
     assert len(other) == 1
     assert len(pd.read_csv(path)) == 3  # rows of other problems stay
-    with pytest.raises(ProblemError, match="two problems are called chain 7; give scenes names"):
+    with pytest.raises(ProblemError, match="two problems are called wall 2 x 1; give scenes names"):
         sweep([scenes[0], scenes[0].with_grips(1e6)], free)
 
 
@@ -107,6 +110,6 @@ def test_the_chart_has_lines_for_few_and_a_map_for_many(count):
 
 def test_without_matplotlib_the_chart_is_left_out_and_it_says_so(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("seqopt._cli.outputs.find_spec", lambda name: None)
-    assert told("chain:bricks=7", "--out", str(tmp_path)) == 0
+    assert told("wall:columns=2,courses=2", "--out", str(tmp_path)) == 0
     assert "figures are left out" in capsys.readouterr().err
     assert {path.name for path in tmp_path.iterdir()} == {"sweep.csv", "sweep.json"}

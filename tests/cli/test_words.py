@@ -71,4 +71,4 @@ def test_every_example_of_help_can_be_parsed():
         assert len(examples) >= 1
         for example in examples:
             if name != "completion":  # whose examples are lines of a shell
-                assert parser().parse_args(example.split()[1:]).command == name
+                assert parser(name).parse_args(example.split()[1:]).command == name

@@ -11,7 +11,6 @@ import pytest
 from seqopt._files import write_text
 from seqopt.errors import FileError, SceneError, StepError
 from seqopt.exchange._content import Given
-from seqopt.exchange._tables import BlockState, step_states
 from seqopt.exchange.exports import export_plan, read_folder
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
@@ -24,17 +23,6 @@ from tests.documents import DOCUMENTS
 
 SCENE = six_bricks()
 STEPS = METHODS["cantilever"](build_network(SCENE), ())
-
-
-def test_states_follow_from_what_stands_and_who_holds():
-    before = dict.fromkeys(SCENE.build_order, BlockState.ABSENT)
-    for row, step in zip(step_states(SCENE, STEPS), STEPS, strict=True):
-        held = {SCENE.brick_of_node[node].name for node in step.held}
-        standing = set(SCENE.build_order[: step.bricks])
-        assert {n for n, s in row.states.items() if s is BlockState.HELD} == held
-        assert {n for n, s in row.states.items() if s is not BlockState.ABSENT} == standing
-        assert set(row.new) == {n for n in standing if before[n] is BlockState.ABSENT}
-        before = row.states
 
 
 def test_json_says_all_of_the_steps():

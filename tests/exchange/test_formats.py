@@ -14,7 +14,7 @@ from seqopt.exchange.imports import import_scene
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import _parse_scene, dump_scene
 from tests.blocks import box
-from tests.documents import BOXES, DOCUMENTS, HIGH, LOW, TOP, model, obj
+from tests.documents import BOXES, DOCUMENTS, HIGH, LOW, TOP, obj
 
 METERS = Given(unit="m", density=2400.0)
 
@@ -58,26 +58,6 @@ def test_blocks_faces_and_supports(read, name, masses, areas, ends):
     assert _parse_scene(dump_scene(scene)) == scene
     heights = [brick.position[2] for brick in scene.placed]
     assert heights == sorted(heights)
-
-
-def test_normals_point_from_the_first_brick_into_the_second(read):
-    for name in ("assembly", "legacy", "model", "meshes"):
-        scene = read(f"{name}.json", DOCUMENTS[name])
-        place = {brick.name: np.array(brick.position) for brick in scene.bricks}
-        for joint in scene.joints:
-            a, b = joint.bricks
-            assert (place[b] - place[a]) @ joint.along > 0
-        for ground in scene.grounds:
-            assert (place[ground.brick] - ground.position) @ ground.along > 0
-
-
-def test_a_transformation_of_a_block_is_applied(read):
-    shift = {"dtype": "compas.geometry/Transformation", "data": {"matrix": np.eye(4).tolist()}}
-    shift["data"]["matrix"][0][3] = 5.0
-    given = Given(unit="m", detect=True)
-    plain, moved = (read("m.json", model(shift=s), given) for s in (None, shift))
-    steps = [np.subtract(b.position, a.position) for a, b in zip(plain.bricks, moved.bricks)]  # noqa: B905
-    assert np.array(steps) == pytest.approx(np.tile([5.0, 0.0, 0.0], (2, 1)))
 
 
 def test_a_problem_brings_the_stiffness_of_its_joints(read):

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from seqopt._cli.main import main
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene
-from seqopt.scene.scene_file import load_scene
 from tests.blocks import box
 from tests.documents import obj
 
@@ -71,19 +69,6 @@ def test_accepted_overlaps_are_said_first_and_warned_of(read):
     ) as caught:
         read(SUNK, accept_overlaps=True)
     assert "gap" not in str(caught.value)
-
-
-def test_the_command_refuses_until_it_is_told(tmp_path, capsys):
-    path, out = tmp_path / "half.obj", tmp_path / "half.json"
-    path.write_text(obj(*HALF), encoding="utf-8")
-    words = ["import", str(path), "--unit", "m", "--density", "2000", "--out", str(out)]
-    assert main(words) == 2
-    assert "interpenetrate by 60 mm" in capsys.readouterr().err
-    assert not out.exists()
-    assert main([*words, "--accept-overlaps"]) == 0
-    assert "seqopt: warning: scene half: bricks 0 and 1 interpenetrate" in capsys.readouterr().err
-    with pytest.warns(SceneWarning, match="bricks 0 and 1 interpenetrate by 60 mm"):
-        load_scene(out)
 
 
 def test_a_block_that_is_there_twice_is_named_and_left_out(read, tmp_path):

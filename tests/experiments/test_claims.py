@@ -141,15 +141,6 @@ def test_tables_and_verdicts_are_stored_when_asked(tmp_path, monkeypatch):
     assert after["verdict"].tolist() == ["does not hold", "holds"]
 
 
-@pytest.mark.parametrize(("verdict", "status"), [("left out: pip", 0), ("does not hold", 1)])
-def test_the_exit_status_of_all_says_whether_all_hold(monkeypatch, capsys, verdict, status):
-    asked = []
-    monkeypatch.setattr("experiments.__main__.run", lambda *words: asked.append(words) or verdict)
-    assert main(["all", "--quick"]) == status
-    assert asked == [(name, "--quick") for name in modules()]
-    assert len(capsys.readouterr().out.splitlines()) == len(modules())
-
-
 def test_commands_that_are_written_down_exist():
     """In the documentation and in the experiments' own texts."""
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]

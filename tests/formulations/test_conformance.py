@@ -22,9 +22,8 @@ from seqopt.graph.formulation import GROUP, End, FormulationKind, exhibits, form
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.problem import Aim
-from seqopt.problem.requirements import Limit
 from seqopt.sequence.methods import three_robot_loop
-from seqopt.study.published import CRITERIA, EQUATIONS, WORST_RATIO
+from seqopt.study.published import CRITERIA, EQUATIONS
 from tests.builders import small_arch
 from tests.layered import Costs, answer
 from tests.strategies import budgeted, problems
@@ -318,23 +317,6 @@ def test_all_exact_ones_equal_brute_force_on_a_small_arch(criterion):
     for name in EXACT_SUMS:
         assert valued(problem, name) == pytest.approx(best, rel=1e-6)
     assert valued(problem, "minimax") == pytest.approx(Costs(problem.peaks).best(Aim.PEAK))
-
-
-def test_limits_hold_or_are_infeasible(engine25):
-    schedule = three_robot_loop(engine25.network)
-    best = valued(pose_decisions(engine25, schedule, WORST_RATIO), "minimax")
-    for factor in (1.001, 0.999):
-        limits = [Limit(name, factor * best * bound) for name, bound in WORST_RATIO.limits]
-        problem = pose_decisions(engine25, schedule, EQUATIONS, limits)
-        if factor > 1:
-            choice = solve(problem, ALL["overlap_dp"]).choice
-            for choices in problem.evaluation.steps:
-                chosen = tuple(choice[m] for m in choices.moves)
-                for limit in limits:
-                    assert choices.responses[limit.response][chosen] <= limit.bound
-        else:
-            with pytest.raises(InfeasibleError, match="relax a limit"):
-                solve(problem, "overlap_dp")
 
 
 def test_budgets_of_the_reference_arch(problem25):

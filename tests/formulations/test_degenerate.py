@@ -25,7 +25,7 @@ from formulations.flow import Flow
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, formulations
 from seqopt.problem.problem import Aim
-from tests.layered import answer, told
+from tests.layered import answer
 
 ALL = formulations("costs")
 SMALL = Size(3, 3, 6)
@@ -133,22 +133,6 @@ def another(instance):
 def test_the_judge_tells_them_apart(reply, status, scale):
     """Negative control: what is wrong with an answer shows in its status, in any unit."""
     assert judge(small(scale=scale), answers(reply))["status"] == status
-
-
-@pytest.mark.parametrize("amount", [1e-9, 1e9])
-def test_budgets_are_measured_in_their_own_units(amount):
-    problem = capped(SMALL, np.random.default_rng(0), amount, 0.6)
-    free = answer(replace(problem, budgets=()))
-    with pytest.raises(SolverError, match="more than"):
-        answer(problem, told(problem, free.choice, free.objective))
-    certificate = answer(problem, "overlap_mip").certificate
-    assert certificate.spent["use"] <= problem.budgets[0].bound * (1 + 1e-9)
-    plain = capped(SMALL, np.random.default_rng(0), 1.0, 0.6)
-    assert certificate.objective == pytest.approx(
-        answer(plain, "overlap_mip").certificate.objective
-    )
-    prices = [answer(p, "overlap_lp", proof=False).prices["use"] for p in (problem, plain)]
-    assert amount * prices[0] == pytest.approx(prices[1], abs=1e-4)
 
 
 @takers

@@ -28,7 +28,7 @@ from seqopt.responses.resources import Resources
 from seqopt.scene.library.wall import WallShape, wall
 from seqopt.sequence.rules import FreeRules
 from seqopt.work.progress import Stage
-from tests.builders import from_both_sides, small_arch
+from tests.builders import small_arch
 from tests.strategies import free_builds
 
 LONG = (pytest.mark.slow, pytest.mark.long)
@@ -141,16 +141,6 @@ def test_formulations_of_states_find_the_best_order_too(name, aim, bricks):
         assert found.selection.objective[0] == pytest.approx(least, rel=1e-8)
     best = found.selection.objective[0] <= least * (1 + 1e-6)
     assert found.status == ("optimal" if best else "feasible")
-
-
-def test_another_order_is_found_where_the_own_one_has_no_plan():
-    scene = from_both_sides(2, "VL")
-    placed_by_one = FreeRules(
-        placers=("rob1",), robots=("rob1", "rob2"), least_grips=0, ending="held"
-    )
-    problem = posed(scene, placed_by_one)
-    assert [*brute_force(problem)] == [(2, 1)]
-    assert seqopt.solve(problem, FORMULATION).order == (2, 1)
 
 
 @once
@@ -354,15 +344,6 @@ def test_a_bound_that_is_not_proven_is_claimed(monkeypatch):
     assert "claimed" not in proven.order_bound_said
 
 
-def test_a_wall_is_as_bad_as_it_is_whole_in_any_order():
-    """The released wall is the worst step of every order; nothing else has to be looked at."""
-    problem = posed(wall(WallShape(columns=4, courses=3)))
-    found = seqopt.solve(problem, FORMULATION)
-    assert found.status == "optimal"
-    assert found.selection.effort[0] == 1
-    assert found.selection.bound[0] == pytest.approx(whole_bound(problem))
-
-
 @given(build=free_builds(most_bricks=4, most_robots=3))
 @settings(max_examples=5, deadline=None)
 def test_no_plan_stays_below_the_whole_structure(build):
@@ -372,10 +353,3 @@ def test_no_plan_stays_below_the_whole_structure(build):
     except InfeasibleError:
         return
     assert whole_bound(problem) <= best * (1 + 1e-9)
-
-
-def test_what_is_no_problem_gets_one_line():
-    with pytest.raises(ProblemError, match="orders 'all': give one of tied, any"):
-        posed(small_arch(4), among="all")
-    with pytest.raises(ProblemError, match="option depth: order_search has most"):
-        seqopt.solve(posed(small_arch(4)), FORMULATION, depth=1)

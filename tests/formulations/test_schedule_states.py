@@ -19,7 +19,6 @@ from seqopt.graph.states.states import build_states, within
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence.methods import modified_sequential, three_robot_loop
 from seqopt.sequence.rules import with_robots
@@ -119,22 +118,6 @@ def test_every_aim_equals_brute_force(name):
         assert plan.certificate.bounds == pytest.approx(best, rel=1e-6)
         assert plan.status == "optimal"
         assert plan.summary()["schedule"] == schedule.method
-
-
-@once
-@pytest.mark.parametrize("name", ["three-robot", "four"])
-def test_limits_equal_brute_force(name):
-    engine, schedule, plans = plans_of(name)
-    scene = engine.network.scene
-    worst = sorted({goals("T_max,sum", scene, *each) for each in plans})
-    bound = worst[len(worst) // 3][0]
-    least = min(total for tension, total in worst if tension <= bound)
-    limited = build_states(engine, schedule, ONES, "sum", [Limit("T_max", bound)])
-    found = seqopt.solve(limited, "schedule_search")
-    assert found.selection.objective[0] == pytest.approx(least, rel=1e-7)
-    none = build_states(engine, schedule, ONES, "sum", [Limit("T_max", 0.999 * worst[0][0])])
-    with pytest.raises(InfeasibleError, match=r"it becomes possible with T_max="):
-        seqopt.solve(none, "schedule_search")
 
 
 @once

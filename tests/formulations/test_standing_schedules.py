@@ -11,9 +11,9 @@ import pytest
 import seqopt
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import DRY, find_mortar
+from seqopt.contact.mortar import find_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.states.states import build_states
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
@@ -177,20 +177,6 @@ def test_demands_that_others_imply_are_not_asked():
     weak, strong = Standing("bond=3e3"), Standing("dry")
     tilted = Standing("bond=1e3", 0.1)
     assert _without_implied((weak, strong, tilted, weak)) == (strong, tilted)
-
-
-def test_a_robot_that_holds_anything_says_nothing_of_what_stands(dry):
-    with pytest.raises(ProblemError, match="without a largest force holds up anything"):
-        build_states(dry.engine, FreeRules(payload="ignored"), ONES, "minmax", stands="dry")
-
-
-def test_a_bond_that_opens_a_way_is_named():
-    engine = ComplianceEngine(build_network(small_arch(6)))
-    rules = FreeRules(robots=("rob1", "rob2"), least_grips=0)
-    problem = build_states(engine, rules, ONES, "minmax", stands=Standing("dry", 0.0))
-    problem = replace(problem, standing=Standing(replace(DRY, friction=0.05)))
-    with pytest.raises(InfeasibleError, match=r"it becomes possible with .*a bond of [\d.e+]+ Pa"):
-        seqopt.solve(problem, "schedule_search")
 
 
 def test_the_bond_that_is_named_is_enough():

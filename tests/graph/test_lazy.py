@@ -59,18 +59,3 @@ def test_a_cut_is_found_without_asking_what_lies_before_it():
     assert path is None
     assert known[21] == FAILS
     assert len(asked) <= 4
-
-
-def test_who_never_knows_leaves_no_path():
-    """The control: what is not known to pass does not."""
-    graph = Graph(
-        np.array([0], np.int32), np.array([1], np.int32), np.ones((1, 1)), (False,),
-        np.array([False, True]),
-    )  # fmt: skip
-    known = np.array([PASSES, 0])
-
-    def unsure(part, rows):
-        return np.zeros(len(rows), dtype=np.int64)
-
-    assert _lazy_path(graph, np.arange(2), known, unsure, unsure) is None
-    assert known.tolist() == [PASSES, FAILS]

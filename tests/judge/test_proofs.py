@@ -197,17 +197,3 @@ def test_what_was_left_out_for_a_threshold_bounds_all_orders(monkeypatch):
     monkeypatch.setattr("seqopt.judge._proof.MOST", 3)
     with pytest.raises(TooManyPartsError):
         Proof(problem).bounds_first(best * 1.01)  # the whole arch is below that
-
-
-def test_goals_that_take_no_more_than_all_must_leave_the_cut_of_the_first():
-    """Then the states strictly below the worst value are enough, as without these goals."""
-    problem = build_states(
-        seqopt.make_engine("compliance", small_arch(6)), FreeRules(), ONES, "minmax,steps"
-    )
-    best = seqopt.solve(problem).certificate.values
-    proof, alone = Proof(problem), Proof(replace(problem, goals=problem.goals[:1]))
-    assert proof.bounds(best) == best
-    assert alone.bounds(best[:1]) == best[:1]
-    assert proof.states == alone.states
-    assert Proof(problem).bounds((1.01 * best[0], best[1]))[0] < 1.01 * best[0]
-    assert Proof(problem).bounds((best[0], best[1] + 1))[1] <= best[1]

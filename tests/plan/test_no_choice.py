@@ -105,14 +105,6 @@ def test_a_formulation_that_returns_nonsense_has_failed(problem, what):
     assert "\n" not in str(caught.value)
 
 
-def test_whole_numbers_of_any_kind_are_a_choice(problem):
-    exact = find_formulation("overlap_dp")
-    true = exact.solve(problem.compiled(exact.aim).instance)
-    odd = replace(true, states=np.array(true.states), objective=np.array(true.objective))
-    plan = solve(problem, replace(exact, solve=lambda _: odd))
-    assert plan.selection == solve(problem, exact).selection
-
-
 def says_so(_):
     raise InfeasibleError("no choice is within all budgets")
 

@@ -49,17 +49,6 @@ def test_the_best_plan_with_props_is_that_of_brute_force(rules, nodes):
     assert plan.certificate.gap == 0
 
 
-def test_one_robot_builds_on_centering():
-    scene = small_arch(5)
-    one = scene.with_robots(scene.robots[-1]).with_centering()
-    rules = seqopt.FreeRules(least_grips=0, newest="free")
-    plan = seqopt.solve(posed(one, rules))
-    assert [len(step.held) for step in plan.steps] == [1, 0] * 5
-    assert plan.certificate.gap == 0
-    assert plan.steps[-1].held == ()
-    assert plan.responses()["props"].tolist()[-1] == 0  # they are struck with the last grip
-
-
 def test_rules_count_props_as_grips():
     scene = small_arch(4).with_props(Prop(node=3))
     network = seqopt.build_network(scene)

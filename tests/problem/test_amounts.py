@@ -141,13 +141,6 @@ def test_a_package_adds_both_by_entry_points(tmp_path, monkeypatch):
     assert not any(3 in step.held for step in plan.steps)
 
 
-@pytest.mark.parametrize("name", ["sum(T_max)", "payload"])
-def test_names_that_mean_something_are_refused(name):
-    for part in (Amount(name, busy), Filter(name, busy)):
-        with pytest.raises(ProblemError, match="has a meaning already; give another one"):
-            seqopt.register(part)
-
-
 def test_states_go_to_other_processes_once_filters_were_asked():
     graph = seqopt.solve(posed("minmax,steps", "F_largest=900")).graph
     level, start = graph.space.first + 1, graph.space.start()

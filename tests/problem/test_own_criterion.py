@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.placement.robust_placement import least_quantile
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.decision_costs import best_in_order
 from seqopt.graph.decisions import pose_decisions
@@ -151,20 +150,6 @@ def test_aims_in_their_order_agree_with_brute_force(problem, data):
     assert found[best_in_order(goals)] == min(found.values())
 
 
-def test_the_order_matters():
-    one = posed(seqopt.CRITERIA["worst-ratio-published"])
-    two = posed(seqopt.CRITERIA["weighted-published"])
-    goals = [(one.peaks, Aim.PEAK), (two.sums, Aim.SUM)]
-    choices = best_in_order(goals), best_in_order(goals[::-1])
-    (peak, total), (more, least) = (
-        [aim.value_of(costs, choice) for costs, aim in goals] for choice in choices
-    )
-    assert peak == seqopt.solve(one, "minimax").certificate.objective
-    assert least == pytest.approx(seqopt.solve(two, "overlap_dp").certificate.objective)
-    assert total >= least - 1e-9
-    assert more >= peak
-
-
 # quantiles over steps
 
 
@@ -175,19 +160,3 @@ def step_costs(problem, choice):
         costs = problem.step_costs(choices)
         out.append(float(costs[tuple(choice[m] for m in choices.moves)]))
     return np.sort(out)[::-1]
-
-
-@pytest.mark.parametrize("share", [0.0, 0.3])
-def test_quantiles_agree_with_brute_force(share):
-    problem = posed(seqopt.CRITERIA["worst-ratio-published"], small_arch(6))
-    found = least_quantile(problem, share)
-    most = int(share * found.steps + 1e-9)
-    every = (
-        step_costs(problem, choice)
-        for choice in product(*(range(size) for size in problem.sums.sizes))
-        if np.isfinite(problem.sums.cost(choice))
-    )
-    assert found.level == min(costs[most] for costs in every)
-    own = step_costs(problem, found.choice)
-    assert (own > found.level).sum() == found.above <= most
-    assert len(own) == found.steps

@@ -13,7 +13,6 @@ from PIL import Image
 import seqopt
 from seqopt.problem.problem import Orders
 from seqopt.report._notebook import facts
-from seqopt.report._robots import ROBOT_COLORS
 from seqopt.report.comparison import largest
 
 HEAVIEST = 60_000  # letters of HTML
@@ -42,14 +41,6 @@ def test_every_value_has_a_table_and_a_picture_and_is_light(values):
         assert images(html), name
         assert len(html) < HEAVIEST, name
         assert html.count("<table") == html.count("</table>") == 1
-
-
-def test_colors_of_robots_survive_in_small_pictures(values):
-    steps, _ = images(values["Plan"]._repr_html_())
-    colors = {color for _, color in steps.convert("RGB").getcolors(100_000)}
-    for robot in ROBOT_COLORS[:3]:
-        wanted = [int(robot[i : i + 2], 16) for i in (1, 3, 5)]
-        assert min(max(abs(a - b) for a, b in zip(c, wanted, strict=True)) for c in colors) < 20
 
 
 def test_figures_are_those_of_the_plan(values):
