@@ -1,4 +1,4 @@
-"""Charts of comparisons, plans, Pareto sets and maps of failure (extra ``plot``)."""
+"""Charts of comparisons, plans, Pareto sets, sweeps and maps of failure (extra ``plot``)."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from seqopt.report._style import (
     SMALL,
     VERMILION,
     dress,
+    look,
     looks,
     new_figure,
     picture_files,
@@ -41,6 +42,8 @@ COLUMNS = {
     "F_max_N": "largest tension\nT_max [N]",
     "D_max_1e-3mm": "largest displacement\nD_max [µm]",
 }
+MOST_LINES = 6  # of a sweep, beyond which it is a map
+BOUND = "_bound"
 CASE = 0.27  # inches: of a row of a map of failure
 MARKS = 12  # along a line, so that lines are told apart without their color
 LABELS = {
@@ -104,10 +107,10 @@ def draw_responses(
         steps = table.groupby("bricks")
         ended = table["bricks"] - 1 + (steps.cumcount() + 1) / steps["step"].transform("count")
         every = max(1, len(table) // MARKS)
-        look = styles[name].line() | {"lw": 1.2, "ms": 4.5, "mfc": "white"}
-        look |= {"markevery": (number % every, every), "label": name}
+        line = styles[name].line() | {"lw": 1.2, "ms": 4.5, "mfc": "white"}
+        line |= {"markevery": (number % every, every), "label": name}
         for axis, column in zip(axes, columns, strict=True):
-            axis.plot(ended, table[column], **look)
+            axis.plot(ended, table[column], **line)
     for axis, label in zip(axes, columns.values(), strict=True):
         axis.set_ylabel(label)
         dress(axis)
@@ -140,11 +143,11 @@ def front_figure(
             axes.plot(*ways, "o", ms=4, mfc="none", mec=GRAY, mew=0.8, label=f"{label}, its set")
         x, y = (_in_shown_unit(table[c], c) for c in (first, name))
         dots = axes.scatter(x, y, c=table["steps"], cmap="viridis", s=18, zorder=2)
-        look: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none", "mew": 2}
+        mark: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none", "mew": 2}
         for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
             if first in worst and name in worst:
                 at = [_in_shown_unit(worst[c], c) for c in (first, name)]
-                axes.plot(*at, marker, label=in_words(method), zorder=3, **look)
+                axes.plot(*at, marker, label=in_words(method), zorder=3, **mark)
         axes.set(xlabel=LABELS.get(first, first), ylabel=LABELS.get(name, name))
         _scale(axes, FAR * float(pd.Series(y).max()))
         dress(axes)
@@ -238,3 +241,47 @@ def _draw_along(axes: Axes, steps: pd.DataFrame, rows: list[tuple[str, str]]) ->
         words["some step is undecided"] = Verdict.UNDECIDED
     marks = [Patch(color=VERDICTS[verdict.value], label=word) for word, verdict in words.items()]
     axes.legend(handles=marks, loc="upper right", bbox_to_anchor=(1.0, 1.25), ncols=len(marks))
+
+
+@styled
+def draw_sweep(table: pd.DataFrame, names: Sequence[str]) -> Figure:
+    """Draw the first goal over the first name, a line for every value of a second one.
+
+    Where these are more than six, a map of both. Problems without a plan are crosses. ``table``: of
+    `seqopt.sweep.sweep`; ``names``: its columns of what differs.
+    """
+    several = [name for name in names if len(table[name].unique()) > 1] or [*names[:1]]
+    first, second = several[0], several[1] if len(several) > 1 else ""
+    goal = next(c.removesuffix(BOUND) for c in table.columns if c.endswith(BOUND))
+    figure = new_figure(3.4)
+    axes = figure.subplots()
+    axes.set_xlabel(first)
+    if second and table[second].nunique() > MOST_LINES:
+        grid = table.pivot_table(index=second, columns=first, values=goal, sort=False)
+        image = axes.imshow(grid.to_numpy(float), origin="lower", aspect="auto", cmap="cividis")
+        figure.colorbar(image, label=LABELS.get(goal, goal))
+        axes.set_facecolor(GRAY)
+        axes.set_xticks(range(grid.shape[1]), grid.columns)
+        axes.set_yticks(range(grid.shape[0]), grid.index)
+        axes.set_ylabel(second)
+        return figure
+    numbers = pd.to_numeric(table[first], errors="coerce")
+    named = numbers.isna().any()  # then values stand one beside the other
+    place = pd.Series(pd.factorize(table[first])[0] if named else numbers, table.index, float)
+    for number, value in enumerate(table[second].unique() if second else [""]):
+        own = table[table[second] == value] if second else table
+        about = look(number).line()
+        axes.plot(place[own.index], own[goal].astype(float), label=f"{second} {value}", **about)
+    lacking = table[table[goal].isna()]
+    if len(lacking):
+        foot, low = axes.get_xaxis_transform(), np.full(len(lacking), 0.03)
+        axes.plot(place[lacking.index], low, "x", color=GRAY, transform=foot, label="no plan")
+    if named:
+        axes.set_xticks(range(table[first].nunique()), table[first].unique())
+    elif numbers.min() > 0 and numbers.max() >= 100 * numbers.min():
+        axes.set_xscale("log")
+    axes.set_ylabel(LABELS.get(goal, goal))
+    if second or len(lacking):
+        axes.legend()
+    dress(axes)
+    return figure

@@ -11,7 +11,7 @@ import pytest
 import seqopt
 from seqopt._cli.main import main
 from seqopt.errors import ProblemError
-from seqopt.report._sweep_chart import draw_sweep
+from seqopt.report.charts import draw_sweep
 from seqopt.sweep import _spread_values, _spread_words, sweep
 
 ASKED = ["--schedule", "free", "--aim", "F_largest,steps", "--no-stability"]

@@ -19,13 +19,11 @@ from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call, names_of, signature_of
 from seqopt._cli.words import Folder, Words, shown
 from seqopt._files import csv_text, make_folder, read_text, write_folder, write_text
-from seqopt._later import Later
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.sweep import MOST, WORDS, _plan_row, _solve_cases, _spread_values, _spread_words
 from seqopt.work.progress import Tell
 from seqopt.workflow import optimize
 
-CHARTED = Later("seqopt.report._sweep_chart")  # matplotlib is an extra
 ROWS, ASKED, CHART = "sweep.csv", "sweep.json", "sweep"
 
 
@@ -135,5 +133,5 @@ def _chart(table: pd.DataFrame, names: list[str]) -> dict[str, bytes]:
     if outputs.figure_notes() or not table.columns.str.endswith("_bound").any():
         return {}
     return outputs.picture(
-        CHART, lambda _: CHARTED.draw_sweep(table, [n for n in names if n in table])
+        CHART, lambda charts: charts.draw_sweep(table, [n for n in names if n in table])
     )
