@@ -32,7 +32,7 @@ def table():
     """What a few cases look like when all agree, with an LMGC90 that says what we say."""
     shown = [t for t in built_trials() if t.group in ("incline", "stack")]
     shown += [t for t in sample_trials(["A"]) if t.name == "A"]
-    table = pd.DataFrame([row_of(trial, None, aside=False) for trial in shown])
+    table = pd.DataFrame([row_of(trial, None) for trial in shown])
     wedged = table["case"] == "A"
     table["lmgc90"] = table["ours"].where(~wedged, Verdict.FALLS.value)
     return table
