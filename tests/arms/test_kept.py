@@ -43,18 +43,3 @@ def test_postures_are_kept_and_taken(folder, words, monkeypatch):
     _known.cache_clear()
     monkeypatch.setattr(_tables, "_compute_table", lambda *_: pytest.fail("computed again"))
     assert main([*words, "--cache", "kept"]) == 0
-
-
-def test_times_say_where_arms_cannot_be(folder, capsys):
-    assert main(["times", "plan"]) == 0
-    assert "arms:" not in capsys.readouterr().err
-    text = (folder / "plan" / "scene.json").read_text(encoding="utf-8")
-    for where, said in (
-        ("[0.3, -9.0, 0.0]", "has no posture (too far: its flange gets about 2.5 m from its base)"),
-        ("[0.3, 0.0, 0.0]", "arms: not checked; robot arm: the base of its arm hits brick 2"),
-    ):
-        moved = text.replace("[0.3, -0.9, 0.0]", where)
-        assert moved != text
-        (folder / "plan" / "scene.json").write_text(moved, encoding="utf-8")
-        assert main(["times", "plan"]) == 0
-        assert said in capsys.readouterr().err

@@ -257,23 +257,6 @@ def test_the_judge_finds_an_arm_that_is_not_at_its_node():
         check_postures(scene, plan.steps)
 
 
-def test_stiffness_changes_what_is_best_but_not_where_arms_are():
-    """Nearly rigid joints are rigid grips; the table of postures is that of all stiffnesses."""
-    scene = soft(robots=2)
-    stiff = scene.with_robots(
-        *(replace(r, arm=replace(r.arm, joint_stiffness=(1e12,) * 6)) for r in scene.robots)
-    )
-    one, two, bare = (find_postures(s) for s in (scene, stiff, scene.with_grips(None)))
-    assert one.joints is two.joints is bare.joints
-    grips = [(3, 6)]
-    found = [
-        make_engine("compliance", s).solve(4, [s.grip_numbers(*grips)]).grip_force
-        for s in (stiff, scene.with_grips(None), scene)
-    ]
-    assert found[0] == pytest.approx(found[1], rel=1e-2)
-    assert np.abs(found[2] - found[1]).max() > 0.1 * np.abs(found[1]).max()
-
-
 def test_a_node_that_an_arm_cannot_hold_is_a_line():
     scene = beside(soft(), 9.0)
     node = scene.placed[0].nodes[1]

@@ -20,7 +20,7 @@ from seqopt.engines.rigid._response_maps import loads_of
 from seqopt.engines.rigid.compliance import _CANCEL, _EVEN, ComplianceEngine, _cancels
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides, six_bricks, solve_batch
-from tests.limit_scenes import LOOSE_AT, chain, loosened
+from tests.limit_scenes import chain, loosened
 from tests.reference_chain import solve_exactly
 
 KINDS = ("translational_stiffness", "rotational_stiffness")
@@ -114,16 +114,6 @@ def test_motions_cancel_where_their_parts_are_ten_times_what_is_left(
         )
         assert _cancels(own, index, force)[row] == seen
     assert _cancels(own, np.zeros((3, 0), int), np.zeros((3, 0))).tolist() == [False] * 3
-
-
-def test_what_was_corrected_before_for_other_bricks_is_no_help():
-    """More bricks, fewer, the same again: each as an engine of its own would say."""
-    net = build_network(loosened(chain(16), 1e-9, only_turning=True))
-    engine, joined = ComplianceEngine(net), LOOSE_AT + 2
-    for bricks in (joined + 1, joined + 3, joined, joined + 2, joined + 2):
-        grips = [[2 * bricks - 1, 2 * bricks - 3, 4]]
-        own = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
-        assert engine.solve(bricks, grips, Want.ALL) == own
 
 
 def test_grips_on_other_bricks_are_answered_as_if_nothing_had_been_asked():

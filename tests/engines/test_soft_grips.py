@@ -14,7 +14,7 @@ from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import GripError, MechanismError, SceneError
+from seqopt.errors import MechanismError, SceneError
 from seqopt.network.build import build_network
 from tests.builders import six_bricks
 from tests.soft_bodies import SoftBodies
@@ -176,19 +176,6 @@ def test_turning_is_a_hold_of_its_own():
         weight = np.linalg.norm(free.weight[1])
         assert np.linalg.norm(found.grip_force) == pytest.approx(weight, rel=1e-4)
         assert np.abs(found.grip_moment).max() > 0
-
-
-def test_numbers_of_grips_that_there_are_not(arch25):
-    scene = robots(arch25, (1e6, None), (None, None))
-    engine = make_engine("compliance", scene)
-    first, second = scene.grip_numbers((7, None)), scene.grip_numbers((None, 7))
-    assert first == (7,)
-    assert second != first
-    for wrong in (0, second[0] + 100, -1, 60 + second[0] - first[0]):
-        with pytest.raises(GripError, match="grip on node"):
-            engine.solve(10, [[wrong]])
-    with pytest.raises(GripError, match="a node is held twice"):
-        engine.solve(10, [[*first, *second]])
 
 
 @pytest.mark.parametrize(

@@ -7,15 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import DRY
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import find_formulation
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
-from seqopt.sequence.methods import cantilever, three_robot_loop
-from seqopt.stability.assessment import assess
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import rescaled
 
@@ -37,14 +34,6 @@ def plain(arch25):
     return {criterion: solved(arch25, criterion) for criterion in (EQUATIONS, CLOSEST)}
 
 
-@pytest.fixture(scope="module")
-def verdicts(arch25):
-    """Three steps about the crown, each with its verdict."""
-    net = build_network(arch25)
-    steps = cantilever(net)[26:31:2]
-    return [(s, assess(step_assembly(net, s.bricks, s.grips), DRY)) for s in steps]
-
-
 @pytest.mark.parametrize("criterion", [EQUATIONS, CLOSEST], ids=lambda c: c.name)
 @pytest.mark.parametrize("scales", SCALES)
 def test_ranks_and_choices_do_not_know_units(arch25, plain, criterion, scales):
@@ -55,20 +44,6 @@ def test_ranks_and_choices_do_not_know_units(arch25, plain, criterion, scales):
     assert certified.objective == pytest.approx(certificate.objective, rel=1e-9)
     for a, b in zip(own.sums.shared, other.sums.shared, strict=True):
         np.testing.assert_allclose(b, a, rtol=1e-9)
-
-
-@pytest.mark.parametrize("scales", SCALES)
-def test_verdicts_do_not_know_units(arch25, verdicts, scales):
-    length, force, softness = scales
-    net = build_network(rescaled(arch25, length, force, softness))
-    for step, a in verdicts:
-        b = assess(step_assembly(net, step.bricks, step.grips), DRY)
-        assert a.verdict is b.verdict
-        assert b.bond == pytest.approx(a.bond * force / length**2, rel=1e-3)
-        assert b.friction == pytest.approx(a.friction, abs=2e-4)
-        np.testing.assert_allclose(b.pull, a.pull, rtol=2e-3)
-        assert b.grip == pytest.approx(a.grip * force, rel=1e-3)
-        assert (a.first_block, a.first_contact) == (b.first_block, b.first_contact)
 
 
 def test_a_resolution_in_other_units_is_another_criterion(arch25, plain):

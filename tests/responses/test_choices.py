@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.graph.decisions import pose_decisions
-from seqopt.network.build import build_network
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.responses import _blocks as batches
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
@@ -52,15 +48,6 @@ def test_states_hold_the_responses_of_their_steps(engine25, method):
 def test_unknown_responses_are_refused(engine25, loop25):
     with pytest.raises(ProblemError, match="response F_rob9 does not exist; give C_max, D_max"):
         pose_decisions(engine25, loop25, RankSum("x", equal("F_rob9"), equal("F_rob9")))
-
-
-def test_each_robot_is_a_term_whatever_its_name(arch25):
-    """Equation 2 ranks the forces of all robots of a scene."""
-    robots = tuple(replace(r, name=n) for r, n in zip(arch25.robots, "abc", strict=True))
-    net = build_network(replace(arch25, robots=robots))
-    renamed = pose_decisions(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
-    first = renamed.evaluation.steps[0].responses
-    assert {"F_a", "F_b", "F_c", "T_max", "M_sup"} == set(first)
 
 
 def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):

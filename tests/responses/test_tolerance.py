@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.problem.amounts import parse_goals
-from seqopt.responses._tolerance import Allowed, allowed_by, misfits, step_tolerance
+from seqopt.responses._tolerance import Allowed, misfits, step_tolerance
 from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
 from seqopt.responses.quantities import NO_TOLERANCE
 from tests.builders import block, small_arch
@@ -129,11 +129,6 @@ def test_a_direction_that_is_not_the_worst_is_found_out():
     assert (low > 0.99 * rate).all()
 
 
-def test_names_tell_what_is_allowed():
-    for allowed in (Allowed(), Allowed(900.0), Allowed(shift=1e-5), Allowed(900.0, 1e-5)):
-        assert allowed_by(allowed.name) == allowed
-
-
 def test_soft_grips_may_be_farther_off_and_unequal_robots_carry_their_own(engine):
     scene = engine.network.scene
     step = seqopt.cantilever(engine.network)[20]
@@ -175,19 +170,6 @@ def test_no_plan_has_more_tolerance_than_the_best():
     assert within.steps
     with pytest.raises(InfeasibleError, match="tolerance of"):
         seqopt.optimize(SCENE, "free", limits=[seqopt.Limit("tolerance", 1.01 * best)])
-
-
-def test_robots_of_other_payloads_are_not_taken_for_each_other():
-    """Also where no payload has to be kept: a tolerance is of the robot that holds."""
-    one, two, three = SCENE.robots
-    scene = SCENE.with_robots(one, replace(two, payload=2 * two.payload), three)
-    rules = seqopt.FreeRules(payload="ignored", least_grips=1)
-    plan = seqopt.optimize(scene, "free", aim="tolerance,steps", rules=rules)
-    along = [step_tolerance(plan.engine, step).distance for step in plan.steps]
-    assert plan.status == "optimal"
-    assert plan.objective["tolerance"] == pytest.approx(min(along), rel=1e-6)
-    alike = seqopt.optimize(SCENE, "free", aim="tolerance,steps", rules=rules)
-    assert plan.objective["tolerance"] > alike.objective["tolerance"] * (1 - 1e-9)
 
 
 def test_a_loop_keeps_to_a_tolerance():

@@ -72,16 +72,6 @@ def test_the_first_two_that_reach_build():
         robot_loop(with_robots(scene, far, *anywhere(3)))
 
 
-def test_a_third_robot_steps_in_where_no_two_are_enough():
-    """Robots beside the ends of a chain reach their end; the mobile one helps as little as can."""
-    scene = small_arch(8)
-    left, right = near(scene, "left", 1, 2, 3, 4), near(scene, "right", 5, 6, 7, 8)
-    net = with_robots(scene, left, right, *anywhere(1))
-    assert placers(net.scene, sequential(net)) == (
-        ["left", "rob1", "left", "rob1", "right", "rob1", "right", "rob1"]
-    )
-
-
 def test_from_both_ends_the_robot_beside_each_end_places_it():
     scene = from_both_ends(9, "V")
     left, right = near(scene, "left", 1, 2, 3, 4, 5), near(scene, "right", 5, 6, 7, 8, 9)

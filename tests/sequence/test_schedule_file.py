@@ -104,13 +104,6 @@ def test_a_move_to_which_nothing_is_open_is_named(arch25):
     assert str(caught.value).startswith("schedule s.csv: step 2")
 
 
-def test_a_part_that_nobody_is_sure_to_hold_is_named():
-    scene = replace(small_arch(5), build_order=(1, 3, 2, 4, 5))
-    text = HEADER + "1,place,1,1,,\n2,place,2,1,?,\n3,release,2,1,,\n"
-    with pytest.raises(StepError, match=r"s.csv: step 3 \(release\): brick 3 hangs free"):
-        parse_schedule(scene, text, "s.csv")
-
-
 def test_schedules_are_found_by_name_file_and_value(engine25, loop25, tmp_path):
     network, path = engine25.network, tmp_path / "own.csv"
     path.write_text(schedule_text(loop25), encoding="utf-8")

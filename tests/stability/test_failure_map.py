@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -77,20 +75,6 @@ def test_the_least_friction_is_enough_and_less_is_not():
     least = case.friction_needed
     assert not any(falls(network, steps, Mortar(friction=least)))
     assert any(falls(network, steps, Mortar(friction=0.98 * least)))
-
-
-def test_one_more_robot_holds_the_first_step(network, builds, found):
-    scene = network.scene
-    more = replace(scene.robots[0], name="more")
-    helped = seqopt.build_network(replace(scene, robots=(*scene.robots, more)))
-    held = found.cases[found.cases["grip_node"].notna()].to_dict(orient="records")
-    assert held
-    for case in held:
-        step = builds[case["build"]][case["first_step"] - 1]
-        step = replace(step, grips=(*step.grips, int(case["grip_node"])))
-        mortar = Mortar(friction=case["value"])
-        if case["holds"] == "dry":
-            assert step_verdicts(helped, [step], mortar) == (Verdict.STANDS,)
 
 
 def test_no_tilt_is_the_friction_of_the_mortar_and_more_tilt_fells_no_less(network, builds):

@@ -43,20 +43,17 @@ def structures():
     """By name: an assembly, its mortar and the true verdict."""
     network = build_network(load_scene("arch25"))
     steps = METHODS["cantilever"](network)
-    step = {n: step_assembly(network, steps[n].bricks, steps[n].grips) for n in (10, 25, 26, 27)}
+    step = {n: step_assembly(network, steps[n].bricks, steps[n].grips) for n in (25, 26)}
     stands, falls = Verdict.STANDS, Verdict.FALLS
     return {
         "a stack that leans": (stack([0.2, 0.1]).assembly(2000.0), DRY, stands),
-        "a stack that leans too far": (stack([0.7]).assembly(2000.0), DRY, falls),
         "a stack that just falls": (stack([0.501]).assembly(2000.0), DRY, falls),
         "a thick arch": (ring(9, 5.0, 0.9).assembly(2000.0), DRY, stands),
         "a thin arch": (ring(9, 5.0, 0.3).assembly(2000.0), DRY, falls),
         "a bar between walls": (wedged(), SLIPPERY, stands),
         "a bar between smooth walls": (wedged(), Mortar(friction=0.0), falls),
-        "step 11": (step[10], DRY, falls),
         "step 26": (step[25], DRY, stands),
         "step 27": (step[26], DRY, falls),
-        "step 28": (step[27], DRY, falls),
     }
 
 
@@ -184,9 +181,9 @@ def test_the_true_answers_are_believed():
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("route", ROUTES)
 def test_no_faked_answer_turns_a_verdict(route):
-    """2,376 answers, and 6,237 to the chain; those that keep enough of the truth are believed."""
+    """1,728 answers, and 4,536 to the chain; those that keep enough of the truth are believed."""
     verdicts = [*judged(route)]
-    assert len(verdicts) == (2376 if route == "cone program" else 6237)
+    assert len(verdicts) == (1728 if route == "cone program" else 4536)
     assert not any(starmap(is_false, verdicts))
     for truth in (Verdict.STANDS, Verdict.FALLS):
         assert {(truth, truth), (truth, Verdict.UNDECIDED)} <= set(verdicts)

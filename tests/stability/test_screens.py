@@ -115,14 +115,6 @@ def test_motions_and_forces_prove_what_the_certificates_checks_say(arch25):
         assert low == pytest.approx(bound(own, case, answer), rel=1e-6, abs=1e-12)
 
 
-def test_payloads_count_per_robot(arch25):
-    screen = Screen(build_network(arch25), DRY)
-    weak, strong = screen.stands(12, [[8, 23], [8, 23]], [[10.0, 10.0], [100.0, 100.0]])
-    assert (weak, strong) == (FALLS, STANDS)
-    none = screen.stands(12, [[8, 23]], 0.0)
-    assert none == screen.stands(12, [[0, 0]])
-
-
 def test_a_brick_without_joint_falls_whatever_the_bond():
     """The second brick has no joint: nothing but a robot carries it."""
     scene = replace(small_arch(3), joints=(), robots=(Robot(name="rob1", payload=500.0),))

@@ -76,15 +76,6 @@ def test_bricks_that_interpenetrate_are_warned_of_once(recwarn):
     assert not recwarn.list
 
 
-def test_margins_of_chosen_steps_alone(network, steps):
-    chosen = [steps[1].number]
-    found = [*each_stability(network, steps, DRY, MARGINS, chosen)]
-    assert [np.isnan(each.bond) for each in found] == [True, False, True, True]
-    plain = assess_steps(network, steps, DRY)
-    assert [each.verdict for each in found] == [each.verdict for each in plain]
-    assert {each.jammed for each in plain} == {None}
-
-
 @pytest.mark.slow
 def test_shared_steps_have_the_same_rows(network):
     steps = seqopt.sequential(network)[:20]

@@ -5,19 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import InfeasibleError
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.times._counts import least_by_counts
-from seqopt.times._steps import step_times
 from tests.brute_force import ONES
 from tests.builders import small_arch
 from tests.times.builders import RULES, WORDS, engine_of, least_makespan
 
-SECONDS = st.floats(0.0, 100.0)
 ALONE = FreeRules(least_grips=1)
 
 
@@ -27,19 +23,6 @@ def test_no_build_takes_less_than_counts_say(words, rules):
     engine = engine_of(3, 3, *words)
     least = least_makespan(engine, rules)
     assert 0.5 * least < least_by_counts(engine.network, rules) <= least * (1 + 1e-9)
-
-
-@settings(max_examples=6, deadline=None)
-@given(st.tuples(*[SECONDS] * 5), st.floats(0.2, 5.0))
-def test_given_builds_take_no_less(seconds, slower):
-    names = ("fetch", "place", "approach", "grip", "release")
-    words = ",".join(f"{name}={value}" for name, value in zip(names, seconds, strict=True))
-    scene = seqopt.load_scene("arch25").with_durations(words, f"rob2:slower={slower}")
-    network = seqopt.build_network(scene)
-    took = step_times(scene, seqopt.cantilever(network))[-1].end
-    least = least_by_counts(network, FreeRules(newest="free"))
-    assert least <= took * (1 + 1e-9)
-    assert least >= 25 * (min(1.0, slower) * seconds[1]) * (1 - 1e-9)  # one places after the other
 
 
 def test_a_robot_that_does_all_alone_is_known_exactly():
