@@ -62,7 +62,7 @@ class DiscreteEngine(OpeningEngine):
             every = np.vstack([point_motion(arm), np.eye(6)[3:]]) * system.unit[:6]
             stiffness = np.asarray(np.linalg.inv(flexibility), float)
             springs.append(_Spring(grip, body, ways, every[ways], stiffness, offset))
-        held = self._hold(system, columns, compliance, springs)
+        held = _held_nodes(network, system, columns, compliance, springs)
         found = settle(held)
         if found.rests:
             return _fields(network, held, found, columns, springs)
@@ -75,11 +75,6 @@ class DiscreteEngine(OpeningEngine):
             f"{bricks} bricks held at {names}: the discrete elements neither came to rest nor "
             "became unstable; assess the step's stability to learn whether there is an equilibrium"
         )
-
-    def _hold(
-        self, system: System, columns: Ints, compliance: GripCompliance, springs: list[_Spring]
-    ) -> Held:
-        return _held_nodes(self._network, system, columns, compliance, springs)
 
 
 class _Spring(NamedTuple):
@@ -135,8 +130,7 @@ def _fields(
 ) -> Fields:
     """Return the fields of one grip set.
 
-    Two rigid grips on one brick share so that their forces are as small as can be; a moment on a
-    brick that pads exert belongs to no node.
+    Two rigid grips on one brick share so that their forces are as small as can be.
     """
     system, moved = held.system, held.moved(found.motion)
     wrench = np.zeros((len(network.springs.since), 6))
@@ -148,8 +142,6 @@ def _fields(
         both[spring.ways] = spring.force(moved[6 * spring.body : 6 * spring.body + 6])
         force[spring.grip], moment[spring.grip] = both[:3], both[3:]
         compliant[spring.grip] = 0 in spring.ways
-    if not springs:
-        exerted += held.pull - held.pads @ moved
     nodes = network.node_position[network.inner.ravel()[columns]]
     for body in np.unique(columns[~compliant] // 2):
         mine = np.flatnonzero(~compliant & (columns // 2 == body))
