@@ -39,8 +39,6 @@ ROBOTS = (
 STUDY_BED = BedStiffness(normal=100e9, tangential=10e9)
 """Stiffnesses jKn and jKs of the discrete-element models of Bruun et al., N/m³ (section 3.2.3)."""
 
-"""Of a robot's grip: stiffer "by an order of magnitude"; how large its pads are is not printed."""
-
 RESOLUTION = (("F", 1.0), ("T", 1.0), ("C", 1.0), ("M", 1.0), ("D", 1e-6))
 """Rounding (N, N, N m, m) with which ranks explain most of the choices in the published plan."""
 
