@@ -291,7 +291,6 @@ class FreeRules:
             yield "newest=free", replace(self, newest=Newest.FREE)
         if self.regrips is not None:
             yield f"regrips={self.regrips + 1}", replace(self, regrips=self.regrips + 1)
-            yield "regrips=any", replace(self, regrips=None)
         for name, value, said in _LOOSEST:
             if getattr(self, name) != value:
                 yield f"{name}={said}", replace(self, **{name: value})  # type: ignore[arg-type]
@@ -305,6 +304,7 @@ _CHOICES: dict[str, type[Enum]] = {
 }  # rules of which one of a few is chosen
 
 _LOOSEST = (
+    ("regrips", None, "any"),
     ("candidates", "", "all"),
     ("placers", (), "any"),
     ("payload", Payload.IGNORED, "ignored"),
@@ -318,7 +318,6 @@ def _usual_grips(robots: int) -> int:
 
 
 _COUNTS = ("least_grips", "regrips")
-_UNBOUND = {("regrips", "any"): None, ("placers", "any"): (), ("candidates", "all"): ""}
 RULES = ("newest", "payload", "ending", "placers", "candidates", *_COUNTS)
 """Names of rules in words."""
 
@@ -335,7 +334,7 @@ def parse_rules(
     several = (given,) if isinstance(given, str | FreeRules) else given
     if not isinstance(several, Sequence):
         raise StepError(f"{where} {short(given)}: give a seqopt.FreeRules, or as least_grips=1")
-    found = FreeRules()
+    found, loosest = FreeRules(), {(name, said): value for name, value, said in _LOOSEST}
     for each in several:
         if isinstance(each, FreeRules):
             found = each
@@ -347,7 +346,7 @@ def parse_rules(
         value: object = int(text) if name in _COUNTS and text.isdecimal() else text
         if name == "placers":
             value = tuple(part.strip() for part in text.split(","))
-        found = replace(found, **{name: _UNBOUND.get((name, text), value)})  # type: ignore[arg-type]
+        found = replace(found, **{name: loosest.get((name, text), value)})  # type: ignore[arg-type]
     return replace(found, robots=robots) if robots else found
 
 
