@@ -15,7 +15,7 @@ from seqopt.network.build import build_network
 from seqopt.responses.table import step_fields
 from seqopt.sequence.methods import METHODS
 from seqopt.study.published import published_plan
-from tests.builders import hinged, scaled
+from tests.builders import block, hinged, scaled
 from tests.direct_solve import solve_dense
 from tests.strategies import arches, both_sided, loosened, states, walls
 
@@ -155,3 +155,12 @@ def test_the_frame_says_when_it_fails(engine25):
     """Beyond any use of double precision the answer is a solver's failure, not a verdict."""
     with pytest.raises(SolverError, match="contrast"):
         FrameEngine(engine25.network, contrast=1e14).solve(25, [[1, 25, 49]])
+
+
+@pytest.mark.parametrize("engine_type", [ComplianceEngine, FrameEngine])
+@pytest.mark.parametrize("grips", [[], [1], [1, 2]])
+def test_a_brick_on_springs_without_stiffness_is_loose(engine_type, grips):
+    """Where nothing holds it either, no row at all says what resists."""
+    none = {f"{way}_stiffness": (0.0, 0.0, 0.0) for way in ("translational", "rotational")}
+    with pytest.raises(MechanismError, match="nothing resists a motion of brick 1"):
+        engine_type(build_network(block(**none))).solve(1, [grips])

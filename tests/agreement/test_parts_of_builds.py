@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import permutations, product
 
+import networkx as nx
 import numpy as np
 import pytest
 
@@ -23,7 +24,7 @@ from seqopt.scene.scene import in_order
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.schedule_file import _what_is_left
-from seqopt.sequence.steps import Site
+from seqopt.sequence.steps import Site, StepKind
 from tests.brute_force import ONES, best_values
 from tests.builders import from_both_sides, small_arch
 
@@ -221,3 +222,21 @@ def test_what_no_rule_allows_is_named():
         FreeRules(robots=two, begin=Site(1, (None, None, 1))).span(three)
     with pytest.raises(StepError, match="rule begin"):
         FreeRules(begin=3)
+
+
+def test_sites_follow_the_steps():
+    engine = engine_of(4, 3)
+    plan = seqopt.solve(seqopt.pose(engine, FreeRules(), ONES, "minmax,steps"))
+    held = nx.Graph()
+    for count in range(1, len(plan.steps) + 1):
+        site, step = Site.after(plan.steps, count), plan.steps[count - 1]
+        assert (site.bricks, site.grips, site.step) == (step.bricks, step.grips, step.number)
+        free = [n for n, g in zip(site.stays, site.grips, strict=True) if g is not None]
+        assert free.count(None) == len(free)
+        held.add_node(count)
+        if step.kind is StepKind.PLACE:
+            assert site.regrips == 0
+    assert Site.after(plan.steps, 0) == Site(0)
+    for wrong in (-1, len(plan.steps) + 1, 1.5):
+        with pytest.raises(StepError, match="the plan has 0 to"):
+            Site.after(plan.steps, wrong)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from seqopt._cli.main import main
 from seqopt.exchange._tasks import FRAMES, plan_tasks
@@ -81,3 +84,19 @@ def test_the_page_for_compas_fab_runs_and_prints_what_it_says(tmp_path, monkeypa
     capsys.readouterr()
     exec(compile(code, "page", "exec"), {})
     assert capsys.readouterr().out == said
+
+
+def test_pandas_has_a_row_for_every_task():
+    table = pd.read_csv(io.StringIO(export_plan(SCENE, STEPS, "tasks_csv")))
+    assert [*table["action"]] == [task.action.value for task in TASKS]
+    for name in FRAMES:
+        known = [getattr(task, name) for task in TASKS]
+        rows = table[
+            [f"{name}_{end}" for end in ("x", "y", "z", "qx", "qy", "qz", "qw")]
+        ].to_numpy()
+        for row, frame in zip(rows, known, strict=True):
+            assert np.isnan(row).all() == (frame is None)
+            if frame is not None:
+                np.testing.assert_allclose(row[:3], frame.point, atol=1e-8)
+                turned = Rotation.from_quat(row[3:]).as_matrix().T
+                np.testing.assert_allclose(turned, frame.axes, atol=1e-7)

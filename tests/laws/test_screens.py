@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
+from seqopt.network.build import build_network
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
 from tests.builders import about_vertical, moved, scaled
 from tests.strategies import arches
@@ -88,3 +89,12 @@ def test_a_law_that_is_broken_is_seen():
     with pytest.raises(AssertionError):
         never_hurts(np.array([STANDS, FALLS]), np.array([FALLS, FALLS]))
     assert replace(DRY, friction=0.1) != DRY
+
+
+@pytest.mark.parametrize("tilt", [0.1])
+def test_less_tilt_never_hurts(arch25, tilt):
+    network, sets = build_network(arch25), np.array([[a, 24] for a in range(2, 24)])
+    sets = np.vstack([sets, sets - [0, 1]])
+    upright, tilted = (Screen(network, DRY, x).stands(12, sets) for x in (0.0, tilt))
+    assert (tilted == STANDS).any()
+    never_hurts(tilted, upright)
