@@ -45,8 +45,8 @@ def posed(engine, criterion, limits=()):
     return pose_decisions(engine, three_robot_loop(engine.network), criterion, limits)
 
 
-QUICK = {("overlap_dp", CONDITIONAL), ("minimax", WORST_RATIO), ("overlap_dp", OWN)}
-SLOW = {("overlap_dp", WEIGHTED), ("minimax", CONDITIONAL), ("overlap_mip", WORST_RATIO)}
+QUICK = {("overlap_dp", OWN)}
+SLOW = {("overlap_dp", CONDITIONAL), ("minimax", WORST_RATIO), ("overlap_mip", WEIGHTED)}
 
 
 def marks(case):

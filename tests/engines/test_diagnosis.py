@@ -110,7 +110,7 @@ def test_three_grips_hold_what_is_cut_off():
 
 def test_nearly_loose_is_solved_or_refused_never_wrong():
     seen = set()
-    for factor in (*(10.0**-power for power in range(0, 18, 3)), 0.0):
+    for factor in (*(10.0**-power for power in range(0, 18, 6)), 0.0):
         for grips in ([], [49], [30, 49], HELD):
             net = build_network(loosened(chain(25), factor, only_turning=False))
             told = diagnose(ComplianceEngine(net), 25, grips)

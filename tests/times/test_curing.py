@@ -81,7 +81,7 @@ def test_instant_bond_takes_as_long_as_ever_and_none_as_dry():
 def test_slower_mortar_makes_no_build_shorter(robots):
     engine = engine_of(4 if robots == 2 else 6, robots)
     rules = FreeRules(least_grips=robots - 1)
-    found = [cured(engine, words, rules=rules).makespan for words in ("0", "10h", "100h")]
+    found = [cured(engine, words, rules=rules).makespan for words in ("0", "100h")]
     assert found == sorted(found)
     if robots == 2:
         assert found[-1] > found[0]
