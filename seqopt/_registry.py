@@ -32,9 +32,9 @@ VIEWS = {
 OFFERS = {
     "PostureRules": "seqopt.arms._judge",
     "check_postures": "seqopt.arms._judge",
-    "compute_held_postures": "seqopt.arms._held",
+    "compute_held_postures": "seqopt.arms._permits",
     "find_postures": "seqopt.arms.reach",
-    "hold_alike": "seqopt.arms._held",
+    "hold_alike": "seqopt.arms._permits",
     "permits": "seqopt.arms._permits",
     "with_postures": "seqopt.arms._kept",
     "makespan": "seqopt.times._twin",

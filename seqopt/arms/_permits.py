@@ -1,14 +1,16 @@
 """What arms allow in the build order of a scene: who reaches which node, and who together.
 
 Of a state it is asked whether there are postures that go together; with one posture of every robot
-at every node this is the one that a robot keeps while it holds. An arm with compliant joints has
-one, whose stiffness is that of its grip.
+at every node this is the one that a robot keeps while it holds. An arm with compliant joints holds
+a node in one posture, the same in all build orders and plans, so that the compliance of its grip is
+known. It is chosen by the bricks that it hits, by how often it is in the way of those of other
+arms, and, where that leaves a choice, by how stiff it is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -18,6 +20,7 @@ import pandas as pd
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
+from seqopt.scene.arm import HeldPostures
 from seqopt.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -219,3 +222,30 @@ def reach_described(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
 def _listed(names: list[str], most: int = 30) -> str:
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
+
+
+def compute_held_postures(scene: Scene) -> HeldPostures:
+    """Return the postures in which arms with compliant joints hold."""
+    from seqopt.arms._reached import Site  # noqa: PLC0415  # few scenes have arms
+    from seqopt.arms._tables import held_by  # noqa: PLC0415
+
+    table = find_postures(scene)
+    assert table is not None
+    return held_by(Site.of(scene), table, tuple((r.name, r.arm) for r in scene.robots))
+
+
+def hold_alike(nominal: Scene, scene: Scene) -> Scene:
+    """Return a variation of a scene in which robots hold in the postures of the nominal one.
+
+    It is as it was where it has other arms: joints may have other stiffnesses.
+    """
+    arms = [  # what determines postures, and whether joints are compliant
+        [
+            arm and (replace(arm, postures=1, joint_stiffness=()), bool(arm.joint_stiffness))
+            for arm in (robot.arm for robot in each.robots)
+        ]
+        for each in (nominal, scene)
+    ]
+    alike = arms[0] == arms[1] and {*nominal.brick_of_node} == {*scene.brick_of_node}
+    held = nominal.held_postures if alike else None
+    return scene if held is None else scene.holding(held)

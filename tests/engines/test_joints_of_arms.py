@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.arms import _held
+from seqopt.arms import _permits
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import Recipe, engine_for, make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -188,7 +188,7 @@ def test_scenarios_hold_in_the_same_postures(arch25):
     first, second = drawn.robots
     away = replace(second, arm=replace(second.arm, position=(9.0, 0.0, 0.0)))
     other = drawn.with_robots(first, away)
-    assert _held.hold_alike(scene, other) is other
+    assert _permits.hold_alike(scene, other) is other
     assert "held_postures" not in vars(other)
     assert "held_postures" not in vars(drawn)  # by itself it has postures of its own
 
