@@ -33,23 +33,19 @@ _FOLDED = ((0.75, -0.45), (0.35, 0.1), (0.2, 0.1))  # elbow, wrist, tip: up and 
 
 Arms = Mapping[str, Sequence[Floats | PosedArm | None]]
 """Points of arms, (k, 3), m, or arms in postures, by robots' names: an entry for every step."""
-Sketches = dict[tuple[str, int | None], Floats]  # points of arms (k, 3), m
 
 
 class Cell:
     """Where the robots of a scene stand, and how they hold nodes.
 
-    ``arms``: lines that are known; the others are sketched. ``sketched``: those that were before,
-    by robot and node; more are added. It has the ``corners`` of all bricks, (k, 3), the ``level``
-    of the ground, that of the lowest corner, the ``size`` of the structure, its longest diagonal,
-    and its ``middle`` on the ground, (3,), m.
+    ``arms``: lines that are known; the others are sketched. It has the ``corners`` of all bricks,
+    (k, 3), the ``level`` of the ground, that of the lowest corner, the ``size`` of the structure,
+    its longest diagonal, and its ``middle`` on the ground, (3,), m.
     """
 
-    def __init__(
-        self, scene: Scene, arms: Arms | None = None, sketched: Sketches | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, arms: Arms | None = None) -> None:
         self.scene, self._arms = scene, arms or {}
-        self._sketched: Sketches = {} if sketched is None else sketched
+        self._sketched = dict[tuple[str, int | None], Floats]()  # points (k, 3), m
         self.up = np.array(scene.up)
         self.corners = np.vstack([vertices_of(brick)[0] for brick in scene.bricks])
         low, high = self.corners.min(axis=0), self.corners.max(axis=0)
@@ -231,16 +227,14 @@ def _require_arms(scene: Scene, steps: Sequence[Step], given: Arms) -> None:
             )
 
 
-def arm_data(
-    scene: Scene, steps: Sequence[Step], given: Arms, sketched: Sketches | None = None
-) -> dict[str, object]:
+def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, object]:
     """Return the arms of robots in every step, ready for JSON.
 
     ``lines`` are points, each line once; ``at`` has a row for every step with the place of each
-    robot's among them, or -1. ``sketched``: as of `Cell`.
+    robot's among them, or -1.
     """
     _require_arms(scene, steps, given)
-    cell, places, known = Cell(scene, given, sketched), dict[str, int](), {id(None): -1}
+    cell, places, known = Cell(scene, given), dict[str, int](), {id(None): -1}
     lines, at = list[object](), list[list[int]]()
     for s, step in enumerate(steps):
         row = cell.arms(step, s)

@@ -29,7 +29,7 @@ from seqopt.errors import ProblemError
 from seqopt.exchange._tasks import tasks_csv, tasks_in_postures, tasks_json
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
-from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, Sketches, arm_data
+from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
 from seqopt.report.text import _deciding_step, _in_a_sentence, _robot_words, in_words
 from seqopt.responses.quantities import _number_text
 from seqopt.responses.table import (
@@ -204,7 +204,6 @@ def _build_data(
     engine: Engine,
     build: Build,
     known: Mapping[tuple[int, Grips], Fields] | None = None,
-    sketched: Sketches | None = None,
     *,
     fields: bool = True,
 ) -> dict[str, object]:
@@ -213,7 +212,7 @@ def _build_data(
     Rows of the table of responses are text; ``stands`` says whether every step stands with every
     mortar, ``marks`` what is wrong with it; the packed fields ``twist``, ``edge``, ``push`` and
     ``turn`` (force and moment of every ground end) have the ``scale`` of each step, or are None.
-    ``known``: fields by state; ``sketched``: arms by robot and node.
+    ``known``: fields by state.
     """
     lines = [line.split(",") for line in csv_text(build.table).splitlines()]
     scene = engine.network.scene
@@ -231,7 +230,7 @@ def _build_data(
         "decides": _deciding_step(scene, build.table, build.verdicts),
         "sentence": build.sentence(scene),
         "words": in_words(build.name),
-        "arms": arm_data(scene, build.steps, build.arms, sketched),
+        "arms": arm_data(scene, build.steps, build.arms),
         "steps": [
             {
                 "number": step.number,
@@ -364,13 +363,12 @@ def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
     drawn = [bool(end <= MOST) and not b.order for b, end in zip(builds, ends, strict=True)]
     states = _distinct(build.steps for build in compress(builds, drawn))
     known = dict(zip(states, _each_fields(engine, states.values(), _WANT), strict=True))
-    sketched: Sketches = {}
     why = "they place bricks in another order than the scene" if len(drawn) > sum(drawn) else ""
     why = "there are too many steps" if ends[-1] > MOST else why
     return {
         "structure": _structure_data(network),
         "builds": [
-            _build_data(engine, build, known, sketched, fields=fields)
+            _build_data(engine, build, known, fields=fields)
             | {"tasks": _tasks(engine, build) if build is builds[0] and not build.order else None}
             for build, fields in zip(builds, drawn, strict=True)
         ],
