@@ -116,31 +116,6 @@ def test_an_export_names_steps_that_arms_cannot_be_in(folder, tmp_path, capsys):
     assert "arms cannot: " in capsys.readouterr().err
 
 
-def test_arms_are_drawn_from_their_base_to_what_they_hold(plan):
-    scene, found = plan.engine.network.scene, plan.arms.postures
-    arms, held = _known_arms(scene, plan.steps), 0
-    assert set(arms) == set(found.table.robots)
-    for robot in (each for each in scene.robots if each.arm is not None):
-        r = scene.robots.index(robot)
-        foot = arms[robot.name][0].line[0]
-        for step, arm in zip(plan.steps, arms[robot.name], strict=True):
-            points = arm.line
-            assert np.allclose(points[0], foot)
-            assert np.allclose(foot, robot.arm.position)
-            node = step.grips[r]
-            if node is None:
-                assert np.array_equal(points[1], points[2])
-                assert np.linalg.norm(points[1] - foot) < 1.0
-                continue
-            held += 1
-            assert np.allclose(points[-1], scene.node_position(node), atol=1e-5)
-            assert np.allclose(
-                points[-2], found.table.place[found.steps[step.number - 1][r]], atol=1e-5
-            )
-    assert held
-    assert _known_arms(scene.with_robots(scene.robots[2]), ()) == {}
-
-
 def seen(points):
     return points @ VIEW.axes()[:2].T
 

@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.decisions import pose_decisions, steps_over
+from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
-from seqopt.problem.requirements import Limit, payload_limits
 from seqopt.report.comparison import compare
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import RESPONSES, robot_response
@@ -89,19 +88,6 @@ def test_a_name_hides_no_overload():
     scene = called("one", name, "three")
     notes = compare(ComplianceEngine(build_network(scene)), EQUATIONS).notes
     assert any(f"sequential: {name} holds up to" in note for note in notes)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_limits_and_budgets_mean_the_robot(name):
-    scene = called("one", name, "three")
-    limits = payload_limits(scene)
-    assert limits[1] == Limit(robot_response(name), PAYLOAD)
-    problem = posed(scene, EQUATIONS, limits=limits, also=(robot_response(name),))
-    own = [step.responses[robot_response(name)] for step in problem.evaluation.steps]
-    budget = steps_over(problem, robot_response(name), 0.0, 99.0)
-    held = sum(not s.moves and s.grips[1] is not None for s in problem.schedule.steps)
-    every = held * len(problem.schedule.moves[0].candidates) + sum((a > 0).sum() for a in own)
-    assert sum(a.sum() for a in (*budget.single, *budget.shared)) == every
 
 
 @given(first=st.text(max_size=4), second=st.text(max_size=4))

@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from seqopt.errors import SceneError
-from seqopt.scene.boxes import as_vectors, block_brick, vertices_of
+from seqopt.scene.boxes import as_vectors, block_brick
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import C_SHAPE, L_SHAPE, box, prism
-from tests.builders import six_bricks
 
 ANGLES = st.tuples(*[st.floats(-3, 3)] * 3)
 SIZES = st.lists(st.floats(0.1, 10.0), min_size=3, max_size=3)
@@ -50,19 +49,6 @@ def test_nodes_of_a_block_that_is_hollow_in_the_middle_lie_in_it():
     assert own.contains(high)
     assert low + high == pytest.approx(2 * own.centroid)
     assert not own.contains(own.centroid + np.array([0.75, 0.0, 0.0]))  # where a box would have one
-
-
-def test_bricks_of_an_arch_are_what_their_corners_make():
-    for brick in six_bricks().bricks:
-        points, faces = vertices_of(brick)
-        made = block_brick(
-            brick.name, Polyhedron(as_vectors(points), faces), brick.density, nodes=brick.nodes
-        )
-        assert made.mass == pytest.approx(brick.mass)
-        assert made.dimensions == pytest.approx(brick.dimensions)
-        assert made.position == pytest.approx(brick.position)
-        either = {tuple(np.round(made.node_position(node), 9)) for node in made.nodes}
-        assert either == {tuple(np.round(brick.node_position(n), 9)) for n in brick.nodes}
 
 
 CUBE = box((1.0, 1.0, 1.0))

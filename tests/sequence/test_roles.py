@@ -21,7 +21,7 @@ from seqopt.sequence.methods import (
     three_robot_loop,
 )
 from seqopt.sequence.steps import StepKind, idle_robots
-from tests.builders import anywhere, from_both_ends, small_arch
+from tests.builders import anywhere, small_arch
 
 
 def placers(scene, steps):
@@ -70,26 +70,6 @@ def test_the_first_two_that_reach_build():
         StepError, match="one places bricks 1, 5, all within reach of rob1, rob2, rob3;"
     ):
         robot_loop(with_robots(scene, far, *anywhere(3)))
-
-
-def test_from_both_ends_the_robot_beside_each_end_places_it():
-    scene = from_both_ends(9, "V")
-    left, right = near(scene, "left", 1, 2, 3, 4, 5), near(scene, "right", 5, 6, 7, 8, 9)
-    net = with_robots(scene, right, left)
-    steps = sequential(net)
-    who = dict(zip(scene.build_order, placers(net.scene, steps), strict=True))
-    assert all(who[name] == ("left" if name < 5 else "right") for name in who if name != 5)
-    assert _two_robot_loop(net).fill(filled(net)) == steps
-
-
-def filled(net):
-    """Return the node by which the sequential method places every brick."""
-    steps = sequential(net)
-    return [
-        next(n for n in s.held if n in net.scene.placed[s.bricks - 1].nodes)
-        for s in steps
-        if s.kind is StepKind.PLACE
-    ]
 
 
 def test_robots_by_name_take_the_roles_in_their_order():

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import pytest
 
-import seqopt
 from seqopt.errors import FileError, StepError
 from seqopt.network.build import build_network
 from seqopt.sequence.methods import SCHEDULES
@@ -17,7 +16,7 @@ from seqopt.sequence.schedule_file import (
     read_schedule,
     schedule_text,
 )
-from tests.builders import anywhere, from_both_ends, small_arch
+from tests.builders import small_arch
 
 HEADER = "step,type,bricks,rob1_node,rob2_node,rob3_node\n"
 START = HEADER + "1,place,1,1,,\n2,place,2,1,2,\n"
@@ -127,28 +126,3 @@ def test_what_cannot_be_found_gets_one_line(engine25, loop25, tmp_path):
         find_schedule(build_network(small_arch(5)), loop25)
     with pytest.raises(StepError, match="robots rob1, rob2: only a schedule by name takes them"):
         find_schedule(network, loop25, ("rob1", "rob2"))
-
-
-def test_a_schedule_of_ones_own_is_optimized(tmp_path):
-    """From a file, given whole and by name it is the same problem."""
-    scene, path = small_arch(7), tmp_path / "own.csv"
-    loop = SCHEDULES["three-robot"](scene)
-    path.write_text(schedule_text(loop), encoding="utf-8")
-    plans = [seqopt.optimize(scene, schedule) for schedule in ("three-robot", loop, path)]
-    assert len({plan.nodes for plan in plans}) == 1
-    assert plans[2].summary()["schedule"] == "own"
-
-
-def test_two_teams_build_from_both_ends_by_a_file():
-    """What no method writes: two robots at each end, one of them free to hold where it is best."""
-    scene = replace(from_both_ends(5, "V"), robots=anywhere(4))
-    assert scene.build_order == (1, 5, 2, 4, 3)
-    text = "step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node\n"
-    rows = ["place,1,1,,,", "place,2,1,,9,", "place,3,1,2,9,", "release,3,,2,9,"]
-    rows += ["reposition,3,?,2,9,", "place,4,?,2,9,7", "release,4,?,2,,7", "reposition,4,?,2,?,7"]
-    rows += ["release,4,,2,?,7", "place,5,5,2,?,7"]
-    text += "".join(f"{k},{row}\n" for k, row in enumerate(rows, start=1))
-    plan = seqopt.optimize(scene, parse_schedule(scene, text, "both.csv"), "weighted")
-    assert plan.certificate.gap <= 1e-9
-    assert len(plan.nodes) == 2
-    assert plan.summary()["idle_robots"] == []

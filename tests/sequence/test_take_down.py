@@ -87,16 +87,6 @@ def peak_of(engine, steps):
     return float((np.array(worst) / scales).max())
 
 
-def test_a_part_is_taken_down():
-    engine = arch()
-    for ending, held in (("held", True), ("released", False), ("one-by-one", False)):
-        rules = replace(DOWN, finish=Site(2), ending=ending)
-        plan = seqopt.solve(posed(engine, "minmax,steps", rules))
-        assert plan.status == "optimal"
-        assert plan.steps[-1].bricks == 2
-        assert bool(plan.steps[-1].held) is held
-
-
 @pytest.mark.slow
 def test_margins_are_aims_of_a_take_down():
     plan = seqopt.solve(posed(small_wall(), "tilt"))
