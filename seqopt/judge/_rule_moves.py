@@ -181,15 +181,17 @@ class RuleTables(_Tables):
 
     def successors(self, level: int, states: Ints) -> Iterator[Transitions]:
         """Yield the successors of states (n, c) that the rules allow, by kind of step."""
-        rows, bricks, begin = np.arange(len(states)), self.bricks_at(level), self._rules.begin
+        rows, bricks = np.arange(len(states)), self.bricks_at(level)
+        # who stands there against the rules has begun to let go, one by one, and may only do that
+        lets_go = level == self.last and self._rules.how_it_ends is Ending.ONE_BY_ONE
         keeps = rows[self.keep(bricks, states)] if bricks else rows
         if bricks:
-            begins = begin is not None and level == self.first and not self._is_let_go(level)
+            begins = self._rules.begin is not None and level == self.first and not lets_go
             able = rows if begins else keeps
             if self._limited:
                 able = able[states[able, -1] < self._rules.regrips]
             yield from self._taken(level, states, able, self._places(bricks)[0], regrip=True)
-            yield from self._released(level, states)
+            yield from self._released(level, states, checked=not lets_go)
         if level < self.last and self._top:
             yield from self._removed(level, states, keeps)
         elif level < self.last:
@@ -207,24 +209,23 @@ class RuleTables(_Tables):
         """
         first = {robot for group in self._groups for robot in group[:-1] if not self._parks}
         bricks = self.bricks_at(level)
-        for robot in (
-            robot for robot in range(self.robots) if robot not in first and wanted[robot]
-        ):
+        takers = [robot for robot in range(self.robots) if robot not in first and wanted[robot]]
+        for robot in takers:
             free = rows[states[rows, robot] <= 0]
             held = states[free, : self.robots]
             source, after, distance = self._take(states, free, robot, wanted[robot], held)
             after[:, self.robots :] = after[:, self.robots :] + 1 if regrip else 0
             ok = self._postures.allow(bricks, after)
             if not regrip:
-                ok &= self.keep(bricks, after)
+                ok = self.keep(bricks, after) & ok
             yield Transitions(level, source[ok], self.in_order(after[ok]), regrip, distance[ok])
 
-    def _released(self, level: int, states: Ints) -> Iterator[Transitions]:
+    def _released(self, level: int, states: Ints, *, checked: bool) -> Iterator[Transitions]:
         """Yield successors in which one robot lets go, or at the end all."""
         for robot in range(self.robots):
             source = np.flatnonzero(states[:, robot] > 0)
             after = self._let_go(states[source], robot)
-            if not self._is_let_go(level):
+            if checked:
                 ok = self.keep(self.bricks_at(level), after)
                 source, after = source[ok], after[ok]
             yield self._without_way(level, source, after)
@@ -253,13 +254,6 @@ class RuleTables(_Tables):
     def _without_way(self, level: int, source: Ints, after: Ints) -> Transitions:
         none = np.zeros(len(source))
         return Transitions(level, source, self.in_order(after), regrip=False, distance=none)
-
-    def _is_let_go(self, level: int) -> bool:
-        """Return whether robots let go one by one there, and only so, under all rules.
-
-        Who stands there against the rules has begun to let go.
-        """
-        return level == self.last and self._rules.how_it_ends is Ending.ONE_BY_ONE
 
     def certain(self) -> Iterator[tuple[int, Ints]]:
         """Yield the level and the places held (1, robots) in states that every build passes."""

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, combinations, islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -294,17 +295,16 @@ def worst_least(problem: States, response: str, look: Look | None = None) -> flo
     return least_peak(found.graph().graph, 0) if found.whole else np.inf
 
 
-@dataclass(frozen=True)
-class Remedy:
+class Remedy(NamedTuple):
     """A relaxation that makes the problem feasible.
 
     ``name``: the constraint; ``enough``: returns the least sufficient relaxation in words, empty
-    if robots would carry more than all loads; ``rules``: as command-line words, if it is of rules;
-    ``of_arms``: whether it asks for other arms.
+    if robots would carry more than all loads, by default the name; ``rules``: as command-line
+    words, if it is of rules; ``of_arms``: whether it asks for other arms.
     """
 
     name: str
-    enough: Callable[[], str]
+    enough: Callable[[], str] | None = None
     rules: tuple[str, ...] = ()
     of_arms: bool = False
 
@@ -331,13 +331,13 @@ class Remedies:
                 if not (ways and other.of_arms)
             )
             for name, both, of_rules in islice(pairs, 1):
-                typed = f"{name} (--rule {' --rule '.join(both)})" if of_rules else name
-                ways.append(Remedy(name, partial(str, typed)))
+                ways.append(Remedy(name + f" (--rule {' --rule '.join(both)})" * of_rules))
         if not ways and finished:  # no robot can do anything about it
             return "; no robot helps: it needs more bond or friction, less load, or other limits"
         if not ways:
             return ", even if two rules or limits are loosened; extend a reach or add a robot"
-        enough = dict.fromkeys(text for way in ways if (text := way.enough()))
+        said = (way.enough() if way.enough else way.name for way in ways)
+        enough = dict.fromkeys(text for text in said if text)
         if enough:
             return f"; it becomes possible with {' or '.join(enough)}"
         return f"; robots would have to carry more than all weights and loads; {HARD}"
@@ -365,29 +365,28 @@ class Remedies:
             return
         if not scene.has_arms:
             reaches = _enough_reach(scene, self._exists_in)
-            yield from (Remedy(words, partial(str, words)) for words in reaches)
+            yield from map(Remedy, reaches)
         if ground_moves(scene) and (soft := self._softer()):
-            yield Remedy(soft, partial(str, soft))
+            yield Remedy(soft)
 
     def _remedy(self, name: str, text: str, relaxed: States) -> Remedy:
         """Return the remedy of a filter, whose relaxation in words is known to suffice."""
+
+        def payload() -> str:  # the least, as the peak force of the problem without payloads
+            held = worst_least(relaxed, LARGEST, self.look)
+            if held > whole_load(relaxed.network):
+                return self._softer()
+            said = _payload_text(max(held, _heaviest(self.problem)))
+            return f"a payload of {said} N (--payload {said})"
+
         if name == "rules":
             said = partial(str, f"{text} (--rule {text})")
-            ignored = partial(self._payload_if_ignored, relaxed)
-            return Remedy(text, ignored if text == IGNORED else said, (text,))
+            return Remedy(text, payload if text == IGNORED else said, (text,))
         enough = dict[str, Callable[[], str]]()
         for limit in self.problem.limits:
             enough[limit.label] = partial(self._enough_limit, limit)
         enough |= {"stands": self._enough_bond, "payload": self._enough_payload}
-        return Remedy(text, enough.get(name, partial(str, text)), of_arms=name == "arms")
-
-    def _payload_if_ignored(self, problem: States) -> str:
-        """Return the least payload, as the peak force of a problem without payloads; in words."""
-        held = worst_least(problem, LARGEST, self.look)
-        if held > whole_load(problem.network):
-            return self._softer()
-        said = _payload_text(max(held, _heaviest(self.problem)))
-        return f"a payload of {said} N (--payload {said})"
+        return Remedy(text, enough.get(name), of_arms=name == "arms")
 
     def _softer(self) -> str:
         """Describe the stiffest sufficient grips; empty if none suffice."""

@@ -70,6 +70,18 @@ def test_the_old_rest_goes_on_where_nothing_changed():
     assert first["differs"] == rest.steps[-1].number
 
 
+def test_the_old_rest_is_asked_for_its_margins():
+    """Of what goes on nobody claims a margin: it is what is proven of its steps."""
+    problem = seqopt.pose(
+        seqopt.make_engine("compliance", small_arch(4)), FreeRules(), ONES, "friction,steps"
+    )
+    plan = seqopt.solve(problem)
+    values = goes_on(plan.states, plan.steps)
+    assert values["friction"] > 0
+    assert values == pytest.approx(plan.objective, rel=0.02)
+    assert compared(plan, plan.steps)["as_planned"] == values
+
+
 def test_what_the_old_rest_breaks_is_named():
     site, old = Site.after(PLAN.steps, 4), PLAN.steps[4:]
     lost = next(r.name for r, n in zip(SCENE.robots, old[0].grips, strict=True) if n is not None)
