@@ -207,12 +207,17 @@ def find_path(instance: Instance, formulation: Formulation, run: Run, offset: fl
     returns its incumbent. Raises `InfeasibleError` if no path is within all caps; `SolverError` if
     the answer fails its check; `KeyboardInterrupt` if there is no incumbent yet.
     """
+
+    def raised(values: Sequence[float]) -> tuple[float, ...]:
+        return values[0] + offset, *values[1:]
+
+    def shifted(found: Finding) -> Finding:
+        return replace(found, objective=found.objective + offset, bound=found.bound + offset)
+
     formulation.require_options(run.options)
     limit = min(run.left, run.options.get("seconds", math.inf))
-    tell = run.progress
-    shifted = None if tell is None else lambda found: tell(_moved(found, offset))
-    watch = Watch(limit, shifted if offset else tell)
-    seconds = {"compile": 0.0}
+    tell, seconds = run.progress, {"compile": 0.0}
+    watch = Watch(limit, None if tell is None else lambda found: tell(shifted(found)))
     with timed(seconds, "solve"):
         selection = _selected(instance, formulation, run, watch, offset)
     seconds["compile"] = selection.compile_seconds
@@ -220,8 +225,12 @@ def find_path(instance: Instance, formulation: Formulation, run: Run, offset: fl
     with timed(seconds, "verify"):
         judge = partial(judged, instance, formulation, selection)
         selection, certificate = proven(selection, judge, run)
-    if offset:
-        selection, certificate = _raised(selection, certificate, offset)
+    trace = tuple(map(shifted, selection.trace))
+    objective, bound = raised(selection.objective), raised(selection.bound)
+    selection = replace(selection, objective=objective, bound=bound, trace=trace)
+    if certificate is not None:
+        values, bounds = raised(certificate.values), raised(certificate.bounds)
+        certificate = replace(certificate, values=values, bounds=bounds)
     return Found(selection, certificate, (), seconds)
 
 
@@ -263,23 +272,6 @@ def _selected(
     stopped = INTERRUPT if watch.interrupted else selection.stopped
     watch.tell(selection.objective[0], selection.bound[0])  # without a clock there is no log
     return replace(selection, stopped=stopped, trace=watch.trace)
-
-
-def _moved(found: Finding, offset: float) -> Finding:
-    return replace(found, objective=found.objective + offset, bound=found.bound + offset)
-
-
-def _raised(
-    selection: Solution, certificate: Certificate | None, offset: float
-) -> tuple[Solution, Certificate | None]:
-    """Return solution and certificate with ``offset`` added to the first value and bound."""
-    values, bounds = ((v[0] + offset, *v[1:]) for v in (selection.objective, selection.bound))
-    trace = tuple(_moved(found, offset) for found in selection.trace)
-    selection = replace(selection, objective=values, bound=bounds, trace=trace)
-    if certificate is None:
-        return selection, None
-    proven = [(v[0] + offset, *v[1:]) for v in (certificate.values, certificate.bounds)]
-    return selection, replace(certificate, values=proven[0], bounds=proven[1])
 
 
 def judged(instance: Instance, formulation: Formulation, found: Solution) -> Certificate:
