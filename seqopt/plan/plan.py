@@ -279,8 +279,9 @@ class Plan(ShownBuild):
         """How many different models were solved."""
         if self.looked_at is not None:
             return self.looked_at
-        own = self.graph.models
-        if self.search is not None:
+        if self.search is None:
+            own = self.graph.models
+        else:  # the graph would solve them all to count them
             own = window_models(self.decisions.schedule, self.choice)
         return own + self.selection.effort[1]
 
