@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt._cli.main import main
@@ -90,6 +90,7 @@ def test_a_name_hides_no_overload():
     assert any(f"sequential: {name} holds up to" in note for note in notes)
 
 
+@settings(max_examples=10)
 @given(first=st.text(max_size=4), second=st.text(max_size=4))
 def test_no_two_robots_share_a_name(first, second):
     taken = {*RESPONSES, *CHOICE_RESPONSES, "F_each", "F_rob", "F_max"}
