@@ -12,6 +12,7 @@ from seqopt.work.progress import Stage, duration
 
 PATIENCE = 1.0  # s for which a command says nothing
 TICK = 0.5  # s between two lines
+CLEARED = 2.0  # s for which an end waits until the line is cleared
 TAIL = 24  # columns beside the words of a stage
 
 
@@ -42,7 +43,7 @@ class Watcher:
         """Wait until the line is cleared, also where an error or an interrupt ends the command."""
         self._over.set()
         if self._shows:
-            self._ticking.join(TICK)
+            self._ticking.join(CLEARED)
 
     def __call__(self, told: object) -> None:
         """Record the current stage with its share, or in words."""
