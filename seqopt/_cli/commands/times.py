@@ -115,7 +115,10 @@ def _build(
 ) -> tuple[GivenSequence, float, float | None]:
     """Return a build, its makespan, s, and that of the best assignment, if requested."""
     if standing is not None and standing.curing is None:
-        raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
+        raise ProblemError(
+            "--stands: here it goes with --curing of mortar that has a bond; seqopt assess says "
+            "what stands"
+        )
     build = GivenSequence(make_engine(USUAL, network), (*steps,), standing=standing)
     try:
         given = float(build.times()["end_s"].iloc[-1])
