@@ -319,9 +319,9 @@ class ThresholdSearch:
         return bool(found and not self._caps and all(map(le, found.objective, self.floors)))
 
     def misses_floor(self) -> bool:
-        """Return whether a dive, whose states stay visited, proves that every plan exceeds it."""
+        """Return whether states up to it, which stay visited, prove that every plan exceeds it."""
         floor = self.floors[0]
-        if not self._cuts or self.wide.dive(floor):
+        if not self._cuts or self.wide.dive(floor) or self.wide.rise(floor):
             return False
         return self.wide.excluded > floor
 

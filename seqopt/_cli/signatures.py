@@ -215,23 +215,24 @@ class Signature:
         lines = _read(self.function.__doc__)[0]
         texts = self.texts() if helps or self._foreign else {}
         command.description = wrapped(self._spoken(" ".join(lines.get("", ()))))
+        own = sorted(self.options.values(), key=lambda e: not e.place or e.default is MISSING)
         if usages := lines.get("Usage"):
             command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
         else:
-            places = (each for each in self.options.values() if each.place)
+            places = (each for each in own if each.place)  # as report [SCENE] FOLDER
             shown = (e.value if e.default is MISSING else f"[{e.value}]" for e in places)
             command.usage = " ".join([command.prog, *shown, "[options]"])
         if examples := self.examples:
             listed = "\n".join(f"  {example}" for example in examples)
             command.epilog = f"example{'s' * (len(examples) > 1)}:\n{listed}"
         strict = command.prog.split()[-1] in STRICT
-        beside = {name: Option(name) for name in PRINTED if name != "strict" or strict}
+        own += [Option(name) for name in PRINTED if name != "strict" or strict]
         groups: dict[str, list[Option]] = {}
-        for name, option in {**self.options, **beside}.items():
-            if name in HIDDEN:
+        for option in own:
+            if option.name in HIDDEN:
                 continue
-            question, value, _ = texts.get(name, ("", "", ""))
-            asked = (title for title, names in QUESTIONS.items() if name in names.split())
+            question, value, _ = texts.get(option.name, ("", "", ""))
+            asked = (title for title, names in QUESTIONS.items() if option.name in names.split())
             title = question if question[-1:] == "?" else next(asked, OWN)
             upper = value if value == value.upper() and value != "CHOICE" else ""
             known = replace(option, more={"value": upper, **option.more}) if upper else option
