@@ -25,7 +25,7 @@ def horizontal(count, joint_t=1e8, joint_r=1e6):
     return arch_scene(shape)
 
 
-@pytest.mark.parametrize("count", [1, 40])
+@pytest.mark.parametrize("count", [1, 5, 40])
 def test_cantilever_closed_form(count):
     """A level cantilever of rigid bricks: moments and shears at the joints, summed by hand.
 
@@ -72,6 +72,14 @@ def test_a_brick_hanging_from_its_upper_half():
     joint = np.abs(fields.support[0, 0, :3]).max()
     assert fields.edge_force.max() == pytest.approx(half * np.cos(lean), abs=0.1 * joint + 1e-9)
     assert round(fields.edge_force.max(), 1) == pytest.approx(17.6)
+
+
+def test_two_grips_on_one_brick_leave_its_inner_edge_empty(engine25):
+    """The limit of a stiff bar with both ends held (plan steps 51 to 53 and 55)."""
+    net = engine25.network
+    fields = engine25.solve(15, [[28, 29], [28, 29]])
+    edge = np.flatnonzero((net.edge_brick == 14) & (net.edge_spring < 0))
+    assert np.abs(fields.edge_force[:, edge]).max() <= 1e-9 * np.abs(fields.edge_force).max()
 
 
 def test_robots_carry_a_level_beam_by_symmetry():

@@ -162,7 +162,7 @@ def some_grips(scene, bricks):
 
 
 @pytest.mark.parametrize("kind", SCENES)
-@pytest.mark.parametrize("part", [0.3, 1.0])
+@pytest.mark.parametrize("part", [0.3, 0.7, 1.0])
 def test_engines_agree(kind, part):
     """One flexibility that grows, two systems of equations, a frame and discrete elements."""
     scene = loaded(SCENES[kind]())
@@ -222,6 +222,14 @@ def test_weight_loads_and_movements_add_up(kind):
             assert all(np.abs(answer.brick_twist).max() > 1e-12 for answer in answers)
 
 
+def test_a_factor_on_weight_is_a_factor_on_answers():
+    scene = SCENES["arch"]()
+    heavy = replace(scene, weight_factor=1.35)
+    once, more = (ComplianceEngine(s).solve(9, [[17]], Want.ALL) for s in (scene, heavy))
+    assert far(more, type(once)(**{n: 1.35 * getattr(once, n) for n in NAMES})) < 1e-10
+    assert heavy.up == scene.up
+
+
 @pytest.mark.parametrize("kind", SCENES)
 def test_ground_that_moves_as_one_takes_everything_along(kind):
     """No force changes: the structure moves as a whole."""
@@ -235,6 +243,16 @@ def test_ground_that_moves_as_one_takes_everything_along(kind):
     expected = shift + np.cross(turn, network.node_position)
     assert found.displacement[0] == pytest.approx(expected, abs=1e-11)
     assert np.abs(found.joint_wrench).max() < 1e-9 * 1e-3 * network.springs.stiffness.max()
+
+
+def test_a_chain_with_a_loose_part():
+    """What only robots hold takes loads and movements too."""
+    scene = loaded(SCENES["arch"](), seed=3)
+    apart = build_network(replace(scene, joints=scene.joints[:11] + scene.joints[12:]))
+    for grips in ([[40, 45, 49]], [[40, 44, 48]]):
+        found = ComplianceEngine(apart).solve(25, grips, Want.ALL)
+        columns = grip_columns(apart, 25, np.array(grips))
+        assert far(found, solve_mixed(apart, 25, columns)) < 1e-9
 
 
 def test_a_long_chain_that_meets_the_far_ground():
