@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import seqopt
 from seqopt.contact.faces import _face_distance, bare_assembly
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
@@ -20,6 +22,7 @@ from seqopt.scene.scene_file import (
     load_scene,
 )
 
+DATA = Path(seqopt.__file__).parent / "data"
 PRINTED = (2.670, 4.350)  # m; sides of the plan, section 3.1 of Bruun et al.
 NARROWEST, WIDEST = 0.0015, 0.0265  # m; between the faces of bricks that touch
 
@@ -52,6 +55,14 @@ def test_every_built_in_scene_is_named_drawn_from_text_and_not_odd(name):
     assert "\n" not in ABOUT[name]
     assert _parse_scene(dump_scene(scene)) == scene
     assert load_scene(name) == scene
+
+
+@pytest.mark.parametrize(
+    "path", sorted(DATA.joinpath("scenes").glob("*.json")), ids=lambda p: p.stem
+)
+def test_scenes_that_ship_as_files_obey_the_schema(path):
+    """So that loading them need not ask."""
+    assert _parse_scene(path.read_text("utf-8")) == load_scene(path.stem)
 
 
 @pytest.mark.parametrize("name", builtin_scenes())
