@@ -14,11 +14,13 @@ from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import MechanismError, SceneError
+from seqopt.errors import GripError, MechanismError, SceneError
 from seqopt.network.build import build_network
 from tests.builders import six_bricks
+from tests.limit_scenes import softened
 from tests.soft_bodies import SoftBodies
 
+STATES = 200  # random ones, one in two with hands that are moved
 NAMES = ("edge_force", "displacement", "grip_force", "grip_moment", "support", "joint_wrench")
 
 
@@ -57,7 +59,63 @@ def inner_nodes(net, bricks):
     return [net.index_of_node[n] for b in net.scene.placed[:bricks] for n in b.nodes]
 
 
+def drawn_state(arch, i):
+    """A random state: scene, brick count, nodes, stiffness of hands, and how far they are moved."""
+    rng = np.random.default_rng([i, 7])
+    scene = softened(arch, i)
+    size = 10 ** rng.uniform(3, 9)
+    shift = size if rng.random() < 0.7 else tuple(size * 10 ** rng.uniform(-1, 1, 3))
+    turn = None if rng.random() < 0.6 else 10 ** rng.uniform(1, 7)
+    bricks = int(rng.integers(2, 26))
+    free = [n for b in scene.placed[:bricks] for n in b.nodes if n not in scene.blocked_nodes]
+    nodes = rng.choice(free, min(int(rng.integers(1, 5)), len(free)), replace=False).tolist()
+    if rng.random() < 0.4:  # two on one brick
+        pair = scene.placed[int(rng.integers(1, bricks))].nodes
+        nodes = [*pair, *(n for n in nodes if n not in pair)][:4]
+    moved = 4e-4 * rng.normal(size=(len(nodes), 3)) * (i % 2)
+    return (
+        scene.with_grips(shift, turn),
+        bricks,
+        nodes,
+        hands_of([(shift, turn)] * len(nodes)),
+        moved,
+    )
+
+
+def agree_with_dense(arch, i):
+    """The largest relative difference of a random state's forces, moments and displacements."""
+    scene, bricks, nodes, hands, moved = drawn_state(arch, i)
+    borne, shifts = SoftBodies(scene, bricks).solve(nodes, hands, moved)
+    net = build_network(scene)
+    given = moved[None] if moved.any() else None
+    found = ComplianceEngine(net).solve(bricks, [nodes], Want.ALL, given)
+    own = found.displacement[0, inner_nodes(net, bricks)]
+    out = [far(found.grip_force[0], borne[:, :3]), far(own, shifts)]
+    return max([*out, far(found.grip_moment[0], borne[:, 3:])] if hands[:, 3:].any() else out)
+
+
+@pytest.mark.parametrize("i", range(0, STATES, 20))
+def test_a_dense_solver_agrees(arch25, i):
+    assert agree_with_dense(arch25, i) <= 1e-9
+
+
+@pytest.mark.long
+@pytest.mark.slow
+def test_a_dense_solver_agrees_on_all_states(arch25):
+    assert max(agree_with_dense(arch25, i) for i in range(STATES)) <= 1e-9
+
+
+def test_the_dense_solver_would_notice(arch25):
+    """Negative control: a tenth softer, or moved a tenth less, is another answer."""
+    scene, bricks, nodes, hands, moved = drawn_state(arch25, 1)
+    solver = SoftBodies(scene, bricks)
+    right = solver.solve(nodes, hands, moved)[0]
+    assert far(solver.solve(nodes, 0.9 * hands, moved)[0], right) > 1e-3
+    assert far(solver.solve(nodes, hands, 0.9 * moved)[0], right) > 1e-3
+
+
 WAYS = {
+    "alike": [(1e6, None)] * 3,
     "turning": [(1e6, 1e4)] * 3,
     "each its own": [(3e6, None), (1e6, 2e4), (1e5, None)],
     "by axis": [((1e5, 1e6, 1e7), None)] * 3,
@@ -66,10 +124,11 @@ WAYS = {
 
 @pytest.mark.parametrize("grips", [(3, 8, 11), (4, 5, 9)])
 @pytest.mark.parametrize("ways", WAYS)
-def test_engines_agree(ways, grips):
+@pytest.mark.parametrize("moved", [0.0, 1e-8])
+def test_engines_agree(ways, grips, moved):
     """Who holds which node counts; so small a shift leaves joints in their elastic limits."""
     scene = robots(six_bricks("V"), *WAYS[ways])
-    shift = 1e-8 * np.random.default_rng(0).normal(size=(1, 3, 3))
+    shift = moved * np.random.default_rng(0).normal(size=(1, 3, 3))
     shift[..., 1] = 0.0
     net, numbers = build_network(scene), [scene.grip_numbers(grips)]
     borne, shifts = SoftBodies(scene, 6).solve(grips, hands_of(WAYS[ways]), shift[0])
@@ -86,7 +145,7 @@ def test_engines_agree(ways, grips):
     assert (apart(other, whole) > 1e-3) == (ways == "each its own")
 
 
-@pytest.mark.parametrize("ways", [[(None, None), (1e6, None), (1e5, 1e3)]])
+@pytest.mark.parametrize("ways", [[(None, None), (1e6, None), (1e5, 1e3)], [(None, 1e5)] * 3])
 @pytest.mark.parametrize("grips", [(3, 20, 33), (22, 23, 33), (36, 37, 39)])
 def test_some_are_rigid(arch25, ways, grips):
     """Together with soft ones, on one brick, and on an island that robots alone hold."""
@@ -178,11 +237,27 @@ def test_turning_is_a_hold_of_its_own():
         assert np.abs(found.grip_moment).max() > 0
 
 
+def test_numbers_of_grips_that_there_are_not(arch25):
+    scene = robots(arch25, (1e6, None), (None, None))
+    engine = make_engine("compliance", scene)
+    first, second = scene.grip_numbers((7, None)), scene.grip_numbers((None, 7))
+    assert first == (7,)
+    assert second != first
+    for wrong in (0, second[0] + 100, -1, 60 + second[0] - first[0]):
+        with pytest.raises(GripError, match="grip on node"):
+            engine.solve(10, [[wrong]])
+    with pytest.raises(GripError, match="a node is held twice"):
+        engine.solve(10, [[*first, *second]])
+
+
 @pytest.mark.parametrize(
     ("given", "named"),
     [
         ({"stiffness": 0.0}, "robot a: stiffness is 0.0; give one number or three, 0.001 to 1e"),
+        ({"stiffness": "soft"}, "stiffness is 'soft'"),
+        ({"stiffness": (1e6, 1e6)}, "stiffness is"),
         ({"stiffness": np.inf}, "N/m, or none if rigid"),
+        ({"stiffness": True}, "stiffness is True"),
         ({"rotational_stiffness": -1.0}, "rotational_stiffness is -1.0.*or none if its node may"),
         ({"rotational_stiffness": 1e16}, "rotational_stiffness is"),
     ],
