@@ -320,10 +320,11 @@ class ThresholdSearch:
 
     def misses_floor(self) -> bool:
         """Return whether states up to it, which stay visited, prove that every plan exceeds it."""
-        floor = self.floors[0]
-        if not self._cuts or self.wide.dive(floor) or self.wide.rise(floor):
-            return False
-        return self.wide.excluded > floor
+        floor, trial = self.floors[0], self.wide.copy()
+        if not self._cuts or trial.dive(floor) or trial.rise(floor):
+            return False  # what takes as much as the floor would stay visited below a later cut
+        self.wide = trial
+        return trial.excluded > floor
 
     def best(self, start: float = -np.inf) -> Solution:
         """Return the best path, by a threshold that rises until states below it reach an end.
@@ -396,13 +397,12 @@ class ThresholdSearch:
         if self.wide.passes == 0 or (np.isinf(below) and self.incumbent):
             return False  # what lies below a first threshold is seldom all that a path needs
         trial = self.wide.copy()
-        if trial.dive(threshold, below):
-            way = trial.way()
-            if way is not None:
-                best = lexicographic(way.graph)
-                if not close_fallen(trial, way, best.path):
-                    self.incumbent = selected(trial.space, way, best)
-                    return True
+        way = trial.way() if trial.dive(threshold, below) else None
+        best = None if way is None else lexicographic(way.graph)
+        if way and best and best.values[0] < self._ceiling:
+            if not close_fallen(trial, way, best.path):
+                self.incumbent = selected(trial.space, way, best)
+                return True
             with suppress(InfeasibleError, NothingFoundError):  # of what stands
                 self.incumbent = best_standing(trial)
                 return True
