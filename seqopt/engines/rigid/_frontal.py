@@ -47,6 +47,7 @@ from seqopt.network.network import Network
 from seqopt.work._threads import one_thread
 
 AT_ONCE = 24  # bricks that are eliminated together: blocks large enough for matrix products
+_SHRINKING = 1e-4  # largest correction from which on the next ones are foreseen
 MOST = 6  # corrections, after which an answer is given up
 _MARGIN = 10.0  # times more than the last correction shrank that the next one may be
 TINY = np.finfo(float).tiny
@@ -256,7 +257,8 @@ def _solve_one(
         state, forces = state + change, forces + more / unit
         size = sizes(parts, change[None])[0]  # the next correction is as much smaller
         share, before = min(1.0, _MARGIN * np.max(size / np.maximum(before, TINY))), size
-        if count and unchanged(parts, state[None], share * change[None], largest)[0]:
+        small = unchanged(parts, state[None], change[None], _SHRINKING)[0]  # not shrunk by chance
+        if count and small and unchanged(parts, state[None], share * change[None], largest)[0]:
             wrench, twist = unscaled(parts, state[None])
             force = held.force @ (forces * parts.unit)
             return Solution(twist, wrench, *borne(force[None], len(columns), compliance))
