@@ -123,7 +123,6 @@ COMMANDS = {
         ("export", "exporting:export", "write a plan in a format of others"),
         ("instance", "instance:instance", "write the graph of a problem, for any solver"),
         ("judge", "judge:run", "check a bare solution of an instance, and a bound"),
-        ("completion", "completion:run", "let the shell complete words of seqopt"),
     )
 }
 """The commands that are always there, by name."""

@@ -35,7 +35,7 @@ def test_both_tables_name_the_same_homes():
     assert {*lazy, "__version__"} == {*seqopt.__all__}
 
 
-LIGHT = ("numpy", "pandas", "scipy", "networkx", "shtab")
+LIGHT = ("numpy", "pandas", "scipy", "networkx")
 LATE = ("pandas.core", "scipy.optimize", "seqopt.exchange.imports", "seqopt.report.page")
 SELDOM = (
     *("networkx", "scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib"),

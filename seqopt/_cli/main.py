@@ -10,7 +10,7 @@ from contextlib import suppress
 from importlib import import_module
 
 from seqopt._cli.answer import Status, answer_of, print_answer, status_of
-from seqopt._cli.arguments import EXAMPLES, Request, named_command, request
+from seqopt._cli.arguments import EXAMPLES, Request, named_command, parser, request
 from seqopt._cli.terminal import flush, quiet_numbers, show, silence
 from seqopt._later import Later
 from seqopt._registry import COMMANDS
@@ -59,6 +59,8 @@ def load(words: Sequence[str]) -> None:
 
 
 def _run(words: Sequence[str], said: list[Request]) -> int:
+    if "_ARGCOMPLETE" in os.environ:  # the shell asks what may follow
+        import_module("argcomplete").autocomplete(parser())
     if not words:
         show(EXAMPLES)
         return Status.DONE

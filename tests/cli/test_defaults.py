@@ -97,7 +97,7 @@ def test_assess_and_replan_in_python_are_the_commands(capsys, arch, tmp_path):
 def test_every_command_has_a_function_of_python():
     """Those that describe a scene, read one or look a move up have values that do the same."""
     functions = {*doors.__all__} - {"Answer", "Command"}
-    assert functions == COMMANDS.keys() - {"scene", "import", "completion"}
+    assert functions == COMMANDS.keys() - {"scene", "import"}
     for name in functions:
         taken = inspect.signature(getattr(doors, name)).parameters.values()
         assert all(each.kind is not each.VAR_KEYWORD for each in taken), name

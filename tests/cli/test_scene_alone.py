@@ -12,7 +12,7 @@ from seqopt.scene.scene_file import save_scene
 from tests.builders import small_arch
 from tests.commands import command
 
-OF_OTHERS = {"import", "judge", "completion"}  # of files, a shell
+OF_OTHERS = {"import", "judge"}  # of files
 ALONE = sorted(COMMANDS.keys() - OF_OTHERS)
 
 

@@ -40,7 +40,6 @@ def test_without_words_it_shows_three_examples_that_are_commands(capsys):
         ("optimize --robust worst-peak --vary stifness=2 --out x", "stiffness"),
         ("pareto chain:bricks=7 --aim D_max --pick D_mx --out x", "D_max"),
         ("import a.obj --unit mmm --out x", "mm"),
-        ("completion bahs", "bash"),
     ],
 )
 def test_the_word_that_was_meant_is_named(capsys, monkeypatch, tmp_path, words, meant):
@@ -70,5 +69,4 @@ def test_every_example_of_help_can_be_parsed():
         examples = signature_of(command.load()).examples
         assert len(examples) >= 1
         for example in examples:
-            if name != "completion":  # whose examples are lines of a shell
-                assert parser(name).parse_args(example.split()[1:]).command == name
+            assert parser(name).parse_args(example.split()[1:]).command == name
