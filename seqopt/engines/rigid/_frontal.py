@@ -34,11 +34,11 @@ from seqopt.engines.interface import Fields, _join_sets, no_sets
 from seqopt.engines.rigid._mechanism import Ungripped, share, ungripped_system
 from seqopt.engines.rigid._mixed import (
     Solution,
+    are_small,
     borne,
     held_rows,
     respond,
     sizes,
-    unchanged,
     unscaled,
 )
 from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
@@ -257,8 +257,11 @@ def _solve_one(
         state, forces = state + change, forces + more / unit
         size = sizes(parts, change[None])[0]  # the next correction is as much smaller
         share, before = min(1.0, _MARGIN * np.max(size / np.maximum(before, TINY))), size
-        small = unchanged(parts, state[None], change[None], _SHRINKING)[0]  # not shrunk by chance
-        if count and small and unchanged(parts, state[None], share * change[None], largest)[0]:
+        if not count:
+            continue
+        whole = sizes(parts, state[None])
+        small = are_small(parts, whole, size[None], _SHRINKING)[0]  # not shrunk by chance
+        if small and are_small(parts, whole, share * size[None], largest)[0]:
             wrench, twist = unscaled(parts, state[None])
             force = held.force @ (forces * parts.unit)
             return Solution(twist, wrench, *borne(force[None], len(columns), compliance))

@@ -360,10 +360,17 @@ def unchanged(
 ) -> Bools:
     """Return whether corrections (S, 6s + 6b) are small beside forces, moments, shifts and turns.
 
-    Where nothing moves, as where robots hold every brick at both nodes, what is left is rounding:
-    it is measured against the weight. ``largest``: that counts as small.
+    ``largest``: that counts as small.
     """
-    size, change = sizes(parts, states), sizes(parts, corrections)
+    return are_small(parts, sizes(parts, states), sizes(parts, corrections), largest)
+
+
+def are_small(parts: Ungripped, size: Floats, change: Floats, largest: float) -> Bools:
+    """Return whether changes (S, 4) are small beside what changes (S, 4), both as of `sizes`.
+
+    Where nothing moves, as where robots hold every brick at both nodes, what is left is rounding:
+    it is measured against the weight.
+    """
     other = size.reshape(-1, 2, 2).max(axis=2).repeat(2, axis=1)
     least = np.maximum(_EMPTY * other, _LIGHT * np.abs(parts.load).max())
     return np.asarray((change <= largest * np.maximum(size, least)).all(axis=1))
@@ -372,8 +379,8 @@ def unchanged(
 def sizes(parts: Ungripped, states: Floats) -> Floats:
     """Return the largest force, moment, shift and turn of each state, (S, 4)."""
     both = np.split(states, [len(parts.wrench_unit)], axis=1)
-    kinds = [part.reshape(len(states), part.shape[1] // 6, 2, 3) for part in both]
-    return np.hstack([np.abs(part).max(axis=(1, 3), initial=0.0) for part in kinds])
+    ways = [np.abs(part[:, way::6]).max(axis=1, initial=0.0) for part in both for way in range(6)]
+    return np.stack(ways, axis=1).reshape(len(states), 4, 3).max(axis=2)
 
 
 _SPLIT = 2.0**27 + 1.0  # halves the 53 digits of a double

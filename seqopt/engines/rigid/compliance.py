@@ -141,7 +141,7 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     return out
 
 
-_LARGE, _EACH = 300, 75  # bricks, in all and for every set, from which on blocks are sooner
+_LARGE, _EACH = 150, 75  # bricks, in all and for every set, from which on blocks are sooner
 _KEPT = 32e6  # bytes of operators that may stay when another is made
 _SCREEN = 1e-6  # the same, of what is only to be compared
 _EVEN = 5e-5  # softest over stiffest joint from which on pivots bound the error
