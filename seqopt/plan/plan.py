@@ -343,10 +343,9 @@ class Plan(ShownBuild):
         ``steps_before_release`` without those that let all go at the end, ``regrips``, ``makespan``
         (s, if it is known how long robots take), ``idle_robots``, which never grip; limits of the
         linear range that are left, which model was ``enough``, what is known of ``arms``, and
-        payloads that are exceeded; ``models_evaluated``, ``models_in_six_digits`` of them,
-        ``models_in_proof`` (None without one), ``states_in_proof``, ``seconds``; of an order that
-        was sought ``order``, ``orders`` (among which), ``order_status``, ``order_bound`` (on the
-        first aim, of any order), ``order_bound_proven``, ``order_evaluated`` and ``order_stopped``;
+        payloads that are exceeded; what was ``spent``, ``seconds``; of an order that was sought
+        ``order``, ``orders`` (among which), ``order_status``, ``order_bound`` (on the first aim, of
+        any order), ``order_bound_proven``, ``order_evaluated`` and ``order_stopped``;
         the ``engine`` and ``versions``.
         """
         if not self.steps:  # a path through an instance, or given costs
@@ -354,9 +353,8 @@ class Plan(ShownBuild):
             spent = dict(getattr(self.certificate, "spent", {}))
             whole = {**self._named(), **known, **self._answer(), "budgets": spent}
             return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}
-        graph, proof, scene = self._of_scene, self.certificate, self.engine.network.scene
+        graph, scene = self._of_scene, self.engine.network.scene
         asked = self.problem if isinstance(self.problem, Problem) else graph
-        in_proof = None if proof is None or self.gap is None else proof.models or self.models
         return {
             "scene": scene.name,
             "schedule": self.method,
@@ -374,13 +372,43 @@ class Plan(ShownBuild):
             "enough": self.enough.facts(),
             **({} if self.arms is None else self.arms.described()),
             "payload_exceeded": [str(excess) for excess in self.overloads],
-            "models_evaluated": self.models,
-            "models_in_six_digits": graph.six_digit_models,
-            "models_in_proof": in_proof,  # all where costs are given
-            "states_in_proof": 0 if proof is None else proof.states,
+            "spent": self.spent,
             **self._of_order(),
             "seconds": dict(self.seconds),
             **provenance(self.engine),
+        }
+
+    @property
+    def spent(self) -> dict[str, dict[str, object]]:
+        """What was computed to choose and to prove, beside what had to be.
+
+        ``models``: ``searched``, ``six_digits`` of them, ``proof`` (None without one), and
+        ``states`` in that; ``responses``: ``asked`` by goals, criterion and limits, and
+        ``computed``, beside grip forces, which come with all; ``verdicts``: ``asked`` of grip sets,
+        and the linear ``programs`` that these took.
+        """
+        graph, proof, moves = self._of_scene, self.certificate, self.graph.candidates
+        asked = {limit.response for limit in graph.limits}.union(
+            *(g.responses for g in graph.goals)
+        )
+        by_criterion = moves or any(goal.of_criterion for goal in graph.goals)
+        computed = {*()} if moves else {*graph.sets.names}
+        for bricks in {m.bricks for m in self.decisions.schedule.moves} if moves else {1}:
+            asked.update(graph.criterion.wanted(bricks) if by_criterion else ())
+            computed.update(self.decisions.evaluation.wanted(bricks) if moves else ())
+        stands = None if graph.standing is None else graph.stability
+        return {
+            "models": {
+                "searched": self.models,
+                "six_digits": graph.six_digit_models,
+                "proof": None if proof is None or self.gap is None else proof.models or self.models,
+                "states": 0 if proof is None else proof.states,
+            },
+            "responses": {"asked": sorted(asked), "computed": sorted(computed)},
+            "verdicts": {
+                "asked": 0 if stands is None else stands.looked_at,
+                "programs": 0 if stands is None else stands.programs,
+            },
         }
 
     def brief(self) -> dict[str, object]:

@@ -16,12 +16,13 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ExtraError, FileError, ProblemError
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
+from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import overloads
 from seqopt.report._regret._table import RegretTable
 from seqopt.report._robots import _known_arms
 from seqopt.report.comparison import CLOSED, Comparison, largest, method_tables, shown_table
 from seqopt.report.page import Build, Scatter, _Drawn, report_page
-from seqopt.report.text import IN_UNITS, in_words
+from seqopt.report.text import IN_UNITS, in_words, spent_said
 from seqopt.responses.table import (
     OUTSIDE,
     REMEDY,
@@ -150,6 +151,7 @@ def plan_page(
     first, *rest = _builds(scene, tables, left, verdicts)
     builds = [replace(first, tasks=tasks or {}), *rest]
     found = f"Found by: {in_words(name)} ({plan.result})."
+    found += f" {spent_said(plan, prover)}" if isinstance(plan, Plan) and plan.steps else ""
     shown = [_worst_table(scene, builds)]
     return report_page(engine, builds, builds[0].sentence(scene), shown, found=found)
 

@@ -89,7 +89,8 @@ class BuildProver:
 
     ``network``: of the scene in the order in which the builds place bricks; ``mortars``: by what
     they are called, that of the scene last; without any, nothing is asked; ``progress``: called
-    with the progress; ``refusal``: why no verdict is found, where bricks do not touch; else empty.
+    with the progress; ``refusal``: why no verdict is found, where bricks do not touch; else empty;
+    ``proven``: verdicts that took a proof of their own, which others imply.
     """
 
     def __init__(
@@ -99,7 +100,12 @@ class BuildProver:
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
         self._parts: PartialAssemblies | None = None  # of as many bricks as any step had so far
         self._crew: Crew | None = None
-        self.refusal = ""
+        self.refusal, self.proven = "", 0
+
+    @property
+    def spent(self) -> dict[str, int]:
+        """How many verdicts were asked, by state and mortar, and how many were proven for them."""
+        return {"verdicts": sum(map(len, self._known.values())), "proven": self.proven}
 
     def of_builds(
         self, builds: Mapping[str, Sequence[Step]]
@@ -150,6 +156,7 @@ class BuildProver:
         found = dict[_State, Verdict]()
         for step, one in zip(with_progress(what, new, self._progress), each, strict=True):
             self._known[name][_state(step)] = found[_state(step)] = one.verdict
+        self.proven += len(found)
         for other, held in self.mortars.items():
             sure = {Verdict.STANDS} if _is_as_strong(held, mortar) else set()
             sure |= {Verdict.FALLS} if _is_as_strong(mortar, held) else set()

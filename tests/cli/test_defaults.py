@@ -18,7 +18,9 @@ from seqopt.scene.scene_file import save_scene
 from seqopt.workflow import Part
 from tests.builders import small_arch
 
-UNLIKE = ("seconds", "models_paper_count", "stability")  # of one run, or added by the command
+UNLIKE = (  # of one run, or added by the command
+    *("seconds", "models_paper_count", "stability", "spent_on_showing"),
+)
 
 
 def answered(capsys, *arguments):

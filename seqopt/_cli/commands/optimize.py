@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import isfinite
 from pathlib import Path
@@ -53,6 +53,9 @@ class Found:
     tell: Tell
     engine: str | None = None  # that is named
     robust: Robust | None = None
+    tables: dict[str, bytes | str] = field(
+        default_factory=dict
+    )  # further files, once they are made
 
     @cached_property
     def analyzed(self) -> bool:
@@ -92,6 +95,8 @@ class Found:
             "models_paper_count": dict(zip(("cascading", "overlap"), counts, strict=False)) or None,
             "stability": {v.mortar: v.facts() for v in self.verdicts.get(plan.title, ())},
         }
+        pictures = sum(name.endswith((".png", ".svg")) for name in self.tables)
+        out["spent_on_showing"] = {**self.prover.spent, "pictures": pictures}
         out |= {"left_out": dict(self.clock.left_out)} if self.clock.left_out else {}
         if self.robust is None:
             return out
@@ -178,19 +183,18 @@ def find(
 
 def answered(found: Found) -> Answer[Plan]:
     """Write a plan, and return its answer, without the parts that exceed the time limit."""
-    made: dict[str, bytes | str] = {}
     proving = found.prover.begun(found.plan.steps) if found.clock.left else nullcontext()
     with proving:  # in another process, as commands may, unlike scripts
         if found.out.path is not None and found.analyzed and found.summary:  # says most: first
             tables = partial(outputs.plan_files, found.plan)
-            made = found.clock.spare("its tables", tables, made)
+            found.tables.update(found.clock.spare("its tables", tables, {}))
         _ = found.verdicts
-        return _answer(found, found.out.write(found.tell, lambda: _files(found, made)))
+        return _answer(found, found.out.write(found.tell, lambda: _files(found)))
 
 
-def _files(found: Found, tables: Mapping[str, bytes | str]) -> dict[str, bytes | str]:
+def _files(found: Found) -> dict[str, bytes | str]:
     """Return the files of a plan by name, at least table, summary and scene."""
-    plan, made = found.plan, dict[str, bytes | str]()
+    plan, made, tables = found.plan, dict[str, bytes | str](), found.tables
     tasks = {kind: str(tables[f"tasks.{kind}"]) for kind in ("csv", "json") if tables}
     if found.analyzed:
         shown = partial(PAGES.plan_page, plan, found.prover, tasks=tasks)
