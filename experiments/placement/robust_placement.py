@@ -41,11 +41,16 @@ from experiments.harness.scenes import half_circle
 from formulations.scenario_program import solve_program
 from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
 from seqopt.arrays import Floats
-from seqopt.graph.decision_costs import Joined, LayeredCosts, best_in_order, compile_totals
+from seqopt.graph.decision_costs import (
+    Joined,
+    LayeredCosts,
+    ScenarioCosts,
+    best_in_order,
+    compile_totals,
+)
 from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.graph.formulation import Watch
 from seqopt.graph.states.states import States, of_decisions, over_scenarios
-from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
@@ -141,12 +146,29 @@ def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
 
 
 def measured(plan: Plan, unseen: States) -> dict[str, object]:
-    """Return what a plan is worth where it was made and elsewhere."""
-    trial, proof = judge_unseen(plan, unseen).summary(), plan.certificate
+    """Return the objective of a plan where it was made and elsewhere, beside two others.
+
+    Those are the exact optimum of the nominal scene, and the best plan of each scenario alone.
+    """
+    graph, proof = plan.graph.alone_in_scene, plan.certificate
+    own = graph.decisions
     assert proof is not None
+    assert own is not None
+    aim, known = graph.over.aim, ScenarioCosts(own.sums, own.peaks, 0, 0.0)
+
+    def best(costs: ScenarioCosts) -> Choice:
+        return best_in_order([(aim.costs(costs), aim), (aim.costs(costs), Aim.SUM)])
+
     row = {"objective": proof.objective, "gap": proof.claimed_gap, "gap_by_weights": proof.gap}
     row |= {"solve_s": plan.seconds["solve"]}
-    return row | {**{f"{name}_{who}": trial[name][who] for name in trial for who in trial[name]}}
+    nominal, sets = best(known), {"nominal": (known,), "optimized": graph.costs_in_scenarios}
+    for name, found in (sets | {"unseen": unseen.costs_in_scenarios}).items():
+        choices = {"robust": [plan.choice] * len(found), "nominal": [nominal] * len(found)}
+        for who, each in (choices | {"knows_it": [*map(best, found)]}).items():
+            pairs = zip(found, each, strict=True)
+            reached = [aim.value_of(aim.costs(costs), choice) for costs, choice in pairs]
+            row[f"{name}_{who}"] = graph.over.value(np.array(reached))
+    return {**row}
 
 
 def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:

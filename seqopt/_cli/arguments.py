@@ -49,8 +49,6 @@ GONE = {
     "--seconds": "it is --time-limit, as of any command",
     "--staged": "in Python seqopt.responses.analyze_staged has it",
     "--stiffens": "give a scene whose joints are softer, as seqopt scene --export writes it",
-    "--tables": "in Python plan.alternatives() has every choice",
-    "--unseen": "in Python seqopt.plan.out_of_sample.judge_unseen has it",
 }  # options that there were, and what to do in their place
 
 

@@ -1,21 +1,22 @@
-"""Why a free schedule is infeasible: the brick at which it stops, and what would help."""
+"""Why a problem is infeasible: budgets in conflict, or where builds stop, and what would help.
+
+Every filter says how it is loosened. Each relaxation with which there is a plan is a remedy, and is
+named with the least value that is enough, where there is one.
+"""
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import chain, combinations, islice
-from typing import NamedTuple
+from itertools import chain, combinations
 
 import numpy as np
 
 from seqopt.arrays import Ints
-from seqopt.engines.interface import Engine
-from seqopt.engines.registry import engine_for, recipe_of
+from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
@@ -37,24 +38,14 @@ from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.filters import IGNORED, STANDING
-from seqopt.problem.requirements import Excess, Limit, overloads
+from seqopt.problem.requirements import Excess, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import (
-    PROP_EXCESS,
-    _payload_text,
-    _plain,
-    _rounded_up,
-    length_text,
-    robot_response,
-)
-from seqopt.responses.table import analyze
-from seqopt.scene.scene import Scene
+from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
 from seqopt.sequence._rule_check import RuleBook, unbearable
 from seqopt.sequence.methods import _enough_reach
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import OpenStep, loads
-from seqopt.sequence.steps import Step
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
 
@@ -121,14 +112,13 @@ def confirmed(
     remedies are sought. Result: a `SolverError` if a plan is feasible, a `NothingFoundError` if
     the stability of some states is undecided.
     """
-    end, capped = time.perf_counter() + seconds, problem.goals[len(problem.aims) :]
+    look, capped = Look(time.perf_counter() + seconds), problem.goals[len(problem.aims) :]
     own = (goal for goal in problem.aims if goal.of_criterion)  # whose values may be infinite
-    goals = (*STEPS, *own, *capped)
-    steps = replace(_with_any_margin(problem), goals=goals)
+    steps = replace(_with_any_margin(problem), goals=(*STEPS, *own, *capped))
     try:
         hint = None
         if barred(steps) is None:
-            found = Look(end)(steps)
+            found = look(steps)
             if found.whole and problem.paths:
                 kept = ", ".join(map(str, problem.paths))
                 return claimed(name, f"no plan keeps {kept}; leave it out", exact=exact)
@@ -140,10 +130,9 @@ def confirmed(
         proven = Proof(steps, hint).is_impossible()
     except (LateError, TooManySetsError, TooManyPartsError):
         proven = False
-    bare = replace(problem, goals=problem.aims, budgets=(), orders=None)
     why = "no plan is allowed"
     if explain:
-        why = _why_impossible(bare, end - time.perf_counter())
+        why = _why_impossible(replace(problem, goals=problem.aims, budgets=(), orders=None), look)
     if problem.orders is not None:
         why = f"no order of the bricks has a plan; in the scene's own, {why}"
     if proven:
@@ -159,24 +148,20 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
     graph, states = found.graph()
     if not problem.is_timed:
         with suppress(InfeasibleError, NothingFoundError):
-            spent = within_budgets(graph, problem.budgets).values[-len(problem.budgets) :]
-            pairs = zip(problem.goals[-len(spent) :], spent, strict=True)
-            one = ", ".join(f"{goal} {value:.6g}" for goal, value in pairs)
-            return SolverError(f"formulation {name} {ALLOWED}: {one}")
+            within_budgets(graph, problem.budgets)
+            return SolverError(f"formulation {name} {ALLOWED}")
     said, proven = list[str](), False
     for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
-        goal = problem.goals[k]
-        if not goal.in_time:
+        goal, unit = problem.goals[k], " s" * problem.goals[k].in_time
+        if goal.in_time:
+            known = goal.twin is not None
+            least = goal.twin.least(problem.network, problem.rules) if known else -np.inf
+            proven |= least > tied(cap)
+        else:
             least = distances(graph, graph.amounts[:, k])[graph.ends].min()
-            alone = " by itself" if least <= tied(cap) else ""
-            said.append(f"{goal} is at least {least:.6g}{alone}, and {cap:g} is allowed")
-            continue
-        least = -np.inf if goal.twin is None else goal.twin.least(problem.network, problem.rules)
-        if least > tied(cap):
-            said.append(f"makespan is at least {least:.6g} s, and {cap:g} s are allowed")
-            proven = True
-        else:  # what it is at best takes a search
-            said.append(f"{cap:g} s of makespan are allowed; --aim makespan finds the least")
+        alone = " by itself" if least <= tied(cap) else ""
+        at_least = f"{goal} is at least {least:.6g}{unit}{alone}, and " * bool(np.isfinite(least))
+        said.append(f"{at_least}{cap:g}{unit} is allowed")
     proven = proven or Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
     why = f"{problem.title}: no plan is within all budgets; {', '.join(said)}"
     return InfeasibleError(why) if proven else claimed(name, why, exact=exact)
@@ -187,68 +172,6 @@ def _with_any_margin(problem: States) -> States:
     for name in (goal.name for goal in problem.goals if goal.margins):
         problem = with_margin(problem, name, WORST[name])
     return problem
-
-
-def _why_impossible(problem: States, seconds: float = np.inf) -> str:
-    """Return one line: the brick at which all builds stop, and remedies found within ``seconds``.
-
-    Of an engine with a ``rigid`` one the latter is used: loads tried here may be far beyond the
-    capacity of joints, where discrete elements take seconds per state.
-    """
-    engine = getattr(problem.engine, "rigid", problem.engine)
-    problem = _with_any_margin(replace(problem, engine=engine))
-    look, finished = Look(time.perf_counter() + seconds), False
-    where = "no plan is allowed"
-    try:
-        steps = replace(problem, goals=STEPS)
-        if (state := barred(steps)) is not None:
-            whole = problem.space.bricks_at(state[0]) == len(problem.network.inner)
-            finished = whole and not problem.space.grips(state[1]).any()
-            where = _describe_barred(problem, *state, finished=finished)
-        else:
-            found = look(steps)
-            if found.whole and any(goal.of_criterion for goal in problem.aims):
-                return f"{problem.title}: criterion {problem.criterion.name} allows no plan"
-            where = _where(problem, found.reached)
-        return f"{problem.title}: {where}{Remedies(problem, look).said(finished=finished)}"
-    except LateError:
-        return f"{problem.title}: {where}; time was over before it was known what helps, give more"
-
-
-def _describe_barred(problem: States, level: int, state: Ints, *, finished: bool) -> str:
-    """Describe the infeasible state that every plan passes, and the violated constraint.
-
-    ``finished``: whether it is the finished structure without grips.
-    """
-    each, falls = problem.each or (problem,), False
-    what = f"step {level} of {problem.space.levels}, in which no grip is open,"
-    if finished:
-        what = "the finished structure, which nobody holds,"
-    for one in each:
-        if not one.values(level, state)[1].all():
-            return f"{what} {_describe_excess(one, level, state)}"
-        states, demanded = one.responses(level, state)[0], one.every_filter if one.demands else ()
-        falls |= any(f.refuted(states).any() for f in demanded if f.expensive)
-    how = "does not stand" if falls else "is not proven to stand"
-    demand = next(iter(problem.demands), None)
-    return f"{what} {how}{'' if demand is None else f' {demand.said}'}"
-
-
-def _describe_excess(problem: States, level: int, state: Ints) -> str:
-    """Describe the limits that a state exceeds."""
-    states, _ = problem.responses(level, state)
-    found = states.responses
-    named = ((each, found[each.response]) for each in problem.limits if each.response in found)
-    over = [
-        f"{each.label}={each.shown(float(value[0])):.6g} instead of {each.shown(each.bound):g}"
-        for each, value in named
-        if each.exceeded(value).any()
-    ]
-    for each in problem.filters if not over else ():
-        if not each.proven(states).all():
-            falls = each.refuted(states).any()
-            return f"{'does not' if falls else 'is not proven to'} pass the filter {each.name}"
-    return f"has {' and '.join(over)}" if over else "asks more of robots than they carry"
 
 
 class LateError(Exception):
@@ -281,191 +204,63 @@ class Look:
         """Return the states without the stability requirement, which is checked lazily."""
         return StandingLook(replace(problem, goals=STEPS, standing=None, settled=()), self.tell)
 
+    def least(self, problem: States, response: str) -> float:
+        """Return the least peak of a response over all plans, SI units; infinite if infeasible.
 
-OF_ROBOTS = ("rules", "arms")  # filters that leave the finished structure as it is
-
-
-def worst_least(problem: States, response: str, look: Look | None = None) -> float:
-    """Return the least peak of a response over all plans, SI units; infinite if infeasible.
-
-    ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``.
-    """
-    asked = replace(problem, goals=(BUILT_IN.get(response) or worst(response),))
-    found = (look or Look())(asked)
-    return least_peak(found.graph().graph, 0) if found.whole else np.inf
-
-
-class Remedy(NamedTuple):
-    """A relaxation that makes the problem feasible.
-
-    ``name``: the constraint; ``enough``: returns the least sufficient relaxation in words, empty
-    if robots would carry more than all loads, by default the name; ``rules``: as command-line
-    words, if it is of rules; ``of_arms``: whether it asks for other arms.
-    """
-
-    name: str
-    enough: Callable[[], str] | None = None
-    rules: tuple[str, ...] = ()
-    of_arms: bool = False
-
-
-@dataclass(frozen=True)
-class Remedies:
-    """The remedies of an infeasible problem; ``look`` decides feasibility."""
-
-    problem: States
-    look: Look
-
-    def said(self, *, finished: bool) -> str:
-        """Describe the remedies, as the end of a line.
-
-        ``finished``: whether the finished structure without grips is infeasible.
+        ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``.
         """
-        ways = [*self._alone(finished=finished)]
-        if not finished and all(way.of_arms for way in ways):  # of the same arms two rules ask less
-            (rules,) = (each for each in self.problem.every_filter if each.name == "rules")
-            pairs = (
-                (f"{text} together with {other.name}", (text, *other.rules), bool(other.rules))
-                for text, problem in rules.ways(self.problem)
-                for other in Remedies(problem, self.look)._alone()
-                if not (ways and other.of_arms)
-            )
-            for name, both, of_rules in islice(pairs, 1):
-                ways.append(Remedy(name + f" (--rule {' --rule '.join(both)})" * of_rules))
-        if not ways and finished:  # no robot can do anything about it
-            return "; no robot helps: it needs more bond or friction, less load, or other limits"
-        if not ways:
-            return ", even if two rules or limits are loosened; extend a reach or add a robot"
-        said = (way.enough() if way.enough else way.name for way in ways)
-        enough = dict.fromkeys(text for text in said if text)
-        if enough:
-            return f"; it becomes possible with {' or '.join(enough)}"
-        return f"; robots would have to carry more than all weights and loads; {HARD}"
-
-    def _alone(self, *, finished: bool = False) -> Iterator[Remedy]:
-        """Yield every single relaxation that suffices; of each rule, and of arms, only the least.
-
-        Then reaches and softer grips with which a plan exists. ``finished``: as of `said`; rules,
-        arms and reaches are then left out. Payloads are not asked where no state is held within
-        them, and every robot bears its brick.
-        """
-        problem, scene = self.problem, self.problem.network.scene
-        kept = problem.rules.keeps_payloads(stands=False) and problem.demands
-        idle = () if kept or _unbearable(problem) else ("payload",)
-        done = set[tuple[str, str]]()
-        for each in problem.every_filter:
-            if each.name in (*idle, *(OF_ROBOTS if finished else ())):
-                continue
-            for text, relaxed in each.ways(problem):
-                key = each.name, text.partition("=")[0] * (each.name == "rules")
-                if key not in done and self.look.exists(relaxed):
-                    done.add(key)
-                    yield self._remedy(each.name, text, relaxed)
-        if finished or problem.scenarios or recipe_of(problem.engine) is None:
-            return
-        if not scene.has_arms:
-            reaches = _enough_reach(scene, self._exists_in)
-            yield from map(Remedy, reaches)
-        if ground_moves(scene) and (soft := self._softer()):
-            yield Remedy(soft)
-
-    def _remedy(self, name: str, text: str, relaxed: States) -> Remedy:
-        """Return the remedy of a filter, whose relaxation in words is known to suffice."""
-
-        def payload() -> str:  # the least, as the peak force of the problem without payloads
-            held = worst_least(relaxed, LARGEST, self.look)
-            if held > whole_load(relaxed.network):
-                return self._softer()
-            said = _payload_text(max(held, _heaviest(self.problem)))
-            return f"a payload of {said} N (--payload {said})"
-
-        if name == "rules":
-            said = partial(str, f"{text} (--rule {text})")
-            return Remedy(text, payload if text == IGNORED else said, (text,))
-        enough = dict[str, Callable[[], str]]()
-        for limit in self.problem.limits:
-            enough[limit.label] = partial(self._enough_limit, limit)
-        enough |= {"stands": self._enough_bond, "payload": self._enough_payload}
-        return Remedy(text, enough.get(name), of_arms=name == "arms")
-
-    def _softer(self) -> str:
-        """Describe the stiffest sufficient grips; empty if none suffice."""
-        return softer_grips(self.problem.engine, self._exists_in)
-
-    def _enough_bond(self) -> str:
-        """Return the least bond, Pa, with which a plan exists, in words; found by bisection."""
-        if any(demand.tilt for demand in self.problem.demands):
-            return STANDING
-        own, bare = (
-            self.problem.standing or Standing(),
-            replace(self.problem, settled=(), goals=STEPS),
-        )
-        states = self.look.standing(bare)
-
-        def exists(bond: float) -> bool:
-            asked = states.proving(replace(bare, standing=own.demanding("bond", bond)))
-            return barred(asked) is None and states.exists(asked)
-
-        try:
-            return f"a bond of {_rounded_up(bisected('bond', exists)[1]):.10g} Pa"
-        except InfeasibleError:
-            return STANDING
-
-    def _enough_payload(self) -> str:
-        """Return the least common payload with which a plan exists, to three digits, in words."""
-
-        def exists(payload: float) -> bool:
-            return self.look.exists(self.problem.carrying(payload))
-
-        low = min(robot.payload for robot in self.problem.network.scene.robots)
-        high = 2 * low
-        while not exists(high):
-            low, high = high, 2 * high
-        step = 10.0 ** max(0, math.floor(math.log10(high)) - 2)
-        least, most = math.floor(low / step), math.ceil(high / step)
-        while most - least > 1:
-            middle = (least + most) // 2
-            least, most = (least, middle) if exists(middle * step) else (middle, most)
-        is_free, loaded = self.problem.rules.method == FREE, whole_load(self.problem.network)
-        if is_free and most * step > max(loaded, _heaviest(self.problem)):
-            return ""
-        said = _payload_text(most * step)
-        return f"a payload of {said} N (--payload {said})"
-
-    def _enough_limit(self, limit: Limit) -> str:
-        """Return the least feasible bound of all limits with a label, in words."""
-        found = [each for each in self.problem.limits if each.label == limit.label]
-        name, bound = found[0].response, found[0].bound
-        if not (name in STATE_RESPONSES or is_tolerance(name)):
-            bears = "props that bear any force, both ways"
-            return bears if limit.label == PROP_EXCESS else f"no limit on {limit.label}"
-        rest = tuple(each for each in self.problem.limits if each not in found)
-        least = worst_least(replace(self.problem, limits=rest), name, self.look)
-        robots = self.problem.network.scene.robots
-        forces = (LARGEST, *(robot_response(r.name) for r in robots))
-        if name in forces and least > whole_load(self.problem.network):
-            return self._softer()
-        if is_tolerance(limit.label):
-            return f"a tolerance of {length_text(1 / least)} instead of {length_text(bound)}"
-        most = _rounded_up(found[0].shown(least))
-        return f"{limit.label}={most:.6g} instead of {found[0].shown(bound):g}"
-
-    def _exists_in(self, scene: Scene) -> bool:
-        return self.look.exists(self.problem.in_scene(scene))
+        goals = (BUILT_IN.get(response) or worst(response),)
+        found = self(replace(problem, goals=goals))
+        return least_peak(found.graph().graph, 0) if found.whole else np.inf
 
 
-def _unbearable(problem: States) -> dict[int, str]:
-    """Return the steps in which a robot cannot bear its brick, and why; of rules there are none."""
-    steps: Sequence[OpenStep] = getattr(problem.rules, "steps", ())
-    return unbearable((problem.network.scene, *problem.worlds), steps, problem.rules.begin)
+def _why_impossible(problem: States, look: Look) -> str:
+    """Return one line: the brick at which all builds stop, and remedies found in time.
+
+    Of an engine with a ``rigid`` one the latter is used: loads tried here may be far beyond the
+    capacity of joints, where discrete elements take seconds per state.
+    """
+    engine = getattr(problem.engine, "rigid", problem.engine)
+    problem = _with_any_margin(replace(problem, engine=engine))
+    where, finished = "no plan is allowed", False
+    try:
+        steps = replace(problem, goals=STEPS)
+        if (state := barred(steps)) is not None:
+            whole = problem.space.bricks_at(state[0]) == len(problem.network.inner)
+            finished = whole and not problem.space.grips(state[1]).any()
+            what = f"step {state[0]} of {problem.space.levels}, in which no grip is open,"
+            what = "the finished structure, which nobody holds," if finished else what
+            where = f"{what} {_fault(problem, *state)}"
+        else:
+            found = look(steps)
+            if found.whole and any(goal.of_criterion for goal in problem.aims):
+                return f"{problem.title}: criterion {problem.criterion.name} allows no plan"
+            where = _where(problem, found.reached)
+        return f"{problem.title}: {where}{_remedies(problem, look, finished=finished)}"
+    except LateError:
+        return f"{problem.title}: {where}; time was over before it was known what helps, give more"
 
 
-def _heaviest(problem: States) -> float:
-    """Return the heaviest brick of a build by rules, with the tool of any robot of the team, N."""
-    rules, scene = problem.free_rules, problem.network.scene
-    bricks, team = slice(*sorted(rules.span(scene))), rules.team(scene)
-    every = (loads(s, s.robots[r])[bricks] for s in (scene, *problem.worlds) for r in team)
-    return max(float(own.max()) for own in every)
+def _fault(problem: States, level: int, state: Ints) -> str:
+    """Return which limits an infeasible state exceeds, or which filter it does not pass."""
+    for one in problem.each or (problem,):
+        states, _ = one.responses(level, state)
+        known = [(each, states.responses.get(each.response)) for each in one.limits]
+        over = [
+            f"{each.label}={each.shown(float(value[0])):.6g} instead of {each.shown(each.bound):g}"
+            for each, value in known
+            if value is not None and each.exceeded(value).any()
+        ]
+        if over:
+            return f"has {' and '.join(over)}"
+        for each in one.every_filter:
+            if each.name != "payload" and not each.proven(states).all():
+                how = "does not" if each.refuted(states).any() else "is not proven to"
+                said = f"pass the filter {each.name}"
+                if each.name == "stands":
+                    said = " ".join(["stand", *(d.said for d in problem.demands[:1])])
+                return f"{how} {said}"
+    return "asks more of robots than they carry"
 
 
 def _where(problem: States, reached: int) -> str:
@@ -492,51 +287,135 @@ def _where(problem: States, reached: int) -> str:
     return where
 
 
-STIFFNESSES = (1e8, 1e7, 1e6, 1e5, 1e4, 1e3)  # of grips, N/m, the stiffest that helps first
+def _unbearable(problem: States) -> dict[int, str]:
+    """Return the steps in which a robot cannot bear its brick, and why; of rules there are none."""
+    steps: Sequence[OpenStep] = getattr(problem.rules, "steps", ())
+    return unbearable((problem.network.scene, *problem.worlds), steps, problem.rules.begin)
 
 
-def whole_load(network: Network) -> float:
-    """Return the sum of the sizes of all weights, loads and wind, N: the most any robot carries."""
+Way = tuple[str, str, States]  # the filter that is loosened, how in words, and the problem then
+
+
+def _remedies(problem: States, look: Look, *, finished: bool) -> str:
+    """Describe the relaxations that are enough, alone or else two of them, as the end of a line.
+
+    ``finished``: whether the finished structure fails, which nobody holds: no robot helps.
+    """
+    ways = [*_ways(problem, look, finished=finished)]
+    found = [_enough(problem, look, *way) for way in ways]
+    if not finished and all(name == "arms" for name, *_ in ways):
+        (rules,) = (each for each in problem.every_filter if each.name == "rules")
+        pairs = (
+            f"{text} together with {other}" + f" (--rule {text} --rule {other})" * (name == "rules")
+            for text, relaxed in rules.ways(problem)
+            for name, other, _ in _ways(relaxed, look)
+            if not (ways and name == "arms")
+        )
+        found += [pair for pair in [next(pairs, "")] if pair]
+    if found:
+        return f"; it becomes possible with {' or '.join(dict.fromkeys(found))}"
+    if finished:
+        return "; no robot helps: it needs more bond or friction, less load, or other limits"
+    return ", even if two rules or limits are loosened; extend a reach or add a robot"
+
+
+def _ways(problem: States, look: Look, *, finished: bool = False) -> Iterator[Way]:
+    """Yield every single relaxation that is enough; of each filter, and each rule, only the least.
+
+    Payloads are not asked where no state is held within them, and every robot bears its brick.
+    """
+    kept, done = problem.rules.keeps_payloads(stands=False), set[tuple[str, str]]()
+    idle = set() if (kept and problem.demands) or _unbearable(problem) else {"payload"}
+    idle |= {"rules", "arms"} if finished else set()
+    for each in problem.every_filter:
+        for text, relaxed in each.ways(problem) if each.name not in idle else ():
+            key = each.name, text.partition("=")[0] * (each.name == "rules")
+            if key not in done and look.exists(relaxed):
+                done.add(key)
+                yield each.name, text, relaxed
+    scene, able = problem.network.scene, recipe_of(problem.engine) is not None
+    if able and not (finished or problem.scenarios or scene.has_arms):
+        for text in _enough_reach(scene, lambda other: look.exists(problem.in_scene(other))):
+            yield "reach", text, problem
+
+
+def _enough(problem: States, look: Look, name: str, text: str, relaxed: States) -> str:
+    """Return a relaxation that is enough in words, with its least value; arguments: a `Way`."""
+    limits = [each for each in problem.limits if each.label == name]
+    if text == IGNORED or name == "payload":
+        return f"a {_payload(problem, look, None if name == 'payload' else relaxed)}"
+    if name == "rules":
+        return f"{text} (--rule {text})"
+    if name == "stands" and not any(demand.tilt for demand in problem.demands):
+        return _bond(problem, look)
+    return _bound(problem, look, limits) if limits else text
+
+
+NEWTONS = sorted({m * 10**k for k in range(4) for m in range(1, 1000)})  # in three digits
+
+
+def _payload(problem: States, look: Look, free: States | None) -> str:
+    """Return the least payload of all robots in words; ``free``: without payloads, if one may be.
+
+    Then it is the least peak of forces, or what the heaviest brick asks of any robot of the team.
+    """
+    if free is None:
+        least: float = min(robot.payload for robot in problem.network.scene.robots)
+        first, end = (bisect_left(NEWTONS, each) for each in (least, NEWTONS[-1]))
+
+        def exists(payload: float) -> bool:
+            return look.exists(problem.carrying(payload))
+
+        least = NEWTONS[bisect_left(NEWTONS, x=True, lo=min(first, end), hi=end, key=exists)]
+    else:
+        rules, scene = problem.free_rules, problem.network.scene
+        bricks, team = slice(*sorted(rules.span(scene))), rules.team(scene)
+        every = (loads(s, s.robots[r])[bricks] for s in (scene, *problem.worlds) for r in team)
+        least = max(look.least(free, LARGEST), *(float(own.max()) for own in every))
+    said, far = _payload_text(least), _beyond(problem.network, least)
+    return f"payload of {said} N (--payload {said}){far}"
+
+
+def _beyond(network: Network, force: float) -> str:
+    """Return a hint where a force is more than all weights, loads and wind; else nothing."""
     applied = network.applied(len(network.inner))[:, :3]
-    return float(np.linalg.norm(np.concatenate([network.weight, applied]), axis=1).sum())
+    whole = np.linalg.norm(np.concatenate([network.weight, applied]), axis=1).sum()
+    hint = ", more than all weights and loads: softer grips (--grips) may do with less"
+    return hint * bool(force > whole)
 
 
-def payload_advice(engine: Engine, steps: Sequence[Step], over: Sequence[Excess]) -> str:
-    """Describe remedies of the exceeded payloads of a plan, as of `overloads`."""
-    network = engine.network
-    held = max((each.largest for each in over if each.brick is None), default=0.0)
-    if held <= whole_load(network):
-        least = _payload_text(max(each.largest for each in over))
-        how = f"--payload {least}, or payload of its robots in the scene file"
-        return f"payload of {least} N is enough for this plan: {how}"
+def _bond(problem: States, look: Look) -> str:
+    """Return the least bond, Pa, with which a plan exists, in words; found by bisection."""
+    own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=STEPS)
+    states = look.standing(bare)
 
-    def kept(scene: Scene) -> bool:
-        found = overloads(scene, analyze(engine_for(engine, scene), steps))
-        return all(each.brick is not None for each in found)  # what is carried stays as heavy
+    def exists(bond: float) -> bool:
+        asked = states.proving(replace(bare, standing=own.demanding("bond", bond)))
+        return barred(asked) is None and states.exists(asked)
 
-    still = " that hold nodes in place while the ground moves" * ground_moves(network.scene)
-    why = f"stiff grips{still}"
-    what = f"{held:,.0f} N, {_plain(held / whole_load(network), 3)} times all weights and loads,"
-    helps = softer_grips(engine, kept)
-    return f"no payload helps: {what} come of {why}; {f'{helps} are enough' if helps else HARD}"
+    try:
+        return f"a bond of {_rounded_up(bisected('bond', exists)[1]):.10g} Pa"
+    except InfeasibleError:
+        return STANDING
 
 
-HARD = "softer grips were not found to help; ground that moves less, or softer supports, may"
+def _bound(problem: States, look: Look, limits: Sequence[Limit]) -> str:
+    """Return the least feasible bound of all limits with one label, in words."""
+    name, label, bound = limits[0].response, limits[0].label, limits[0].bound
+    if not (name in STATE_RESPONSES or is_tolerance(name)):
+        bears = "props that bear any force, both ways"
+        return bears if label == PROP_EXCESS else f"no limit on {label}"
+    rest = tuple(each for each in problem.limits if each not in limits)
+    least = look.least(replace(problem, limits=rest), name)
+    if is_tolerance(label):
+        return f"a tolerance of {length_text(1 / least)} instead of {length_text(bound)}"
+    most = _rounded_up(limits[0].shown(least))
+    return f"{label}={most:.6g} instead of {limits[0].shown(bound):g}"
 
 
-def ground_moves(scene: Scene) -> bool:
-    """Return whether any ground end has a movement."""
-    return any(any(ground.movement or ()) for ground in scene.grounds)
-
-
-def softer_grips(engine: Engine, exists: Callable[[Scene], bool]) -> str:
-    """Describe the stiffest sufficient grips below those of the scene; empty if there are none."""
-    scene = engine.network.scene
-    own = [float(np.min(robot.stiffness)) for robot in scene.robots if robot.stiffness]
-    if recipe_of(engine) is None or scene.has_arms:
-        return ""
-    for stiffness in (each for each in STIFFNESSES if each < min(own, default=np.inf)):
-        if exists(scene.with_grips(stiffness)):
-            said = f"{stiffness:.0e}".replace("e+0", "e")
-            return f"grips of {said} N/m (--grips {said})"
-    return ""
+def payload_advice(network: Network, over: Sequence[Excess]) -> str:
+    """Return the payload that is enough for a plan that exceeds some, as of `overloads`."""
+    force = max(each.largest for each in over)
+    least = _payload_text(force)
+    how = f"--payload {least}, or payload of its robots in the scene file"
+    return f"payload of {least} N is enough for this plan: {how}{_beyond(network, force)}"

@@ -6,30 +6,27 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from itertools import pairwise
 from math import isfinite
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
 from seqopt.graph._decision_search import Windows
-from seqopt.graph.decisions import Decisions, move_costs, rank_of
+from seqopt.graph.decisions import Decisions
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Solution
 from seqopt.graph.instance import Instance
 from seqopt.graph.states.states import States
 from seqopt.judge._step_checks import certified
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.problem import Aim, Problem
+from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
 from seqopt.problem.standing import Standing
-from seqopt.responses._choices import StepChoices, window_models
+from seqopt.responses._choices import window_models
 from seqopt.responses._grip_sets import Moved
 from seqopt.responses._tolerance import is_tolerance, values_text
 from seqopt.responses.quantities import length_text
@@ -344,9 +341,8 @@ class Plan(ShownBuild):
         (s, if it is known how long robots take), ``idle_robots``, which never grip; limits of the
         linear range that are left, which model was ``enough``, what is known of ``arms``, and
         payloads that are exceeded; what was ``spent``, ``seconds``; of an order that was sought
-        ``order``, ``orders`` (among which), ``order_status``, ``order_bound`` (on the first aim, of
-        any order), ``order_bound_proven``, ``order_evaluated`` and ``order_stopped``;
-        the ``engine`` and ``versions``.
+        ``order``, ``orders`` (among which), whether the bound is proven of any order
+        (``order_bound_proven``) and ``order_evaluated``; the ``engine`` and ``versions``.
         """
         if not self.steps:  # a path through an instance, or given costs
             known: dict[str, object] = getattr(self.problem, "facts_of", dict)()
@@ -445,41 +441,36 @@ class Plan(ShownBuild):
             "claimed_gap": left,
         }
 
-    def _order_bound(self) -> tuple[float, bool]:
-        """Return the lower bound of the first goal over all orders, and whether that is proven."""
-        proof, claimed = self.certificate, self.selection.bound[0]
-        if proof is None or not isfinite(proof.bounds[0]):
-            return claimed, False
-        return proof.bounds[0], True
-
     def _of_order(self) -> dict[str, object]:
         """Return the entries of a summary about the optimized order, if one was sought."""
         if not self.order:
             return {}
-        bound, proven = self._order_bound()
         return {
             "order": [*self.order],
             "orders": self.problem.orders.value,  # type: ignore[union-attr]  # one was sought
-            "order_status": str(self.status),
-            "order_bound": bound if isfinite(bound) else None,
-            "order_bound_proven": proven,
+            "order_bound_proven": self._order_is_bounded,
             "order_evaluated": self.selection.effort[0],
-            "order_stopped": self.stopped,
         }
+
+    @property
+    def _order_is_bounded(self) -> bool:
+        return self.certificate is not None and isfinite(self.certificate.bounds[0])
 
     @property
     def order_bound_said(self) -> str:
         """The lower bound over all orders in words, and whether it is proven."""
-        bound, proven = self._order_bound()
+        proof, goal, claimed = self.certificate, self.states.goals[0], " (claimed, not proven)"
+        bound = self.selection.bound[0]
+        if proof is not None and self._order_is_bounded:
+            bound, claimed = proof.bounds[0], ""
         if not isfinite(bound):
             return "others are not looked at yet"
-        claimed, goal = "" if proven else " (claimed, not proven)", self.states.goals[0]
         if is_tolerance(goal.name):  # of which more is better
             return f"no order above {length_text(goal.shown(bound))}{claimed}"
         return f"no order below {bound:.6g}{claimed}"
 
     def table(self) -> pd.DataFrame:
-        """Return the choice: moves with their costs, or grips if states were chosen.
+        """Return the choice: the candidate of every move, or grips if states were chosen.
 
         Result: a row per move: ``move``, ``step``, ``to_step`` (the last in which the node is
         held), ``bricks``, ``robot``, ``brick``, ``node``, ``largest_force_N``, ``candidates`` (how
@@ -503,64 +494,4 @@ class Plan(ShownBuild):
             "largest_force_N": [row["largest_force_N"] for row in own],
             "candidates": [len(move.candidates) for move in moves],
         }
-        table, aim = pd.DataFrame(columns), self.formulation.aim
-        if aim is None or self.graph.scenarios:
-            return table
-        return table.join(_move_costs(self.decisions, self.choice, aim, self.search))
-
-    def alternatives(self) -> pd.DataFrame:
-        """Return the responses and the cost of every evaluated choice.
-
-        Result: a row per choice, by step; ``second_node`` where two moves are open. SI units. Where
-        the responses of all choices are not kept, those that go with the plan's choices before.
-        """
-        problem, parts = self.decisions, []
-        looked: list[tuple[StepChoices, int | None]] = []  # and the node of an earlier move
-        if self.search is None and not problem.evaluation.streams:
-            looked = [(choices, None) for choices in problem.evaluation.steps]
-        else:
-            nodes, found = (
-                problem.nodes(self.choice),
-                self.search or Windows(problem, [*self.choice]),
-            )
-            for k in range(len(problem.schedule.moves)):
-                pair = ((c, nodes[k - 1] if len(c.moves) == 2 else None) for c in found.row(k))
-                looked += pair
-        for choices, before in looked:
-            table = _choice_table(problem, choices)
-            columns = ["node", "second_node"] if before is None else ["second_node"]
-            columns = columns[: table.index.nlevels]
-            rows = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
-            if before is not None:
-                rows.insert(0, "node", before)
-            rows.insert(0, "step", choices.step.number)
-            parts.append(pd.concat([rows, table.reset_index(drop=True)], axis=1))
-        return pd.concat(parts).sort_values("step", kind="stable", ignore_index=True)
-
-
-def _move_costs(
-    problem: Decisions, choice: tuple[int, ...], aim: Aim, search: Windows | None
-) -> pd.DataFrame:
-    """Return costs of the choice, move by move; ``search``: the models, if not all were solved."""
-    rows = []
-    for k, (before, now) in enumerate(pairwise((0, *choice))):
-        if search is not None:
-            costs = search.costs(k)
-            margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
-            rows.append({"cost": costs[now], "margin": margin})
-        else:
-            layered = aim.costs(problem)
-            rank = rank_of(move_costs(problem, k, before), now)
-            single, shared = layered.single[k][now], layered.shared[k][before, now]
-            rows.append({"single_cost": single, "shared_cost": shared, "rank_in_window": rank})
-    return pd.DataFrame(rows)
-
-
-def _choice_table(problem: Decisions, choices: StepChoices) -> pd.DataFrame:
-    """Return responses and cost of every choice of a step, by its nodes, SI units."""
-    axes = next(iter(choices.responses.values())).ndim
-    moves = [problem.schedule.moves[m] for m in choices.moves[-axes:]]
-    names = [f"{move.robot}_node" for move in moves]
-    index = pd.MultiIndex.from_product([move.candidates for move in moves], names=names)
-    columns: Mapping[str, Floats] = {**choices.responses, "cost": problem.step_costs(choices)}
-    return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
+        return pd.DataFrame(columns)

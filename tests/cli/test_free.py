@@ -101,7 +101,7 @@ def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     summary = json.loads((out / "summary.json").read_text())
     scene = load_scene(out / "scene.json")
     assert [*scene.build_order] == summary["order"] != [*load_scene(arch).build_order]
-    assert summary["order_bound"] == pytest.approx(summary["objective"]["F_largest"])
+    assert summary["bound"]["F_largest"] == pytest.approx(summary["objective"]["F_largest"])
     assert len(read_plan(scene, out / "plan.csv")) == summary["steps"]
 
 

@@ -266,7 +266,7 @@ def test_beyond_the_most_sets_the_own_order_has_a_bound():
     assert (plan.selection.stopped, plan.status) == ("size", "feasible")
     assert plan.selection.objective[0] == own > best * 1.001
     assert plan.selection.bound[0] <= best * (1 + 1e-9)
-    assert plan.summary()["order_status"] == plan.status
+    assert plan.summary()["status"] == plan.status
     with pytest.raises(ProblemError, match="option most=-1"):
         seqopt.solve(problem, FORMULATION, most=-1)
 

@@ -17,7 +17,7 @@ from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.states.states import build_states
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
-from seqopt.plan._infeasible import worst_least
+from seqopt.plan._infeasible import Look
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.standing import NARROW, Standing, _without_implied, slack
 from seqopt.sequence.methods import three_robot_loop
@@ -133,7 +133,7 @@ def test_a_bond_is_found_to_its_share_at_every_size(scale):
     problem = leaning(scale)
     plan = seqopt.solve(problem, "schedule_search")
     (value,), (bound,) = plan.certificate.values, plan.certificate.bounds
-    true = worst_least(problem, "bond")
+    true = Look().least(problem, "bond")
     assert 0.98 * value <= bound <= true <= value * (1 + 2 * GAP)
     assert plan.certificate.gap == pytest.approx((value - bound) / value)
     assert plan.summary()["gap"] == plan.certificate.gap > 1e-3

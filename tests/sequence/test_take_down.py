@@ -106,7 +106,7 @@ def test_best_order_is_that_of_all():
     values = [seqopt.solve(among.at(order)).objective["minmax"] for order in orders]
     assert len(orders) > 1
     assert found.objective["minmax"] == pytest.approx(min(values), rel=1e-9)
-    assert found.summary()["order_status"] == found.status == Status.OPTIMAL
+    assert found.summary()["status"] == found.status == Status.OPTIMAL
     steps = seqopt.solve(seqopt.pose(engine, DOWN, criterion, "minmax,steps", orders="tied"))
     least = min(
         seqopt.solve(replace(among, goals=steps.graph.goals).at(o)).objective["steps"]

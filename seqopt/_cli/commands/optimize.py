@@ -259,7 +259,7 @@ def _lines(found: Found, over: Sequence[str]) -> Iterator[str]:
         yield wrapped(", ".join(map(str, plan.order)), first="order: ")
     yield from (f"payload exceeded: {excess}" for excess in over)
     if over and (loads := overloads(scene, plan._columns)):
-        yield ADVICE.payload_advice(plan.engine, plan.steps, loads)
+        yield ADVICE.payload_advice(plan.engine.network, loads)
 
 
 def _notes(found: Found) -> Iterator[str]:
