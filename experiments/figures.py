@@ -43,9 +43,9 @@ WORDS = (
     "arch:span=2,rise=0.8",
     "arch:span=2,rise=1.2,curve=catenary,pattern=VLR",
     "arch:span=2,rise=1.3,curve=pointed,dimensions=0.12x0.1x0.06",
-    "barrel:test=2",
+    "vault:span=2,rise=0.8,columns=4",
     "wall:columns=6,courses=8,corbel=-0.03,gap=0.005",
-    "dome:courses=6,around=16,rise=0.8,thickness=0.06",
+    "dome163",
 )
 
 

@@ -28,6 +28,7 @@ from scipy.optimize import linprog
 from experiments.calibration.parts import barrel_vaults as barrel
 from experiments.calibration.parts.barrel_vaults import BED, LAWS, Vault, vaults
 from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.scenes import barrel_vault
 from seqopt import DRY, Scene
 from seqopt.arrays import Floats
 from seqopt.contact.faces import step_assembly
@@ -35,7 +36,6 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.scene import Load
-from seqopt.scene.library import barrel_vault
 from seqopt.stability._load_factor import load_factor
 from seqopt.study.published import printed
 

@@ -1,4 +1,4 @@
-"""Arches of any number of bricks, and walls in running bond, open between bricks."""
+"""Arches of any number of bricks, tested vaults, and walls in running bond, open between bricks."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -12,10 +12,11 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.plan.pose import pose
 from seqopt.plan.solve import solve
 from seqopt.scene.library.arch_form import chain
+from seqopt.scene.library.common import MASONRY
 from seqopt.scene.library.wall import WallShape, wall
 from seqopt.sequence.methods import METHODS, modified_sequential, three_robot_loop
 from seqopt.sequence.steps import Step
-from seqopt.study.published import EQUATIONS, ROBOTS, published_plan
+from seqopt.study.published import EQUATIONS, ROBOTS, SOURCE, printed, published_plan
 
 
 def arch25() -> ComplianceEngine:
@@ -45,6 +46,38 @@ def scene_named(name: str) -> Scene:
     if name == "arch25":
         return reference
     return longer(reference, (int(name.removeprefix("chain")) - 1) / 24)
+
+
+def barrel_vault(test: int) -> Scene:
+    """Return one of the eight vaults whose load tests the paper calibrates its springs by.
+
+    It is a chain of boxes as wide as the vault, built from one abutment to the other. Span and rise
+    are taken to the inner face: neighbors touch there, and joints widen outward.
+    """
+    row = printed("arch_tests").set_index("test").loc[test]
+    thickness, bricks, half = (
+        row["t_mm"] / 1e3,
+        row["n_bricks"],
+        2 * np.arctan(2 * row["r_m"] / row["L_m"]),
+    )
+    turn = half / bricks  # of half a brick
+    chord = 2 * (0.5 * row["L_m"] / np.sin(half) + 0.5 * thickness) * np.sin(turn)
+    gap = thickness * np.tan(turn)
+    shift, about = MASONRY.over_rectangle(row["b_m"], thickness)
+    shape = ArchShape(
+        pitch=[half - (2 * b + 1) * turn for b in range(bricks)],
+        pattern="V",
+        gap=gap,
+        overhang=0.25 * row["b_m"],
+        stub=0.5 * chord,
+        translational_stiffness=shift,
+        rotational_stiffness=about,
+        dimensions=(chord - gap, row["b_m"], thickness),
+        density=row["gamma_m_kg_m3"],
+    )
+    return arch_scene(
+        shape, f"barrel vault {test}", provenance=f"{row['reference']}, after {SOURCE}"
+    )
 
 
 def half_circle(count: int) -> Network:

@@ -107,22 +107,15 @@ ABOUT = {
     "dome163": "a dome in running bond, 2.0 m wide and 0.7 m high, generated",
     "vault338": "a herringbone vault around arch25 over 2670 x 4350 mm, our reconstruction",
 }
-_GENERATED = {"dome163": "dome:courses=10,around=22,rise=0.7,opening=0.6,thickness=0.06"}
-"""Built-in scenes in words; the dome is of the size at which benchmarks of domes are taken."""
-
 
 _MESHES = {".obj": True, ".ply": True, ".stl": True, ".3dm": False, ".glb": False}
 """By ending, whether one has to say the unit."""
 
 KINDS = {
     "arch": "an arch by span and rise: arch:span=2,rise=0.7,curve=catenary",
-    "barrel": "one of the eight tested barrel vaults: barrel:test=3",
     "chain": "an arch of any number of bricks that turn evenly: chain:bricks=40",
-    "dome": "a dome: dome:courses=6,around=20,opening=0.6",
     "vault": "a barrel vault in running bond: vault:span=2,rise=0.8,columns=3",
-    "wall": (
-        "a wall in running bond: wall:columns=6,courses=4,corbel=0.02, or wall:length=2,height=0.6"
-    ),
+    "wall": "a wall in running bond: wall:columns=6,courses=4,corbel=0.02",
 }
 """What each kind of scene is, with an example."""
 
@@ -173,8 +166,8 @@ def _scene_by_words(words: str) -> Scene:
 
 def builtin_scenes() -> tuple[str, ...]:
     """Return the names of the scenes that ship with the package, in alphabetical order."""
-    stored = (item.name.removesuffix(".json") for item in _DATA.joinpath("scenes").iterdir())
-    return tuple(sorted({*stored, *_GENERATED}))
+    stored = _DATA.joinpath("scenes").iterdir()
+    return tuple(sorted(item.name.removesuffix(".json") for item in stored))
 
 
 def load_scene(name: str | Path) -> Scene:
@@ -208,8 +201,6 @@ def load_scene(name: str | Path) -> Scene:
     if not isinstance(name, str | Path):
         raise SceneError(f"a {type(name).__name__} is not a name of a scene; give text or a path")
     name = str(name)
-    if name in _GENERATED:
-        return replace(_scene_by_words(_GENERATED[name]), name=name)
     if name in builtin_scenes():
         text = _DATA.joinpath("scenes", f"{name}.json").read_text("utf-8")
         return _scene_from_dict(json.loads(text))  # ours obey the schema: a test asks

@@ -38,10 +38,9 @@ WORDS = (
     "arch:span=2,rise=0.8",
     "arch:span=3,rise=1.2,curve=catenary",
     "arch:span=2,rise=1.2,curve=pointed",
-    *(f"barrel:test={number}" for number in range(1, 9)),
+    "vault:span=2,rise=0.8,columns=3",
     "wall:columns=6,courses=5",
     "wall:columns=5,courses=4,corbel=0.02",
-    "dome:courses=6,around=20",
 )
 ALL = (*ABOUT, *WORDS, ARMADILLO)
 

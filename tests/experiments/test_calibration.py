@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from experiments.calibration.parts.barrel_vaults import (
     vaults,
 )
 from experiments.harness.results import RESULTS
+from experiments.harness.scenes import barrel_vault
 from seqopt.network._mechanics import spring_maps
 from seqopt.network.build import build_network
 from seqopt.study.published import printed
@@ -117,3 +119,32 @@ def test_what_is_left_of_the_lead():
     test = stats.ttest_rel(rows["paper_percent"].abs(), rows["fit_percent"].abs())
     assert test.statistic == pytest.approx(gain[0] / gain[1], rel=1e-3)
     assert test.pvalue > 0.5
+
+
+@pytest.mark.parametrize(
+    ("test", "span", "rise", "bricks", "mass"),
+    [
+        (1, 2.18, 1.09, 46, 2000 * 1.69),
+        (2, 1.6, 0.8, 31, 2100 * 1.0),
+        (5, 5.45, 1.47, 81, 2400 * 3.01),
+    ],
+)
+def test_a_tested_vault_has_the_printed_inner_face(test, span, rise, bricks, mass):
+    """Table of experiments of Bruun et al.: L, r (the rise), bricks, density times width."""
+    built = barrel_vault(test)
+    assert len(built.bricks) == bricks
+    inner = []
+    for brick in (built.bricks[0], built.bricks[bricks // 2], built.bricks[-1]):
+        length, _, thickness = brick.dimensions
+        along = np.array(brick.length_axis)
+        outward = np.cross(along, brick.width_axis)
+        for side in (-0.5, 0.5):
+            inner.append(
+                np.array(brick.position) + side * length * along - 0.5 * thickness * outward
+            )
+    ends = inner[0], inner[-1]
+    assert ends[1][0] - ends[0][0] == pytest.approx(span, rel=0.02)
+    assert max(point[2] for point in inner) - ends[0][2] == pytest.approx(rise, rel=0.02)
+    radius = (span**2 / 4 + rise**2) / (2 * rise)
+    ring = (math.pi if rise == span / 2 else 4 * math.atan(2 * rise / span)) * thickness * radius
+    assert sum(brick.mass for brick in built.bricks) == pytest.approx(mass * ring, rel=0.05)

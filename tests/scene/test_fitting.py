@@ -1,38 +1,11 @@
-"""Lengths in whole bricks, and orders after words."""
+"""Orders after words."""
 
 from __future__ import annotations
-
-import re
 
 import pytest
 
 from seqopt.errors import SceneError
 from seqopt.scene.scene_file import load_scene
-
-
-def refusal(words):
-    with pytest.raises(SceneError) as error:
-        load_scene(words)
-    return str(error.value)
-
-
-def replaced(words, name, value):
-    """Return words with another number."""
-    return re.sub(rf"\b{name}=[^,]+", f"{name}={value}", words)
-
-
-@pytest.mark.parametrize("number", ["length", "height"])
-def test_a_length_of_whole_bricks_says_which_are(number):
-    other = "height" if number == "length" else "length"
-    words = f"wall:{number}=0.49,{other}=0.6,dimensions=0.2x0.1x0.06,gap=0.01"
-    good = {"length": "0.62", "height": "0.62"}[other]
-    words = replaced(words, other, good)
-    text = refusal(words)
-    fits = re.findall(r"([\d.]+) \((\d+) (columns|courses)\)", text)
-    assert len(fits) == 2
-    for value, count, name in fits:
-        scene = load_scene(replaced(words, number, value))
-        assert scene.name.split()[1 if name == "columns" else 3] == count
 
 
 def test_a_wall_from_both_sides_meets_in_the_middle():

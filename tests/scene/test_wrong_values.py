@@ -11,7 +11,7 @@ from seqopt.errors import SceneError
 from seqopt.exchange import Given, import_scene
 from seqopt.scene import Load
 from seqopt.scene.arch import ArchShape
-from seqopt.scene.library import ArchForm, DomeShape, JointLaw, WallShape
+from seqopt.scene.library import ArchForm, JointLaw, WallShape
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.shape import Polyhedron
 from tests.builders import six_bricks
@@ -21,7 +21,6 @@ CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 VALUES = {
     "arch": ArchShape(pitch=(1.2, 0.0, -1.2), pattern="V"),
     "arch form": ArchForm(span=2.0, rise=0.7),
-    "dome": DomeShape(courses=6, around=20),
     "wall": WallShape(columns=3, courses=2),
     "joint law": JointLaw(translational=(1.0, 1.0, 1.0)),
     "mortar": Mortar(friction=0.5),

@@ -17,7 +17,7 @@ from seqopt.network.build import build_network
 from seqopt.responses._staged import staged_fields
 from seqopt.scene import Load
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.library import DomeShape, WallShape, chain, dome, wall
+from seqopt.scene.library import WallShape, chain, wall
 from tests.builders import HERE
 from tests.direct_solve import solve_dense
 
@@ -149,7 +149,7 @@ def loaded(scene, seed=0, way=1e-4, size=300.0):
 SCENES = {
     "arch": lambda: seqopt.load_scene("arch25"),
     "wall": lambda: wall(WallShape(columns=4, courses=3)),
-    "dome": lambda: dome(DomeShape(courses=3, around=10, thickness=0.06)),
+    "vault": lambda: seqopt.load_scene("vault:span=1,rise=0.4,columns=3"),
 }
 
 
