@@ -1,25 +1,8 @@
-"""Experiments and commands run as a user runs them, warnings being errors."""
+"""Commands run as a user runs them, warnings being errors."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
-from experiments.harness.results import HOME
 from seqopt._cli.main import main
-
-
-def run_experiment(name, *arguments):
-    """Return what an experiment prints."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-m", "experiments", name, *arguments],
-        cwd=HOME.parent,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 def beside_models(err):

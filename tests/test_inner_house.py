@@ -14,6 +14,7 @@ import seqopt
 from seqopt.scene.arm import Arm
 from tests.builders import ROOT
 
+pytestmark = pytest.mark.slow  # what inner rooms import is read every day
 OUTER = ("arms", "exchange", "times", "report", "_cli")
 SOLVED = """
 import json, seqopt

@@ -74,21 +74,6 @@ def test_pareto_writes_table_plans_and_chart(capsys, tmp_path, arch):
     assert len(picked) == table["steps"][table["M_sup"].argmin()]
 
 
-def test_figures_that_cannot_be_drawn_are_left_out_and_it_says_so(
-    capsys, monkeypatch, tmp_path, arch
-):
-    """Without the extra that draws: tables and the page are written all the same."""
-    asked = ("pareto", arch, "--aim", "F_largest,steps")
-    assert run(capsys, *asked, "--out", str(tmp_path / "drawn"))[0] == 0
-    monkeypatch.setattr("seqopt._cli.outputs.find_spec", lambda name: None)
-    status, _, error = run(capsys, *asked, "--out", str(tmp_path / "plain"))
-    assert (status, error.count("\n")) == (0, 1)
-    assert "figures are left out, they need matplotlib" in error
-    drawn, plain = ({f.name for f in (tmp_path / n).iterdir()} for n in ("drawn", "plain"))
-    assert drawn - plain == {"pareto.png", "pareto.svg"}
-    assert "report.html" in plain
-
-
 def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     out = tmp_path / "out"
     words = ["--schedule", "free", "--order", "search", "--aim", "F_largest,steps"]
@@ -145,7 +130,9 @@ def test_a_take_down_is_written_and_read_everywhere(capsys, tmp_path, arch):
     assert (status, "the new plan is the old one" in said) == (0, True)
 
 
-@pytest.mark.parametrize("words", [PROPPED, CLOSE], ids=" ".join)
+@pytest.mark.parametrize(
+    "words", [PROPPED, pytest.param(CLOSE, marks=pytest.mark.slow)], ids=" ".join
+)
 def test_what_limits_follow_from_the_scene_goes_with_it(capsys, tmp_path, arch, words):
     """Props that bear only so much, and a tolerance beside other limits; also planned again."""
     out, quick = tmp_path / "propped", "--no-stability"

@@ -118,8 +118,8 @@ def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, problem, dat
 
 
 @pytest.mark.parametrize("name", SHOWN)
-def test_it_is_repeatable(name, problem25):
-    assert solve(problem25, name).choice == solve(problem25, name).choice
+def test_it_is_repeatable(name, problem8):
+    assert solve(problem8, name).choice == solve(problem8, name).choice
 
 
 @every
@@ -193,10 +193,10 @@ def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
 
 
 @timely
-def test_an_interrupt_leaves_an_allowed_choice_and_a_bound_that_holds(name, engine8):
+def test_an_interrupt_leaves_an_allowed_choice_and_a_bound_that_holds(name, problem8):
     """It comes with the first finding; a second one would end the program."""
     formulation, came = ALL[name], []
-    problem = pose_decisions(engine8, three_robot_loop(engine8.network), EQUATIONS)
+    problem = problem8
     best = solve(problem, "overlap_dp")
     if formulation.takes_budgets:
         way = travel(problem, np.inf)
@@ -304,8 +304,9 @@ def valued(problem, name, **options):
 
 
 @pytest.fixture(scope="module")
-def engine8():
-    return ComplianceEngine(build_network(small_arch(8)))
+def problem8():
+    engine = ComplianceEngine(build_network(small_arch(8)))
+    return pose_decisions(engine, three_robot_loop(engine.network), EQUATIONS)
 
 
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
@@ -319,6 +320,7 @@ def test_all_exact_ones_equal_brute_force_on_a_small_arch(criterion):
     assert valued(problem, "minimax") == pytest.approx(Costs(problem.peaks).best(Aim.PEAK))
 
 
+@pytest.mark.slow
 def test_budgets_of_the_reference_arch(problem25):
     free = solve(problem25, "overlap_dp")
     for budget in (travel(problem25, 20.0), steps_over(problem25, "F_largest", 300.0, 5.0)):

@@ -61,18 +61,20 @@ def check(problem, name, formulation):
     ("bricks", "moves", "name", "formulation"),
     [
         (4, UP, "sum(T_max)", "schedule_search"),
-        (4, UP, "travel", "schedule_search"),
-        (4, UP, "regrips", "schedule_search"),
+        pytest.param(4, UP, "travel", "schedule_search", marks=slow),
+        pytest.param(4, UP, "regrips", "schedule_search", marks=slow),
         (4, UP, "sum(T_max)", "path_beam"),
         (4, DOWN, "steps", "schedule_search"),
-        (5, "loop", "sum(M_sup)", "schedule_search"),
+        pytest.param(5, "loop", "sum(M_sup)", "schedule_search", marks=slow),
     ],
 )
 def test_states_have_a_plan_within_every_optimum(bricks, moves, name, formulation):
     check(posed(bricks, moves), name, formulation)
 
 
-@pytest.mark.parametrize(("name", "aim"), [("sum(M_sup)", "sum"), ("travel", "steps,minmax")])
+@pytest.mark.parametrize(
+    ("name", "aim"), [("sum(M_sup)", "sum"), pytest.param("travel", "steps,minmax", marks=slow)]
+)
 def test_so_they_have_for_any_aim(name, aim):
     """Where a sum is to be small, prices of budgets have to find a plan at the edge of them."""
     problem = posed(4, UP).but(goals=aim)
@@ -97,7 +99,7 @@ def test_orders_have_a_plan_within_every_optimum(name, formulation):
 @pytest.mark.parametrize(
     ("name", "formulation"),
     [
-        ("makespan", "makespan_labels"),
+        pytest.param("makespan", "makespan_labels", marks=slow),
         ("sum(T_max)", "makespan_labels"),
         ("regrips", "makespan_flow"),
     ],

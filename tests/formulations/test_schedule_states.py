@@ -102,7 +102,7 @@ def goals(aim, scene, steps, table):
 
 
 @once
-@pytest.mark.parametrize("name", ["modified", "four"])
+@pytest.mark.parametrize("name", [pytest.param("modified", marks=pytest.mark.slow), "four"])
 def test_every_aim_equals_brute_force(name):
     engine, schedule, plans = plans_of(name)
     scene = engine.network.scene
@@ -121,7 +121,7 @@ def test_every_aim_equals_brute_force(name):
 
 
 @once
-@pytest.mark.parametrize("name", ["three-robot", "four"])
+@pytest.mark.parametrize("name", [pytest.param("three-robot", marks=pytest.mark.slow), "four"])
 def test_budgets_equal_brute_force(name):
     """A worst value within one budget is exact; of sums a bound holds, and the gap is said."""
     engine, schedule, plans = plans_of(name)
@@ -178,7 +178,7 @@ def test_the_judge_of_budgets_has_prices_of_its_own_to_check():
     ("name", "mortar"),
     [
         ("four", "dry"),
-        ("three-robot", "bond=2e3"),
+        pytest.param("three-robot", "bond=2e3", marks=pytest.mark.slow),
         pytest.param("three-robot", "bond=2e4", marks=pytest.mark.slow),
     ],
 )
@@ -213,6 +213,7 @@ def test_what_stands_equals_brute_force(name, mortar):
 
 
 @once
+@pytest.mark.slow
 def test_the_judge_sees_a_worse_plan_and_one_of_another_schedule():
     """The control: the second best is refused, and so are steps that the schedule has not."""
     engine, schedule, every = plans_of("three-robot")

@@ -127,7 +127,8 @@ def test_a_second_margin_is_that_of_the_mortar_alone():
         seqopt.solve(leaning(aim="bond,tilt"), "schedule_search")
 
 
-@pytest.mark.parametrize("scale", [1e-3, pytest.param(1e3, marks=slow)])
+@slow
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
 def test_a_bond_is_found_to_its_share_at_every_size(scale):
     """Fifty pascals were left open, whatever the size; the gap says what is."""
     problem = leaning(scale)
@@ -179,6 +180,7 @@ def test_demands_that_others_imply_are_not_asked():
     assert _without_implied((weak, strong, tilted, weak)) == (strong, tilted)
 
 
+@slow
 def test_the_bond_that_is_named_is_enough():
     engine = ComplianceEngine(build_network(small_arch(6)))
     loop = three_robot_loop(engine.network)

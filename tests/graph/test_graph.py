@@ -19,7 +19,7 @@ from seqopt.graph.space import Moves, Space
 from seqopt.judge.arithmetic import budget_bounds
 from tests.random_graphs import graphs, simple_paths, values_of
 
-few = settings(max_examples=60, deadline=None, derandomize=True)
+few = settings(max_examples=25)
 
 
 @given(graph=graphs())

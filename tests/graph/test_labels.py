@@ -14,7 +14,7 @@ from seqopt.problem.problem import WORST_TOTAL, cvar
 from tests.random_graphs import graphs, simple_paths
 
 NONE = LabelSearch(None, np.inf, -np.inf)
-few = settings(max_examples=60, deadline=None, derandomize=True)
+few = settings(max_examples=25)
 
 
 def taken(graph):

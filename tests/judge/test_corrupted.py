@@ -93,8 +93,8 @@ PLAIN = [(s, a) for s in SPACES for a in AMOUNTS if s != "loop" or a not in ("st
 PLAIN = [each for each in PLAIN if each[1] not in ("bond", "friction")]
 
 
-DAILY = {*(("orders", name) for name in ("minmax", "travel", "held")), ("free", "bond")}
-LOOP = ("minmax", "sum", "T_max", "travel", "held")  # others are responses as these are
+DAILY = {("orders", "minmax"), ("free", "bond")}
+LOOP = ("minmax", "travel", "held")  # of the free schedule all are seen every day
 
 
 def params(cases):
@@ -147,7 +147,7 @@ FREE_NODE = {"loop": 3, "free": 6, "orders": 3}  # that best plans hold
 TOTAL = "sum(F_largest)"  # of which there are few plans as good
 STANDS = {"loop": "bond=3500", "free": "dry", "orders": "dry"}
 KINDS = ("limit", "own", "stands", "payload", "rules")
-SLOW = {("loop", "stands"), *(("orders", kind) for kind in KINDS if kind != "own")}
+SLOW = {("loop", "stands"), *(("orders", kind) for kind in KINDS)}
 FILTERS = [
     pytest.param(s, k, marks=[pytest.mark.slow] * ((s, k) in SLOW))
     for s in SPACES

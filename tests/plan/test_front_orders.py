@@ -18,13 +18,12 @@ from seqopt.plan.pose import graph_of
 from seqopt.responses.table import analyze
 from tests.builders import small_arch
 
-BRICKS = 4
 AIMS = ["T_max,F_largest", pytest.param("D_max,steps", marks=pytest.mark.slow)]
 RULES = seqopt.FreeRules()
 
 
-def posed(aim, order=None, rules=RULES, **words):
-    network = seqopt.build_network(small_arch(BRICKS), order)
+def posed(aim, order=None, rules=RULES, bricks=3, **words):
+    network = seqopt.build_network(small_arch(bricks), order)
     engine = seqopt.make_engine("compliance", network)
     return seqopt.pose(engine, rules, seqopt.CRITERIA["worst-ratio"], aim, **words)
 
@@ -46,7 +45,7 @@ def of_every_order(aim):
         for order in permutations(allowed.scene.build_order)
         if allowed.allows(order)
     ]
-    assert len(found) == 8  # of a chain between two ground ends
+    assert len(found) == 4  # of a chain between two ground ends
     every = np.unique(np.concatenate(found), axis=0)
     return every[[not beaten(point, every) for point in every]]
 
@@ -74,7 +73,7 @@ def test_another_order_is_better_than_the_own_one(tied):
 def test_every_plan_is_analyzed_in_its_own_order(tied):
     for engine, steps, point in zip(tied.engines, tied.steps, tied.table.T_max, strict=True):
         assert analyze(engine, steps)["F_max_N"].max() == pytest.approx(point, rel=1e-5)
-    assert {engine.network.scene.build_order for engine in tied.engines} != {(1, 2, 3, 4)}
+    assert {engine.network.scene.build_order for engine in tied.engines} != {(1, 2, 3)}
 
 
 def short_of_one(problem, **options):
@@ -85,7 +84,7 @@ def short_of_one(problem, **options):
 def test_a_missing_point_is_seen():
     lacking = replace(find_formulation("pareto_zones"), name="lacking", solve=short_of_one)
     with pytest.raises(SolverError, match="the set lacks a point below"):
-        find_front(posed(AIMS[0], orders="tied"), lacking)
+        find_front(posed(AIMS[0], bricks=4, orders="tied"), lacking)
 
 
 def test_that_no_order_has_a_plan_is_proven():

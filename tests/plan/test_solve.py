@@ -16,7 +16,7 @@ WORST = seqopt.CRITERIA["worst-ratio"]
 
 
 def posed(goals):
-    engine = ComplianceEngine(build_network(small_arch(5)))
+    engine = ComplianceEngine(build_network(small_arch(4)))
     return seqopt.pose(engine, three_robot_loop(engine.network), WORST, goals)
 
 

@@ -91,6 +91,7 @@ def test_what_outer_rooms_offer_is_where_it_is_said_to_be():
     assert display(Plan, "gantt") is gantt_picture  # as of all that are shown as builds
 
 
+@pytest.mark.slow
 def test_without_matplotlib_there_are_tables_and_one_line_that_says_what_to_install():
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT], capture_output=True, text=True, check=False
