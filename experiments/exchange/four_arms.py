@@ -3,7 +3,7 @@
 Method: four ABB IRB 4600-40/2.55, as compas_fab ships them, stand two on either side of a wall of
 16 blocks of aerated concrete, and of a herringbone vault's middle arch of 13 bricks with the first
 four bricks on each side of it. Both scenes are put through the command line: ``seqopt optimize
---schedule free`` and ``seqopt export``. The tasks are then read with pandas alone. The claim holds
+--schedule free``. The tasks are then read with pandas alone. The claim holds
 if each plan is proven optimal and keeps the postures of its arms, no other plan of the table being
 better; no robot exceeds its payload; every step stands, the wall dry, the vault with epoxy; every
 arm holds some time, and has joint values in every task but that of picking.
@@ -47,7 +47,7 @@ EXAMPLES = FIGURES.parent / "examples" / "four_arms"
 COLORS = 128  # of a film: less than half the bytes
 ABB = "compas_fab:data/robot_library/abb_irb4600_40_255/urdf/robot_description.urdf"
 PAYLOAD = 390.0  # N
-FILES = ("plan.csv", "plan.json", "tasks.json", "tasks.csv")
+FILES = ("plan.csv", "tasks.json", "tasks.csv")
 SHOWN = {"wall": (8, 19, 28), "vault": (12, 22, 46)}  # steps in the picture
 
 
@@ -86,7 +86,6 @@ def built(name: str, scene: Scene, folder: Path) -> dict[str, object]:
     given, plan = folder / "scene.json", folder / "plan"
     seqopt.save_scene(scene, given)
     run("optimize", given, "--schedule", "free", "--out", plan)
-    run("export", plan, "--format", "json", "--out", plan / "plan.json")
     said = json.loads((plan / "summary.json").read_text(encoding="utf-8"))
     tasks = pd.read_csv(plan / "tasks.csv")
     driven = tasks[tasks["action"] != "pick"]

@@ -87,11 +87,13 @@ def time_files(plan: ShownBuild) -> dict[str, bytes]:
     return {} if plan.makespan is None else picture("times", lambda _: plan.gantt())
 
 
-def task_files(plan: Plan) -> dict[str, str]:
+def task_files(plan: ShownBuild) -> dict[str, str]:
     """Return the tasks of robots for their programming, by file name."""
-    scene = plan.engine.network.scene
-    postures = None if plan.arms is None else plan.arms.postures
-    tasks = [*TASKS.plan_tasks(scene, plan.steps, postures=postures)]
+    scene, arms = plan.engine.network.scene, getattr(plan, "arms", None)
+    if arms is None:
+        tasks = [*TASKS.tasks_in_postures(scene, plan.steps)]
+    else:
+        tasks = [*TASKS.plan_tasks(scene, plan.steps, postures=arms.postures)]
     return {"tasks.json": TASKS.tasks_json(scene, tasks), "tasks.csv": TASKS.tasks_csv(tasks)}
 
 

@@ -13,7 +13,7 @@ needed:
 >>> print(scene.provenance.splitlines()[1])
 a table of boxes: no faces
 
-Plans are written as tables, JSON, tasks of robots, and for COMPAS (`export_plan`).
+Plans are written as tasks of robots, and for COMPAS (`export_plan`).
 """
 
 from typing import TYPE_CHECKING

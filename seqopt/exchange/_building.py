@@ -42,10 +42,9 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         if corners > MOST_CORNERS:
             raise SceneError(f"its blocks have {corners} corners; {MOST_CORNERS} is the most")
         unit = _unit(content, given, said)
-        up = content.up if given.up is None else one_of("up", given.up, UPS)
+        up = one_of("up", given.up or "z", UPS)
         if up == "y":
-            origin = "as given" if given.up else "as the format has it"
-            said.append(f"y is up in the file, {origin}: (x, y, z) is (x, -z, y) here")
+            said.append("y is up in the file, as given: (x, y, z) is (x, -z, y) here")
         content = content.placed(unit, up)
         supports = _supports(content, given, said)
         blocks = [repair_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
@@ -79,9 +78,8 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
 
 def _unit(content: Content, given: Given, said: list[str]) -> float:
     """Return the file's unit of length in m."""
-    known = content.unit
-    usual = content.usual_unit if given.unit is None else None
-    if known is None and usual is None and given.unit is None:
+    unit = content.unit if given.unit is None else one_of("unit", given.unit, UNITS)
+    if unit is None:
         points = np.vstack([block.vertices for block in content.blocks])
         size = " by ".join(f"{x:.4g}" for x in np.ptp(points, axis=0)) if points.size else "0"
         silent = given.density is None and any(
@@ -91,13 +89,9 @@ def _unit(content: Content, given: Given, said: list[str]) -> float:
             f"it does not say its unit of length, and is {size} large; give one of "
             f"{', '.join(UNITS)} (--unit){', and a density (--density)' if silent else ''}"
         )
-    unit = one_of("unit", (known or usual) if given.unit is None else given.unit, UNITS)
-    if usual is not None:
-        said.append(f"lengths are in {unit}, as the format has them; say --unit if they are not")
-    elif known is None:
-        said.append(f"lengths are in {unit}, as given")
-    elif unit != known:
-        raise SceneError(f"its lengths are known in {known}; give no other unit")
+    if content.unit not in (None, unit):
+        raise SceneError(f"its lengths are known in {content.unit}; give no other unit")
+    said += [] if content.unit else [f"lengths are in {unit}, as given"]
     return UNITS[unit]
 
 

@@ -39,11 +39,10 @@ from seqopt.exchange._content import (
     points,
 )
 from seqopt.exchange._meshes import object_content
-from seqopt.exchange._tables import step_states
 from seqopt.scene._checks import short
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, StepKind
 
 
 def _placed(source: str, held: Entry, elements: dict[str, tuple[str, Entry]]) -> dict[str, Floats]:
@@ -306,13 +305,17 @@ def assembly_with_plan(
     for i, brick in enumerate(scene.placed):
         nodes[brick.name].update(order=i, place_step=None, held=[])
     plan = graph.setdefault("attributes", {})["plan"] = []
-    for row in step_states(scene, steps):
-        number = row.step.number
-        for name in row.new:
-            nodes[name]["place_step"] = number
-        for robot, (node, name) in row.holds.items():
-            nodes[name]["held"].append([number, robot, node])
-        holds = {robot: list(held) for robot, held in row.holds.items()}
-        kind = row.step.kind.value
-        plan.append({"step": number, "type": kind, "placed": list(row.new), "holds": holds})
+    takes_down = any(step.kind is StepKind.REMOVE for step in steps)  # then nothing is placed
+    before = steps[0].bricks if takes_down else 0
+    for step in steps:
+        new = [brick.name for brick in scene.placed[before : step.bricks]]
+        grips = zip(scene.robots, step.grips, strict=True)
+        held = {robot.name: node for robot, node in grips if node is not None}
+        holds = {robot: [node, scene.brick_of_node[node].name] for robot, node in held.items()}
+        for name in new:
+            nodes[name]["place_step"] = step.number
+        for robot, (node, name) in holds.items():
+            nodes[name]["held"].append([step.number, robot, node])
+        kind, before = step.kind.value, step.bricks
+        plan.append({"step": step.number, "type": kind, "placed": new, "holds": holds})
     return json.dumps(whole) + "\n"

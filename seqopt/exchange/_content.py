@@ -73,11 +73,8 @@ class Content:
     ----------
     blocks, faces
         What is built, and where blocks touch; no faces where the file has none.
-    unit, usual_unit
-        Unit of length, one of `UNITS`, if the file says it; or if the format has one, which not all
-        who write it respect.
-    up
-        Which axis the format has up, one of `UPS`.
+    unit
+        Unit of length, one of `UNITS`, if the file says it.
     law
         Stiffnesses of joints, if the file has them.
     said
@@ -87,8 +84,6 @@ class Content:
     blocks: tuple[FileBlock, ...]
     faces: tuple[FileFace, ...] = ()
     unit: str | None = None
-    usual_unit: str | None = None
-    up: str = "z"
     law: JointLaw | None = None
     said: tuple[str, ...] = ()
 
@@ -109,7 +104,7 @@ class Given:
     unit
         Unit of length of the file: m, cm, mm, in or ft.
     up
-        Axis of the file that points up, ``z`` or ``y``; by default that of its format.
+        Axis of the file that points up, ``z`` or ``y``; by default ``z``.
     density
         Of blocks for which the file has none, kg/m³.
     supports

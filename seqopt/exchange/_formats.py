@@ -11,6 +11,7 @@ from typing import Any
 from seqopt._files import read_text
 from seqopt._registry import Part, registered
 from seqopt.errors import SceneError
+from seqopt.exchange._boxes import read_boxes
 from seqopt.exchange._compas_models import (
     assembly_with_plan,
     is_meshes,
@@ -20,23 +21,18 @@ from seqopt.exchange._compas_models import (
 )
 from seqopt.exchange._compas_shapes import kind, payload
 from seqopt.exchange._content import Content, assembly_json
-from seqopt.exchange._mesh_files import read_3dm, read_glb, read_mesh, read_obj, write_obj
-from seqopt.exchange._tables import plan_csv, plan_json, read_boxes
+from seqopt.exchange._mesh_files import read_mesh, read_obj, write_obj
 from seqopt.exchange._tasks import tasks_csv, tasks_in_postures, tasks_json
 from seqopt.scene._checks import short
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step
 
 _NEVER = ("nodes", "joints", "ground ends", "robots", "loads")  # what files of blocks are without
-_MESHED = ".glb or .obj, every block a closed mesh with a name"
-_INSTEAD = {  # what to save in place of what is not read
-    "dwg dxf": "open it in Rhino and save as .3dm, or export closed solids as .stl",
-    "gh ghx": "bake it and save from Rhino as .3dm",
-    "step stp iges igs sat x_t fcstd": "open it in Rhino and save as .3dm, or in FreeCAD and save "
-    "as .obj",
-    "ifc rvt": "convert it (IfcConvert a.ifc a.obj, of IfcOpenShell), or export closed meshes as "
-    ".obj",
-    "skp blend fbx dae max c4d usd usdz": f"export {_MESHED}",
-    "gltf": "export .glb, which is one file",
-    "off 3mf": f"export {_MESHED}",
+_INSTEAD = {  # how to save as .obj, every block a closed mesh with a name, what is not read
+    "dwg dxf step stp iges igs sat x_t fcstd": "open it in Rhino or FreeCAD, and export",
+    "3dm gh ghx": "bake and mesh it in Rhino, and export",
+    "ifc rvt": "convert it (IfcConvert a.ifc a.obj, of IfcOpenShell), or export",
+    "skp blend fbx dae max c4d usd usdz glb gltf off 3mf": "export",
 }
 _REFUSED = {  # kinds of COMPAS, and what to save in their place
     "scene": "save its meshes as a list (compas.json_dump)",
@@ -118,24 +114,20 @@ def sniffed(document: Any, source: str) -> str:
     raise SceneError(f"{source}: no assembly that is known; give one of {', '.join(readable())}")
 
 
+def _tasks(
+    text: Callable[..., str], scene: Scene, steps: Sequence[Step], distance: float | None = None
+) -> str:
+    return text(scene, tasks_in_postures(scene, steps, distance))
+
+
 JSON = Format("", ("json",), partial(_document, None))  # of COMPAS, whichever it is
 BUILT_IN = {
     each.name: each
     for each in (
-        Format("csv", write=plan_csv),
-        Format("json", write=plan_json),
-        Format(
-            "tasks",
-            write=lambda scene, steps, distance=None: tasks_json(
-                scene, tasks_in_postures(scene, steps, distance)
-            ),
-            takes=("distance",),
-        ),
+        Format("tasks", write=partial(_tasks, tasks_json), takes=("distance",)),
         Format(
             "tasks_csv",
-            write=lambda scene, steps, distance=None: tasks_csv(
-                tasks_in_postures(scene, steps, distance)
-            ),
+            write=partial(_tasks, lambda _, tasks: tasks_csv(tasks)),
             takes=("distance",),
         ),
         Format(
@@ -153,8 +145,6 @@ BUILT_IN = {
             lambda scene, _: write_obj(scene),
             lost=("densities", "the order", *_NEVER, "steps"),
         ),
-        Format("3dm", ("3dm",), read_3dm),
-        Format("glb", ("glb",), read_glb),
         *(Format(n, (n,), partial(read_mesh, form=n)) for n in ("ply", "stl")),
     )
 }
@@ -183,7 +173,8 @@ def read_file(path: Path, form: str | None = None) -> Content:
     if found is None or found.read is None:
         remedies = (said for endings, said in _INSTEAD.items() if suffix in endings.split())
         if form is None and (remedy := next(remedies, "")):
-            raise SceneError(f"{path}: a .{suffix} cannot be read; {remedy}")
+            as_obj = "closed meshes with a name each as .obj"
+            raise SceneError(f"{path}: a .{suffix} cannot be read; {remedy} {as_obj}")
         what = f"format is {short(form)}" if form else f"{path}: its format is not known"
         raise SceneError(f"{what}; give one of {', '.join(readable())}")
     content: object = found.read(path)

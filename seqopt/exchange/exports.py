@@ -50,8 +50,8 @@ def export_plan(
     >>> import seqopt
     >>> scene = seqopt.load_scene("arch25")
     >>> steps = seqopt.sequential(seqopt.build_network(scene))
-    >>> export_plan(scene, steps[:2], "json")[:38]
-    '{"format": "seqopt-plan", "version": 1'
+    >>> export_plan(scene, steps[:2], "tasks")[:39]
+    '{"format": "seqopt-tasks", "version": 1'
     """
     known = formats()
     write = known[form].write if form in known else None

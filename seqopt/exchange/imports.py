@@ -69,10 +69,9 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     low = {ground.brick for ground in scene.grounds}
     silent = given is None or (given.supports is None and given.up is None)
     if silent and len(low) >= _LYING and 2 * len(low) > len(scene.bricks):
-        up = "z" if content.up == "y" else "y"
         warnings.warn(
             f"scene {scene.name}: {len(low)} of {len(scene.bricks)} blocks rest on the ground; if "
-            f"{up} is up in the file, say so (--up {up})",
+            "y is up in the file, say so (--up y)",
             SceneWarning,
             stacklevel=2,
         )
@@ -82,7 +81,7 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
 def read_content(path: Path, form: str | None = None) -> Content:
     """Return what a file says, in the format of a name; by default in that which it looks like."""
     if path.is_dir():
-        raise FileError(f"{path} is a folder; give a file with all blocks: .obj, .glb or .3dm")
+        raise FileError(f"{path} is a folder; give a file with all blocks, as .obj")
     return without_repeats(read_file(path, form))
 
 

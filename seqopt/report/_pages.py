@@ -131,13 +131,11 @@ def plan_page(
     *,
     table: pd.DataFrame | None = None,
     others: Tables | None = None,
-    tasks: Mapping[str, str] | None = None,
 ) -> str:
     """Return the page of a plan, beside others and, where the scene is small, fixed methods.
 
     ``prover`` says which steps stand: by default dry, and with epoxy, where the scene is small;
-    ``table``, ``tasks``: the responses of the plan, and what robots do, as of `Build`, where they
-    are known.
+    ``table``: the responses of the plan, where they are known.
     """
     engine, name = plan.engine, plan.title
     scene = engine.network.scene
@@ -148,8 +146,7 @@ def plan_page(
     prover = prover or BuildProver(engine.network, SHOWN if small else {})
     verdicts = prover.of_builds({key: _steps_in_table(scene, t) for key, t in tables.items()})
     left = plan._within.of_builds(tables)  # knows the plan's own steps
-    first, *rest = _builds(scene, tables, left, verdicts)
-    builds = [replace(first, tasks=tasks or {}), *rest]
+    builds = _builds(scene, tables, left, verdicts)
     found = f"Found by: {in_words(name)} ({plan.result})."
     found += f" {spent_said(plan, prover)}" if isinstance(plan, Plan) and plan.steps else ""
     shown = [_worst_table(scene, builds)]

@@ -26,7 +26,6 @@ from seqopt.arms._urdf import shape_notes
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import ProblemError
-from seqopt.exchange._tasks import tasks_csv, tasks_in_postures, tasks_json
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
@@ -72,8 +71,7 @@ class Build:
     order; ``falls`` (steps, B, 6): how steps fall, with the first mortar; ``arms``: the joints of
     robots whose postures are known, points (k, 3), m, from the base to the tip of the tool, an
     entry a step, by the names of robots (of others a simple arm is drawn); ``faults``: in which
-    steps arms cannot be, in words;
-    ``tasks``: what robots do, as CSV and JSON, where that is known.
+    steps arms cannot be, in words.
     """
 
     name: str
@@ -86,7 +84,6 @@ class Build:
     falls: Floats | None = None
     arms: Arms = field(default_factory=dict)
     faults: Sequence[str] = ()
-    tasks: Mapping[str, str] = field(default_factory=dict)
 
     def sentence(self, scene: Scene) -> str:
         """Describe it in one sentence."""
@@ -288,12 +285,9 @@ def _packed(values: Floats) -> dict[str, object]:
     flat = values.reshape(len(values), -1)
     size = np.abs(flat).max(axis=1, initial=0.0)
     scale = np.where(size > 0, size / LARGEST, 1.0)
-    data = _compressed(np.round(flat / scale[:, None]).astype("<i2").tobytes())
+    packed = gzip.compress(np.round(flat / scale[:, None]).astype("<i2").tobytes(), 9, mtime=0)
+    data = b64encode(packed).decode("ascii")
     return {"scale": [float(f"{s:.6g}") for s in scale], "width": flat.shape[1], "data": data}
-
-
-def _compressed(data: bytes) -> str:
-    return b64encode(gzip.compress(data, 9, mtime=0)).decode("ascii")
 
 
 def report_page(
@@ -369,27 +363,11 @@ def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
         "structure": _structure_data(network),
         "builds": [
             _build_data(engine, build, known, fields=fields)
-            | {"tasks": _tasks(engine, build) if build is builds[0] and not build.order else None}
             for build, fields in zip(builds, drawn, strict=True)
         ],
         "responses": RESPONSES,
         "note": f"{LEFT_OUT}: {why}." if why else "",
     }
-
-
-def _tasks(engine: Engine, build: Build) -> dict[str, str]:
-    """Return the tasks of a build as CSV and JSON, compressed: to copy and to keep."""
-    texts = build.tasks or task_texts(engine.network.scene, build.steps)
-    return {kind: _compressed(text.encode()) for kind, text in texts.items()}
-
-
-def task_texts(scene: Scene, steps: Sequence[Step]) -> dict[str, str]:
-    """Return the tasks of a build as CSV and JSON.
-
-    Arms are in their postures; where nothing computes these, grips are proposals.
-    """
-    tasks = [*tasks_in_postures(scene, steps)]
-    return {"csv": tasks_csv(tasks), "json": tasks_json(scene, tasks)}
 
 
 def _part(caption: str, part: pd.DataFrame | _Drawn) -> str:

@@ -108,8 +108,7 @@ ABOUT = {
     "vault338": "a herringbone vault around arch25 over 2670 x 4350 mm, our reconstruction",
 }
 
-_MESHES = {".obj": True, ".ply": True, ".stl": True, ".3dm": False, ".glb": False}
-"""By ending, whether one has to say the unit."""
+_MESHES = (".obj", ".ply", ".stl")
 
 KINDS = {
     "arch": "an arch by span and rise: arch:span=2,rise=0.7,curve=catenary",
@@ -214,12 +213,12 @@ def load_scene(name: str | Path) -> Scene:
             f"scene {name}: no such built-in scene or file{hint}; "
             f"built in: {', '.join(builtin_scenes())}; or in words, as arch:span=2,rise=0.7"
         )
-    if path.is_file() and (unit := _MESHES.get(path.suffix.lower())) is not None:
+    if path.is_file() and path.suffix.lower() in _MESHES:
         out = shlex.quote(f"{path.resolve().stem}.json")
-        words = f"{shlex.quote(str(path))} {'--unit m ' * unit}--density 2400 --out {out}"
+        words = f"{shlex.quote(str(path))} --unit m --density 2400 --out {out}"
         raise SceneError(
             f"scene {path}: a mesh; seqopt import {words} makes a scene of it, with its own "
-            f"{'unit and ' * unit}density"
+            "unit and density"
         )
     scene = _with_models(_parse_scene(read_text(path), name), path.parent.joinpath)
     warn_of(scene, name)

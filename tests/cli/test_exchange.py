@@ -35,7 +35,6 @@ def test_from_an_assembly_to_a_plan_and_back(source, tmp_path, capsys):
     assert run(*words) == 0
     graph = json.loads(back.read_text(encoding="utf-8"))["data"]["graph"]["data"]
     assert graph["node"]["7"]["order"] == 1
-    assert run("export", plan, "--format", "csv", "--out", tmp_path / "blocks.csv") == 0
 
 
 @pytest.mark.parametrize(
@@ -62,9 +61,9 @@ def test_inputs_are_not_overwritten(source, tmp_path, capsys):
     assert run("import", source, *words, "--out", source) == 2
     assert "it is the input" in capsys.readouterr().err
     assert json.loads(source.read_text(encoding="utf-8")) == DOCUMENTS["assembly"]
-    assert run("export", tmp_path, "--format", "csv", "--out", tmp_path / "plan.csv") == 2
+    assert run("export", tmp_path, "--out", tmp_path / "plan.csv") == 2
     assert "it is the input" in capsys.readouterr().err
-    assert run("export", tmp_path, "--format", "csv", "--out", tmp_path / "x.csv") == 2
+    assert run("export", tmp_path, "--out", tmp_path / "x.csv") == 2
     assert "it has no scene.json" in capsys.readouterr().err
 
 

@@ -209,7 +209,12 @@ def test_what_can_be_mended_is_mended_and_said(read):
             "block 1: its mass of 2.4 kg is 2000 kg/m³ in 0.0012 m³, its density 1800 kg/m³; give",
         ),
         ("a.xyz", "0 0 0\n", METERS, "its format is not known; give one of compas_assembly"),
-        ("a.dxf", "0\nSECTION\n", METERS, "a .dxf cannot be read; open it in Rhino and save as"),
+        (
+            "a.dxf",
+            "0\nSECTION\n",
+            METERS,
+            "a .dxf cannot be read; open it in Rhino or FreeCAD, and export closed meshes",
+        ),
         ("a.json", "{", METERS, "not JSON, line 1"),
         ("a.json", '{"node": NaN}', METERS, "NaN stands where a number should"),
         ("a.json", {"format": "seqopt-scene"}, METERS, "a scene of seqopt already"),

@@ -47,6 +47,8 @@ def test_a_format_of_ones_own_is_read_and_written(path):
     seqopt.register(lines)
     assert "corners" in readable()
     assert "corners" in writable()
+    with pytest.raises(SceneError, match="its lengths are known in m; give no other unit"):
+        import_scene(path, given=Given(unit="mm", density=2000.0))
     scene = import_scene(path, given=GIVEN)
     assert scene.bricks[0].mass == pytest.approx(2000.0 * 0.4 * 0.2 * 0.1)
     steps = sequential(build_network(seqopt.load_scene("chain:bricks=7")))
@@ -64,7 +66,7 @@ def test_what_a_function_of_others_returns_wrong_is_one_line(path):
 
 
 def test_names_that_are_taken_are_refused_by_kind():
-    for part in (Format("csv"), Amount("steps", len)):
+    for part in (Format("obj"), Amount("steps", len)):
         with pytest.raises(ProblemError, match="this name has a meaning already"):
             seqopt.register(part)
     seqopt.register(Format("steps"))  # kinds do not share names

@@ -128,10 +128,8 @@ def _of_imports() -> Iterator[tuple[str, File]]:
     yield "obj", ("i.obj", export_plan(scene, steps, "obj").encode(), brought)
     yield "compas_assembly", ("i.json", _json(DOCUMENTS["assembly"]), brought)
     yield "boxes", ("i.csv", BOXES.encode(), brought)
-    made = trimesh.Scene([trimesh.creation.box((0.2, 0.1, 0.1))])
-    for end in ("glb", "ply", "stl"):
-        whole = made if end == "glb" else made.to_mesh()
-        content = whole.export(file_type=end)
+    for end in ("ply", "stl"):
+        content = trimesh.creation.box((0.2, 0.1, 0.1)).export(file_type=end)
         yield (
             end,
             (f"i.{end}", content if isinstance(content, bytes) else content.encode(), brought),

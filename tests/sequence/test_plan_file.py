@@ -6,11 +6,11 @@ import pandas as pd
 import pytest
 
 from seqopt.errors import StepError
-from seqopt.exchange._tables import plan_csv
 from seqopt.network.build import build_network
 from seqopt.sequence.methods import sequential
 from seqopt.sequence.schedule_file import parse_plan, read_plan
 from seqopt.sequence.steps import Step, StepKind
+from tests.quality.fuzz_cases import plan_text
 
 HEADER = "step,type,bricks,rob1_brick,rob1_node,rob2_brick,rob2_node,rob3_brick,rob3_node\n"
 
@@ -63,7 +63,7 @@ def test_a_plan_that_pandas_wrote_again_is_the_same(tmp_path, arch25):
     """Columns with empty cells are floats in pandas: 48 is written as 48.0."""
     steps = sequential(build_network(arch25))
     path = tmp_path / "plan.csv"
-    path.write_text(plan_csv(arch25, steps), encoding="utf-8")
+    path.write_text(plan_text(arch25, steps), encoding="utf-8")
     pd.read_csv(path).to_csv(path, index=False)
     assert ",1.0," in path.read_text(encoding="utf-8")
     assert read_plan(arch25, path) == tuple(steps)

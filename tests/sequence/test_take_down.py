@@ -10,7 +10,6 @@ import pytest
 
 import seqopt
 from seqopt.errors import ProblemError, SolverError, StepError
-from seqopt.exchange._tables import plan_csv
 from seqopt.graph._orders import among_orders, order_rules
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
@@ -23,6 +22,7 @@ from seqopt.sequence.steps import Site, Step, StepKind, check_sequence
 from tests.brute_force import ONES, allowed, best_values
 from tests.builders import turned_round
 from tests.plain_rules import PlainBook
+from tests.quality.fuzz_cases import plan_text
 
 ARCH = seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V")
 DOWN = seqopt.FreeRules(direction="take-down")
@@ -180,7 +180,7 @@ def test_removal_is_by_who_alone_holds(who, match):
 def test_plans_are_read_back():
     scene = seqopt.load_scene("arch25")
     down = turned_round(scene, seqopt.sequential(seqopt.build_network(scene)))
-    assert parse_plan(scene, plan_csv(scene, down), "down") == down
+    assert parse_plan(scene, plan_text(scene, down), "down") == down
     table = seqopt.analyze(seqopt.make_engine("auto", scene), down)
     assert table["bricks"].iloc[-1] == 0
     assert not table[["F_max_N", "D_max_1e-3mm"]].iloc[-1].any()

@@ -23,15 +23,14 @@ def export(
     *,
     cache: Path | str | None = None,
     progress: Tell = shown,
-    format: Annotated[str, ("choices", writable)] = "csv",  # noqa: A002  # the option's name
+    format: Annotated[str, ("choices", writable)] = "tasks",  # noqa: A002  # the option's name
     source: Path | str | None = None,
     distance: Annotated[float | None, ("value", "M")] = None,
     out: File | None = None,
 ) -> Answer[str]:
     """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
 
-    It says which block is absent, placed or held in which step, what each robot does and where, or
-    is the assembly with its plan.
+    It says what each robot does and where, or is the assembly with its plan.
 
     Parameters
     ----------
@@ -56,7 +55,6 @@ def export(
 
     Examples
     --------
-    $ seqopt export best --format csv --out blocks.csv
     $ seqopt export best --format tasks --distance 0.15 --out tasks.json
     """
     place, taken = inputs.plan_folder(folder, cache, progress)

@@ -41,7 +41,7 @@ def run(  # noqa: PLR0913  # every option is a parameter
 ) -> Answer[None]:
     """Read an assembly of others, say what was assumed, and write it as a scene.
 
-    It is a file of Rhino, an assembly of COMPAS, meshes, or a table of boxes.
+    It is an assembly of COMPAS, meshes, or a table of boxes.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ def run(  # noqa: PLR0913  # every option is a parameter
     name : str, optional
         Of the scene (default: that of the file).
     unit : str, optional
-        Unit of length, where the file has none.
+        Unit of length of the file.
     up : str, optional
-        Axis that is up (default: y in a GLB, else z).
+        Axis that is up (default: z).
     density : float, optional
         Of blocks for which the file has none, kg/m³.
     supports : str, optional

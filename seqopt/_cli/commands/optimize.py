@@ -195,9 +195,8 @@ def answered(found: Found) -> Answer[Plan]:
 def _files(found: Found) -> dict[str, bytes | str]:
     """Return the files of a plan by name, at least table, summary and scene."""
     plan, made, tables = found.plan, dict[str, bytes | str](), found.tables
-    tasks = {kind: str(tables[f"tasks.{kind}"]) for kind in ("csv", "json") if tables}
     if found.analyzed:
-        shown = partial(PAGES.plan_page, plan, found.prover, tasks=tasks)
+        shown = partial(PAGES.plan_page, plan, found.prover)
         content = found.clock.spare(PAGE, shown, None)
         made |= {} if content is None else {PAGE: content}
     if rows := trace_rows(plan.trace):

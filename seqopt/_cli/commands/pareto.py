@@ -36,7 +36,6 @@ from seqopt.problem.requirements import Limit, _said_limits
 from seqopt.problem.standing import Standing
 from seqopt.report._pages import front_page, plan_page
 from seqopt.report.comparison import method_tables, shown_table
-from seqopt.report.page import task_texts
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import Departure, LinearRange, _analyze_builds, builds_in_words
 from seqopt.scene.scene_file import dump_scene
@@ -278,12 +277,12 @@ def _write_picked(
     result = f"one of {len(found.value.steps)} plans"
     plan = _Picked(own, found.value.steps[chosen], f"plan with the least {name}", result=result)
     report = {"scene": own.network.scene.name, "picked": picked, **provenance(own)}
-    table, tasks = plan.responses(), task_texts(own.network.scene, plan.steps)
+    table = plan.responses()
     files = {
         **outputs.bare_files(plan, table, report),
-        **{f"tasks.{kind}": text for kind, text in tasks.items()},
+        **outputs.task_files(plan),
         **outputs.time_files(plan),
-        PAGE: plan_page(plan, found.provers[own], table=table, tasks=tasks),
+        PAGE: plan_page(plan, found.provers[own], table=table),
     }
     write_folder(folder, files)
 

@@ -487,7 +487,6 @@
     byId("now").replaceChildren(...pair.map((build) => table(build, at)));
     marking.forEach((mark) => mark(at));
     charts.cursors.forEach((move) => move(at));
-    for (const id of ["copy", "csv", "json"]) byId(id).hidden = !pair[0].tasks;
     if (points) points.mark();
   }
   let moved = false;  // by whom looks at it
@@ -549,7 +548,6 @@
   byId("second").prepend(new Option("nothing", "", true, true));
   byId("second").value = "";
   await Promise.all(builds.flatMap((build) => ["twist", "edge", "push", "turn", "fall"].map((name) => unpack(build[name]))));
-  await Promise.all(builds.map(async ({ tasks }) => { for (const kind in tasks) tasks[kind] = new TextDecoder().decode(await unzip(tasks[kind])); }));
   for (const id of ["first", "second"]) byId(id).addEventListener("change", () => { drawCharts(); refresh(); });
   for (const id of ["magnify", "forces", "robots", "fall"]) byId(id).addEventListener("input", refresh);
   byId("tables").classList.toggle("long", document.querySelectorAll("#tables figure:first-child tr").length > 9);
@@ -572,23 +570,6 @@
     link.download = `${structure.name} step ${Number(slider.value) + 1}.png`;
     link.href = panes[0].picture();
     link.click();
-  });
-  for (const [kind, type] of [["csv", "text/csv"], ["json", "application/json"]]) byId(kind).addEventListener("click", () => {
-    const build = shown()[0], link = document.createElement("a");
-    link.download = `${structure.name} ${build.name} tasks.${kind}`;
-    link.href = URL.createObjectURL(new Blob([build.tasks[kind]], { type }));
-    link.click();
-    URL.revokeObjectURL(link.href);
-  });
-  byId("copy").addEventListener("click", async () => {
-    const area = document.createElement("textarea");
-    area.value = shown()[0].tasks.csv;
-    document.body.append(area);
-    area.select();
-    const done = document.execCommand("copy");
-    area.remove();
-    byId("copy").textContent = done ? "copied" : "not allowed here";
-    setTimeout(() => { byId("copy").textContent = "copy tasks"; }, 1500);
   });
   document.addEventListener("keydown", (event) => {
     if (["SELECT", "INPUT", "BUTTON"].includes(event.target.tagName) && event.target !== slider) return;
