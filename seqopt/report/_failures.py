@@ -21,8 +21,9 @@ from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import FailureMap
 from seqopt.work.progress import Tell
-from seqopt.workflow import optimize
+from seqopt.workflow import Search, optimize
 
+PATIENCE = 20.0  # s for each plan: one that is not proven to be the best is a way to build as well
 AXIS_WORDS = {"friction": "friction", "tilt": "tilt, degrees"}
 SHOWN = {
     "first_step": "first step",
@@ -38,20 +39,29 @@ def usual_builds(
 ) -> tuple[dict[str, Sequence[Step]], list[str]]:
     """Return the steps of the fixed methods, of a loop and of a free schedule.
 
-    The plans are those of `seqopt.optimize` without options. Results: ``builds`` by name, and
-    ``notes``: why others are not possible.
+    The plans are those of `seqopt.optimize` within `PATIENCE`. Results: ``builds`` by name, each
+    once, and ``notes``: what is not possible, not proven to be the best, or the same as another.
     """
-    network, builds = build_network(scene), dict[str, Sequence[Step]]()
-    notes = []
+    network, builds, notes = build_network(scene), dict[str, Sequence[Step]](), list[str]()
+
+    def keep(name: str, steps: Sequence[Step]) -> None:
+        same = next((known for known, own in builds.items() if own == steps), None)
+        if same is None:
+            builds[name] = steps
+        else:  # where nothing bridges, as in walls and domes, the fixed methods are one
+            notes.append(f"{name}: the same steps as {same}")
+
     for name, method in METHODS.items():
         try:
-            builds[name] = method(network)
+            keep(name, method(network))
         except SeqoptError as error:
             notes.append(f"{name}: {error}")
     for schedule in (None, FREE):
         try:
-            plan = optimize(scene, schedule, progress=progress)
-            builds[plan.method] = plan.steps
+            plan = optimize(scene, schedule, search=Search(time_limit=PATIENCE), progress=progress)
+            keep(plan.method, plan.steps)
+            if plan.stopped:
+                notes.append(f"{plan.method}: the best plan within {PATIENCE:g} s")
         except SeqoptError as error:
             notes.append(f"{schedule or 'loop'}: {error}")
     return builds, notes
@@ -132,6 +142,8 @@ def failure_blocks(scene: Scene, found: FailureMap, wrapped: Callable[[str], str
             counts[case["value"]] = f"{case['fall']}{open_}"
         cells = "".join(f"{count:>8}" for count in counts.values())
         lines.append(f"{f'{build}, {holds}':{_NAME}}{rows['steps'].iloc[0]:5}{cells}")
+    if not found.cases[["fall", "undecided"]].to_numpy().any():
+        return ["\n".join(lines), "every step is proven to stand, in every case"]
     cures = [f"What falls first, {axis} {found.usual:.3g}, and what would cure it"]
     at = (found.cases["value"] == found.usual) & (found.cases["fall"] > 0)
     for case in found.cases[at].to_dict(orient="records"):

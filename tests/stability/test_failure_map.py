@@ -10,13 +10,17 @@ from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
-from seqopt.report._failures import cure_words, usual_builds
+from seqopt.exchange._content import Given
+from seqopt.exchange.imports import import_scene
+from seqopt.report import _failures
+from seqopt.report._failures import cure_words, failure_blocks, usual_builds
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._prover import Prover
 from seqopt.stability._screens import Screen
 from seqopt.stability._steps import step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.failure_map import failure_map
+from tests.documents import box, obj
 
 FRICTIONS = (0.15, 0.45)
 
@@ -112,6 +116,40 @@ def test_wrong_words(network, builds):
 def test_what_is_not_proven_is_not_called_impossible(bond, said):
     case = {"bond_needed_Pa": bond, "friction_needed": np.inf, "grip_node": None}
     assert cure_words(case) == said
+
+
+def test_steps_of_a_wall_that_two_methods_share_are_mapped_once_and_all_stand():
+    scene = seqopt.load_scene("wall:columns=2,courses=2")
+    builds, notes = usual_builds(scene)
+    assert [*builds] == ["sequential", "three-robot", "free"]
+    assert "cantilever: the same steps as sequential" in notes
+    found = failure_map(scene, builds, ["dry"], values=[DRY.friction])
+    assert not found.cases[["fall", "undecided"]].to_numpy().any()
+    assert failure_blocks(scene, found, str)[1:] == ["every step is proven to stand, in every case"]
+
+
+def test_an_imported_mesh_that_leans_out_is_mapped_with_a_cure(tmp_path):
+    """Of three cubes the third lies beyond the second's edge: it tips unless it is held."""
+    cubes = [box((0.2, 0.2, 0.2), at=at) for at in ((0, 0, 0), (0, 0, 0.2), (0.11, 0, 0.4))]
+    (tmp_path / "stack.obj").write_text(obj(*cubes))
+    scene = import_scene(tmp_path / "stack.obj", given=Given(unit="m", density=2000.0))
+    bare = [Step(1, StepKind.PLACE, 3, (None,) * len(scene.robots))]
+    found = failure_map(scene, {"bare": bare}, ["dry"], values=[0.5])
+    (case,) = found.cases.to_dict("records")
+    assert (case["fall"], case["brick"], case["motion"]) == (1, "2", "turns")
+    assert "one more robot at node" in failure_blocks(scene, found, str)[1]
+    held = [Step(1, StepKind.PLACE, 3, (case["grip_node"], None, None))]
+    (other,) = failure_map(scene, {"held": held}, ["dry"], values=[0.5]).cases.to_dict("records")
+    assert other["fall"] == 0
+
+
+def test_a_plan_that_is_not_proven_in_time_is_mapped_too(monkeypatch):
+    """On a scene of many bricks no search may run without an end before anything is mapped."""
+    monkeypatch.setattr(_failures, "PATIENCE", 1e-9)
+    builds, notes = usual_builds(seqopt.load_scene("wall:columns=3,courses=3"))
+    assert "sequential" in builds
+    late = [note for note in notes if "within 1e-09 s" in note or note.startswith(("loop", "free"))]
+    assert len(late) == 2
 
 
 @pytest.mark.slow
