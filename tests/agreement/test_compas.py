@@ -30,7 +30,7 @@ compas = pytest.importorskip("compas")
 compas_cra = pytest.importorskip("compas_cra")
 FOLDER = Path(compas_cra.SAMPLE)
 SNAKE = pytest.param("snake", marks=pytest.mark.slow)
-QUICK = ("A", "bridge", "shelf-stable")
+QUICK = ("bridge",)
 OTHERS = {*SAMPLES} - {"armadillo_cra", "snake", *QUICK}
 SLOW = [pytest.param(n, marks=pytest.mark.slow) for n in sorted(OTHERS)]
 SMALL = [*QUICK, *SLOW, SNAKE]
@@ -64,7 +64,7 @@ def test_blocks_and_faces_are_those_of_compas_cra(name):
     assert structure(scene).area.sum() == pytest.approx(area, rel=1e-6)
 
 
-@pytest.mark.parametrize("name", ["bridge", "A", SNAKE])
+@pytest.mark.parametrize("name", ["bridge", SNAKE])
 def test_verdicts_are_those_of_compas_cra(name):
     friction = SAMPLES[name].friction
     mine = assess(structure(imported(name)), Mortar(friction=friction))
@@ -74,7 +74,7 @@ def test_verdicts_are_those_of_compas_cra(name):
 def test_too_little_friction_falls_for_both():
     """The bridge needs a coefficient of 0.073."""
     mine = assess(structure(imported("bridge")), Mortar(friction=0.05))
-    assert mine.verdict is force_only(sample_scene("bridge"), 0.05).verdict is Verdict.FALLS
+    assert mine.verdict is force_only(theirs_of("bridge"), 0.05).verdict is Verdict.FALLS
 
 
 @pytest.mark.long
@@ -89,15 +89,6 @@ def test_armadillo_on_its_true_faces():
     mine = assess(found, Mortar(friction=friction))
     assert mine.verdict is force_only(sample_scene("armadillo_cra"), friction).verdict
     assert mine.verdict is Verdict.STANDS
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_faces_of_the_armadillo_are_found_where_the_file_has_them():
-    """Its blocks are warped; two thirds of them touch within a millimeter, nearly all within 3."""
-    held, found = (structure(imported("armadillo_cra", detect=d)) for d in (False, True))
-    assert found.area.sum() == pytest.approx(held.area.sum(), rel=0.04)
-    assert len(found.area) == pytest.approx(len(held.area), rel=0.04)
 
 
 def test_a_plan_goes_back_into_the_assembly(tmp_path):

@@ -19,7 +19,6 @@ from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.graph.formulation import FormulationKind, find_formulation, formulations
 from seqopt.graph.states.states import build_states
-from seqopt.problem.problem import parse_robust
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
 from seqopt.sequence.methods import modified_sequential, three_robot_loop
 from seqopt.sequence.rules import FreeRules, with_robots
@@ -219,40 +218,6 @@ def test_everything_goes_with_everything(name, data):
     agree(problem, formulation, best, len(words))
 
 
-@cache
-def costs_in_each(name, _grips_of):
-    """What a state costs in every scenario by itself; None where it is not allowed in one."""
-    bricks, grips = _grips_of
-    rules = FreeRules() if name == "free" else IGNORED
-    found = [allowed(engine, rules, bricks, grips) for engine in engines_of(name, 3)]
-    if any(each is None for each in found):
-        return None
-    return np.array([(each / SCALES).max() for each in found])
-
-
-@pytest.mark.parametrize(
-    ("name", "over"),
-    [
-        pytest.param("modified-sequential", "cvar=0.5", marks=pytest.mark.slow),
-        pytest.param("free", "worst-total", marks=pytest.mark.slow),
-    ],
-)
-def test_totals_over_scenarios_are_the_least_of_every_path(name, over):
-    words = tuple(f"sum in {k}" for k in range(3))
-    totals = np.array([*every_path(name, "", lambda *each: costs_in_each(name, each), words)])
-    least = parse_robust(over).each(totals).min()
-    drawn = seqopt.scenarios(scene_of(name), count=3, seed=3)
-    problem = seqopt.pose(
-        *(engines_of(name, 0)[0], rules_of(name, ""), ONES), "sum", scenarios=drawn, over=over
-    )
-    for formulation in PLANS:
-        plan = seqopt.solve(problem, formulation)
-        if formulation.kind is FormulationKind.EXACT:
-            assert plan.objective[over] == pytest.approx(least, rel=1e-7)
-        assert plan.certificate.bounds[0] <= least * (1 + 1e-9) <= plan.objective[over] * (1 + 2e-9)
-        assert plan.summary()["aims"] == [over]
-
-
 def over(worst, response, bound):
     return worst[FOUR.index(response)] > bound * (1 + LIMIT_TOLERANCE)
 
@@ -282,22 +247,3 @@ def test_a_plan_that_is_not_the_best_is_seen():
     for wrong in ([0.9 * best[0], best[1]], [1.1 * best[0], best[1]], [best[0], best[1] - 1]):
         with pytest.raises(AssertionError):
             agree(problem, PLANS[0], wrong, 2)
-
-
-@pytest.mark.parametrize(("name", "scenarios"), [("three-robot", 2), ("modified-sequential", 0)])
-def test_candidates_and_states_have_one_optimum(name, scenarios):
-    """The least worst step by layers, by states, and by every formulation of either."""
-    engine, schedule = engines_of(name, 0)[0], rules_of(name, "")
-    drawn = seqopt.scenarios(scene_of(name), count=2, seed=3) if scenarios else ()
-    problem = seqopt.pose(engine, schedule, ONES, scenarios=drawn)
-    given = [(s.bricks, s.grips) for s in schedule.steps if not s.moves]
-    closed = max((taken("minmax", state(name, scenarios, "", each)) for each in given), default=0.0)
-    exact = [f for f in PLANS if f.kind is FormulationKind.EXACT]
-    peaks = ["minimax", "minimax_layer"]
-    found = {f: seqopt.solve(problem, f) for f in (*exact, *peaks)}
-    least = [max(found[name].certificate.objective, closed) for name in peaks]
-    least += [found[f].certificate.objective for f in exact]
-    assert least == pytest.approx([least[0]] * len(least), rel=1e-6)
-    assert {plan.status for plan in found.values()} == {"optimal"}
-    other = seqopt.solve(problem.but(limits=[Limit("F_largest", 1e9)]), "minimax")
-    assert other.certificate.objective == pytest.approx(found["minimax"].certificate.objective)

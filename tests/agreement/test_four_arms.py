@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from experiments.exchange.four_arms import EXAMPLES, SCENES, stored_build
+from experiments.exchange.four_arms import EXAMPLES, SCENES
 from seqopt.errors import StepError
 from seqopt.exchange.exports import read_folder
 from seqopt.scene.scene_file import dump_scene, load_scene
@@ -93,23 +93,6 @@ def test_compas_opens_tasks_with_frames_shapes_and_postures(build):
         assert list(grip.point) == pytest.approx(list(task["grip"].point), abs=1e-6)
     plain = json.loads(content(name, "tasks.json"))["tasks"][1]["grip"]
     assert not isinstance(plain, Frame)  # the control: it is compas that makes frames
-
-
-def test_joints_put_the_tool_where_the_task_says(build):
-    """By the arm's own kinematics, from the joints in the table of tasks alone."""
-    for extra in ("pinocchio", "coal", "compas_fab"):
-        pytest.importorskip(extra)
-    name, scene, steps = build
-    _, _, arms = stored_build(name)
-    held = 0
-    for r, robot in enumerate(scene.robots):
-        for step, arm in zip(steps, arms[robot.name], strict=True):
-            assert arm.holds == (step.grips[r] is not None)
-            if arm.holds:
-                held += 1
-                tip = scene.node_position(step.grips[r])
-                np.testing.assert_allclose(arm.line[-1], tip, atol=1e-5)
-    assert held > 2 * len(steps)
 
 
 def test_compas_fab_takes_the_arms_of_the_tasks_there():

@@ -18,7 +18,6 @@ from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status
 from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import Orders
-from seqopt.problem.requirements import Limit
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import in_order
 from seqopt.sequence.methods import three_robot_loop
@@ -95,20 +94,25 @@ def test_builds_from_anywhere_to_anywhere_are_the_best_of_all(aim):
     assert found > 20
 
 
+@cache
+def best_from(begin, aim):
+    return best_values(engine_of(3, 2), FreeRules(least_grips=1, begin=begin), aim)
+
+
 @pytest.mark.parametrize("formulation", PLANS)
 def test_every_formulation_begins_where_it_is_told(formulation):
     engine = engine_of(3, 2)
     for (begin, why), aim in zip(sites(engine), ("minmax,steps", "sum") * 3, strict=False):
         rules = FreeRules(least_grips=1, begin=begin)
         found = planned(engine, rules, aim, formulation)
-        assert same(found, best_values(engine, rules, aim)), why
+        assert same(found, best_from(begin, aim)), why
 
 
 @pytest.mark.parametrize("aim", FEW[1:])
 def test_the_rest_of_the_best_plan_is_the_best_rest(aim):
     engine = engine_of(4, 3)
     plan = seqopt.solve(seqopt.pose(engine, FreeRules(), ONES, aim))
-    for count in range(0, len(plan.steps), 2):
+    for count in range(0, len(plan.steps), 3):
         begin = Site.after(plan.steps, count)
         rest = seqopt.solve(seqopt.pose(engine, FreeRules(begin=begin), ONES, aim))
         assert rest.steps[0].number == count + 1
@@ -122,21 +126,6 @@ def test_the_rest_of_the_best_plan_is_the_best_rest(aim):
             assert rest.objective[first] <= plan.objective[first] * (1 + 1e-9)
         if aim.endswith("steps") and first == "minmax" and count == 0:
             assert values_of(rest) == pytest.approx(values_of(plan), rel=1e-9)
-
-
-def test_limits_standing_and_scenarios_go_on_too():
-    scene = with_robots(small_arch(4), 3)
-    plan = seqopt.optimize(scene, "free", ONES, aim="minmax,steps")
-    begin = Site.after(plan.steps, 3)
-    limit, rules = Limit("T_max", 1e3), FreeRules(begin=begin)
-    some = seqopt.scenarios(scene, count=2, seed=1)
-    for more in ({"limits": [limit]}, {"stands": "epoxy"}, {"robust": seqopt.Robust(scenes=some)}):
-        rest = seqopt.optimize(scene, "free", ONES, aim="minmax,steps", rules=rules, **more)
-        whole = seqopt.optimize(scene, "free", ONES, aim="minmax,steps", **more)
-        assert rest.status == whole.status == "optimal"
-        assert rest.steps[0].number == 4
-    budget = seqopt.optimize(scene, "free", ONES, aim="minmax", rules=rules, budgets="steps=9")
-    assert len(budget.steps) <= 9
 
 
 def test_loops_go_on_from_their_steps_and_end_at_them():

@@ -56,21 +56,6 @@ def test_compas_has_frames_and_meshes():
     assert not same(found["tasks"][1]["grip"], TASKS[1].block_frame)  # the control
 
 
-def test_compas_fab_takes_blocks_and_targets_of_tasks():
-    robots = pytest.importorskip("compas_fab.robots")
-    found = opened("tasks")
-    for task, mine in zip(found["tasks"], TASKS, strict=True):
-        if mine.grip is not None:  # a block that hangs from the tool is where it is built
-            target = robots.FrameTarget(task["grip"], robots.TargetMode.TOOL)
-            assert same(target.target_frame, mine.grip)
-            held = compas.geometry.Transformation.from_frame(target.target_frame)
-            hung = held * compas.geometry.Transformation.from_frame(task["grip_in_block"]).inverse()
-            assert same(compas.geometry.Frame.from_transformation(hung), mine.block_frame)
-    for block, brick in zip(found["blocks"], SCENE.placed, strict=True):
-        body = robots.RigidBody.from_mesh(block["shape"]).collision_meshes[0]
-        assert np.allclose(body.centroid(), brick.position, atol=1e-9)
-
-
 @pytest.mark.slow
 def test_the_page_for_compas_fab_runs_and_prints_what_it_says(tmp_path, monkeypatch, capsys):
     """Its own inverse kinematics takes our targets."""

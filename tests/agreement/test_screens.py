@@ -19,7 +19,7 @@ from seqopt.scene.parts import Robot
 from seqopt.stability._prover import Prover
 from seqopt.stability._screens import Margins, Screen
 from seqopt.stability.assessment import Verdict, _verdict_of, assess, bonded
-from tests.strategies import arches, walls
+from tests.strategies import arches
 
 VERDICTS = {1: Verdict.STANDS, -1: Verdict.FALLS, 0: Verdict.UNDECIDED}
 MORTARS = [DRY, Mortar(friction=0.9), bond_mortar(2e3), Mortar(friction=0.3, cohesion=1e3)]
@@ -68,21 +68,6 @@ def compare(scene, bricks, mortar):
 @settings(max_examples=5)
 @given(arches(max_bricks=5), st.sampled_from(MORTARS), st.floats(0.5, 6.0), st.integers(1, 5))
 def test_small_arches(scene, mortar, multiple, bricks):
-    compare(with_payload(scene, multiple), min(bricks, len(scene.bricks)), mortar)
-
-
-@pytest.mark.long
-@pytest.mark.slow
-@settings(max_examples=20)
-@given(arches(), st.sampled_from(MORTARS), st.floats(0.5, 6.0), st.integers(1, 7))
-def test_arches(scene, mortar, multiple, bricks):
-    compare(with_payload(scene, multiple), min(bricks, len(scene.bricks)), mortar)
-
-
-@pytest.mark.slow
-@settings(max_examples=12)
-@given(walls(), st.sampled_from(MORTARS), st.floats(0.5, 6.0), st.integers(1, 9))
-def test_walls(scene, mortar, multiple, bricks):
     compare(with_payload(scene, multiple), min(bricks, len(scene.bricks)), mortar)
 
 

@@ -34,7 +34,7 @@ def test_every_engine(engine):
 
 def test_stability():
     one, other = (
-        assess_steps(network, METHODS["cantilever"](network, ()), DRY, ["bond", "friction"])
+        assess_steps(network, METHODS["cantilever"](network, ())[::4], DRY, ["bond", "friction"])
         for network in (PLAIN, SHAPED)
     )
     assert [s.verdict for s in one] == [s.verdict for s in other]

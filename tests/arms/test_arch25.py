@@ -8,16 +8,13 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.arms._plan_postures import plan_postures
 from seqopt.engines.registry import make_engine
 from seqopt.responses.table import force_column
 from seqopt.scene.arm import Arm
-from seqopt.study.published import published_plan
 from tests.arms.scenes import NORTH, SOUTH, TOOL
 
 for extra in ("pinocchio", "coal", "compas_fab", "mujoco"):
     pytest.importorskip(extra)
-from tests.arms.witness import Site as Witness  # noqa: E402
 
 pytestmark = [pytest.mark.slow, pytest.mark.long]
 
@@ -41,43 +38,6 @@ def around(third):
 @pytest.fixture(scope="module", params=["beside", "end"])
 def third(request):
     return request.param
-
-
-def contacts(scene, steps, found):
-    """The steps in which MuJoCo sees something touch."""
-    witness = Witness(scene, found.table)
-    names = [robot.name for robot in scene.robots]
-    rows = [dict(zip(names, rows, strict=True)) for rows in found.steps]
-    held = [{name: row for name, row in each.items() if row is not None} for each in rows]
-    pairs = zip(steps, held, strict=True)
-    return [step.number for step, each in pairs if each and witness.touching(each, step.bricks)]
-
-
-def test_the_published_plan_needs_the_third_base_beside_the_first(third):
-    scene, steps = around(third), published_plan(seqopt.load_scene("arch25"))
-    found = plan_postures(scene, steps)
-    lacking = {fault.step for fault in found.unreached}
-    if third == "beside":
-        assert lacking == set()
-        assert contacts(scene, steps, found) == []
-    else:
-        alone = [f.step for f in found.unreached if "has no posture" in f.why]
-        assert 32 <= len(alone) <= 40  # 32 if arms may hit the brick that they grip, else 37
-        free = [step for step in range(1, 91) if step not in lacking]
-        assert not {*free} & {*contacts(scene, steps, found)}
-
-
-def test_the_free_plan_is_as_good_as_without_arms(third):
-    scene = around(third)
-    bare = scene.with_robots(
-        *(seqopt.Robot(name=robot.name, payload=robot.payload) for robot in scene.robots)
-    )
-    plan = seqopt.optimize(scene, "free", aim="minmax,steps")
-    other = seqopt.optimize(bare, "free", aim="minmax,steps")
-    assert plan.objective == pytest.approx(other.objective)
-    assert len(plan.steps) == 48
-    assert plan.arms.best
-    assert contacts(scene, plan.steps, plan.arms.postures) == []
 
 
 @pytest.fixture(scope="module")

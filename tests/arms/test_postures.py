@@ -9,13 +9,12 @@ import pytest
 
 import seqopt
 from seqopt.arms import find_postures
-from seqopt.arms._judge import PostureRules, check_postures
-from seqopt.arms._permits import permits, reach_table
+from seqopt.arms._judge import PostureRules
+from seqopt.arms._permits import permits
 from seqopt.arms._plan_postures import plan_postures
 from seqopt.arms._reached import Site, reached_alone
 from seqopt.arms._tables import _compute_table, _stored_table
 from seqopt.errors import InfeasibleError, SceneError, StepError
-from seqopt.scene._armed import reachable, within_reach
 from seqopt.scene.scene import in_order
 from seqopt.sequence._rule_space import StateRows
 from tests.arms.scenes import beside, two_arms
@@ -140,19 +139,6 @@ def test_search_and_judge_ask_the_table_in_two_ways(tight):
             assert not allowed.all()
 
 
-def test_reach_is_that_of_arms(scene):
-    north, _, crane = scene.robots
-    assert within_reach(scene, crane) == scene.within_reach(crane)
-    far = replace(north, arm=replace(north.arm, position=(0.0, 9.0, 0.0)))
-    away = scene.with_robots(far, *scene.robots[1:])
-    assert not any(within_reach(away, far))
-    assert reachable(away, far, 5) == ()
-    rows = reach_table(scene)
-    assert len(rows) == 2 * 10
-    assert (rows["to_bricks"][rows["postures"] == 0] == 0).all()
-    assert rows["to_bricks"].max() == 5
-
-
 @pytest.mark.parametrize("schedule", ["free", "three-robot"])
 def test_no_step_of_a_plan_has_a_contact(schedule, scene, table, witness):
     plan = seqopt.optimize(scene, schedule)
@@ -186,17 +172,6 @@ def test_the_judge_finds_a_search_that_allows_arms_too_little(scene, monkeypatch
     monkeypatch.setattr(StateRows, "for_arms", never_both)
     with pytest.raises(InfeasibleError, match="claimed by schedule_search, and not proven"):
         seqopt.optimize(scene.with_robots(*scene.robots[:2]), "free", rules="least_grips=1")
-
-
-def test_steps_are_checked_by_themselves(scene):
-    states = [step for step in seqopt.sequential(without(scene)) if len(step.held) == 2]
-    check_postures(scene, states[:1])
-    with pytest.raises(StepError, match=f"step {states[0].number}: arms cannot hold"):
-        check_postures(hostile(scene.with_robots(*scene.robots[:2])), [held_by_two(states[0])])
-
-
-def held_by_two(step):
-    return replace(step, grips=step.grips[:2])
 
 
 def without(scene):

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.spatial import ConvexHull
 
 import seqopt
 from seqopt._cli.main import main
@@ -17,7 +16,7 @@ from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_json
 from seqopt.exchange.exports import export_plan, read_folder
-from seqopt.report._pictures import VIEW, steps_picture
+from seqopt.report._pictures import steps_picture
 from seqopt.report._robots import _known_arms
 from tests.arms.scenes import TOOL, beside, two_arms
 
@@ -114,44 +113,6 @@ def test_an_export_names_steps_that_arms_cannot_be_in(folder, tmp_path, capsys):
     words = ["export", str(tmp_path), "--format", "tasks", "--out", str(tmp_path / "tasks.json")]
     assert main(words) == 0
     assert "arms cannot: " in capsys.readouterr().err
-
-
-def seen(points):
-    return points @ VIEW.axes()[:2].T
-
-
-def outlines(axes):
-    """What is drawn of robots in a picture: outlines of bodies, and lines of sketches."""
-    return [patch.get_path().vertices for patch in axes.patches[1:]]
-
-
-def area(points):
-    """The area inside a line through points, by the shoelace formula."""
-    x, y = points[:, 0], points[:, 1]
-    return 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
-def test_pictures_draw_arms_in_their_postures(plan):
-    engine, steps = plan.engine, plan.steps
-    posed = _known_arms(engine.network.scene, steps)
-    number = next(s.number for s in steps if s.grips[0] is not None)
-    (axes,) = steps_picture(engine, steps, number).axes
-    arm = posed["north"][number - 1]
-    inside = [ConvexHull(seen(points)).volume for points in arm.bodies]
-    drawn = [abs(area(each)) for each in outlines(axes)]
-    assert all(min(abs(each - other) for other in drawn) < 1e-9 for each in inside)
-    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-    for own in (each for every in posed.values() for each in every):
-        points = seen(np.vstack([own.line, *own.bodies]))
-        assert (points > low).all()  # arms are seen whole
-        assert (points < high).all()
-    (bare,) = steps_picture(engine, steps, number, arms={}).axes  # the control: sketches are asked
-    sketched = [abs(area(each)) for each in outlines(bare)]
-    assert not any(min(abs(each - other) for other in sketched) < 1e-9 for each in inside)
-    with_arms, sketches = (
-        steps_picture(engine, steps[:2], 1, **how).get_size_inches() for how in ({}, {"arms": {}})
-    )
-    assert tuple(with_arms) != tuple(sketches)  # there is room for the arms
 
 
 def test_arms_that_are_given_must_be_of_robots(plan):

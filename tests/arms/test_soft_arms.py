@@ -189,7 +189,8 @@ def test_free_schedules_agree_with_brute_force(aim, size):
     assert plan.objective[aim] == pytest.approx(brute_force(scene, aim), rel=1e-8)
 
 
-@pytest.mark.parametrize("aim", [pytest.param("minmax", marks=pytest.mark.slow), "sum"])
+@pytest.mark.slow
+@pytest.mark.parametrize("aim", ["minmax", "sum"])
 def test_the_loop_agrees_with_brute_force(aim):
     scene = soft()
     engine = make_engine("compliance", scene)
@@ -245,30 +246,8 @@ def test_the_judge_finds_grips_that_give_way_in_another_way():
         check_postures(scene, plan.steps)
 
 
-def test_the_judge_finds_an_arm_that_is_not_at_its_node():
-    scene = soft()
-    plan = seqopt.optimize(scene, "free", FORCE)
-    found = scene.held_postures
-    elsewhere = np.where(found.rows >= 0, found.rows[:, -1:], -1)
-    one = [model[-1:].repeat(len(model), axis=0) for model in found.jacobians]
-    wrong = replace(found, rows=elsewhere, jacobians=tuple(one))
-    scene = scene.holding(wrong)
-    with pytest.raises(StepError, match=r"another compliance than its joints|arms cannot hold"):
-        check_postures(scene, plan.steps)
-
-
 def test_a_node_that_an_arm_cannot_hold_is_a_line():
     scene = beside(soft(), 9.0)
     node = scene.placed[0].nodes[1]
     with pytest.raises(GripError, match=f"robot south has no posture at node {node}"):
         make_engine("compliance", scene).solve(1, [scene.grip_numbers((None, node, None))])
-
-
-@pytest.mark.slow
-def test_orders_are_searched_with_arms_that_give_way():
-    scene = soft(4)
-    plans = [seqopt.optimize(scene, "free", FORCE, order=order) for order in (None, "search")]
-    best = [plan.objective["minmax"] for plan in plans]
-    assert best[1] <= best[0] * (1 + 1e-9)
-    again = seqopt.optimize(plans[1].engine.network.scene, "free", FORCE)
-    assert again.objective["minmax"] == pytest.approx(best[1], rel=1e-9)

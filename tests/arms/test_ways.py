@@ -10,11 +10,10 @@ import pytest
 
 import seqopt
 from seqopt.arms._model import ArmModel
-from seqopt.arms._reached import WAY, Site, reached_alone, targets, way
-from seqopt.arms._tables import _stored_table
+from seqopt.arms._reached import WAY, targets, way
 from seqopt.arms.reach import find_postures
 from seqopt.errors import SceneError
-from seqopt.scene.arm import MOST, Arm
+from seqopt.scene.arm import Arm
 from tests.arms.scenes import TOOL, two_arms
 
 for extra in ("pinocchio", "coal", "compas_fab", "mujoco"):
@@ -103,26 +102,6 @@ def test_checked_ways_leave_fewer_postures_and_less_room(scenes, tables):
     plan = seqopt.optimize(scenes[1], "free", aim="minmax", rules="least_grips=1")
     assert plan.arms.best
     assert not plan.arms.postures.unreached
-
-
-@pytest.mark.slow
-def test_two_arms_keep_apart_on_their_ways(scenes):
-    """An arm that holds is in the way of one that comes, more often than of one that holds."""
-    shares = []
-    for scene in scenes:
-        site = Site.of(scene)
-        alone = [reached_alone(site.alone(k), MOST) for k in range(2)]
-        assert len(alone[0].placed.ways) == (WAY if scene is scenes[1] else 0)
-        shares.append(find_postures(scene).collide.mean())
-    assert shares[1] > shares[0] > 0
-
-
-@pytest.mark.slow
-def test_tables_with_ways_have_a_key_of_their_own(scenes, tables, tmp_path):
-    for scene, table in zip(scenes, tables, strict=True):
-        kept = _stored_table(tmp_path, Site.of(scene), lambda table=table: table)
-        assert (kept.joints == table.joints).all()
-    assert len([*tmp_path.iterdir()]) == 2
 
 
 def test_an_approach_is_kept_in_scene_files(scenes, tmp_path):

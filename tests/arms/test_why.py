@@ -86,18 +86,6 @@ def test_bricks_and_bases_that_are_hit_are_named(tmp_path):
         assert fault.why == f"arm at node {node} has no posture ({why})"
 
 
-def test_a_base_of_another_arm_is_named(tmp_path):
-    urdf, at = boxes(tmp_path / "arm.urdf"), (0.3, -0.9, 0.0)
-    assert not reasons(beside_a_wall(urdf, at, **TOP))  # the control
-    pillar = boxes(tmp_path / "pillar.urdf", l0='<box size="0.06 0.06 2.4"/>')
-    scene = beside_a_wall(urdf, at, **TOP)
-    (first,) = scene.robots
-    arm = replace(first.arm, urdf=str(pillar), position=(0.3, -0.2, 0.0))
-    other = replace(first, name="post", arm=arm)
-    found = reasons(scene.with_robots(first, other))
-    assert any("hits the base of post" in why for why in found.values()), found
-
-
 def test_the_command_lists_nodes_by_reason(tmp_path, capsys):
     file = tmp_path / "s.json"
     seqopt.save_scene(beside_a_wall(boxes(tmp_path / "arm.urdf", gripper=True), **TOP), file)

@@ -82,7 +82,7 @@ def test_what_blocks_get_wrong_is_corrected_or_refused():
         system.solve(count, columns, compliance, LAST_CORRECTION)
 
 
-@pytest.mark.parametrize("softer", [1e-3, 1e-8, 1e-15, 0.0])
+@pytest.mark.parametrize("softer", [1e-3, 1e-8, 0.0])
 def test_what_hardly_holds_is_answered_right_or_not_at_all(softer):
     scene, rng = SCENES["chain"](), np.random.default_rng(0)
     for joint in (2, 9):

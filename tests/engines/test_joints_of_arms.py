@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +10,10 @@ import pytest
 import seqopt
 from seqopt.arms import _permits
 from seqopt.engines.interface import Want
-from seqopt.engines.registry import Recipe, engine_for, make_engine
+from seqopt.engines.registry import engine_for, make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError
 from seqopt.network.build import build_network
-from seqopt.responses._tolerance import misfits
 from seqopt.scene._armed import can_hold
 from tests.arms.joints import compliances, with_joints
 from tests.builders import block, six_bricks
@@ -79,7 +77,7 @@ def agree_with_dense(arch, i):
     return max([*out, far(found.grip_moment[0], borne[:, 3:])] if turn else out)
 
 
-@pytest.mark.parametrize("i", range(0, STATES, 40))
+@pytest.mark.parametrize("i", range(0, STATES, 67))
 def test_a_dense_solver_agrees(arch25, i):
     assert agree_with_dense(arch25, i) <= 1e-9
 
@@ -117,21 +115,6 @@ def test_engines_agree(grips, turn):
         assert far(inner(net, found, 6), shifts) <= close
 
 
-def test_joints_that_are_alike_in_all_directions_are_a_stiffness(arch25):
-    """Three slides along the axes: the grip of a robot with that stiffness, to the last digits."""
-    slides = np.zeros((3, len(arch25.brick_of_node), 6, 3))
-    slides[:, :, [0, 1, 2], [0, 1, 2]] = 1.0
-    grips = (3, 20, 33)
-    arms = with_joints(arch25, np.full((3, 3), 1e6), slides)
-    found = make_engine("compliance", arms).solve(20, [arms.grip_numbers(grips)], Want.ALL)
-    soft = make_engine("compliance", arch25.with_grips(1e6)).solve(20, [grips], Want.ALL)
-    for name in ("grip_force", "displacement", "support", "edge_force"):
-        assert far(getattr(found, name), getattr(soft, name)) <= 1e-12
-    both = with_joints(arch25, np.full((3, 3), 2e6), slides, [(2e6, None)])  # one after the other
-    found = make_engine("compliance", both).solve(20, [both.grip_numbers(grips)], Want.ALL)
-    assert far(found.grip_force, soft.grip_force) <= 1e-12
-
-
 @pytest.mark.parametrize("size", [1e3, 1e5])
 def test_one_joint_bears_what_a_lever_on_a_spring_does(size):
     """A hinge whose axis is level, 1.5 m from the node, beside ground that sinks and does not turn.
@@ -163,16 +146,6 @@ def test_a_posture_that_there_is_not_is_a_line(arch25):
     assert can_hold(arch25, 0, node)
 
 
-def test_other_processes_know_how_joints_give_way(arch25):
-    """Postures go along with a scene."""
-    jacobians = drawn_jacobians(np.random.default_rng(1), arch25, 2)
-    scene = with_joints(arch25, np.full((2, 6), 1e6), jacobians)
-    sent = pickle.loads(pickle.dumps(Recipe("compliance", scene)))
-    grips = [scene.grip_numbers((3, 20))]
-    one, two = (make_engine("compliance", each).solve(18, grips) for each in (scene, sent.scene))
-    assert two.grip_force == pytest.approx(one.grip_force, rel=1e-12)
-
-
 def test_scenarios_hold_in_the_same_postures(arch25):
     """In which joints may have other stiffnesses; a scene with arms elsewhere has its own."""
     jacobians = drawn_jacobians(np.random.default_rng(1), arch25, 2)
@@ -191,12 +164,3 @@ def test_scenarios_hold_in_the_same_postures(arch25):
     assert _permits.hold_alike(scene, other) is other
     assert "held_postures" not in vars(other)
     assert "held_postures" not in vars(drawn)  # by itself it has postures of its own
-
-
-def test_two_that_give_way_may_hold_one_brick_and_be_off(arch25):
-    jacobians = drawn_jacobians(np.random.default_rng(1), arch25, 2)
-    scene = with_joints(arch25, np.full((2, 6), 1e6), jacobians)
-    pair = np.array([scene.grip_numbers((22, 23))])
-    assert 0 < misfits(make_engine("compliance", scene), 18, pair)[0] < 1e6
-    rigid = make_engine("compliance", arch25)
-    assert misfits(rigid, 18, np.array([[22, 23]]))[0] > 1e12

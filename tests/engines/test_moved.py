@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,6 @@ from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.registry import ENGINES
-from seqopt.engines.rigid._mixed import solve_mixed
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError
 from seqopt.network.build import build_network
 from tests.builders import six_bricks
@@ -90,19 +86,6 @@ def test_a_brick_is_not_stretched(engine25):
     assert apart(engine25.solve(18, grips, Want.ALL, moved), other) > 1e-3
     edge = np.flatnonzero((net.edge_spring < 0) & (net.edge_brick == 11))
     assert not one.edge_force[0, edge].any()
-
-
-@pytest.mark.parametrize("kind", ["whole", "island"])
-def test_what_is_corrected_moves_too(arch25, kind):
-    """Also grips close together far out, of which the operator alone knows too little."""
-    joints = arch25.joints[:11] + arch25.joints[12:]
-    scenes = {"whole": arch25, "island": replace(arch25, joints=joints)}
-    net = build_network(scenes[kind])
-    sets = [(36, 37, 39), (34, 36, 39), (25, 31, 38), (26, 27, 37)]
-    moved, columns = drawn(sets, 4e-4), grip_columns(net, 20, sets)
-    exact = solve_mixed(net, 20, columns, read_compliance(net, columns, sets, moved))
-    assert apart(ComplianceEngine(net).solve(20, sets, Want.ALL, moved), exact) <= 1e-9
-    assert apart(ComplianceEngine(net).solve(20, sets, Want.ALL), exact) > 1e-3
 
 
 def test_a_hand_that_takes_all_force_away(engine25):

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid import compliance as trial
-from seqopt.engines.rigid._grip_equations import _solve_positive
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -33,7 +31,7 @@ def error(net, fields, row, grips):
 
 
 @pytest.mark.parametrize("only_turning", [True, False])
-@pytest.mark.parametrize("factor", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
+@pytest.mark.parametrize("factor", [1e-3, 1e-9, 1e-15])
 def test_grips_beyond_a_loose_joint(factor, only_turning):
     """The force method alone loses every digit here and says nothing: the second assertion."""
     net = build_network(loosened(chain(25), factor, only_turning=only_turning))
@@ -49,66 +47,6 @@ def test_grips_beyond_a_loose_joint(factor, only_turning):
         assert not trusted[:2].any() or factor >= 1e3 * np.finfo(float).eps / accuracy
         for row in np.flatnonzero(trusted):
             assert error(net, fields, row, sets[row]) <= accuracy
-
-
-@pytest.mark.parametrize("count", [1, 2, 6, 9])
-def test_many_small_systems(count):
-    rng = np.random.default_rng(count)
-    root = rng.standard_normal((7, count, count))
-    matrix, load = root @ root.transpose(0, 2, 1), rng.standard_normal((7, count))
-    system = np.concatenate([np.tril(matrix), load[:, None]], axis=1).transpose(1, 2, 0).copy()
-    answer, pivot = _solve_positive(system)
-    expected = np.linalg.solve(matrix, load[..., None])[..., 0]
-    diagonals = np.linalg.cholesky(matrix).diagonal(axis1=1, axis2=2) ** 2
-    scaled = diagonals / matrix.diagonal(axis1=1, axis2=2)
-    rounding = count * np.finfo(float).eps * np.linalg.cond(matrix)  # of both routes, at most
-
-    def is_near(answer):
-        off = np.abs(answer.T - expected).max(axis=1)
-        return (off <= rounding * np.abs(expected).max(axis=1)).all()
-
-    assert is_near(answer)
-    assert (np.abs(pivot.T / scaled - 1).max(axis=1) <= rounding).all()
-    assert not is_near(answer * (1 + 1e-6))  # the control
-
-
-@pytest.mark.parametrize("last", [-1.0, 0.0, 0.5, 1.0, 1.0 + 1e-9])
-def test_a_system_that_is_not_positive_is_seen(last):
-    """Beside a sound one, whose answer stays."""
-    system = np.empty((4, 3, 2))
-    system[:3, :, 0] = [[2, 0, 0], [1, 1, 0], [1, 1, last]]  # positive definite beyond 1
-    system[:3, :, 1] = 2 * np.eye(3)
-    system[3] = 1.0
-    answer, pivot = _solve_positive(system)
-    assert not pivot[:, 0].min() >= 1e-8  # also where it is no number
-    assert np.abs(pivot[:, 1] - 1).max() <= 1e-15
-    assert np.abs(answer[:, 1] - 0.5).max() <= 1e-15
-
-
-def test_a_batch_of_many_passes(monkeypatch):
-    net = build_network(chain(8))
-    sets = [(1, 9, 14), (14, 15, 3), (4, 5, 2), (12, 10, 7), (8, 9, 15)]
-    whole = ComplianceEngine(net).solve(8, sets, Want.ALL)
-    monkeypatch.setattr(trial, "_CHUNK", 2)
-    parts = ComplianceEngine(net).solve(8, sets, Want.ALL)
-    for name in ("edge_force", "displacement", "grip_force", "support"):
-        gap = np.abs(getattr(parts, name) - getattr(whole, name)).max()
-        assert gap <= 1e-12 * np.abs(getattr(whole, name)).max()
-
-
-def test_what_is_solved_again_fits_what_was_asked():
-    net = build_network(loosened(chain(25), 1e-9, only_turning=True))
-    engine = ComplianceEngine(net)
-    whole = engine.solve(25, [HELD, (3, 8, 10), (48, 49, 30)], Want.ALL)
-    part = engine.solve(25, [HELD, (3, 8, 10), (48, 49, 30)], Want.SUPPORT)
-    for name in ("support", "grip_force"):
-        size = np.abs(getattr(whole, name)).max()
-        assert np.abs(getattr(part, name) - getattr(whole, name)).max() <= 1e-12 * size
-    assert part.edge_force.shape == (3, 0)
-    held = whole.displacement[2, [net.index_of_node[n] for n in (48, 49, 30)]]
-    assert np.abs(held).max() < 1e-12 * np.abs(whole.displacement[2]).max()
-    inner = np.flatnonzero((net.edge_brick == 24) & (net.edge_spring < 0))
-    assert whole.edge_force[2, inner] == 0  # nothing between two grips on one brick
 
 
 def test_grips_close_together_on_a_long_chain():

@@ -94,7 +94,7 @@ def agree_with_dense(arch, i):
     return max([*out, far(found.grip_moment[0], borne[:, 3:])] if hands[:, 3:].any() else out)
 
 
-@pytest.mark.parametrize("i", range(0, STATES, 20))
+@pytest.mark.parametrize("i", range(0, STATES, 40))
 def test_a_dense_solver_agrees(arch25, i):
     assert agree_with_dense(arch25, i) <= 1e-9
 
@@ -265,18 +265,3 @@ def test_numbers_of_grips_that_there_are_not(arch25):
 def test_wrong_stiffness_is_a_line(given, named):
     with pytest.raises(SceneError, match=named):
         seqopt.Robot(name="a", payload=1.0, **given)
-
-
-def test_diagnosis_sees_grips_that_do_not_give(arch25):
-    """Negative control: the rigid answer does not solve the soft problem."""
-    rigid = make_engine("compliance", arch25)
-
-    class Stiff:
-        network = build_network(arch25.with_grips(1e6))
-
-        def solve(self, bricks, grips, want=Want.RESPONSES, moved=None):
-            return rigid.solve(bricks, grips, want, moved)
-
-    assert diagnose(Stiff(), 18, [3, 20, 33]).residuals.grips > 1e-3
-    own = make_engine("compliance", Stiff.network)
-    assert diagnose(own, 18, [3, 20, 33]).finding is Finding.SOLVED_WELL

@@ -33,7 +33,7 @@ def best(scene, rules, aim="minmax", scales=SCALES):
         return np.full(aim.count(",") + 1, np.inf)
 
 
-few = settings(max_examples=4, deadline=None)
+few = settings(max_examples=3, deadline=None)
 builds = free_builds(most_bricks=4, most_robots=3)
 
 

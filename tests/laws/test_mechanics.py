@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt.engines.frame import FrameEngine
@@ -196,7 +196,6 @@ def test_renumbering_changes_nothing(state, seed):
 @pytest.mark.parametrize(
     ("what", "factor"), [("length", 1e3), ("density", 1e-3), ("stiffness", 1e3)]
 )
-@settings(max_examples=12)
 @given(state=states(any_scene))
 def test_scaling(what, factor, state):
     """Forces follow the weight, moments weight times length, motions weight over stiffness."""

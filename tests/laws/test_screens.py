@@ -93,7 +93,7 @@ def test_a_law_that_is_broken_is_seen():
 
 @pytest.mark.parametrize("tilt", [0.1])
 def test_less_tilt_never_hurts(arch25, tilt):
-    network, sets = build_network(arch25), np.array([[a, 24] for a in range(2, 24)])
+    network, sets = build_network(arch25), np.array([[a, 24] for a in range(2, 24, 3)])
     sets = np.vstack([sets, sets - [0, 1]])
     upright, tilted = (Screen(network, DRY, x).stands(12, sets) for x in (0.0, tilt))
     assert (tilted == STANDS).any()

@@ -7,146 +7,163 @@ without stiffness, joints at nodes, odd names and payloads). Each case runs as t
 it, in a folder of its own. Its end is a fault if there is
 
 - a traceback, a warning that is no line of the program's own, or a status that is not documented;
-- no end within 60 s;
 - an error without its line, or with files left; a file left over, a changed input, a part of a
   folder of results;
 - a table or an archive with a response that is not finite, or a robot that grips and has no force.
 
-Then programs are ended from outside at 50 random moments (SIGKILL, SIGTERM and SIGINT in turn),
-half while they optimize, half while they do nothing but write. They must leave nothing or whole
-folders. After SIGKILL, which no program can answer, a hidden folder may be left beside them.
-
-Files of every kind that is read are damaged too, and read without a command: each ends in a line
-of its own, or is read.
+A case that takes 60 s ends the run, with what it was at. Files of every kind that is read are
+damaged too, and read without a command: each ends in a line of its own, or is read.
 
 Optimizing is not drawn with discrete elements, which take minutes for hundreds of grip sets.
 
-Inputs: five small scenes. Command: ``python -m tests.quality.fuzz [--cases N] [--files N]
-[--kills N]``; the exit status is 1 if there is a fault.
+Inputs: five small scenes. Command: ``python -m tests.quality.fuzz [--cases N] [--files N]``; the
+exit status is 1 if there is a fault.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import faulthandler
+import io
 import json
-import signal
-import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Sequence
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from tests.builders import ROOT
-from tests.quality.fuzz_cases import COMMANDS
+from seqopt._cli.answer import Status
+from seqopt._cli.main import main as run_command
+from seqopt.responses.quantities import RESPONSES, robot_response
+from tests.quality.fuzz_cases import Case, Mutator, write_case
 from tests.quality.fuzz_files import read_damaged, right_files
-from tests.quality.fuzz_judge import judged
 
-SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-OPTIMIZE = (
-    "plan.csv",
-    "selection.csv",
-    "trace.csv",
-    "summary.json",
-    "scene.json",
-    "report.html",
-    "tasks.csv",
-    "tasks.json",
+CASES, FILES = 20_000, 1000
+LONGEST = 60.0  # s; a case that takes longer hangs
+ENDS = {status.value for status in Status} - {Status.INTERRUPTED.value}
+STARTS = (  # of lines on standard error
+    *("seqopt", "engine: ", "enough: ", "left out: ", "grips: ", "proof: ", "robots: ", "rules: "),
+    *("payload: ", "payload exceeded: ", "not done, ", "kept: ", "stability: not proven; "),
+    *("stresses in joints are not checked: ", "outside the linear range: "),
+    "Do not rely on numbers outside the linear range. ",
 )
-BARE = ("plan.csv", "summary.json", "scene.json", "trace.csv")  # of one that is ended at the end
-BLOCKS = tuple(f"block{i}" for i in range(24))
-WRITER = """
-import signal
-from pathlib import Path
-from seqopt._files import write_folder
-signal.signal(signal.SIGTERM, signal.default_int_handler)  # as the command line takes it
-for name in range(1000):
-    write_folder(Path("{out}", str(name)), {{f"block{{i}}": "x" * 500_000 for i in range(24)}})
-"""
+ARCHIVE, IMAGE = b"PK", b"\x89PNG"  # how files of fields and of pictures begin
+SET = {"plan.csv", "selection.csv", "summary.json"}
 
 
-def optimizing(folder: Path) -> list[str]:
-    """Return a program that optimizes arch25 into ``out/0``."""
-    words = ["optimize", "--formulation", "overlap_dp", "--out", str(folder / "0")]
-    return [sys.executable, "-m", "seqopt", *words]
+def judge(case: Case) -> tuple[int, str]:
+    """Run a case in a folder of its own; return its status and what is wrong with its end."""
+    out, err = io.StringIO(), io.StringIO()
+    with tempfile.TemporaryDirectory() as name, contextlib.chdir(name), warnings.catch_warnings():
+        warnings.simplefilter("error")  # but what the command line turns into lines
+        write_case(case, folder := Path(name))
+        faulthandler.dump_traceback_later(LONGEST, exit=True, file=sys.__stderr__)
+        try:
+            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+                status = int(run_command(list(case.words)))
+        except Exception:  # a traceback is what this looks for
+            last = traceback.format_exc().strip().splitlines()
+            own = [line.strip() for line in last if "/seqopt/" in line or "/formulations/" in line]
+            return -1, f"traceback: {last[-1][:200]} {own[-1:]}"
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+        said = out.getvalue(), err.getvalue()
+        return status, next(_faults(case, folder, status, said), "")
 
 
-def writing(folder: Path) -> list[str]:
-    """Return a program that does nothing but write folders, ``out/0`` and so on."""
-    return [sys.executable, "-c", WRITER.format(out=folder)]
+def _faults(case: Case, folder: Path, status: int, said: tuple[str, str]) -> Iterator[str]:
+    """Yield what is wrong with the end of a case."""
+    lines = said[1].splitlines()
+    if status not in ENDS:
+        yield f"status {status}"
+    if status >= Status.BAD_INPUT and not (lines and lines[-1].startswith("seqopt")):
+        yield f"status {status} without a reason: {said[1][:200]!r}"
+    if any(not line.startswith(STARTS) for line in lines):
+        yield f"more than lines of its own on standard error: {said[1][:300]!r}"
+    if "\x1b" in said[0] + said[1]:
+        yield "a sign that steers a terminal"
+    if (folder / "scene.json").read_bytes() != case.scene and not _is_output(case.words):
+        yield "the input was changed"
+    yield from _faults_of_files(case, folder, status)
+    if status < Status.BAD_INPUT and (fault := _fault_of_table(said[0])):
+        yield fault
+    if status < Status.BAD_INPUT and case.words[0] == "compare" and " inf" in said[0]:
+        yield "compare prints inf"
 
 
-def killed(program: str, number: int) -> dict[str, object]:
-    """End a program at a random moment; return what it left."""
-    rng = np.random.default_rng(number)
-    make, names, longest = {
-        "optimize": (optimizing, OPTIMIZE, 3.0),
-        "write": (writing, BLOCKS, 2.0),
-    }[program]
-    how = SIGNALS[number % len(SIGNALS)]
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell, and it
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # would be so in what is started
-    with tempfile.TemporaryDirectory() as name:
-        out = Path(name) / "out"
-        process = subprocess.Popen(
-            make(out), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-        )
-        moment = rng.uniform(0.0, longest)
-        time.sleep(moment)
-        process.send_signal(how)
-        said = process.communicate(timeout=60)[1]
-        left = _left(out, names)
-    if how == signal.SIGINT and program == "optimize" and moment > 0.3 and "Traceback" in said:
-        left = "traceback"
-    return {"program": program, "signal": how.name, "moment": moment, "left": left}
+def _is_output(words: tuple[str, ...]) -> bool:
+    """Return whether the scene's file is named as an output alone."""
+    before = [first for first, second in pairwise(words) if second == "scene.json"]
+    return bool(before) and all(word in ("--out", "--export", "--fields") for word in before)
 
 
-def _left(out: Path, names: Sequence[str]) -> str:
-    """Return whether all folders under their names are whole, and whether anything else is left."""
-    if not out.exists():
-        return "nothing"
-    folders = [path for path in out.iterdir() if not path.name.startswith(".")]
-    least = BARE if names == OPTIMIZE else names
-    for folder in folders:
-        if not {*least} <= {path.name for path in folder.iterdir()} <= {*names}:
-            return "a part"
-        if "summary.json" in names:
-            json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        elif {path.stat().st_size for path in folder.iterdir()} != {500_000}:
-            return "a part"
-    hidden = len(list(out.iterdir())) > len(folders)
-    return ("whole" if folders else "nothing") + (", and a hidden folder" if hidden else "")
+def _faults_of_files(case: Case, folder: Path, status: int) -> Iterator[str]:
+    left = {path.relative_to(folder) for path in folder.rglob("*") if path.is_file()}
+    new = left - {Path("scene.json"), Path("plan.csv")}
+    if any(path.name.startswith(".") for path in left):
+        yield f"left over: {sorted(map(str, left))}"
+    rows = status == Status.NO_ANSWER and case.words[0] == "analyze"  # of steps that are answered
+    if new and status in (Status.BAD_INPUT, Status.NO_ANSWER) and not rows:
+        yield f"status {status}, and written: {sorted(map(str, new))}"
+    for path in new:
+        names = {other.name for other in (folder / path).parent.iterdir()}
+        if path.name in SET and not names >= SET and path.parent != Path():
+            yield f"a part of a folder: {sorted(names)}"
+        if fault := _fault_of_content(folder / path):
+            yield f"{path}: {fault}"
 
 
-CASES, KILLS, FILES = 20_000, 50, 1000
-GOOD = {"nothing", "whole"}
-KILLED = {f"{left}, and a hidden folder" for left in GOOD}  # by what no program can answer
+def _fault_of_content(path: Path) -> str:
+    """Return what is not finite in a file, told by its content: names are drawn at random too."""
+    content = path.read_bytes()
+    if content.startswith(ARCHIVE):
+        with np.load(io.BytesIO(content)) as fields:
+            floats = [fields[n] for n in fields.files if fields[n].dtype.kind == "f"]
+        return "" if all(np.isfinite(a).all() for a in floats) else "a field is not finite"
+    if content.startswith(IMAGE):
+        return ""
+    text = content.decode()
+    if text.startswith("{"):
+        numbers = [v for v in json.loads(text).values() if isinstance(v, float)]
+        return "" if np.isfinite(numbers).all() else "a number is not finite"
+    return _fault_of_table(text)
 
 
-def summary(table: pd.DataFrame) -> pd.DataFrame:
-    """Return how many cases of a kind and command ended with a status, and with a fault."""
-    known = table["command"].where(table["command"].isin(COMMANDS), "other")
-    groups = table.assign(command=known, fault=table["fault"] != "").groupby(
-        ["kind", "command", "status"]
-    )
-    found = groups.agg(
-        cases=("number", "size"), faults=("fault", "sum"), longest_s=("seconds", "max")
-    )
-    return found.reset_index().round({"longest_s": 1})
+def _fault_of_table(text: str) -> str:
+    """Return what is not finite in a table of steps."""
+    if not text.startswith("step,type") or text.startswith("step,type,action"):  # tasks
+        return ""
+    table = pd.read_csv(io.StringIO(text))
+    if "verdict" in table:
+        tilts = table["tilt_survived_deg"]  # one is finite where one is asked for
+        proven = (table["verdict"] == "stands") & (table["unproven"] == 0) & tilts.notna().any()
+        return "" if np.isfinite(tilts[proven]).all() else "a tilt"
+    columns = [r.column for r in RESPONSES.values()]
+    if "finding" in table:  # steps without an answer have none
+        table = table[table["finding"].isna()]
+    if not len(table) or columns[0] not in table:  # steps alone, where time was over
+        return ""
+    if not np.isfinite(table[columns].to_numpy(float)).all():
+        return "a response is not finite"
+    for node in (column for column in table if column.endswith("_node")):
+        force = f"{robot_response(node.removesuffix('_node'))}_N"
+        if not (table[node].notna() == np.isfinite(table[force].astype(float))).all():
+            return f"{force}: a robot that grips has no force"
+    return ""
 
 
-def is_clean(row: dict[str, object]) -> bool:
-    """Return whether what a killed program left is nothing or whole."""
-    left = row["left"]
-    return left in GOOD or (row["signal"] == "SIGKILL" and left in KILLED)
-
-
-def holds(table: pd.DataFrame, kills: pd.DataFrame) -> bool:
-    """Return whether no case had a fault, and no killed program left a part of a folder."""
-    return not table["faults"].any() and all(is_clean(row) for row in kills.to_dict("records"))
+def run(first: int, last: int) -> Iterator[tuple[Case, int, str]]:
+    """Yield the cases of some numbers, their status and what is wrong with their end."""
+    mutator = Mutator()
+    for number in range(first, last):
+        yield (case := mutator.case(number), *judge(case))
 
 
 def _damaged(count: int) -> list[str]:
@@ -160,25 +177,19 @@ def _damaged(count: int) -> list[str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--cases", type=int, default=CASES, help="how many cases")
-    parser.add_argument("--kills", type=int, default=KILLS, help="how many programs are ended")
     parser.add_argument("--files", type=int, default=FILES, help="how many damaged ones of a kind")
     options = parser.parse_args(arguments)
-    table = pd.DataFrame(list(judged(0, options.cases)))
-    counts = summary(table)
-    kills = pd.DataFrame(
-        killed("optimize" if number % 2 else "write", number) for number in range(options.kills)
-    )
-    print(counts.to_string(index=False))
-    if len(kills):
-        ends = kills.groupby(["program", "signal", "left"]).size()
-        print(f"\n{ends.rename('kills').reset_index().to_string(index=False)}\n")
-    for row in table[table["fault"] != ""].itertuples():
-        print(f"fault in case {row.number}: {row.fault}")
-    wrong = _damaged(options.files)
+    counts: Counter[tuple[str, int]] = Counter()
+    wrong = []
+    for number, (case, status, fault) in enumerate(run(0, options.cases)):
+        counts[case.kind, status] += 1
+        wrong += [f"case {number}: {fault}"] if fault else []
+    for (kind, status), count in sorted(counts.items()):
+        print(f"{kind:8} status {status}: {count}")
+    wrong += _damaged(options.files)
     print("".join(f"fault: {each}\n" for each in wrong), end="")
-    clean = holds(counts, kills) and not wrong
-    print(f"{'no' if clean else 'a'} fault: {len(table)} cases, {len(kills)} kills")
-    return int(not clean)
+    print(f"{'a' if wrong else 'no'} fault: {options.cases} cases")
+    return int(bool(wrong))
 
 
 if __name__ == "__main__":

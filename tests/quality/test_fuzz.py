@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import io
+import subprocess
+import sys
 import tracemalloc
 import zipfile
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
 import pytest
 
 from seqopt.errors import SeqoptError
-from tests.quality import fuzz_judge
-from tests.quality.fuzz import BLOCKS, _left, holds, is_clean, killed, main, summary
+from tests.builders import ROOT
+from tests.quality import fuzz
+from tests.quality.fuzz import judge, main, run
 from tests.quality.fuzz_cases import Mutator
 from tests.quality.fuzz_files import read_damaged, right_files
-from tests.quality.fuzz_judge import judge, judged, run
 
 CASES = 120
 
@@ -28,26 +28,25 @@ def mutator():
 
 
 @pytest.mark.slow
-def test_a_small_run_of_the_command_finds_no_fault(capsys):
-    assert main(["--cases", "5", "--kills", "2", "--files", "2"]) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == "no fault: 5 cases, 2 kills"
+def test_a_small_run_of_the_command_finds_no_fault(capsys, monkeypatch):
+    assert main(["--cases", "5", "--files", "2"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "no fault: 5 cases"
+    monkeypatch.setattr(fuzz, "judge", lambda _: (2, "any"))  # the control
+    assert main(["--cases", "1", "--files", "0"]) == 1
+    assert "fault: case 0: any" in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_changed_input_leaves_no_fault_and_one_that_would_is_told():
+def test_changed_input_leaves_no_fault():
     rows = list(run(0, CASES))
-    assert [row for row in rows if row["fault"]] == []
-    cases, kills = pd.DataFrame(rows), pd.DataFrame({"left": ["whole"], "signal": ["SIGKILL"]})
-    assert holds(summary(cases), kills)
-    assert not holds(summary(cases.assign(fault=["any", *[""] * (CASES - 1)])), kills)
-    assert not holds(summary(cases), kills.assign(left="a part"))
-    assert {row["kind"] for row in rows} == {"scene", "plan", "words", "nothing"}
-    assert {row["status"] for row in rows} >= {0, 2, 3}
+    assert [fault for _, _, fault in rows if fault] == []
+    assert {case.kind for case, _, _ in rows} == {"scene", "plan", "words", "nothing"}
+    assert {status for _, status, _ in rows} >= {0, 2, 3}
 
 
-@pytest.mark.parametrize("number", [5793, 17131])  # bricks of 1e9 m: no answer was finite
+@pytest.mark.parametrize("number", [17131])  # bricks of 1e9 m: no answer was finite
 def test_cases_that_were_faults_are_none_now(mutator, number):
-    assert judge(mutator.case(number)).fault == ""
+    assert judge(mutator.case(number))[1] == ""
 
 
 def case_of(mutator, *words):
@@ -60,8 +59,8 @@ def test_a_traceback_is_seen(mutator, monkeypatch):
     def fails(_):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(fuzz_judge, "main", fails)
-    assert judge(case_of(mutator, "scene")).fault.startswith("traceback: ZeroDivisionError")
+    monkeypatch.setattr(fuzz, "run_command", fails)
+    assert judge(case_of(mutator, "scene"))[1].startswith("traceback: ZeroDivisionError")
 
 
 @pytest.mark.parametrize(
@@ -75,50 +74,30 @@ def test_a_traceback_is_seen(mutator, monkeypatch):
     ],
 )
 def test_an_end_that_is_wrong_is_seen(mutator, monkeypatch, does, seen):
-    monkeypatch.setattr(fuzz_judge, "main", lambda _: does())
-    assert seen in judge(case_of(mutator, "scene")).fault
+    monkeypatch.setattr(fuzz, "run_command", lambda _: does())
+    assert seen in judge(case_of(mutator, "scene"))[1]
 
 
 @pytest.mark.parametrize("lost", ["T_max", "F_rob1_N"])
 def test_a_result_that_is_not_finite_is_seen(mutator, monkeypatch, lost):
     case = case_of(mutator, "analyze", "scene.json", "--method", "sequential")
-    assert judge(case).fault == ""
+    assert judge(case)[1] == ""
     text = "step,type,bricks,rob1_brick,rob1_node,F_rob1_N,F_sup_N,M_sup_Nm,F_min_N,F_max_N,F_avg_N"
     text += ",T_pct,D_max_1e-3mm,D_avg_1e-3mm,D_std_1e-3mm\n1,place,1,1,1,{},1,1,1,{},1,1,1,1,1\n"
     cells = ("", 1) if lost == "F_rob1_N" else (1, "inf")
-    monkeypatch.setattr(fuzz_judge, "main", lambda _: print(text.format(*cells), end="") or 0)
+    monkeypatch.setattr(fuzz, "run_command", lambda _: print(text.format(*cells), end="") or 0)
     said = "a robot that grips has no force" if lost == "F_rob1_N" else "response is not finite"
-    assert said in judge(case).fault
-
-
-def test_a_hang_is_seen():
-    """Nothing is as fast as a millisecond."""
-    (row,) = judged(0, 1, longest=1e-3)
-    assert row["fault"] == "hangs: more than 0.001 s"
-
-
-def test_a_part_of_a_folder_is_seen(tmp_path):
-    assert _left(tmp_path / "none", BLOCKS) == "nothing"
-    (tmp_path / "0").mkdir()
-    for name in BLOCKS[1:]:
-        (tmp_path / "0" / name).write_bytes(np.zeros(500_000, np.uint8).tobytes())
-    assert _left(tmp_path, BLOCKS) == "a part"
-    (tmp_path / "0" / BLOCKS[0]).write_bytes(b"")
-    assert _left(tmp_path, BLOCKS) == "a part"
-    (tmp_path / "0" / BLOCKS[0]).write_bytes(bytes(500_000))
-    assert _left(tmp_path, BLOCKS) == "whole"
-    (tmp_path / ".hidden").mkdir()
-    assert _left(tmp_path, BLOCKS) == "whole, and a hidden folder"
-    assert not is_clean({"left": "a part", "signal": "SIGKILL"})
-    assert not is_clean({"left": "whole, and a hidden folder", "signal": "SIGTERM"})
+    assert said in judge(case)[1]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "number", [0, 1, 2, *(pytest.param(number, marks=pytest.mark.long) for number in (3, 4, 5))]
-)
-def test_a_program_that_is_killed_leaves_nothing_or_a_whole(number):
-    assert is_clean(killed("optimize" if number % 2 else "write", number))
+def test_a_hang_ends_the_run():
+    """Nothing is as fast as a millisecond."""
+    code = "from tests.quality import fuzz; fuzz.LONGEST = 1e-3; print([*fuzz.run(0, 1)])"
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "Timeout (0:00:00.001" in done.stderr
 
 
 KINDS = (
@@ -137,7 +116,7 @@ def test_files_of_every_kind_are_right_before_they_are_damaged(tmp_path):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_damaged_file_is_read_or_one_line_says_why_not(tmp_path, kind):
-    assert [f for n in range(60) if (f := read_damaged(kind, n, tmp_path))] == []
+    assert [f for n in range(20) if (f := read_damaged(kind, n, tmp_path))] == []
 
 
 def test_a_reader_that_fails_otherwise_is_seen(tmp_path, monkeypatch):
@@ -170,11 +149,7 @@ MOST = 80e6  # bytes; a file may take 64 MB before anything is unpacked
 
 @pytest.mark.parametrize(
     ("kind", "name", "size", "announced"),
-    [
-        ("instance", "amount_0.npy", MANY, None),
-        ("instance", "amount_0.npy", SOME, 900),
-        ("instance", "more.npy", SOME, None),
-    ],
+    [("instance", "amount_0.npy", MANY, None), ("instance", "more.npy", SOME, None)],
 )
 def test_no_more_is_unpacked_than_may_be(tmp_path, kind, name, size, announced):
     file, right, read = right_files()[kind]

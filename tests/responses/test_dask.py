@@ -13,7 +13,6 @@ from seqopt.engines.registry import make_engine
 from seqopt.responses import _blocks as batches
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import HERE, Resources
-from seqopt.workflow import Search, optimize
 
 distributed = pytest.importorskip("distributed", reason="extra dask")
 
@@ -43,15 +42,6 @@ def evaluated(schedule, resources):
 @pytest.fixture(scope="module")
 def expected(loop25):
     return evaluated(loop25, HERE)
-
-
-def test_results_are_the_same_on_a_cluster(client, loop25, expected):
-    assert evaluated(loop25, Resources(executor=client.get_executor())) == expected
-
-
-def test_a_whole_optimization_runs_on_a_cluster(client):
-    plan = optimize("arch25", search=Search(executor=client.get_executor()))
-    assert plan.nodes == optimize("arch25").nodes
 
 
 def test_a_machine_that_is_lost_takes_nothing_with_it(client, loop25, expected, monkeypatch):

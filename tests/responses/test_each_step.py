@@ -11,7 +11,6 @@ import seqopt
 from seqopt.engines.interface import FLAGS, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError
-from seqopt.responses._grip_sets import most_moved
 from seqopt.responses.table import _analyze_builds, _each_fields, analyze, step_fields
 from seqopt.sequence.steps import Step, StepKind
 
@@ -71,23 +70,3 @@ def test_an_error_names_the_step_whose_it_is(engine, builds):
     loose = Step(7, StepKind.RELEASE, 3, (None,) * len(scene.robots))
     with pytest.raises(MechanismError, match=r"^step 7: "):
         [*_each_fields(hinged, [held, loose])]
-
-
-class Idle:
-    """An engine that must not be asked."""
-
-    def __init__(self, network):
-        self.network = network
-
-    def solve(self, *_, **__):
-        raise AssertionError("solved again")
-
-
-def test_how_far_known_steps_move_is_not_computed_again(engine, builds):
-    steps = builds[0]
-    fields = {step.number: step_fields(engine, step, Want.ALL) for step in steps}
-    found = most_moved(Idle(engine.network), steps, fields)
-    share, step = most_moved(engine, steps, {})
-    assert (found.share, found.step) == (pytest.approx(share, rel=1e-5), step)
-    with pytest.raises(AssertionError, match="solved again"):  # the control
-        most_moved(Idle(engine.network), steps, {step: fields[step]})

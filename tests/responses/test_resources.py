@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import pickle
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +18,6 @@ from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.responses import _blocks as batches
-from seqopt.responses import _grip_sets as division
 from seqopt.responses._blocks import Block, answer, packed
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import Resources
@@ -55,39 +52,6 @@ def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, w
     assert found.steps == expected.steps
     assert found.models == expected.models == 8642
     assert getattr(shared, "tally", None) == getattr(alone, "tally", None)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("portions", [1, 1000])
-def test_results_are_the_same_however_work_is_shared(small_blocks, loop25, portions, monkeypatch):
-    monkeypatch.setattr(division, "_CHUNKS", portions)
-    expected = evaluation(make_engine("auto", loop25.scene), loop25).steps
-    with ThreadPoolExecutor(3) as executor:
-        for workers in (1, 5):
-            engine = make_engine("auto", loop25.scene)
-            found = evaluation(engine, loop25, executor=executor, workers=workers)
-            assert found.steps == expected
-
-
-@pytest.mark.parametrize("portions", [3, 32])
-def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, monkeypatch):
-    """Blocks of one brick count go to one worker unless they are several portions' work."""
-    monkeypatch.setattr(batches, "BLOCK", 5)
-    single = replace(loop25, steps=tuple(s for s in loop25.steps if len(s.moves) == 1))
-    levels = batches.steps_of_batches(single)
-    groups = [batches.batch_of(single, steps, everything) for level in levels for steps in level]
-    every = [block for group in groups for block in group.blocks()]
-    total = sum(block.work for block in every)
-    shared = [*division._split_work(every, total / (2 * portions))]
-    assert [block for portion in shared for block in portion] == every
-    assert portions / 2 < len(shared) <= 2 * portions
-    if portions == 3:
-        counts = [{block.bricks for block in portion} for portion in shared]
-        assert all(a.isdisjoint(b) for a, b in itertools.pairwise(counts))
-    most = division._SEVERAL * total / (2 * portions) + max(block.work for block in every)
-    assert all(sum(block.work for block in portion) <= most for portion in shared)
-    alone = [*division._split_work(every, None)]
-    assert [len(portion) for portion in alone] == [1] * len(every)
 
 
 BUILT = arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, 7).tolist(), pattern="V"))  # in a plane

@@ -16,7 +16,6 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
-from seqopt.report.comparison import compare
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze
@@ -80,13 +79,6 @@ def test_a_name_changes_no_choice(name, criterion):
             np.testing.assert_array_equal(first.responses[response], second.responses[response])
     other = solve(odd, "overlap_dp")
     assert chosen.selection == other.selection
-
-
-def test_a_name_hides_no_overload():
-    name = "a,b"
-    scene = called("one", name, "three")
-    notes = compare(ComplianceEngine(build_network(scene)), EQUATIONS).notes
-    assert any(f"sequential: {name} holds up to" in note for note in notes)
 
 
 @settings(max_examples=10)

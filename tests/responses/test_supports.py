@@ -13,7 +13,6 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import WeightedSum
-from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import RESPONSES, responses_of, support_forces, support_moments
 from seqopt.responses.table import analyze, support_columns
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule
@@ -66,18 +65,6 @@ def test_criteria_see_the_largest(arch, bricks):
     problem = pose_decisions(arch, schedule, MOMENT)
     assert problem.sums.single[0] == pytest.approx(each.max(axis=1), rel=1e-12)
     assert len(set(each.argmax(axis=1))) == 2  # each end is the worse one for some candidate
-
-
-def test_limits_see_the_largest(arch):
-    """One robot relieves the first end, so that only what relieves the other is allowed."""
-    schedule = one_move(arch, 6, held=5)
-    each = moments(arch, schedule)
-    bound = 0.9 * float(each.max())
-    assert (each[:, 0] <= bound).all()
-    problem = pose_decisions(arch, schedule, MOMENT, (Limit("M_sup", bound),))
-    allowed = np.isfinite(problem.sums.single[0])
-    assert (allowed == (each[:, 1] <= bound)).all()
-    assert 0 < allowed.sum() < len(allowed)
 
 
 def test_the_largest_force_keeps_its_sign():

@@ -73,17 +73,6 @@ def test_planes_and_a_program_agree_on_what_is_apart(first, second):
             assert 2 * radius <= -distance[0] + 1e-7
 
 
-@given(first=bricks(1), shift=st.floats(0.001, 0.1))
-def test_faces_that_look_at_each_other_are_their_distance_apart(first, shift):
-    away = (first.dimensions[0] + shift) * np.array(first.length_axis)
-    place = tuple((np.array(first.position) + away).tolist())
-    _, distance = _separations(
-        [first, replace(first, name=2, position=place, nodes=(4, 5), placing_node=4)]
-    )
-    near = np.linalg.norm(away) <= np.linalg.norm(first.dimensions)  # others are not looked at
-    assert distance == pytest.approx([shift] if near else [], abs=1e-12)
-
-
 def test_a_moved_brick_is_found(arch25):
     require_apart("arch", arch25.bricks, "none")
     first, second, *rest = arch25.bricks

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import fields
 
+import jsonschema
 import pytest
 from hypothesis import HealthCheck, given, settings
 
 from seqopt.contact.faces import bare_assembly
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
-from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene, save_scene
+from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene, save_scene, schema
 from tests.blocks import with_shapes
 from tests.builders import six_bricks
 from tests.strategies import scenes_with_all
@@ -101,13 +102,16 @@ def test_a_malformed_shape_gets_one_clear_line(change, named):
 def test_a_scene_comes_back_from_its_file(tmp_path, scene):
     save_scene(scene, tmp_path / "scene.json")
     assert load_scene(tmp_path / "scene.json") == scene
+    text = dump_scene(scene)
+    assert dump_scene(_parse_scene(text)) == text
+    jsonschema.validate(json.loads(text), schema())
 
 
 def test_every_part_of_a_scene_is_drawn():
     """The control: the strategy leaves nothing at its default, so a new field must be drawn too."""
     seen = {}
 
-    @settings(max_examples=60, database=None)
+    @settings(max_examples=40, database=None)
     @given(scene=scenes_with_all())
     def collect(scene):
         for part in (scene, *scene.bricks, *scene.joints, *scene.grounds, *scene.loads):

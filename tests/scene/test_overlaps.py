@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from seqopt.scene.boxes import _find_overlaps, as_vectors, block_brick, overlapping
+from seqopt.scene.boxes import _find_overlaps, as_vectors
 from tests.blocks import C_SHAPE, box, prism
 
 BRICK = (0.2, 0.1, 0.06)
@@ -111,13 +111,3 @@ def test_a_solid_that_is_not_convex_is_as_deep_as_its_parts(size, turn, at):
         assert out == {}
     elif depth > 1.5 * limit:
         assert out[0, 1][0] >= 0.99e3 * min(depth, 1.5 * limit)
-
-
-def test_bricks_of_a_scene_as_boxes_and_as_shapes():
-    halves = [block_brick(i, box(BRICK, at=(0.1 * i, 0.0, 0.0)), 2000.0) for i in (1, 2, 4)]
-    boxes = [replace(brick, shape=None, node_offsets=None) for brick in halves]
-    for bricks in (halves, boxes, [boxes[0], *halves[1:]]):
-        ((a, b, depth),) = overlapping(bricks)
-        assert (a, b) == (1, 2)
-        assert depth == pytest.approx(0.06, rel=1e-3)
-        assert overlapping(bricks[1:]) == []

@@ -72,14 +72,6 @@ def test_what_varies_stays_in_its_bounds_and_all_else_as_it_is(
             assert stub == pytest.approx(np.subtract(theirs.anchor, theirs.position), abs=1e-12)
 
 
-def test_a_seed_is_a_sample_and_another_one_another():
-    scene = six_bricks()
-    few, more = (scenarios(scene, count=n, seed=7) for n in (2, 5))
-    assert more.scenes[:2] == few.scenes  # more scenarios leave the first as they are
-    assert scenarios(scene, count=2, seed=8).scenes != few.scenes
-    assert few.scenes[0] != few.scenes[1]
-
-
 def test_draws_spread_as_they_are_said_to():
     """Log-uniform factors and uniform shares: means and spreads of many draws."""
     scene = six_bricks()

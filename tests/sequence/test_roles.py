@@ -13,7 +13,6 @@ from seqopt.scene.parts import Robot, Sphere
 from seqopt.sequence.methods import (
     METHODS,
     SCHEDULES,
-    _cast,
     _two_robot_loop,
     modified_sequential,
     robot_loop,
@@ -131,13 +130,3 @@ def test_a_brick_that_nobody_reaches_is_named():
         StepError, match=r"a reaches none .*; rob1 does, and holds the brick before"
     ):
         sequential(mixed)
-
-
-def test_casting_takes_the_first_robots_that_fit():
-    scene = small_arch(4)
-    robots = (*anywhere(1), near(scene, "low", 1, 2), Robot(name="any", payload=1.0))
-    cast_of = replace(scene, robots=robots)
-    assert _cast(cast_of, [{0}, {3}, {1}], [0, 1, 2]) == [0, 2, 1]
-    assert _cast(cast_of, [{0}, {3}], [2, 1, 0]) == [2, 0]
-    with pytest.raises(StepError, match="one places bricks 4, all within reach of rob1, any;"):
-        _cast(cast_of, [{3}, {3}, {3}], [0, 1, 2])

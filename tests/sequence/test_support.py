@@ -9,16 +9,9 @@ import pytest
 from experiments.harness.scenes import running_bond
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
-from seqopt.sequence.methods import (
-    _alternate,
-    cantilever,
-    lies_along,
-    open_schedule,
-    sequential,
-    three_robot_loop,
-)
-from seqopt.sequence.schedule import OpenGrip, OpenStep, check_support, islands
-from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.methods import cantilever, open_schedule, sequential, three_robot_loop
+from seqopt.sequence.schedule import OpenGrip, OpenStep, islands
+from seqopt.sequence.steps import StepKind
 from tests.builders import anywhere, branch, from_both_ends, small_arch
 
 
@@ -61,14 +54,6 @@ def test_an_open_grip_holds_an_island_only_if_every_candidate_is_on_it():
     assert open_schedule("x", network, steps).moves[0].candidates == (1, 5)
     with pytest.raises(StepError, match=r"step 5 \(release\): brick 3 hangs free"):
         open_schedule("x", network, [*steps, loose])
-
-
-def test_support_is_checked_step_by_step():
-    network = ordered(small_arch(5), 1, 3, 2, 4, 5)
-    good = [Step(1, StepKind.PLACE, 1, (1, None)), Step(2, StepKind.PLACE, 2, (1, 4))]
-    check_support(network, good)
-    with pytest.raises(StepError, match=r"step 3 \(release\): brick 3 hangs free"):
-        check_support(network, [*good, Step(3, StepKind.RELEASE, 2, (1, None))])
 
 
 def grows_from_what_is_held(network, steps):
@@ -117,13 +102,6 @@ def test_the_cantilever_method_holds_where_the_build_goes_on(scene):
     network = build_network(replace(scene, robots=anywhere(2)))
     assert grows_from_what_is_held(network, cantilever(network)) == []
     assert grows_from_what_is_held(network, sequential(network)) == []
-
-
-def test_that_bricks_lie_along_is_not_enough_where_ends_take_turns():
-    """Held only after bricks that lie along, one end was placed while the other was held."""
-    network = build_network(replace(from_both_ends(11), robots=anywhere(2)))
-    steps = _alternate(network, "cantilever", lies_along(network), ())
-    assert grows_from_what_is_held(network, steps)
 
 
 def test_three_robots_hold_an_island_while_they_can():

@@ -11,7 +11,6 @@ import pytest
 import seqopt
 from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.graph._orders import among_orders, order_rules
-from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import judge_schedule
@@ -21,7 +20,6 @@ from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Site, Step, StepKind, check_sequence
 from tests.brute_force import ONES, allowed, best_values
 from tests.builders import turned_round
-from tests.plain_rules import PlainBook
 from tests.quality.fuzz_cases import plan_text
 
 ARCH = seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V")
@@ -90,15 +88,6 @@ def peak_of(engine, steps):
 
 
 @pytest.mark.slow
-def test_margins_are_aims_of_a_take_down():
-    plan = seqopt.solve(posed(small_wall(), "tilt"))
-    tilts = plan.stability("dry")["tilt_survived_deg"]
-    assert tilts.iloc[-1] == 90  # of the empty site
-    lost = np.pi / 2 - np.radians(tilts.min())
-    assert plan.selection.objective[0] == pytest.approx(lost, rel=0.02)
-
-
-@pytest.mark.slow
 def test_best_order_is_that_of_all():
     engine = small_wall()
     scene, criterion = engine.network.scene, seqopt.CRITERIA["worst-ratio"]
@@ -136,29 +125,6 @@ def test_judge_refuses_what_is_no_take_down():
     wrong = Step(2, StepKind.RELEASE, 4, (None,) * 3)
     with pytest.raises(StepError, match="step 2"):
         check_free(engine.network, DOWN, [plan.steps[0], wrong])
-
-
-def test_searched_states_follow_by_the_book():
-    """Every move of the search is one of the rules in plain words."""
-    engine = small_wall()
-    states = build_states(engine, DOWN, ONES, "minmax")
-    found, book = explore(states), PlainBook(engine.network, states.rules)
-    graph, rows = found.graph()
-    space, numbers = (
-        states.space,
-        [None, *(n for b in engine.network.scene.placed for n in b.nodes)],
-    )
-    flat = [(space.bricks_at(level), row) for level, _, part in rows for row in part.tolist()]
-    seen = 0
-    for source, target in zip(
-        graph.source.tolist()[::50], graph.target.tolist()[::50], strict=True
-    ):
-        (b, row), (after, new) = flat[source], flat[target]
-        grips = tuple(numbers[n] for n in row)
-        wanted = (after, {numbers[n] for n in new})
-        assert wanted in [(to, {*held}) for _, to, held, _ in book.follow(b, grips, 0)]
-        seen += after < b
-    assert seen
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
 from seqopt.errors import StepError
-from seqopt.sequence.methods import SCHEDULES, three_robot_loop
+from seqopt.sequence.methods import SCHEDULES
 from seqopt.sequence.schedule import thin
-from tests.builders import from_both_sides
 
 
 @pytest.mark.parametrize("method", SCHEDULES)
@@ -26,19 +23,6 @@ def test_on_a_chain_joints_are_counted(arch25, method):
         limit = max(4, min(away.values()))
         assert few.candidates == tuple(n for n in whole.candidates if away[n] <= limit)
     assert thinned.steps == schedule.steps
-
-
-def test_meters_are_measured_from_both_ends_of_a_build():
-    scene = from_both_sides(9)
-    schedule = three_robot_loop(scene)
-    thinned = thin(schedule, "within:0.2")
-    for few, whole in zip(thinned.moves, schedule.moves, strict=True):
-        ends = [brick.position for brick in scene.placed[: whole.bricks][-2:]]
-        away = {
-            n: min(math.dist(scene.node_position(n), e) for e in ends) for n in whole.candidates
-        }
-        limit = max(0.2, min(away.values()))
-        assert few.candidates == tuple(n for n in whole.candidates if away[n] <= limit)
 
 
 @pytest.mark.parametrize("rule", ["near:", "near:-1", "far:3", 3])

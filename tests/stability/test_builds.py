@@ -17,7 +17,7 @@ from seqopt.stability import _builds, _steps
 from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
 from seqopt.stability._steps import each_verdict
 from seqopt.stability._verdict_chain import VerdictChain
-from seqopt.stability.assessment import Verdict, assess, verdict
+from seqopt.stability.assessment import Verdict, verdict
 
 FLAT = "arch:span=2,rise=0.8,pattern=VLR"
 
@@ -80,15 +80,6 @@ def test_what_one_mortar_proves_is_not_proven_with_another(flat, builds, monkeyp
     assert len(open_) < len(steps) or not left
 
 
-def test_what_fails_first_is_what_the_first_fallen_step_says(flat, builds, found):
-    for name, steps in builds.items():
-        dry = found[name][0]
-        step = steps[dry.first - 1]
-        said = assess(step_assembly(flat, step.bricks, step.grips), SHOWN["dry"])
-        assert Verdict.FALLS not in dry.verdicts[: dry.first - 1]
-        assert (dry.brick, dry.joint) == (said.first_block, said.first_contact)
-
-
 def test_what_is_not_known_has_a_reason(arch25, tmp_path, capsys):
     narrow = tuple(replace(brick, dimensions=(0.246, 0.09, 0.053)) for brick in arch25.bricks)
     scene = replace(arch25, bricks=narrow)  # those across are 26 mm apart
@@ -120,13 +111,6 @@ def test_what_is_tried_ahead_changes_no_verdict(flat, builds, found, monkeypatch
             each = each_verdict(flat, steps, SHOWN[said.mortar])
             assert tuple(one.verdict for one in each) == said.verdicts
     assert len(tried) > 2 * sum(map(len, builds.values()))  # some were tried ahead
-
-
-def test_equal_structures_are_asked_once(flat, builds, found, monkeypatch):
-    prover = BuildProver(flat)
-    prover.of_builds(builds)
-    monkeypatch.setattr(_builds, "each_by_workers", None)
-    assert prover.of_builds(builds) == found
 
 
 @pytest.mark.parametrize("shared", [False, pytest.param(True, marks=pytest.mark.slow)])

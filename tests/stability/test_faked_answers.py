@@ -23,8 +23,7 @@ from seqopt.stability import _prover as prover
 from seqopt.stability import _verdict_chain as chain
 from seqopt.stability import assessment, limit_analysis
 from seqopt.stability._prover import Proven, Prover
-from seqopt.stability._steps import each_verdict
-from seqopt.stability.assessment import Verdict, _verdict_of, assess, bonded, verdict
+from seqopt.stability.assessment import Verdict, _verdict_of, assess, bonded
 from seqopt.stability.limit_analysis import CAP, Claim, bound
 
 SLIPPERY = Mortar(friction=1e-3)
@@ -246,60 +245,3 @@ def by_value(stand):
     if np.isnan(stand.value):
         return Verdict.UNDECIDED
     return Verdict.STANDS if stand.value <= limit_analysis.EXACT else Verdict.FALLS
-
-
-@cache
-def build():
-    """Steps of a build: of each its parts, the true verdict, and what the solver answers."""
-    network = build_network(load_scene("arch25"))
-    steps = METHODS["cantilever"](network)[5:29:2]
-    parts = [step_assembly(network, step.bricks, step.grips) for step in steps]
-    answers = [compile_equilibrium(part)(bonded(part, DRY)) for part in parts]
-    return network, steps, parts, [verdict(part, DRY) for part in parts], answers
-
-
-def fed(seed):
-    """Yield true and judged verdicts of steps, each fed a fake of its own answer or an earlier one.
-
-    The cone program answers the same, so what proves nothing stays open.
-    """
-    network, steps, parts, truth, answers = build()
-    rng = np.random.default_rng(seed)
-    kinds = VALUES, FORCES | MORE_FORCES, MOTIONS | MORE_MOTIONS
-
-    def fake(assembly):
-        value, force, motion = (rng.choice([*kind.values()]) for kind in kinds)
-        at = next(k for k, part in enumerate(parts) if part == assembly)
-        forces, moved = (answers[max(0, at - back)] for back in rng.integers(0, 2, 2))
-        return replace(
-            moved,
-            value=value(forces.value, 1.0),
-            contact_force=force(forces.contact_force, rng),
-            grip_force=force(forces.grip_force, rng),
-            motion=motion(moved.motion, rng),
-        )
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chain, "approach", lambda sought: iter([fake(sought.assembly)]))
-        found = each_verdict(network, steps, DRY, lambda assembly: lambda *_: fake(assembly))
-        yield from zip(truth, (step.verdict for step in found), strict=True)
-
-
-def fed_often():
-    return (pair for seed in range(60) for pair in fed(seed))
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_a_build_that_is_fed_fakes_has_no_false_verdict():
-    """720 verdicts; what is found in a step is tried on the next."""
-    verdicts = [*fed_often()]
-    assert len(verdicts) == 720
-    assert not any(starmap(is_false, verdicts))
-    assert {(truth, truth) for truth in (Verdict.STANDS, Verdict.FALLS)} <= set(verdicts)
-
-
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_a_chain_that_believes_the_value_is_noticed(monkeypatch):
-    monkeypatch.setattr(chain, "judged", believed)
-    assert any(starmap(is_false, fed_often()))

@@ -70,18 +70,6 @@ def test_props_are_struck_with_the_last_grip(arch25):
     assert len(step_assembly(network, 25, (49, None, None)).payload) == 2
 
 
-def test_one_that_pushes_bears_from_nothing_to_its_capacity(arch25):
-    """What is applied and the grip together: any force between along its line, none beside it."""
-    network = seqopt.build_network(arch25.with_props(Prop(node=8, direction=UP, capacity=50.0)))
-    assembly = step_assembly(network, 5, (None,) * 3)
-    (line,) = assembly.grip_line
-    assert line.tolist() == [0, 0, 1]
-    own = assembly.grip_map.toarray()[24:27]  # of the fifth brick
-    for share in (-25.0, 25.0):
-        force = assembly.applied[4, :3] + own @ [share, 7.0, 7.0]
-        assert force.tolist() == [0, 0, 25.0 + share]
-
-
 def test_steps_of_plans_say_the_same_alone_and_together(arch25):
     scene = arch25.with_props(Prop(node=20), Prop(node=30, direction=UP))
     network = seqopt.build_network(scene)

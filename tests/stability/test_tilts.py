@@ -10,13 +10,9 @@ import pytest
 
 from experiments.stability.parts.blocks import stack
 from formulations.contact.limit_analysis import compile_equilibrium
-from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import DRY, EPOXY, Mortar
-from seqopt.network.build import build_network
-from seqopt.scene.scene_file import load_scene
+from seqopt.contact.mortar import DRY
 from seqopt.stability._prover import _MORE, DIRECTIONS, Prover, hulls, safe_pull, sideways
-from seqopt.stability._screens import FALLS, STANDS, Margins, Screen
-from seqopt.stability.assessment import Verdict, assess, bonded
+from seqopt.stability.assessment import assess, bonded
 
 UP = (0.0, 0.0, 1.0)
 
@@ -101,55 +97,6 @@ def test_a_tilt_is_proven_by_forces_alone():
     assert result.tilt == pytest.approx(exact.tilt, rel=1e-9)
     assert result.unproven
     assert not result.motion.any()
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_half_a_vault_with_epoxy_has_a_tilt():
-    """Two hundred bricks: its motions are not good to a thousandth, and a tilt of NaN was said."""
-    assembly = step_assembly(build_network(load_scene("vault338")), 200, (None, None, None))
-    prove = Prover(assembly, compile_equilibrium)
-    _, worst = safe_pull(prove, fixed(assembly, EPOXY), UP)
-    assert 1.0 < worst < 100.0
-    assert prove.unproven
-    assert Mortar(friction=0.5) != EPOXY
-    assert Verdict.STANDS.value == "stands"
-
-
-@pytest.mark.slow
-@pytest.mark.long
-def test_grip_sets_survive_no_more_however_a_scene_is_turned(arch25):
-    """Of 13 bricks: what a screen says stands survives the tilt by the cone program."""
-    network = build_network(arch25)
-    held = np.array([[25, 20, 0], [25, 18, 5], [26, 12, 3], [25, 9, 1]])
-    margins = Margins(network, DRY)
-    nodes = np.concatenate([[-1], network.inner[:13].ravel()])
-    for row, (least, most) in zip(held, margins.tilt(13, held), strict=True):
-        grips = tuple(int(network.node_name[nodes[place]]) if place else None for place in row)
-        exact = assess(step_assembly(network, 13, grips), DRY, network.scene.up).tilt
-        if np.isnan(exact):
-            assert np.isnan(least)
-            continue
-        assert least <= most + 1e-9
-        assert least == pytest.approx(exact, rel=0.02)
-        for tilt, verdicts in ((0.98 * least, {STANDS}), (1.02 * most, {FALLS})):
-            assert set(Screen(network, DRY, tilt).stands(13, row[None]).tolist()) <= verdicts
-
-
-@pytest.mark.parametrize("known", [2, 3, 16])
-def test_hulls_of_many_are_those_of_each(known):
-    rng = np.random.default_rng(known)
-    survived = np.full((200, 15), np.nan)  # an odd number: no two are opposite
-    for row in survived:
-        row[rng.choice(15, min(known, 15), replace=False)] = rng.uniform(0.2, 2.0, min(known, 15))
-    angles = 2 * np.pi * np.arange(15) / 15
-    there = np.isfinite(survived)
-    pairs = zip(survived, there, strict=True)  # of each alone, without what is not known
-    each = np.array([hulls(angles[own], row[None, own]) for row, own in pairs])[..., 0]
-    safe, angle = hulls(angles, survived)
-    np.testing.assert_allclose(safe, each[:, 0], rtol=1e-12)
-    np.testing.assert_allclose(np.cos(angle - each[:, 1]), np.where(np.isnan(safe), np.nan, 1.0))
-    assert np.isfinite(safe).any() == (known > 2)
 
 
 def test_directions_of_which_nothing_is_known_are_left_out():

@@ -157,19 +157,6 @@ def test_verdicts_of_random_scenes_are_those_of_the_cone_program(scene, seed, mo
         assert own is other or Verdict.UNDECIDED in (own, other)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "mortar", [pytest.param(name, marks=[pytest.mark.long] * (name != "dry")) for name in MORTARS]
-)
-def test_verdicts_of_larger_structures_too(mortar):
-    scenes = load_scene("arch25"), without_joint(leaning_chain(25)).scene, running_bond(4, 4)
-    for seed, scene in enumerate(scenes):
-        network = build_network(scene)
-        steps = random_steps(network, 20, seed)
-        expected = one_by_one(network, steps, MORTARS[mortar])
-        assert step_verdicts(network, steps, MORTARS[mortar]) == expected
-
-
 @pytest.mark.parametrize("mortar", [DRY, EPOXY])
 def test_a_build_needs_no_cone_program(arch25, mortar):
     network = build_network(arch25)
@@ -188,21 +175,6 @@ def test_a_build_needs_no_cone_program(arch25, mortar):
         else:
             assert step.motion.shape == (own.bricks, 6)
             assert np.abs(step.motion[:, :3]).max() <= 1
-
-
-def test_equal_partial_structures_are_asked_once(arch25, monkeypatch):
-    network = build_network(arch25)
-    steps, asked = METHODS["sequential"](network)[:6], []
-    real = chain.VerdictChain.__call__
-
-    def counted(self, bricks, grips, before=None):
-        asked.append((bricks, grips))
-        return real(self, bricks, grips, before)
-
-    monkeypatch.setattr(chain.VerdictChain, "__call__", counted)
-    once = [*each_verdict(network, steps * 3, DRY)]
-    assert len(asked) == 6
-    assert once[:6] == once[6:12] == once[12:]
 
 
 # what is offered is not believed
@@ -228,17 +200,6 @@ def arch():
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-@pytest.mark.parametrize("mortar", [DRY, EPOXY])
-def test_nonsense_from_the_search_turns_no_verdict(arch, mortar, monkeypatch):
-    network, steps, expected = arch
-    monkeypatch.setattr(chain, "approach", lambda sought: nonsense(sought.assembly, 1))
-    monkeypatch.setattr(chain.VerdictChain, "search", lambda *_: None)
-    found = [*each_verdict(network, steps, mortar)]
-    assert tuple(step.verdict for step in found) == expected[mortar]
-    assert "cone program" in {step.proof for step in found}
-
-
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("mortar", [DRY])
 def test_nonsense_that_is_remembered_turns_no_verdict(arch, mortar, monkeypatch):
     network, steps, expected = arch
@@ -250,20 +211,6 @@ def test_nonsense_that_is_remembered_turns_no_verdict(arch, mortar, monkeypatch)
 
     monkeypatch.setattr(chain.VerdictChain, "_learn", poisoned)
     assert step_verdicts(network, steps, mortar) == expected[mortar]
-
-
-WEAKER = {
-    "forces may violate": ("violation", lambda *_: 0.0),
-    "every motion proves": ("bound", lambda *_: 1.0),
-}
-
-
-@pytest.mark.parametrize("weaker", WEAKER)
-def test_a_weaker_judge_is_noticed(arch, weaker, monkeypatch):
-    network, steps, expected = arch
-    monkeypatch.setattr(chain, *WEAKER[weaker])
-    monkeypatch.setattr(chain.VerdictChain, "search", lambda *_: None)  # earlier proofs are tried
-    assert step_verdicts(network, steps, DRY) != expected[DRY]
 
 
 # numbers from elsewhere
@@ -323,33 +270,6 @@ def test_arches_fall_dry_where_a_program_of_its_own_finds_no_forces(name):
             assembly = step_assembly(network, step.bricks, step.grips)
             falls = own is Verdict.FALLS
             assert feasible(assembly, DRY.friction, 16, around=falls) is not falls
-
-
-@pytest.mark.long
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [*ARCHES][1:])
-def test_longer_arches_fall_dry_as_the_cone_program_says(name):
-    network = build_network(load_scene(name))
-    for method, counts in ARCHES[name].items():
-        steps = METHODS[method](network)
-        found = step_verdicts(network, steps, DRY)
-        assert (len(found), found.count(Verdict.FALLS)) == counts
-        assert found == one_by_one(network, steps, DRY)
-
-
-@pytest.mark.slow
-@pytest.mark.long
-def test_a_vault_is_proven_without_cone_programs():
-    """The start of a vault; with epoxy all of it."""
-    network = build_network(load_scene("vault338"))
-    steps = METHODS["sequential"](network)
-    glued = [*each_verdict(network, steps, EPOXY)]
-    assert {step.verdict for step in glued} == {Verdict.STANDS}
-    assert "cone program" not in {step.proof for step in glued}
-    dry = [*each_verdict(network, steps[:200], DRY)]
-    assert "cone program" not in {step.proof for step in dry}
-    for k in range(0, 200, 20):
-        assert dry[k].verdict is one_by_one(network, steps[k : k + 1], DRY)[0]
 
 
 def near_verdicts(network, steps, mortar):

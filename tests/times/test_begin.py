@@ -16,7 +16,7 @@ from seqopt.sequence.steps import Site
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
 from tests.brute_force import ONES
-from tests.times.builders import RULES, WORDS, engine_of, least_makespan
+from tests.times.builders import RULES, engine_of, least_makespan
 from tests.times.curing import least_cured_makespan
 
 ALONE = FreeRules(least_grips=1)
@@ -109,17 +109,3 @@ def test_an_age_that_is_made_up_is_refused():
 def test_wrong_ages_get_a_line(ages, said):
     with pytest.raises((SceneError, seqopt.errors.StepError), match=said):
         Site(2, ages=ages)
-
-
-@pytest.mark.slow
-@pytest.mark.long
-def test_from_every_step_of_the_arch_the_rest_is_as_good():
-    scene = seqopt.load_scene("arch25").with_durations(WORDS)
-    plan = seqopt.optimize(scene, "free", aim="minmax,makespan")
-    for count in range(1, len(plan.steps)):
-        site = Site.after(plan.steps, count)
-        rest = seqopt.optimize(scene, "free", aim="minmax,makespan", rules=FreeRules(begin=site))
-        own = step_times(scene, plan.steps[count:], begin=site)[-1].end
-        assert rest.objective["minmax"] <= plan.objective["minmax"] * (1 + 1e-9)
-        assert rest.makespan <= own * (1 + 1e-9)
-        assert rest.status is Status.OPTIMAL

@@ -15,15 +15,14 @@ from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status
 from seqopt.problem.standing import Standing
-from seqopt.sequence.rules import FreeRules, with_robots
+from seqopt.sequence.rules import FreeRules
 from seqopt.times._curing import CuringBuilds, JointsInTime
 from seqopt.times._step_check import check_cured
 from tests.brute_force import ONES
-from tests.times.builders import WORDS, engine_of
+from tests.times.builders import engine_of
 from tests.times.curing import least_cured_makespan
 
 ALONE = FreeRules(least_grips=1)
-CRITERION = seqopt.CRITERIA["worst-ratio-published"]
 LONG = (pytest.mark.slow, pytest.mark.long)
 TACK = "0s=0.005,1min=0.02,5min=0.4,15min=1"
 
@@ -123,15 +122,6 @@ def test_the_judge_refuses_early_starts_and_missing_motions(plan):
 
 
 @pytest.mark.slow
-def test_states_from_which_all_ways_fall_need_no_labels():
-    scene = with_robots(seqopt.load_scene("chain:bricks=7"), 2).with_durations(WORDS)
-    engine = seqopt.make_engine("compliance", scene)
-    standing = Standing("bond=5e3", curing="0s=0.1,15min=1")
-    plan = seqopt.solve(seqopt.pose(engine, ALONE, CRITERION, "makespan", stands=standing))
-    assert (plan.makespan, plan.status) == (1180.0, Status.OPTIMAL)
-
-
-@pytest.mark.slow
 def test_waits_of_a_given_plan_are_the_least():
     scene = seqopt.load_scene("arch25").with_durations(
         "fetch=30,place=10,approach=10,grip=5,release=5"
@@ -214,19 +204,3 @@ def test_what_is_not_modeled_says_so():
     problem = seqopt.pose(engine, ALONE, ONES, "makespan", stands=Standing("epoxy", curing="1h"))
     with pytest.raises(ProblemError, match="makespan_flow: it does not know mortar that cures"):
         seqopt.solve(problem, "makespan_flow")
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_the_dry_arch_takes_two_more_steps_and_is_the_limit_of_no_bond():
-    """52 steps for 50, where the worst ratio counts first; proven, with as little on both sides."""
-    engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
-    demands = ["dry", Standing("epoxy", curing="never"), Standing("epoxy", curing="0s=1"), "epoxy"]
-    plans = [
-        seqopt.solve(seqopt.pose(engine, FreeRules(), CRITERION, "minmax,steps", stands=stands))
-        for stands in demands
-    ]
-    assert [len(plan.steps) for plan in plans] == [52, 52, 50, 50]
-    assert [plan.regrips for plan in plans] == [2, 2, 1, 1]
-    assert [plan.status for plan in plans] == [Status.OPTIMAL] * 4
-    assert plans[1].steps == plans[0].steps

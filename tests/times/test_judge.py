@@ -14,9 +14,8 @@ from seqopt.graph.formulation import Formulation, FormulationKind, find_formulat
 from seqopt.graph.graph import LabelProof
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status
-from seqopt.sequence.rules import FreeRules, with_robots
 from tests.brute_force import ONES
-from tests.times.builders import RULES, WORDS, engine_of
+from tests.times.builders import RULES, engine_of
 
 
 @pytest.fixture(scope="module")
@@ -113,28 +112,3 @@ def test_a_search_that_ends_early_leaves_a_plan_and_a_proven_bound(plan):
     assert 0 < bound < plan.makespan <= found.makespan
     assert found.gap == pytest.approx(1 - bound / found.makespan)
     assert found.summary()["bound"] == {"makespan": bound}
-
-
-TRIAL = {  # words: least, until the last brick is placed
-    (): 240.0,
-    ("rob4:fetch=75,approach=25",): 265.0,
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "words", [pytest.param(words, marks=[pytest.mark.long] * bool(words)) for words in TRIAL]
-)
-def test_eleven_bricks_by_four_robots(words):
-    """Found first by an exact label search of its own, without bounds."""
-    scene = with_robots(seqopt.load_scene("chain:bricks=11"), 4).with_durations(WORDS, *words)
-    rules = FreeRules(ending="held")
-    engine = seqopt.make_engine("compliance", scene)
-    criterion = seqopt.CRITERIA["worst-ratio-published"]
-    least = TRIAL[words]
-    first = seqopt.solve(seqopt.pose(engine, rules, criterion, "minmax,steps"))
-    plan = seqopt.solve(seqopt.pose(engine, rules, criterion, "minmax,makespan"))
-    assert (plan.makespan, plan.status) == (least, Status.OPTIMAL)
-    if not words:  # robots that are alike take over from each other
-        again = seqopt.GivenSequence(engine, first.reassigned()).makespan
-        assert least <= again < first.makespan

