@@ -9,7 +9,7 @@ import pytest
 
 import seqopt
 from seqopt.arms import find_postures
-from seqopt.arms._judge import PostureRules
+from seqopt.arms._judge import PostureRules, check_postures
 from seqopt.arms._permits import permits
 from seqopt.arms._plan_postures import plan_postures
 from seqopt.arms._reached import Site, reached_alone
@@ -172,6 +172,17 @@ def test_the_judge_finds_a_search_that_allows_arms_too_little(scene, monkeypatch
     monkeypatch.setattr(StateRows, "for_arms", never_both)
     with pytest.raises(InfeasibleError, match="claimed by schedule_search, and not proven"):
         seqopt.optimize(scene.with_robots(*scene.robots[:2]), "free", rules="least_grips=1")
+
+
+def test_steps_are_checked_by_themselves(scene):
+    states = [step for step in seqopt.sequential(without(scene)) if len(step.held) == 2]
+    check_postures(scene, states[:1])
+    with pytest.raises(StepError, match=f"step {states[0].number}: arms cannot hold"):
+        check_postures(hostile(scene.with_robots(*scene.robots[:2])), [held_by_two(states[0])])
+
+
+def held_by_two(step):
+    return replace(step, grips=step.grips[:2])
 
 
 def without(scene):

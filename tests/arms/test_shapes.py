@@ -20,10 +20,23 @@ pytest.importorskip("coal")
 INSIDE = (0.3, 0.0, 0.0)  # the wall
 
 
+EVERY = "no <collision> of l0, l1, l2, l3, l4, l5, l6: <visual> is checked instead"
+
+
 @pytest.fixture
 def shown(tmp_path):
     """An arm of which nothing is given but what is shown."""
     return boxes(tmp_path / "shown.urdf", "visual")
+
+
+def test_a_base_that_is_only_shown_hits_the_wall_as_its_twin_does(tmp_path, shown):
+    with (
+        pytest.warns(SceneWarning, match=re.escape(f"robot arm: its arm has {EVERY}")),
+        pytest.raises(SceneError, match="robot arm: the base of its arm hits brick 2; move it"),
+    ):
+        find_postures(beside_a_wall(shown, INSIDE))
+    with pytest.raises(SceneError, match="the base of its arm hits brick 2"):
+        find_postures(beside_a_wall(boxes(tmp_path / "twin.urdf"), INSIDE))
 
 
 @pytest.mark.parametrize("mesh", [True])
