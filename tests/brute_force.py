@@ -6,7 +6,6 @@ from functools import partial
 
 import networkx as nx
 import numpy as np
-from scipy.optimize import minimize
 
 from seqopt.engines.interface import Want
 from seqopt.errors import MechanismError
@@ -55,38 +54,6 @@ def allowed(engine, rules, bricks, grips):
         if kept and forces[node] > robot.payload * (1 + LIMIT_TOLERANCE):
             return None
     return worst
-
-
-def misfit(engine, bricks, grips):
-    """One over how far the grips of a state may be off: the worst direction is sought by descent.
-
-    Two rigid grips on one brick may not be off at all.
-    """
-    held = [node for node in grips if node is not None]
-    scene, count = engine.network.scene, len(held)
-    if len({scene.brick_of_node[node].name for node in held}) < count:
-        return np.inf
-    if not held:
-        return 0.0
-    payload = [r.payload for r, node in zip(scene.robots, grips, strict=True) if node is not None]
-    off = 1e-4 * np.vstack([np.zeros(3 * count), np.eye(3 * count)]).reshape(-1, count, 3)
-    found = engine.solve(bricks, np.repeat([held], len(off), axis=0), moved=off).grip_force
-    own, change = found[0], (found[1:] - found[0]) / 1e-4
-    return max(_worst_rate(own[i], change[:, i], payload[i]) for i in range(count))
-
-
-def _worst_rate(own, change, most):
-    """The largest share of a payload that a misplacement of a meter uses up."""
-    if np.linalg.norm(own) >= most:
-        return np.inf
-
-    def less(u):
-        pulls = np.linalg.norm((change @ u).reshape(-1, 3), axis=1)
-        return -pulls.sum() / (most * np.linalg.norm(u) - u @ own)
-
-    sphere = np.random.default_rng(0).standard_normal((200, 3))
-    starts = sorted(sphere, key=less)[:3]
-    return -min(minimize(less, u / np.linalg.norm(u), method="BFGS").fun for u in starts)
 
 
 def distance(scene, first, second):

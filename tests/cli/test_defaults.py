@@ -60,16 +60,6 @@ def test_python_and_the_command_line_answer_alike(capsys, arch, words, given):
     assert (found["written"], found["exit_status"]) == ([], 0)
 
 
-def test_optimize_alone_says_what_it_found_and_how_to_keep_it(capsys):
-    assert main(["optimize", "arch25"]) == 0
-    said = capsys.readouterr().out
-    first, second, *_ = said.splitlines()
-    best = "largest force 375 N (95.7 % of payload), displacement 14.1 µm"
-    assert first == f"{best}; sum 657.465, optimal"
-    assert second.startswith("overlap_dp (exact): 90 steps, ")
-    assert "--out DIR writes the plan" in second
-
-
 def test_pareto_in_python_is_the_command(capsys, arch, tmp_path):
     words = ("--aim", "F_largest,steps", "--rule", "least_grips=1")
     found = answered(capsys, "pareto", arch, *words)["points"]

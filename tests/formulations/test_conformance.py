@@ -37,7 +37,6 @@ ALL = {
 EXACT_SUMS = [
     n for n, f in SHOWN.items() if f.aim is Aim.SUM and f.kind is not FormulationKind.HEURISTIC
 ]
-RELAXED = ("overlap_lp", "lagrangian")
 AIMED = [(n, aim) for n, f in ALL.items() for aim in ([f.aim] if f.aim else Aim)]
 every = pytest.mark.parametrize("name", ALL)
 every_aim = pytest.mark.parametrize(("name", "aim"), AIMED)
@@ -88,33 +87,6 @@ def test_wide_searches_are_exact(problem):
     moves = len(problem.sums.sizes)
     for name, options in (("beam", {"width": 4}), ("rank_search", {"horizon": moves})):
         assert answer(problem, name, **options).objective == pytest.approx(best)
-
-
-@given(problem=problems(), width=st.integers(1, 4))
-def test_a_beam_never_does_worse_than_the_cascade(problem, width):
-    if not np.isfinite(problem.best()):
-        return
-    beam = answer(problem, "beam", width=width).objective
-    assert beam <= answer(problem, "cascade").objective + 1e-9
-
-
-@pytest.mark.parametrize("name", [*EXACT_SUMS, "minimax"])
-@given(problem=problems(), data=st.data())
-@settings(max_examples=4)
-def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, problem, data):
-    aim = ALL[name].aim
-    if not np.isfinite(problem.best(aim)):
-        return
-    order = [data.draw(st.permutations(range(size))) for size in problem.sums.sizes]
-    before = [[0], *order[:-1]]
-    single = tuple(c[list(o)] for c, o in zip(problem.sums.single, order, strict=True))
-    shared = tuple(
-        c[np.ix_(list(b), list(o))]
-        for c, b, o in zip(problem.sums.shared, before, order, strict=True)
-    )
-    other = Costs(LayeredCosts(single, shared))
-    a, b = (answer(p, name, aim=aim).objective for p in (problem, other))
-    assert a == pytest.approx(b, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", SHOWN)
@@ -279,26 +251,6 @@ def test_budgets_against_brute_force(name, examples):
     hold()
 
 
-@takers
-@given(problem=budgeted(most_budgets=2))
-@settings(max_examples=8)
-def test_prices_are_slopes_of_the_bound(name, problem):
-    """With prices p the bound falls by at most p for every unit that there is more."""
-    try:
-        found = answer(problem, name)
-    except (InfeasibleError, SolverError):
-        return
-    for budget in problem.budgets:
-        if budget.name not in found.prices:
-            continue
-        price = found.prices[budget.name]
-        assert price >= -1e-6
-        wider = [replace(b, bound=b.bound + 1.0 * (b is budget)) for b in problem.budgets]
-        best = replace(problem, budgets=tuple(wider)).best()
-        relaxed = found if name == "overlap_lp" else answer(problem, "lagrangian")
-        assert best >= relaxed.bound - price - 1e-4
-
-
 def valued(problem, name, **options):
     return solve(problem, name, **options).certificate.objective
 
@@ -318,27 +270,3 @@ def test_all_exact_ones_equal_brute_force_on_a_small_arch(criterion):
     for name in EXACT_SUMS:
         assert valued(problem, name) == pytest.approx(best, rel=1e-6)
     assert valued(problem, "minimax") == pytest.approx(Costs(problem.peaks).best(Aim.PEAK))
-
-
-@pytest.mark.slow
-def test_budgets_of_the_reference_arch(problem25):
-    free = solve(problem25, "overlap_dp")
-    for budget in (travel(problem25, 20.0), steps_over(problem25, "F_largest", 300.0, 5.0)):
-        assert budget.spent(free.choice) > budget.bound
-        capped = replace(problem25, budgets=(budget,))
-        plan = solve(capped, ALL["labels"])
-        certificate = plan.certificate
-        assert certificate.gap <= 1e-6
-        assert certificate.objective == pytest.approx(valued(capped, "overlap_mip"), rel=1e-6)
-        assert certificate.spent[budget.name] <= budget.bound + 1e-6
-        assert certificate.spent[budget.name] == pytest.approx(budget.spent(plan.choice))
-        assert certificate.objective > free.certificate.objective
-        costs = Costs(capped.sums, capped.budgets)
-        relaxed = {name: answer(costs, name, proof=False) for name in RELAXED}
-        for found in relaxed.values():
-            assert found.bound <= certificate.objective + 1e-6
-            assert found.prices[budget.name] > 0
-        flow, priced = (found.bound for found in relaxed.values())
-        assert priced == pytest.approx(flow, rel=1e-5)
-    with pytest.raises(ProblemError, match="name it in `also`"):
-        steps_over(problem25, "F_rob9", 100.0, 1.0)

@@ -16,13 +16,12 @@ from experiments.failing.parts.choice_cells import (
     Size,
     capped,
     judge,
-    opposed,
     rows,
     whole,
 )
 from formulations import solvers
 from formulations.flow import Flow
-from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, formulations
 from seqopt.problem.problem import Aim
 from tests.layered import answer
@@ -35,7 +34,6 @@ EXACT = ("labels", "lagrangian", "minimax", "overlap_dp", *FLOWS)
 BOUNDS = ("lagrangian", "overlap_lp")  # where a budget binds
 MIXTURES = {"overlap_mip": "infeasible", "labels": "infeasible", "lagrangian": "infeasible"}
 flows = pytest.mark.parametrize("name", FLOWS)
-takers = pytest.mark.parametrize("name", TAKERS)
 NONE_ALLOWED = {
     "limit nobody meets",
     "no pair allowed",
@@ -67,16 +65,6 @@ def test_no_answer_is_wrong(case):
             binds = case.startswith("budget") and name in BOUNDS
             assert status in ({"answered", "failed"} if binds else {"answered"}), row
             assert binds or row["error"] == pytest.approx(0, abs=1e-9), row
-
-
-def test_budgets_only_mixtures_meet():
-    """The relaxation has a solution, a choice has none: a bound is no proof of feasibility."""
-    problem = opposed(SMALL, np.random.default_rng(0), 1.0)
-    with pytest.raises(InfeasibleError, match="budgets"):
-        answer(problem, "overlap_mip")
-    said = r"keeps budgets exactly \(no path is below [0-9.]+\)"
-    with pytest.raises(NothingFoundError, match=said):
-        answer(problem, "overlap_lp")
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e9])
@@ -135,21 +123,6 @@ def test_the_judge_tells_them_apart(reply, status, scale):
     assert judge(small(scale=scale), answers(reply))["status"] == status
 
 
-@takers
-def test_budgets_of_another_problem_are_refused(name):
-    other = capped(Size(2, 3, 6), np.random.default_rng(0), 1.0, 1.0).budgets
-    with pytest.raises(ProblemError, match="other moves or candidates"):
-        answer(replace(small(), budgets=other), name)
-
-
-@takers
-def test_a_bound_of_infinity_is_no_cap(name):
-    free = answer(small(), name)
-    budget = replace(capped(SMALL, np.random.default_rng(0), 1.0, 1.0).budgets[0], bound=np.inf)
-    capless = answer(replace(small(), budgets=(budget,)), name).certificate
-    assert capless.objective == pytest.approx(free.objective)
-
-
 @flows
 @pytest.mark.parametrize(
     ("status", "named"),
@@ -178,21 +151,6 @@ def test_a_solver_that_fails_never_calls_the_problem_infeasible(monkeypatch, nam
     for problem in (small(), capped(SMALL, np.random.default_rng(0), 1.0, 0.6)):
         with pytest.raises(SolverError, match=named):
             answer(problem, name)
-
-
-@takers
-@pytest.mark.parametrize("amount", [1e-9, 1e9])
-def test_a_budget_that_cannot_be_met_is_named(name, amount):
-    problem = capped(SMALL, np.random.default_rng(0), amount, -1.0)
-    with pytest.raises(InfeasibleError, match="every choice uses at least 0 of 'use', more than -"):
-        answer(problem, name)
-
-
-@takers
-def test_two_budgets_that_conflict_are_named(name):
-    """Each can be met on its own."""
-    with pytest.raises(InfeasibleError, match=r"'odd' and .* 'even' cannot be kept together"):
-        answer(opposed(SMALL, np.random.default_rng(0), 0.9), name)
 
 
 PATH, BOUND = Flow.path, Flow.bound

@@ -15,7 +15,7 @@ import seqopt
 from formulations.states.order_search import FORMULATION
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph._orders import among_orders, order_rules, whole_bound
+from seqopt.graph._orders import among_orders, order_rules
 from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.states.states import build_states, over_scenarios, within
 from seqopt.judge._proof import Proof
@@ -25,7 +25,6 @@ from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import WORST_TOTAL, Orders, cvar
 from seqopt.problem.standing import Standing, slack
 from seqopt.responses.resources import Resources
-from seqopt.scene.library.wall import WallShape, wall
 from seqopt.sequence.rules import FreeRules
 from seqopt.work.progress import Stage
 from tests.builders import small_arch
@@ -256,12 +255,6 @@ def test_the_proof_of_orders_knows_what_must_stand():
     assert better(standing, least * (1 + 1e-6))
 
 
-@pytest.mark.slow
-def test_it_equals_brute_force_on_a_wall():
-    scene = wall(WallShape(columns=2, courses=2))
-    check_against_brute_force(scene, FreeRules(), "M_sup")
-
-
 def test_beyond_the_most_sets_the_own_order_has_a_bound():
     problem = posed(small_arch(4), aim="F_largest")
     best = seqopt.solve(problem, FORMULATION).selection.objective[0]
@@ -331,14 +324,3 @@ def test_a_bound_that_is_not_proven_is_claimed(monkeypatch):
     proven = seqopt.solve(problem, FORMULATION)
     assert (proven.status, proven.summary()["order_bound_proven"]) == ("optimal", True)
     assert "claimed" not in proven.order_bound_said
-
-
-@given(build=free_builds(most_bricks=4, most_robots=3))
-@settings(max_examples=5, deadline=None)
-def test_no_plan_stays_below_the_whole_structure(build):
-    problem = posed(*build)
-    try:
-        best = solve(replace(problem, orders=None), "schedule_search").selection.objective[0]
-    except InfeasibleError:
-        return
-    assert whole_bound(problem) <= best * (1 + 1e-9)

@@ -10,18 +10,16 @@ import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import seqopt
 from experiments.harness.scenes import longer
-from seqopt import Search
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError, TimeUpError
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge._schedules import judge_schedule, plan_values
 from seqopt.network.build import build_network
-from seqopt.plan.front import FrontProblem, find_front, upper_bounds
+from seqopt.plan.front import FrontProblem, find_front
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.methods import modified_sequential
 from seqopt.sequence.rules import FreeRules
@@ -102,16 +100,6 @@ def test_pareto_sets_equal_brute_force(build):
     assert found.table[["F_largest", "M_sup"]].to_numpy() == pytest.approx(np.array(expected))
 
 
-@given(
-    points=st.lists(st.tuples(*[st.integers(0, 4)] * 3), min_size=1, max_size=6),
-    z=st.tuples(*[st.integers(0, 5)] * 3),
-)
-def test_corners_hold_what_no_point_dominates(points, z):
-    points, z = np.array(points, float), np.array(z, float)
-    free = not (points <= z).all(axis=1).any()
-    assert free == (z < upper_bounds(points)).all(axis=1).any()
-
-
 @pytest.fixture(scope="module")
 def arch(engine25):
     return build_states(engine25, FreeRules(), seqopt.CRITERIA["worst-ratio-published"], "minmax")
@@ -124,25 +112,6 @@ def pose_goals(text):
 
 def test_all_states_of_the_arch_are_counted(arch):
     assert explore(arch).graph().graph.states == 71035  # start and end among them
-
-
-def test_time_and_interrupts_leave_a_plan_and_a_bound(arch, monkeypatch):
-    calls = []
-
-    def interrupt(stage):
-        calls.append(stage)
-        if len(calls) == 40:  # in the second search
-            raise KeyboardInterrupt
-
-    plan = seqopt.solve(arch, "schedule_search", progress=interrupt)
-    assert plan.status == "feasible"
-    assert plan.selection.stopped == "interrupt"
-    assert 0 < plan.selection.bound[0] <= 0.8401 <= plan.selection.objective[0] + 1e-4
-    assert plan.certificate.gap == np.inf
-    with pytest.raises(TimeUpError, match="no plan was found yet; give more"):
-        seqopt.solve(arch, "schedule_search", seconds=0.0)
-    with pytest.raises(ProblemError, match="option speed: schedule_search has width"):
-        seqopt.solve(arch, "schedule_search", speed=2)
 
 
 @pytest.mark.slow
@@ -218,25 +187,6 @@ def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force():
     kept = {each for each, some in others.items() if not (some <= each).all(axis=1).any()}
     assert front.complete
     assert {tuple(row) for row in front.table[["T_max", "F_largest"]].round(6).to_numpy()} == kept
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ({"criterion": "equations-2-3"}, "equations-2-3: it ranks the choices of a move"),
-        ({"formulation": "pareto_zones"}, "states of a build are asked for; use .*schedule_search"),
-        ({"rules": "regrip=0"}, r"rules regrip=0 does not exist \(did you mean regrips\?\)"),
-        (
-            {"search": Search(options={"width": 3, "depth": 1})},
-            "option depth: schedule_search has width",
-        ),
-        ({"schedule": "loop", "rules": "newest=free"}, "rules: only the free schedule has them"),
-    ],
-)
-def test_the_short_cut_says_in_a_line_what_does_not_fit(words, said):
-    with pytest.raises(seqopt.SeqoptError, match=said) as caught:
-        seqopt.optimize(**{"scene": small_arch(4), "schedule": "free"} | words)
-    assert "\n" not in str(caught.value)
 
 
 def strictly_below(problem, value):

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
 
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.decision_costs import Budget, LayeredCosts
-from seqopt.problem.problem import Aim
-from tests.layered import Costs, answer
-from tests.strategies import problems
+from tests.layered import Costs
 
 INF = np.inf
 
@@ -56,19 +52,6 @@ def test_costs_are_copies_that_cannot_be_written_to():
     for array in (*costs.single, *costs.shared):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 1
-
-
-@given(problem=problems())
-def test_candidates_on_paths_are_those_of_allowed_choices(problem):
-    choices = product(*(range(size) for size in problem.sums.sizes))
-    allowed = [choice for choice in choices if np.isfinite(problem.sums.cost(choice))]
-    if not allowed:
-        with pytest.raises(InfeasibleError):
-            problem.compiled()
-        return
-    found = problem.compiled()
-    kept = {*zip(found.instance.levels.tolist(), found.candidates.tolist(), strict=True)}
-    assert kept == {(0, 0), *((k, c) for choice in allowed for k, c in enumerate(choice, start=1))}
 
 
 @pytest.mark.parametrize(
@@ -129,10 +112,3 @@ def test_what_a_choice_takes_of_a_budget(choice, taken):
 def test_a_budget_that_is_no_budget_is_named(change, named):
     with pytest.raises(ProblemError, match=named):
         replace(use(1.0), **change)
-
-
-@given(problem=problems())
-def test_of_choices_with_one_worst_cost_minimax_takes_the_least_sum(problem):
-    worths = {c: (worst, problem.worth(c)) for c, worst in problem.within(Aim.PEAK).items()}
-    if worths:
-        assert worths[answer(problem, "minimax").choice] == min(worths.values())

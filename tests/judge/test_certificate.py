@@ -11,7 +11,6 @@ from hypothesis import given
 from seqopt import judge_instance
 from seqopt.errors import SolverError
 from seqopt.graph.decision_costs import Budget, LayeredCosts
-from seqopt.graph.decisions import travel
 from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.solve import solve
@@ -36,28 +35,6 @@ def test_promises_are_held(problem25):
         solve(problem25, changed(cascade, poor))
     with pytest.raises(SolverError, match="claimed bound"):
         solve(problem25, changed(cascade, bounded(lambda value: 0.995 * value)))
-
-
-def test_within_a_budget_a_poor_answer_is_seen_and_prices_need_not_be_believed(problem25):
-    capped = replace(problem25, budgets=(travel(problem25, 20.0),))
-    best = solve(capped, "labels")
-    poor = min(
-        (
-            (*best.choice[:k], other, *best.choice[k + 1 :])
-            for k, size in enumerate(problem25.sums.sizes)
-            for other in range(size)
-            if other != best.choice[k]
-        ),
-        key=lambda c: (capped.budgets[0].spent(c) > 20.0, problem25.sums.cost(c)),
-    )
-    value, costs = problem25.sums.cost(poor), Costs(capped.sums, capped.budgets)
-    for prices in ((), best.selection.prices[0], (1e9,), (-1.0,)):
-        proof = answer(costs, told(costs, poor, value, prices=prices)).certificate
-        assert proof.gap == pytest.approx((value - best.certificate.objective) / value, abs=1e-9)
-        assert proof.gap > 1e-5
-    for prices in ((np.nan,), (np.inf,)):
-        with pytest.raises(SolverError):
-            answer(costs, told(costs, poor, value, prices=prices))
 
 
 def proven(costs, aim):

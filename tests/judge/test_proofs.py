@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from heapq import heappop, heappush
-from itertools import product
 
 import numpy as np
 import pytest
@@ -13,12 +12,9 @@ import seqopt
 from seqopt.engines.interface import Want
 from seqopt.graph import Explorer
 from seqopt.graph._orders import OrderSpace, among_orders
-from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.paths import distances, keep_best, least_peak, lexicographic_bounds, reached
 from seqopt.graph.states.explored import explore, floors_of_goals
 from seqopt.graph.states.states import build_states
-from seqopt.judge import _bounds as budget_proof
-from seqopt.judge._bounds import least_within
 from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.judge._states import Filter, StateEvaluator
 from seqopt.plan.solve import solve
@@ -27,7 +23,6 @@ from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence.rules import Ending, FreeRules, with_robots
 from tests.builders import small_arch
-from tests.layered import Costs
 from tests.plain_rules import PlainBook
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
@@ -126,17 +121,6 @@ def test_fewer_steps_are_proven_by_states_on_paths_of_fewer_steps():
         assert Proof(problem).bounds((peak, steps + more))[1] <= steps
 
 
-def test_a_proof_by_the_end_alone_is_not_given_to_a_worse_plan():
-    problem = posed("minmax,steps", count=6)
-    floors, proof = floors_of_goals(problem), Proof(problem)
-    assert proof.bounds(floors) == floors
-    assert proof.states == 1
-    best = solve(problem, "schedule_search", proof=False).selection.objective
-    assert best[0] > floors[0]
-    assert proof.bounds((best[0] * 1.01, best[1])) == pytest.approx(best, rel=1e-9)
-    assert proof.states > 200
-
-
 @pytest.mark.parametrize(("aim", "by"), [("F_largest", "limits"), ("sum(M_sup)", "payloads")])
 def test_the_proof_lets_robots_carry_all_they_may(aim, by):
     """They may just carry what any plan needs: plans above the best one are found."""
@@ -149,39 +133,6 @@ def test_the_proof_lets_robots_carry_all_they_may(aim, by):
     problem = posed(aim, scene, limits)
     (best,) = solve(problem, "schedule_search").selection.objective
     assert Proof(problem).bounds((best * (1 + 1e-6),)) == pytest.approx((best,), rel=1e-9)
-
-
-def signed_problem(rng, moves=3, size=5):
-    """A problem with two budgets, amounts and costs of both signs, and what choices cost."""
-
-    def parts():
-        pairs = [(1, size), *[(size, size)] * (moves - 1)]
-        return tuple(rng.normal(size=size) for _ in pairs), tuple(rng.normal(size=p) for p in pairs)
-
-    budgets = tuple(Budget(name, *parts(), float(rng.uniform(-4, 2))) for name in ("one", "two"))
-    problem = Costs(LayeredCosts(*parts()), budgets)
-    return problem, sorted(problem.within().values())
-
-
-@pytest.mark.parametrize(("most", "climbs"), [(1, 20), (3, 1)])
-def test_what_is_set_aside_counts_and_prices_are_not_negative(monkeypatch, most, climbs):
-    """Few partial choices are kept, prices of any sign are claimed: no choice is below a bound."""
-    monkeypatch.setattr(budget_proof, "MOST", most)
-    monkeypatch.setattr(budget_proof, "MIXTURES", climbs)
-    rng = np.random.default_rng(4)
-    proven = 0
-    for _ in range(3):
-        problem, found = signed_problem(rng)
-        compiled = problem.compiled()
-        graph, costs = compiled.instance.graph, compiled.instance.amounts[:, 0]
-        limited = [(cap.column, cap.most) for cap in compiled.instance.caps]
-        for price, value in product((-3.0, 0.0, 5.0), found[:3]):
-            claimed = np.maximum([price, -price], 0.0)  # as the judge of paths reads them
-            own = graph, costs, limited, value - compiled.offset
-            bound = least_within(*own, prices=claimed, laid_down=True)[0] + compiled.offset
-            assert bound <= found[0] + 1e-6
-            proven += bound > found[0] - 0.5
-    assert proven
 
 
 def test_what_was_left_out_for_a_threshold_bounds_all_orders(monkeypatch):

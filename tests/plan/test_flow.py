@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from formulations.flow import unit_flow
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.paths import TIED
@@ -35,38 +34,6 @@ def problem(*bounds):
         ([30, 0, 50], [0, 0], [0, 0]), ([[0, 0, 0]], [[1, 2], [0, 0], [3, 0]], [[0, 0], [0, 0]])
     )
     return Costs(costs, tuple(Budget(f"use {i}", *taken, b) for i, b in enumerate(bounds)))
-
-
-def flow_through(costs):
-    return unit_flow(costs.compiled().instance.asked)
-
-
-ARCS = (
-    *((0, (0, 0)), (0, (0, 2))),
-    *((1, (0, 0)), (1, (0, 1)), (1, (2, 0))),
-    *((2, (0, 0)), (2, (0, 1)), (2, (1, 0)), (2, (1, 1))),
-)  # the move, and which candidates of the one before and of it; no path takes any other
-
-
-def flow_of(choice):
-    """The flow of a choice, arc by arc."""
-    pairs = [*zip((0, *choice[:-1]), choice, strict=True)]
-    return np.array([float(pairs[move] == arc) for move, arc in ARCS])
-
-
-ALLOWED = [(0, 0, 0), (0, 0, 1), (0, 1, 0), (0, 1, 1), (2, 0, 0), (2, 0, 1)]
-
-
-@pytest.mark.parametrize("choice", ALLOWED)
-def test_a_choice_is_a_unit_flow_and_comes_back(choice):
-    own = problem(90.0)
-    flow, arcs = flow_through(own), flow_of(choice)
-    assert (flow.balance @ arcs).tolist() == flow.source.tolist() == [1, 0, 0, 0, 0]
-    assert flow.cost @ arcs * flow.scale == pytest.approx(own.sums.cost(choice), rel=1e-14)
-    assert flow.takes[0] @ arcs * flow.units[0] == own.budgets[0].spent(choice)
-    assert own.compiled().choice(flow.path(arcs)) == choice
-    mixed = 0.6 * arcs + 0.4 * flow_of((2, 0, 0))
-    assert own.compiled().choice(flow.path(mixed)) == choice
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-3])

@@ -57,27 +57,6 @@ def small():
     return Costs(costs).compiled().instance
 
 
-def unlocking(problem, **_):
-    """Make the data say what the answer claims."""
-    problem.amounts.flags.writeable = True
-    problem.amounts[:] = 0.0
-    return seqopt.formulations()["overlap_dp"].solve(problem)
-
-
-def replacing(problem, **_):
-    vars(problem).pop("graph", None), vars(problem).pop("asked", None)
-    object.__setattr__(problem, "amounts", np.zeros_like(problem.amounts))
-    return seqopt.formulations()["overlap_dp"].solve(problem)
-
-
-@pytest.mark.parametrize("cheat", [unlocking, replacing])
-def test_what_a_formulation_changes_is_not_what_it_is_judged_by(cheat):
-    cheater, problem = replace(seqopt.formulations()["overlap_dp"], solve=cheat), small()
-    with pytest.raises(SolverError, match="not 0 as claimed"):
-        seqopt.solve(problem, cheater)
-    assert seqopt.solve(problem, "overlap_dp").certificate.objective == 3.0
-
-
 def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):
     monkeypatch.setattr("seqopt.judge.arithmetic.proven", lambda *_: 99.0)
     with pytest.raises(SolverError, match="the bound 99 is above the path's 3"):

@@ -148,15 +148,3 @@ def test_aims_in_their_order_agree_with_brute_force(problem, data):
             best_in_order(goals)
         return
     assert found[best_in_order(goals)] == min(found.values())
-
-
-# quantiles over steps
-
-
-def step_costs(problem, choice):
-    """The costs of the open steps of a choice, one by one."""
-    out = []
-    for choices in problem.evaluation.steps:
-        costs = problem.step_costs(choices)
-        out.append(float(costs[tuple(choice[m] for m in choices.moves)]))
-    return np.sort(out)[::-1]
