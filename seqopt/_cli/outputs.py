@@ -27,6 +27,7 @@ from seqopt.scene.scene_file import builtin_scenes, dump_scene
 from seqopt.work.progress import Tell
 
 CHARTS = Later("seqopt.report.charts")  # matplotlib is an extra
+FILES = Later("seqopt.report._style")  # likewise
 TASKS = Later("seqopt.exchange._tasks")  # 13 ms, where files are written
 ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
 
@@ -42,7 +43,7 @@ def picture(name: str, draw: Callable[[Any], Any]) -> dict[str, bytes]:
     """Return files of a picture by name, empty without matplotlib; ``draw`` takes the charts."""
     if figure_notes():
         return {}
-    files: dict[str, bytes] = CHARTS.picture_files(name, draw(CHARTS))
+    files: dict[str, bytes] = FILES.picture_files(name, draw(CHARTS))
     return files
 
 

@@ -1,4 +1,4 @@
-"""Where builds fail, on a page: what is mapped, and how steps fall in the viewer."""
+"""Where builds fail, in words: how many steps fall, what falls first, and what would cure it."""
 
 from __future__ import annotations
 
@@ -8,30 +8,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from seqopt.engines.interface import Engine
 from seqopt.errors import SeqoptError
 from seqopt.network.build import build_network
-from seqopt.report.page import Build, report_page
-from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
-from seqopt.stability._builds import BuildVerdicts
-from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import FailureMap
 from seqopt.work.progress import Tell
 from seqopt.workflow import Search, optimize
 
 PATIENCE = 20.0  # s for each plan: one that is not proven to be the best is a way to build as well
 AXIS_WORDS = {"friction": "friction", "tilt": "tilt, degrees"}
-SHOWN = {
-    "first_step": "first step",
-    "bond_needed_Pa": "bond for all steps, kPa",
-    "friction_needed": "friction for all steps",
-    "grip_node": "grip for the first step, node",
-}
-Builds = Mapping[str, Sequence[Step]]
 
 
 def usual_builds(
@@ -65,54 +53,6 @@ def usual_builds(
         except SeqoptError as error:
             notes.append(f"{schedule or 'loop'}: {error}")
     return builds, notes
-
-
-def failure_page(engine: Engine, builds: Builds, found: FailureMap) -> str:
-    """Return the page of a map: its table, and every build with how its steps fall.
-
-    ``engine``: of the scene; ``builds``: those mapped.
-    """
-    value, axis = found.usual, AXIS_WORDS[str(found.cases["axis"].iloc[0])]
-    shown = [
-        Build(
-            name,
-            steps,
-            analyze(engine, steps),
-            _verdicts(found, name, value),
-            falls=found.motions.get(name),
-        )
-        for name, steps in builds.items()
-    ]
-    fall = found.cases["fall"].gt(0).groupby(found.cases["build"], sort=False).any()
-    ways = f"{len(shown)} way{'s' * (len(shown) != 1)} to build {engine.network.scene.name}"
-    sentence = (
-        f"Where {ways} fail{'s' * (len(shown) == 1)}: {int(fall.sum())} of them somewhere on the "
-        f"map. Step by step, with {axis} {value:.3g}: a step that falls can be shown as it falls."
-    )
-    caption = f"Steps that fall, by what holds the joints and by {axis}; a click shows the build"
-    table = found.cases.assign(bond_needed_Pa=found.cases["bond_needed_Pa"] / 1e3)
-    falls = table["fall"] > 0
-    for name in ("bond_needed_Pa", "friction_needed"):
-        table[name] = table[name].where(falls & np.isfinite(table[name]))
-    table["first_step"] = table["first_step"].where(falls)
-    none = [] if table["undecided"].any() else ["undecided"]
-    table = table.drop(columns=["axis", "bricks", *none])
-    cases = table.rename(columns={**SHOWN, "value": axis})  # in display units
-    return report_page(engine, shown, sentence, [(caption, cases)])
-
-
-def _verdicts(found: FailureMap, build: str, value: float) -> tuple[BuildVerdicts, ...]:
-    """Return the verdicts of a build at a value of the axis, the map's first mortar last."""
-    steps, cases = (
-        table[(table["build"] == build) & (table["value"] == value)]
-        for table in (found.steps, found.cases)
-    )
-    out = []
-    for case in cases.to_dict(orient="records"):
-        verdicts = map(Verdict, steps["verdict"][steps["holds"] == case["holds"]])
-        first = case["first_step"], case["brick"], case["joint"]
-        out.append(BuildVerdicts(case["holds"], tuple(verdicts), *first))
-    return tuple(out[::-1])  # the last one marks steps
 
 
 def cure_words(case: Mapping[Any, Any]) -> str:

@@ -44,7 +44,6 @@ FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are s
 PLANS = ("plan.csv", "pick/plan.csv", "steps_*.csv")  # of optimize, pareto and compare
 GAP = "above the best, %"
 _MM = 1000.0  # µm
-PHONE = 3.75  # inches: as wide as a telephone shows at 100 pixels an inch
 SMALL = 60  # bricks up to which a plan is shown beside the fixed methods
 Tables = Mapping[str, pd.DataFrame]
 
@@ -187,12 +186,9 @@ def _speed_parts(speed: RegretTable) -> Iterator[tuple[str, pd.DataFrame | _Draw
     title = f"Speed against regret, valued by {speed.reference}"
     with suppress(ExtraError):
         draw = display(RegretTable, "plot")
-        from seqopt.report._style import WIDTH, picture_files  # noqa: PLC0415  # an extra
+        from seqopt.report._style import picture_files  # noqa: PLC0415  # an extra
 
-        wide, narrow = (
-            picture_files("", draw(speed, width=width))[".png"] for width in (WIDTH, PHONE)
-        )
-        yield title, _Drawn(wide, narrow, speed.sentence)
+        yield title, _Drawn(picture_files("", draw(speed))[".png"], speed.sentence)
     yield f"{title}, in numbers. {speed.sentence}", speed.table
 
 

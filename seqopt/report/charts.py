@@ -13,11 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 
-from seqopt.engines.interface import Engine
 from seqopt.plan.front import Front
 from seqopt.report._failures import AXIS_WORDS
-from seqopt.report._gantt import gantt_picture
-from seqopt.report._pictures import steps_picture
 from seqopt.report._style import (
     GRAY,
     SKY,
@@ -27,12 +24,10 @@ from seqopt.report._style import (
     look,
     looks,
     new_figure,
-    picture_files,
     plain,
     styled,
 )
 from seqopt.report.comparison import _in_shown_unit, _worst_of
-from seqopt.report.page import Build
 from seqopt.report.text import in_words, typed
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import FailureMap
@@ -177,17 +172,6 @@ def _scale(axes: Axes, far: float) -> None:
             if high - low < least:
                 axis.set_view_interval(middle - least / 2, middle + least / 2, ignore=True)
             axis.set_major_formatter(ScalarFormatter(useOffset=False))
-
-
-def plan_figures(engine: Engine, builds: Sequence[Build]) -> dict[str, bytes]:
-    """Return figures of plans as PNG and SVG, by file name: steps, grips, and all responses."""
-    files: dict[str, bytes] = {}
-    for build in builds:
-        files |= picture_files(f"{build.name}_steps", steps_picture(engine, build.steps))
-        grips = gantt_picture(engine.network.scene, build.steps, build.table)
-        files |= picture_files(f"{build.name}_grips", grips)
-    tables = {build.name: build.table for build in builds}
-    return files | picture_files("responses", responses_figure(tables))
 
 
 @styled

@@ -33,10 +33,7 @@ from seqopt.scene.scene import Scene
 from seqopt.scene.shape import normal_of
 
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
-POINTS = 9.0  # from a mark to the middle of its number
-SHARE = 0.026  # of the picture's size that this is, about
-WIDE = 1.5  # of a number over its height
-ANGLES = np.radians(np.arange(0, 360, 15))
+POINTS = 9.0  # from a mark up to the middle of its number
 EDGES = ((0, 4), (0, 2), (0, 1))  # corners of a box along its length, width and thickness
 PAIRS = ((0, 1), (0, 2), (1, 2))  # of these
 EVEN = 1e-9  # share of a direction toward the viewer that is none
@@ -78,31 +75,6 @@ def _frame(axes: Axes) -> None:
     axes.set_aspect("equal")
     axes.autoscale_view()
     axes.set_axis_off()
-
-
-def _aside(marks: Floats, segments: Sequence[Floats]) -> list[tuple[float, float]]:
-    """Return how far beside its mark (n, 2) every label stands, to the right and up, in points.
-
-    Each takes the direction in which the nearest line, mark or label before it is farthest.
-    """
-    reach = SHARE * float(np.ptp(marks, axis=0).max())
-    around = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
-    ends = np.asarray(segments, dtype=float).reshape(-1, 2, 2)
-    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
-    length = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
-    placed = np.empty((0, 2))
-    out = []
-    for spots in marks[:, None] + reach * around:
-        away = spots[:, None] - start
-        share = np.clip((away * along).sum(axis=2) / length, 0.0, 1.0)
-        lines = np.linalg.norm(away - share[..., None] * along, axis=2).min(axis=1)
-        parts = (spots[:, None] - placed) / [WIDE, 1.0]
-        others = np.linalg.norm(parts, axis=2).min(axis=1, initial=np.inf)
-        best = int(np.minimum(lines, others).argmax())
-        placed = np.concatenate([placed, spots[best : best + 1]])
-        x, y = (POINTS * around[best]).tolist()
-        out.append((x, y))
-    return out
 
 
 def _drawing_order(corners: Floats, toward: Floats) -> list[int]:
@@ -202,8 +174,8 @@ def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
         axes.scatter(x, y, area, zorder=3, **mark)
     if numbers:
         inner = np.flatnonzero(kind == PartKind.INNER.value)
-        for i, shift in zip(inner, _aside(seen[inner], segments), strict=True):
-            _write(axes, str(network.node_name[i]), seen[i], shift, ha="center", zorder=4)
+        for i in inner:
+            _write(axes, str(network.node_name[i]), seen[i], (0, POINTS), ha="center", zorder=4)
     _frame(axes)
 
 

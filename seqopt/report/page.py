@@ -57,7 +57,6 @@ RESPONSES = {
 PARTS = {"style": "viewer.css", "three": "three.js", "charts": "charts.js", "viewer": "viewer.js"}
 _WANT = Want.EDGES | Want.BRICKS | Want.SUPPORT
 MOST = 6_000_000  # numbers of fields in a page: about 8 MB
-NARROW = 600  # pixels up to which a screen shows the narrow form of a picture
 LEFT_OUT = "Displacements and axial forces of some builds are left out"
 
 
@@ -68,7 +67,7 @@ class Build:
     ``verdicts`` say which steps stand, where that was asked, with the mortar of the scene last;
     ``bounds`` are limits by column of the table, or ``F_largest``, that are drawn beside the
     responses; ``order`` names the bricks as they are placed, where that is not the scene's own
-    order; ``falls`` (steps, B, 6): how steps fall, with the first mortar; ``arms``: the joints of
+    order; ``arms``: the joints of
     robots whose postures are known, points (k, 3), m, from the base to the tip of the tool, an
     entry a step, by the names of robots (of others a simple arm is drawn); ``faults``: in which
     steps arms cannot be, in words.
@@ -81,7 +80,6 @@ class Build:
     bounds: Mapping[str, float] = field(default_factory=dict)
     departures: Sequence[Departure] = ()
     order: Order = ()
-    falls: Floats | None = None
     arms: Arms = field(default_factory=dict)
     faults: Sequence[str] = ()
 
@@ -122,10 +120,9 @@ class Scatter:
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """A picture on a page: as PNG for wide screens and for narrow ones, and what it shows."""
+    """A picture on a page: PNG, and what it shows."""
 
-    wide: bytes
-    narrow: bytes
+    png: bytes
     alt: str
 
 
@@ -240,7 +237,6 @@ def _build_data(
         "columns": lines[0],
         "rows": lines[1:],
         "forces": [force_column(robot) for robot in scene.robots],
-        "fall": None if build.falls is None else _packed(build.falls),
         **(_fields(engine, build, known or {}) if fields else dict.fromkeys(FIELDS)),
     }
 
@@ -373,14 +369,10 @@ def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
 def _part(caption: str, part: pd.DataFrame | _Drawn) -> str:
     """Return a table as HTML, numbers as people write them, or a picture."""
     if isinstance(part, _Drawn):
-        wide, narrow = (
-            f"data:image/png;base64,{b64encode(png).decode('ascii')}"
-            for png in (part.wide, part.narrow)
-        )
+        source = f"data:image/png;base64,{b64encode(part.png).decode('ascii')}"
         return (
-            f'<figure class="drawn"><figcaption>{escape(caption)}</figcaption><picture>'
-            f'<source media="(max-width: {NARROW}px)" srcset="{narrow}">'
-            f'<img src="{wide}" alt="{escape(part.alt)}"></picture></figure>'
+            f'<figure class="drawn"><figcaption>{escape(caption)}</figcaption>'
+            f'<img src="{source}" alt="{escape(part.alt)}"></figure>'
         )
     body = (
         part.map(_cell_text)

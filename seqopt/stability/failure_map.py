@@ -16,7 +16,6 @@ import numpy as np
 import pandas as pd
 
 from seqopt._showing import display
-from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import PartialAssemblies
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
@@ -55,16 +54,12 @@ class FailureMap:
         ``grip_node``, where one more robot would hold the first step.
     steps : pandas.DataFrame
         The ``verdict`` of every ``step`` of these, and of how many ``bricks`` it is.
-    motions : mapping of str to (steps, B, 6) float
-        By build, how its steps fall with the first of what holds, at the ``usual`` value; zero
-        for those that stand.
     usual : float
         The value nearest to the default: the friction of `DRY`, or no tilt.
     """
 
     cases: pd.DataFrame
     steps: pd.DataFrame
-    motions: Mapping[str, Floats]
     usual: float
 
     def __repr__(self) -> str:
@@ -155,7 +150,7 @@ def failure_map(
     asked = [*_cases(scene, builds, holds, axis, values)]
     told = with_progress("mapping failures", asked, progress)
     rows = [_row(case, axis, value) for value, case in told]
-    steps, motions = list[pd.DataFrame](), dict[str, Floats]()
+    steps = list[pd.DataFrame]()
     for value, case in asked:
         own = {"build": case.build, "holds": case.holds, "axis": axis, "value": value}
         found = {
@@ -164,12 +159,7 @@ def failure_map(
             "verdict": [each.verdict.value for each in case.found],
         }
         steps.append(pd.DataFrame(own | found))
-        if value == usual and case.holds == holds[0]:
-            motions[case.build] = np.zeros((len(case.steps), len(scene.bricks), 6))
-            for motion, each in zip(motions[case.build], case.found, strict=True):
-                if each.verdict is Verdict.FALLS:
-                    motion[: len(each.motion)] = each.motion
-    return FailureMap(pd.DataFrame(rows), pd.concat(steps, ignore_index=True), motions, usual)
+    return FailureMap(pd.DataFrame(rows), pd.concat(steps, ignore_index=True), usual)
 
 
 def _cases(

@@ -128,16 +128,9 @@ def test_commands_write_it_and_folders_are_read_again(capsys, tmp_path):
     again = data_of((tmp_path / "again.html").read_text("utf-8"))
     assert [build["name"] for build in again["builds"]] == ["plan"]
     assert again["builds"][0]["steps"] == first["builds"][0]["steps"]
-    drawn = tmp_path / "drawn"
-    assert main(["report", str(out), "--figures", str(drawn)]) == 0
-    names = {f"{name}.{end}" for name in FIGURES for end in ("png", "svg")}
-    assert {path.name for path in drawn.iterdir()} == names
     capsys.readouterr()
     assert main(["report", str(tmp_path)]) == 2
     assert "there is no plan in it" in capsys.readouterr().err
-
-
-FIGURES = ("plan_steps", "plan_grips", "responses")
 
 
 @pytest.fixture

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from seqopt.report._style import look, looks, new_figure, picture_files, plain
 from seqopt.report.charts import COLUMNS, responses_figure
-from seqopt.report.draw import POINTS, _aside
 
 
 def test_seventy_series_differ_and_ten_do_without_color():
@@ -48,14 +46,6 @@ def test_logarithmic_axes_have_plain_numbers(limits, words):
     ticks = [tick for tick in axes.get_xticks() if low <= tick <= high]
     assert [axes.xaxis.get_major_formatter()(tick) for tick in ticks] == words
     assert len(axes.xaxis.get_minorticklocs()) == 0
-
-
-def test_numbers_stand_beside_lines_and_apart():
-    marks = np.array([[0.0, y] for y in np.linspace(0, 10, 12)])
-    line = np.array([[0.0, 0.0], [0.0, 10.0]])
-    shifts = np.array(_aside(marks, [line]))
-    assert np.hypot(*shifts.T) == pytest.approx(POINTS)
-    assert (np.abs(shifts[1:-1, 0]) > POINTS / 2).all()  # aside of a line that goes up
 
 
 def test_equal_tables_are_one_line():

@@ -93,7 +93,7 @@ def test_it_is_told(tmp_path, capsys):
     assert scene.loading.endswith("weights times 1.35, movement of 1 ground end")
     assert six_bricks().loading == ""
     assert "2 forces, up to" in scene._repr_html_()
-    assert "beside the weight" not in six_bricks()._repr_html_()
+    assert "Beside the weight" not in six_bricks()._repr_html_()
     save_scene(scene, tmp_path / "own.json")
     assert main(["scene", str(tmp_path / "own.json")]) == 0
     assert "beside the weight: 2 forces, up to" in " ".join(capsys.readouterr().out.split())

@@ -19,9 +19,8 @@ from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import BuiltFrom, File, Words, as_built, parse_count, parse_mortar, shown
 from seqopt._files import csv_text
 from seqopt._later import Later
-from seqopt._showing import PAGE
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar
-from seqopt.engines.registry import USUAL, make_engine, versions
+from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -216,14 +215,15 @@ def _map(
     found = failure_map(scene, builds, holds, axis, values, tell)
 
     def files() -> dict[str, bytes | str]:
-        page = MAP.failure_page(make_engine(USUAL, network, None), builds, found)
         tables = {"map.csv": csv_text(found.cases), "map_steps.csv": csv_text(found.steps)}
         picture = outputs.picture("map", lambda charts: charts.failure_figure(found))
-        return {**tables, PAGE: page, **picture}
+        return {**tables, **picture}
 
     written = output.write(tell, files)
     blocks = MAP.failure_blocks(scene, found, wrapped)
-    where = outputs.written_to(output.path, tables="tables, a picture", what="how steps fall")
+    where = (
+        f"tables and a picture {'are' if written else 'would be'} in {output.path or '--out DIR'}"
+    )
     return Answer(
         facts={"versions": versions(), "cases": found.cases, "steps": found.steps},
         text="\n\n".join([*blocks, wrapped(where)]),

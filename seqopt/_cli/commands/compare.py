@@ -73,7 +73,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
         seconds together (60), each plan valued in the most detailed model that there is data for.
     reference : str, optional
         With ``speed``: the engine that values plans (compliance; with ``mortar`` every step has to
-        stand, too; discrete lets joints open; staged adds what earlier steps lock in).
+        stand, too; discrete lets joints open).
     out : pathlib.Path or str, optional
         Write tables, figures and a page with all builds.
 

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
 
 from seqopt._cli import inputs, outputs
 from seqopt._cli.answer import Answer
 from seqopt._cli.signatures import door
 from seqopt._cli.words import BuiltFrom, File, as_built, shown
-from seqopt._files import require_folder, write_folder, write_text
+from seqopt._files import write_text
 from seqopt._showing import PAGE
 from seqopt.contact.mortar import Mortar
 from seqopt.network.build import build_network
-from seqopt.report._pages import folder_builds, folder_page
+from seqopt.report._pages import folder_page
 from seqopt.work.progress import Tell
 
 
 @door
-def report(  # noqa: PLR0913  # every option is a parameter
+def report(  # every option is a parameter
     folder: BuiltFrom,
     scene: BuiltFrom = "arch25",
     *,
@@ -28,7 +27,6 @@ def report(  # noqa: PLR0913  # every option is a parameter
     stability: bool = True,
     cache: Path | str | None = None,
     progress: Tell = shown,
-    figures: Annotated[Path | str | None, ("value", "FOLDER")] = None,
     out: File | None = None,
 ) -> Answer[tuple[Path, ...]]:
     """Write a page with a step viewer of the plans in a folder.
@@ -43,9 +41,6 @@ def report(  # noqa: PLR0913  # every option is a parameter
         Folder that holds plans as CSV; in place of it a scene, whose usual steps are shown.
     scene, engine, mortar, stability, cache, progress : optional
         As of `optimize`.
-    figures : pathlib.Path or str, optional
-        Also write figures there as PNG and SVG: steps, who holds what when, and responses along the
-        build (needs matplotlib).
     out : pathlib.Path or str, optional
         Page to write (default: report.html in the folder, of a scene its name with .html).
 
@@ -58,7 +53,6 @@ def report(  # noqa: PLR0913  # every option is a parameter
     --------
     $ seqopt report best
     $ seqopt report my.json plans --out plans.html
-    $ seqopt report best --figures pictures
     """
     place, taken = inputs.plan_folder(folder, cache, progress)
     built = as_built(scene)
@@ -73,20 +67,11 @@ def report(  # noqa: PLR0913  # every option is a parameter
         own = place == Path(folder)
         path = place / PAGE if own else inputs.file_name(folder, ".html")
     outputs.Output(out, built).keep_apart(path)
-    if figures is not None:
-        require_folder(Path(figures))
     trouble = inputs.posture_trouble(found, cache, progress)
     progress("analyzing plans and writing the page")
     computed = inputs.find_engine(build_network(found), engine, mortar, verdicts=stability)
     prover = inputs.find_prover(computed.network, mortar, progress, asks=stability)
     write_text(path, folder_page(computed, place, prover))
-    written, left = [path], outputs.figure_notes(figures)
-    if figures is not None and not left:
-        progress("drawing figures")
-        builds = folder_builds(computed, place, prover)
-        write_folder(Path(figures), outputs.CHARTS.plan_figures(computed, builds))
-        written.append(Path(figures))
-    text = f"written to {' and '.join(map(str, written))}"
     drawn = (f"arms: drawn without postures; {trouble}",) if trouble else ()
-    notes = (*taken, *drawn, *left)
-    return Answer({}, text, scene=found, written=(*written,), value=(*written,), notes=notes)
+    text, notes = f"written to {path}", (*taken, *drawn)
+    return Answer({}, text, scene=found, written=(path,), value=(path,), notes=notes)

@@ -261,7 +261,7 @@
       this.draw();
     }
     moved(build, s, i, point, options, out) {
-      const [field, by] = options.fall && build.fall ? [build.fall, options.fall] : [build.twist, options.magnify];
+      const field = build.twist, by = options.magnify;
       const c = structure.bricks[i].center, t = [0, 1, 2, 3, 4, 5].map((k) => by * value(field, s, 6 * i + k));
       const r = [point[0] - c[0], point[1] - c[1], point[2] - c[2]];
       out[0] = point[0] + t[0] + t[4] * r[2] - t[5] * r[1];
@@ -476,7 +476,7 @@
   const slider = byId("step");
   let timer = null;
   const shown = () => [builds[byId("first").value], byId("second").value === "" ? null : builds[byId("second").value]].filter(Boolean);
-  const options = () => ({ magnify: Number(byId("magnify").value) || 0, forces: byId("forces").checked, robots: byId("robots").checked, fall: byId("fall").checked ? 0.15 * radius : 0 });
+  const options = () => ({ magnify: Number(byId("magnify").value) || 0, forces: byId("forces").checked, robots: byId("robots").checked });
   function refresh() {
     const pair = shown(), at = Number(slider.value);
     slider.max = Math.max(...pair.map((build) => build.steps.length)) - 1;
@@ -547,9 +547,9 @@
   });
   byId("second").prepend(new Option("nothing", "", true, true));
   byId("second").value = "";
-  await Promise.all(builds.flatMap((build) => ["twist", "edge", "push", "turn", "fall"].map((name) => unpack(build[name]))));
+  await Promise.all(builds.flatMap((build) => ["twist", "edge", "push", "turn"].map((name) => unpack(build[name]))));
   for (const id of ["first", "second"]) byId(id).addEventListener("change", () => { drawCharts(); refresh(); });
-  for (const id of ["magnify", "forces", "robots", "fall"]) byId(id).addEventListener("input", refresh);
+  for (const id of ["magnify", "forces", "robots"]) byId(id).addEventListener("input", refresh);
   byId("tables").classList.toggle("long", document.querySelectorAll("#tables figure:first-child tr").length > 9);
   byId("numbers").value = structure.bricks.length > SHORT ? "" : "names";
   byId("numbers").addEventListener("input", () => panes.forEach((pane) => pane.draw()));
@@ -582,8 +582,6 @@
   if (asked.has("magnify")) byId("magnify").value = asked.get("magnify");
   byId("forces").checked = asked.has("forces");
   byId("robots").checked = asked.get("robots") !== "off";
-  byId("falling").hidden = !builds.some((build) => build.fall);
-  byId("fall").checked = asked.has("fall");
   drawCharts();
   slider.max = Math.max(...shown().map((build) => build.steps.length)) - 1;
   moved = asked.has("step");

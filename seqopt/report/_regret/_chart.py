@@ -1,4 +1,4 @@
-"""The chart of speed against regret, and of the parts of regret (extra ``plot``)."""
+"""The chart of speed against regret (extra ``plot``)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from seqopt.report._regret._table import (
     FAILED,
     FALLS,
     NAMED,
-    USUAL_NAMES,
     RegretTable,
     percent,
     seconds_text,
@@ -118,21 +117,14 @@ NONE = LEAST / 6
 LINE = 24  # letters of a line beside a point
 LETTER = 0.072  # inches of a letter of a title
 LOST = {CUT: "stopped", FAILED: "without a plan", FALLS: "fall", DONE: "not allowed"}
-PARTS = (
-    ("regret", "D", "regret"),
-    ("gap", "|", "proven gap"),
-    ("error", "x", "error of the model"),
-)
 
 
 @styled
 def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
-    """Return the chart of one scene, with the parts of regret, or of several side by side."""
-    if len(tables) == 1:
-        return _alone(tables[0], width)
-    across = 1 if width < WIDTH else 2
+    """Return the chart of one scene, or of several side by side."""
+    across = 1 if width < WIDTH or len(tables) == 1 else 2
     rows = -(-len(tables) // across)
-    figure = new_figure(0.7 + 2.6 * rows, width)
+    figure = new_figure(0.7 + (4.0 if len(tables) == 1 else 2.6) * rows, width)
     panels = figure.subplots(rows, across, squeeze=False).ravel()
     for axes in panels[len(tables) :]:
         axes.set_visible(False)
@@ -140,36 +132,18 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
     for axes, each in zip(panels, tables, strict=False):
         took = each.take
         words = f"take {took['engine']}, {_words(took)}: {seconds_text(took['seconds'])}"
-        lines = textwrap.wrap(words, int((width / across - 0.6) / LETTER))
-        axes.set_title("\n".join([f"{each.scene}, {each.bricks} bricks", *lines]), fontsize=SMALL)
+        valued = f", valued by {each.valued}" if len(tables) == 1 else ""
+        lines = [f"{each.scene}, {each.bricks} bricks{valued}", words]
+        most = int((width / across - 0.6) / LETTER)
+        title = "\n".join(textwrap.fill(line, most) for line in lines)
+        axes.set_title(title, fontsize=SMALL)
     shown = panels[: len(tables)]
     dress(*shown)
-    name_panels(*shown)
+    if len(tables) > 1:
+        name_panels(*shown)
     _legend(figure, tables, 2 if width < WIDTH else 4)
     for labels, taken in marks:
         place(figure, labels, taken)
-    return figure
-
-
-def _alone(table: RegretTable, width: float) -> Figure:
-    """Return the chart of one scene: regret over time, and its parts way by way."""
-    own = table.table.assign(kept=table.kept)  # those not dominated, and defaults
-    shown = (own["formulation"].isin(USUAL_NAMES) | own["kept"]) & np.isfinite(own["regret"])
-    by = ["regret", "seconds"]
-    parts = own[shown].sort_values(by, ascending=False, kind="stable")
-    said = table.sentence.replace("_", " ")  # no name of the code
-    lines = textwrap.wrap(said, int((width - 0.2) / LETTER), break_on_hyphens=False)
-    figure = new_figure(4.3 + 0.15 * len(lines) + 0.3 * len(parts), width)
-    figure.suptitle("\n".join(lines), x=0.01, ha="left")
-    regrets, beside = figure.subplots(2, 1, height_ratios=[3.4, 0.45 + 0.3 * len(parts)])
-    named = f"{table.scene}, {table.bricks} bricks, valued by {table.valued}"
-    regrets.set_title(textwrap.fill(named, int((width - 1.0) / LETTER)))
-    labels, taken = _regrets(regrets, table)
-    _parts(beside, parts, 4 if width < WIDTH else 2)
-    dress(regrets, beside)
-    name_panels(regrets, beside)
-    _legend(figure, [table], 2 if width < WIDTH else 4)
-    place(figure, labels, taken)
     return figure
 
 
@@ -219,27 +193,8 @@ def _regrets(axes: Axes, table: RegretTable) -> tuple[list[Label], list[tuple[Ax
     kept = seen[seen["kept"]][::-1]  # no way lies below these steps
     steps: dict[str, Any] = {"color": INK, "lw": 0.8, "drawstyle": "steps-post", "zorder": 1}
     axes.plot(kept["seconds"], kept["regret"].cummin().map(_height), **steps)
-    _curves(axes, table)
     _scales(axes, table, seen)
     return labels, taken
-
-
-def _curves(axes: Axes, table: RegretTable) -> None:
-    """Draw incumbents of ways with the reference over time, and their gaps."""
-    for at, findings in table.curves.items():
-        row = table.table.iloc[at]
-        known = len(findings) > 1 and np.isfinite(row["regret"])
-        if not known or row["engine"] != table.reference or row["without"]:
-            continue
-        best = float(table.table["value"].min()) or 1.0
-        start = max(float(row["seconds"]) - findings[-1].seconds, 0.0)
-        seconds = [start + each.seconds for each in findings]
-        color = _look(str(row["engine"]), str(row["schedule"]))["color"]
-        how: dict[str, Any] = {"color": color, "lw": 0.7, "alpha": 0.6, "drawstyle": "steps-post"}
-        above = [_height(each.objective / best - 1.0) for each in findings]
-        below = [_height(1.0 - each.bound / best) for each in findings]
-        axes.plot(seconds, np.where(np.isfinite(above), above, np.nan), zorder=1, **how)
-        axes.plot(seconds, np.where(np.isfinite(below), below, np.nan), zorder=1, ls=":", **how)
 
 
 def _scales(axes: Axes, table: RegretTable, seen: pd.DataFrame) -> None:
@@ -260,29 +215,6 @@ def _scales(axes: Axes, table: RegretTable, seen: pd.DataFrame) -> None:
         text.set_in_layout(False)
 
 
-def _parts(axes: Axes, rows: pd.DataFrame, decades: int) -> None:
-    """Draw regret, proven gap and error of the model, a line for each way; ticks by decades."""
-    for line, (_, row) in enumerate(rows.iterrows()):
-        for name, marker, _ in PARTS:
-            value = float(row[name])
-            if np.isfinite(value):
-                mark = _look(str(row["engine"]), str(row["schedule"]), filled=name == "regret")
-                axes.plot(_height(value), line, clip_on=False, ms=6, **mark | {"marker": marker})
-        name = f"{row['engine']}, {row['schedule']}: {_words(row)}"
-        above: dict[str, Any] = {"xytext": (1, 6), "textcoords": "offset points", "fontsize": SMALL}
-        text = axes.annotate(name, (0.0, line), xycoords=("axes fraction", "data"), **above)
-        text.set_in_layout(False)
-    axes.set_yticks([])
-    axes.set(xscale="log", xlabel="share of the worst step", ylim=(-0.5, len(rows) + 0.1))
-    shares = rows[[name for name, *_ in PARTS]].to_numpy(float)
-    most = max(float(np.nanmax(np.where(np.isfinite(shares), shares, np.nan))), 100 * LEAST)
-    ticks = [10.0**power for power in range(-4, int(np.ceil(np.log10(most))) + 1, decades)]
-    axes.set_xticks([NONE, *ticks], ["0", *map(percent, ticks)])
-    axes.set_xticks([], minor=True)
-    axes.set(xlim=(NONE / 3, 4 * most), title="what regret is made of, way by way")
-    axes.axvspan(NONE / 3, 0.5 * LEAST, color=GREEN, alpha=0.13, lw=0, zorder=0)
-
-
 def _legend(figure: Figure, tables: Sequence[RegretTable], across: int) -> None:
     """Draw the legend: engines, schedules and marks."""
     present = dict.fromkeys(str(name) for each in tables for name in each.table["engine"])
@@ -295,6 +227,4 @@ def _legend(figure: Figure, tables: Sequence[RegretTable], across: int) -> None:
         Line2D([], [], color=INK, lw=0.8, label="frontier"),
         Line2D([], [], **mark, marker="o", mfc="none", ms=11, label="take this"),
     ]
-    if len(tables) == 1:
-        marks += [Line2D([], [], **mark, marker=each, label=label) for _, each, label in PARTS]
     figure.legend(handles=marks, loc="outside lower center", ncols=across)

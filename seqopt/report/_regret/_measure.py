@@ -34,7 +34,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
 from seqopt.engines.registry import USUAL as USUAL_ENGINE
 from seqopt.errors import MechanismError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
-from seqopt.graph.formulation import End, Finding, FormulationKind, find_formulation, formulations
+from seqopt.graph.formulation import End, FormulationKind, find_formulation, formulations
 from seqopt.judge._schedules import plan_values
 from seqopt.network.build import build_network
 from seqopt.plan.plan import Plan
@@ -42,9 +42,8 @@ from seqopt.plan.pose import pose, states_of
 from seqopt.plan.solve import on_the_way, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import Criterion, _response_along
+from seqopt.problem.requirements import Criterion
 from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, RegretTable
-from seqopt.responses._staged import analyze_staged
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
@@ -57,7 +56,6 @@ TIMES = 3
 SHARE = 4  # times its part of what is left that a way may take
 REPEAT = 0.1  # share of what it may take up to which a way is repeated
 LOOP = "loop"
-STAGED = "staged"  # responses with what earlier steps lock in, which no engine chooses by
 RIGID_GRIPS = "rigid grips"  # exactly rigid bricks, and grips too, though their stiffness is given
 USUAL = {LOOP: "overlap_dp", FREE: "schedule_search"}
 USUAL_RULES = FreeRules()
@@ -118,8 +116,7 @@ class Way:
 class _Course:
     """What all ways have in common.
 
-    ``reference``: the problem that values plans; ``staged``: whether with what earlier steps lock
-    in; ``criterion``: the objective of ways by ranks;
+    ``reference``: the problem that values plans; ``criterion``: the objective of ways by ranks;
     ``loop``: the schedule with open grips, if there is one; ``rules``: of the free one; ``mortar``:
     whose joints every step is asked to stand with; None where joints do not open.
     """
@@ -130,8 +127,6 @@ class _Course:
     rules: FreeRules
     mortar: Mortar | None
     timer: Timer
-    staged: bool = False
-    findings: list[Finding] = field(default_factory=list)
     known: dict[Sequence[Step], Valued] = field(default_factory=dict)
 
     def engine(self, name: str) -> Engine:
@@ -163,11 +158,9 @@ class _Course:
 
     def row(self, way: Way, seconds: float) -> dict[str, object]:
         """Return the row of a way, which may take so long."""
-        proof, told = way.without != "no proof", list[Finding]()
 
         def call() -> Plan:
-            told.clear()
-            how: dict[str, Any] = {"proof": proof, "progress": told.append}
+            how: dict[str, Any] = {"proof": way.without != "no proof"}
             if "seconds" in find_formulation(way.formulation).options:
                 how["time_limit"] = KEPT * seconds
             return on_the_way(solve(self.problem(way), way.formulation, **how))
@@ -180,7 +173,6 @@ class _Course:
         except (SeqoptError, TimeoutError) as error:
             late = isinstance(error, TimeoutError | TimeUpError)
             return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}
-        self.findings[:] = [each for each in told if isinstance(each, Finding)]
         if plan.steps not in self.known:
             self.known[plan.steps] = self._value(plan.steps)
         value, along, status, why = self.known[plan.steps]
@@ -214,16 +206,7 @@ class _Course:
     def _worst(self, steps: Sequence[Step], end: Sequence[Step]) -> list[float]:
         """Return the worst step of a plan, and of its bare end, if there is one after it."""
         problem = states_of(self.reference)
-        if not self.staged:
-            return [plan_values(problem, part)[0] for part in (steps, end) if part]
-        scene, criterion = problem.network.scene, problem.criterion
-        own = [replace(step, number=n) for n, step in enumerate([*steps, *end], start=1)]
-        table = analyze_staged(problem.network, own)
-        known = {n: np.nan_to_num(_response_along(scene, table, n)) for n in criterion.wanted(1)}
-        rows = ({n: v[k : k + 1] for n, v in known.items()} for k in range(len(own)))
-        pairs = zip(rows, own, strict=True)
-        costs = [float(criterion.costs(row, step.bricks, 1)[0]) for row, step in pairs]
-        return [max(costs[: len(steps)]), *costs[len(steps) :]]
+        return [plan_values(problem, part)[0] for part in (steps, end) if part]
 
 
 def measure_regret(
@@ -251,9 +234,8 @@ def measure_regret(
         For all ways together, s.
     reference : str, optional
         The engine that values plans; by default ``compliance``, with the stiffness of grips that
-        the scene has; ``staged`` adds to that what earlier steps lock in. Where the engine has a
-        mortar, every step has to stand with it, too, which is proven by its joints' equilibrium;
-        ``discrete`` lets these open and slip instead.
+        the scene has. Where the engine has a mortar, every step has to stand with it, too, which
+        is proven by its joints' equilibrium; ``discrete`` lets these open and slip instead.
     progress, timer : callable, Timer, optional
         Called with the progress.
 
@@ -273,29 +255,24 @@ def measure_regret(
     mortar = joints if isinstance(joints, Mortar) else None
     if reference or recipe is not None:  # else an object of one's own
         own = mortar if reference in LIMITED else None
-        base = USUAL_ENGINE if reference in ("", STAGED) else reference
-        named = make_engine(base, engine.network, own)
+        named = make_engine(reference or USUAL_ENGINE, engine.network, own)
     worst = WORST_OVER_METHODS if isinstance(criterion, RankSum) else criterion
     problem = pose(named, rules, worst, "minmax")
-    staged = reference == STAGED
     loop = None
     with suppress(SeqoptError):
         loop = find_schedule(engine.network)
-    course = _Course(problem, criterion, loop, rules, mortar, timer, staged)
-    ways, refused = _ways(course, _name_of(named))
-    name = reference if staged else _name_of(named)
-    rows, curves = list[dict[str, object]](), dict[int, tuple[Finding, ...]]()
+    course = _Course(problem, criterion, loop, rules, mortar, timer)
+    name, rows = _name_of(named), list[dict[str, object]]()
+    ways, refused = _ways(course, name)
     late = set[tuple[str, str]]()  # engines and schedules that need too long to look at all
     for done, way in enumerate(ways):
         progress(Stage(f"regret: {way.engine}, {way.schedule}", done / len(ways)))
         left, others = seconds - (timer.now() - start), len(ways) - done
         most = left / 4 if way.formulation in FEW else min(left / 2, SHARE * left / others)
-        course.findings.clear()
         skips = (way.engine, way.schedule) in late and way.formulation not in FEW
         rows.append(course.row(way, 0.0 if skips else max(left / others, most)))
         if rows[-1]["status"] == CUT and way.formulation not in FEW:
             late.add((way.engine, way.schedule))
-        curves[done] = tuple(course.findings)
     table = pd.DataFrame(rows)
     best = table["value"].min()
     regret = ((table["value"] - best) / (abs(best) or 1.0)).clip(lower=0.0)
@@ -308,7 +285,7 @@ def measure_regret(
     soft = ", soft grips" * bool(np.any(engine.network.compliances.compliance))
     stands = ", where every step stands" * (mortar is not None and name != "discrete")
     about = scene.name, len(scene.bricks), name, f"{name}{soft}{stands}", worst.name, seconds
-    return RegretTable(*about, table, refused, curves)
+    return RegretTable(*about, table, refused)
 
 
 def _name_of(engine: Engine) -> str:
@@ -318,7 +295,7 @@ def _name_of(engine: Engine) -> str:
 
 def check_reference(name: str) -> None:
     """Raise a `ProblemError` if no engine that can value plans has a name; the empty one may."""
-    known = [*(each for each in ENGINES if each != "auto"), STAGED]
+    known = [each for each in ENGINES if each != "auto"]
     if name and name not in known:
         raise ProblemError(f"reference {name!r} does not exist; give one of {', '.join(known)}")
 
