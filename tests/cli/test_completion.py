@@ -16,8 +16,8 @@ pytest.importorskip("argcomplete")
     [
         ("seqopt op", {"optimize"}),
         ("seqopt compare --engine dis", {"discrete"}),
-        ("seqopt optimize --formul", {"--formulation"}),
-        ("seqopt compare --engine qqq", set()),
+        pytest.param("seqopt optimize --formul", {"--formulation"}, marks=pytest.mark.slow),
+        pytest.param("seqopt compare --engine qqq", set(), marks=pytest.mark.slow),
     ],
 )
 def test_the_tab_key_offers_what_there_is(tmp_path, line, want):

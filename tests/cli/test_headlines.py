@@ -9,7 +9,6 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError
-from seqopt.responses.quantities import _payload_text, _rounded_up
 from seqopt.sequence.rules import FreeRules
 from tests.commands import command as run
 
@@ -62,11 +61,3 @@ def test_a_limit_that_helps_has_three_digits_and_does_help():
     assert asked(float(enough)).steps
     with pytest.raises(InfeasibleError):
         asked(0.99 * float(enough))
-
-
-@pytest.mark.parametrize(
-    ("value", "up"), [(0.0, 0.0), (1.234, 1.24), (123.0000001, 124.0), (98_765.0, 98_800.0)]
-)
-def test_what_is_enough_is_rounded_up(value, up):
-    assert _rounded_up(value) == pytest.approx(up, rel=1e-12)
-    assert float(_payload_text(value)) >= value

@@ -5,8 +5,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -19,16 +17,9 @@ from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import cantilever, sequential
 from seqopt.study.published import printed_steps
-from tests.builders import anywhere, from_both_ends, small_arch
+from tests.builders import anywhere, from_both_ends
 from tests.commands import beside_models
 from tests.commands import command as run
-
-
-def summary(capsys, *words):
-    """What a plan is worth, of a scene that the command line chooses for; nothing is written."""
-    status, out, err = run(capsys, "optimize", *words, "--no-stability", "--json")
-    assert (status, beside_models(err)) == (0, "")
-    return json.loads(out)["summary"]
 
 
 @pytest.mark.slow
@@ -208,32 +199,6 @@ def test_a_joint_that_is_missing_gets_one_line_beside_the_table(capsys, tmp_path
     assert pd.read_csv(out)["finding"].notna().any()
 
 
-def test_it_runs_as_a_program():
-    done = subprocess.run(
-        [sys.executable, "-m", "seqopt", "scene"], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.startswith("arch25: 25 bricks")
-    assert done.stderr == ""
-
-
-def test_ranks_are_taken_as_asked(capsys):
-    found = summary(capsys, "--formulation", "overlap_dp", "--ranked", "conditional")
-    assert found["ranked"] == "conditional"
-    assert found["objective"]["sum"] == pytest.approx(656.025)
-
-
-def test_budgets_are_kept_as_asked(capsys):
-    budgets = ("--budget", "travel=0.8", "--budget", "steps_over:F_largest=300:3")
-    found = summary(capsys, "--formulation", "labels", *budgets)
-    way, steps = found["budgets"].values()
-    assert way["bound"] == pytest.approx(0.8 * 24.522771, rel=1e-6)
-    assert way["spent"] <= way["bound"]
-    assert way["price"] > 0
-    assert steps["spent"] <= steps["bound"] == 3
-    assert found["status"] == "optimal"
-    assert found["ended"] == "done"
-
-
 def test_a_time_limit_ends_with_a_choice_and_a_trace(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)  # choosing alone is late
     words = ("--formulation", "overlap_dp", "--time-limit", "0", "--no-stability")
@@ -265,10 +230,3 @@ def test_a_comparison_with_speed(tmp_path, capsys):
     assert page.count("data:image/png;base64,") == 2  # for wide screens and for narrow ones
     assert (out / "speed.png").exists()
     assert "speed" not in json.loads(run(capsys, *words, "--json")[1])
-
-
-@pytest.fixture
-def arch(tmp_path):
-    path = tmp_path / "arch.json"
-    save_scene(small_arch(5), path)
-    return str(path)

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import os
 import stat
-from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from seqopt._cli.main import main
-from seqopt.contact.mortar import DRY, EPOXY
-from seqopt.responses import _tolerance
-from seqopt.stability import _builds
 
 PLAN = "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n"
 
@@ -48,30 +44,3 @@ def test_an_input_is_not_overwritten(capsys, tmp_path):
     assert scene.read_bytes() == before
     assert plan.read_text(encoding="utf-8") == PLAN
     assert len(list(tmp_path.iterdir())) == 2
-
-
-def test_what_a_line_says_is_not_asked_again_for_the_page(monkeypatch, tmp_path):
-    """Tolerances and verdicts of states, and what robots do, are found once for line and page."""
-    asked, tasks = Counter(), []
-    misfits, verdicts = _tolerance.misfits, _builds.each_by_workers
-
-    def each(engine, bricks, grips, *more):
-        asked.update(("off", bricks, tuple(held)) for held in grips.tolist())
-        return misfits(engine, bricks, grips, *more)
-
-    def proven(parts, find, steps, crew):
-        asked.update((find.keywords["mortar"], step.bricks, step.grips) for step in steps)
-        return verdicts(parts, find, steps, crew)
-
-    for module in ("_cli.outputs", "report.page"):
-        monkeypatch.setattr(
-            f"seqopt.{module}.tasks_csv", lambda _: tasks.append(1) or "", raising=False
-        )
-    monkeypatch.setattr("seqopt.exchange._tasks.tasks_csv", lambda _: tasks.append(1) or "")
-    monkeypatch.setattr(_tolerance, "misfits", each)
-    monkeypatch.setattr(_builds, "each_by_workers", proven)
-    asked_for = ["optimize", "chain:bricks=7", "--schedule", "free", "--out", str(tmp_path / "out")]
-    assert main([*asked_for, "--quiet"]) == 0
-    assert {kind for kind, *_ in asked} == {"off", DRY, EPOXY}
-    assert {*asked.values()} == {1}
-    assert len(tasks) == 1

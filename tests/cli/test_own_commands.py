@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
+import pandas as pd
 import pytest
 
 import seqopt
 from seqopt import doors
 from seqopt._registry import ADDED, COMMANDS, every_command
-from seqopt.errors import ProblemError
-from tests.builders import ROOT
+from seqopt.errors import PluginWarning, ProblemError
 from tests.commands import command
-
-PACKAGE = '''
-import pandas as pd
-import seqopt
-from seqopt.doors import Command
 
 
 def weigh(
@@ -53,58 +46,52 @@ def weigh(
     return f"{found.name}: {len(weights)} bricks weigh {sum(weights.values()):.4g} kg"
 
 
-WEIGH = Command("weigh", weigh)
-'''
-POINTS = "[seqopt.parts]\nweigh = my_package:WEIGH\n"
+WEIGH = doors.Command("weigh", weigh)
 
 
 @pytest.fixture
-def package(tmp_path):
-    """A folder with an installed package that has a command; return how seqopt runs beside it."""
-    (tmp_path / "my_package.py").write_text(PACKAGE, encoding="utf-8")
-    info = tmp_path / "my_package-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(POINTS)
+def package(tmp_path, monkeypatch):
+    """Install a package that has a command, by its entry point."""
 
-    def run(*words):
-        paths = (
-            f"import sys; sys.path[:0] = [{str(tmp_path)!r}, {str(ROOT)!r}]; sys.argv[0] = 'seqopt'"
-        )
-        code = f"{paths}\nfrom seqopt.__main__ import run\nsys.exit(run())"
-        return subprocess.run(
-            [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
-        )
+    def install(entry):
+        info = tmp_path / "my_package-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[seqopt.parts]\nweigh = {entry}\n")
+        monkeypatch.syspath_prepend(tmp_path)
 
-    return run
+    return install
 
 
-@pytest.mark.slow
-def test_a_package_adds_a_command(package):
-    assert "    weigh     Say what the bricks of a scene weigh." in package("--help").stdout
-    page = package("weigh", "--help")
-    assert "usage: seqopt weigh [SCENE] [--per brick]" in page.stdout
-    assert "--least KG" in page.stdout
-    assert "seqopt weigh arch25 --per brick" in page.stdout
-    assert package("weigh", "chain:bricks=7").stdout == "chain 7: 7 bricks weigh 25.62 kg\n"
-    table = package("weigh", "chain:bricks=7", "--per", "brick", "--names", "1", "--names", "3")
-    assert table.stdout.splitlines()[0] == "brick,kg"
-    assert len(table.stdout.splitlines()) == 3
-    assert '"text": "chain 7' in package("weigh", "chain:bricks=7", "--json").stdout
-    wrong = package("weigh", "arch26")
-    assert (wrong.returncode, wrong.stderr.count("\n")) == (2, 1)
-    assert "--least: 'x' is not a positive number" in package("weigh", "--least", "x").stderr
-    assert "did you mean --least?" in package("weigh", "--leest", "1").stderr
-    assert "did you mean weigh?" in package("weig").stderr
+def test_a_package_adds_a_command(package, capsys):
+    package(f"{__name__}:WEIGH")
+    assert "    weigh     Say what the bricks of a scene weigh." in command(capsys, "--help")[1]
+    page = command(capsys, "weigh", "--help")[1]
+    assert "usage: seqopt weigh [SCENE] [--per brick]" in page
+    assert "--least KG" in page
+    assert "seqopt weigh arch25 --per brick" in page
+    scene = "chain:bricks=7"
+    assert command(capsys, "weigh", scene)[1] == "chain 7: 7 bricks weigh 25.62 kg\n"
+    words = ("--per", "brick", "--names", "1", "--names", "3")
+    table = command(capsys, "weigh", scene, *words)[1].splitlines()
+    assert (table[0], len(table)) == ("brick,kg", 3)
+    assert '"text": "chain 7' in command(capsys, "weigh", scene, "--json")[1]
+    status, _, said = command(capsys, "weigh", "arch26")
+    assert (status, said.count("\n")) == (2, 1)
+    for wrong, said in (
+        (("weigh", "--least", "x"), "--least: 'x' is not a positive number"),
+        (("weigh", "--leest", "1"), "did you mean --least?"),
+        (("weig",), "did you mean weigh?"),
+    ):
+        assert said in command(capsys, *wrong)[2]
 
 
-@pytest.mark.slow
-def test_a_package_that_fails_is_left_out(package, tmp_path):
-    (tmp_path / "my_package.py").write_text("import nothing_of_this_name\n", encoding="utf-8")
-    page = package("--help")
-    assert (page.returncode, "weigh" in page.stdout) == (0, False)
-    assert "plug-in my_package:WEIGH" in page.stderr
-    assert package("scene", "chain:bricks=7").stderr == ""  # nobody asks for plug-ins there
+def test_a_package_that_fails_is_left_out(package, capsys):
+    package("nothing_of_this_name:WEIGH")
+    with pytest.warns(PluginWarning, match="plug-in nothing_of_this_name:WEIGH"):
+        status, page, _ = command(capsys, "--help")
+    assert (status, "weigh" in page) == (0, False)
+    assert command(capsys, "scene", "chain:bricks=7")[2] == ""  # nobody asks for plug-ins there
 
 
 @pytest.fixture

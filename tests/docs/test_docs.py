@@ -17,8 +17,7 @@ from seqopt.graph.formulation import exhibits, formulations
 from tests.browser import PLAIN, browsed, browses
 from tests.builders import ROOT
 from tests.docs.extensions import stated
-from tests.docs.site_links import broken
-from tests.docs.site_size import megabytes, sizes, words
+from tests.docs.site import broken, megabytes, sizes, words
 from tests.docs.transcripts import PAGES
 
 STATED = stated()

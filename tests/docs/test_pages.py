@@ -11,7 +11,7 @@ import pytest
 
 from tests.builders import ROOT
 from tests.docs.extensions import extension, stated
-from tests.docs.site_links import broken
+from tests.docs.site import broken
 from tests.docs.transcripts import DOCS, PAGES, blocks, furnish, run
 
 NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w])")

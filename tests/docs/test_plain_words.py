@@ -25,12 +25,15 @@ INSTEAD = {  # a phrase, as a pattern, and what to say instead of it
     r"\bthe .{3,20} in the place of the\b": "instead of",
     r"\b(brick|structure|step) goes\b": "becomes unstable; or what it does",
 }
+ANY = re.compile("|".join(INSTEAD), re.IGNORECASE)
 CODE = re.compile(r"```.*?```|`[^`]*`", flags=re.DOTALL)
 
 
 def faults(text: str) -> list[str]:
     """Return the phrases of a text that should be said otherwise, each with what to say."""
     words = " ".join(text.split())
+    if not ANY.search(words):
+        return []
     found = [(re.search(phrase, words, re.IGNORECASE), say) for phrase, say in INSTEAD.items()]
     return [f"{match[0]!r}: say {say!r}" for match, say in found if match]
 

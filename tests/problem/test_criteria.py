@@ -6,6 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import rankdata
 
 from seqopt.errors import ProblemError
 from seqopt.problem.criteria import (
@@ -144,3 +147,10 @@ def test_scales_are_given_or_the_scenes():
     names = [name for name, _ in WORST_OVER_METHODS.limits]
     assert names == [name for name, _, _ in OVER_METHODS.terms]
     assert sorted(names) == sorted(Facts().reference)
+
+
+@given(values=st.lists(st.integers(-5, 5), min_size=1, max_size=30))
+def test_ranks_are_those_of_scipy(values):
+    found = _mean_ranks(np.array(values, dtype=float))
+    assert found.tolist() == rankdata(values, method="average").tolist()
+    assert found.sum() == pytest.approx(len(values) * (len(values) + 1) / 2)
