@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seqopt.errors import InfeasibleError, SolverError, TimeUpError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.decisions import steps_over, travel
 from seqopt.graph.formulation import End, FormulationKind, formulations
@@ -179,6 +179,8 @@ def test_few_labels_stop_with_a_bound(problem25):
     assert few.selection.bound[0] <= best.certificate.objective <= few.certificate.objective
     assert few.ended is End.STOPPED or few.selection.bound == few.selection.objective
     assert few.certificate.claimed_gap < 0.02
+    with pytest.raises(ProblemError, match="name it in `also`"):
+        steps_over(problem25, "F_rob9", 100.0, 1.0)
     tight = replace(capped, budgets=(*capped.budgets, travel(problem25, 11.4)))
     with pytest.raises(TimeUpError, match="no path within all caps was found yet"):
         solve(tight, "labels", most=1, time_limit=0)
