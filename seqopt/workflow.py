@@ -36,7 +36,7 @@ from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules, with_robots
 from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.schedule_file import _what_is_left, find_schedule, read_plan, read_site
+from seqopt.sequence.schedule_file import find_schedule, read_plan, read_site
 from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.study.published import EQUATIONS, find_criterion
 from seqopt.work.progress import Clock, Tell, within
@@ -192,7 +192,7 @@ class _Place:
     """Where a build begins or ends, and the steps that led there, if known."""
 
     site: Site | None = None
-    done: tuple[Step, ...] | None = ()
+    done: tuple[Step, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -389,7 +389,8 @@ def _pose_build(  # noqa: PLR0913  # as of `optimize`
     find_postures(found, search.cache, progress)
     own = make_engine(engine, build_network(found), mortar)
     moves = _find_moves(own.network, part, robots, candidates, rules)
-    moves = _between(moves, begin, turned[1])
+    if begin.site is not None or turned[1].site is not None:
+        moves = replace(moves.free(), begin=begin.site, finish=turned[1].site)
     asked: Sequence[Any] = parse_limits(limits, found)
     states = _chooses_states(moves, formulation, asked, (aim, stands, sought))
     over: RobustAim | str = WORST_PEAK if robust is None else robust.aim
@@ -462,14 +463,14 @@ def _find_place(given: _Place | int | str | None, name: str, scene: Scene) -> tu
         if text.isdecimal():
             site = Site(int(text), (None,) * len(scene.robots) if name == "begin" else None)
             site.holds(scene)
-            return scene, _Place(site, None if site.bricks else ())
+            return scene, _Place(site)
         file, _, step = text.rpartition(":")
         if file and step.isdecimal():
             return scene, _of_plan(scene, Path(file), int(step))
         if not text.endswith(".json"):
             raise StepError(f"give {FORMS}")
         found, site = read_site(scene, Path(text))
-        return found, _Place(site, None)
+        return found, _Place(site)
     except StepError as error:
         raise StepError(f"{name} {text}: {error}") from None
 
@@ -486,7 +487,7 @@ def _of_plan(scene: Scene, path: Path, step: int) -> _Place:
             replace(s, grips=tuple(None if k is None else s.grips[k] for k in where)) for s in steps
         )
     done = tuple(each for each in steps if each.number <= step)
-    return _Place(Site.after(steps, step), done if steps[0].number == 1 else None)
+    return _Place(Site.after(steps, step), done if steps[0].number == 1 else ())
 
 
 def _find_start(
@@ -505,17 +506,3 @@ def _find_start(
     ends = [t.end for t, s in zip(times, begin.done, strict=True) if s.kind is StepKind.PLACE]
     ages = tuple(times[-1].end - end for end in ends)
     return scene, replace(begin, site=replace(begin.site, ages=ages))
-
-
-def _between(moves: Schedule | FreeRules, begin: _Place, end: _Place) -> Schedule | FreeRules:
-    """Return the moves between two places."""
-    if begin.site is None and end.site is None:
-        return moves
-    if isinstance(moves, FreeRules):
-        return replace(moves, begin=begin.site, finish=end.site)
-    if begin.done is None or end.done is None:
-        raise StepError(
-            f"schedule {moves.method}: it goes on, and ends, at a step of a plan of its own; give "
-            "PLAN:STEP, or --schedule free"
-        )
-    return _what_is_left(moves, begin.done, end.site)

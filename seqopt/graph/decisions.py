@@ -52,7 +52,7 @@ from seqopt.responses.quantities import PROP_EXCESS, _payload_text, robot_respon
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenGrip, Schedule
-from seqopt.sequence.steps import Step, _begin_step
+from seqopt.sequence.steps import Step
 
 TIED = 1e-9  # costs this close, relative to the largest, are equal
 
@@ -358,8 +358,7 @@ class Decisions(Shown):
 
 def _require_carried(schedule: Schedule, scenes: Sequence[Scene]) -> None:
     """Raise an `InfeasibleError` if a robot has to carry a brick in a scene that is too heavy."""
-    steps = (_begin_step(schedule.scene, schedule.begin), *schedule.steps)
-    found = [each for scene in scenes for each in _carrying_excesses(scene, steps)]
+    found = [each for scene in scenes for each in _carrying_excesses(scene, schedule.steps)]
     if found:
         worst: dict[str, Excess] = {}
         for each in sorted(found, key=lambda each: each.largest):
@@ -458,11 +457,9 @@ _Grip = int | OpenGrip
 
 
 def _ways(schedule: Schedule) -> Iterator[tuple[str, tuple[_Grip, _Grip]]]:
-    """Yield robot and both ends of every change of grip, also from where the build begins."""
-    scene, site = schedule.scene, schedule.begin
-    before = () if site is None else (site.stays or site.holds(scene), site.holds(scene))
-    every = zip(*before, *(step.grips for step in schedule.steps), strict=True)
-    for robot, grips in zip(scene.robots, every, strict=True):
+    """Yield robot and both ends of every change of grip."""
+    every = zip(*(step.grips for step in schedule.steps), strict=True)
+    for robot, grips in zip(schedule.scene.robots, every, strict=True):
         for ends in pairwise(grip for grip in grips if grip is not None):
             if ends[0] != ends[1]:
                 yield robot.name, ends

@@ -337,8 +337,7 @@ class ScheduleTables(_Tables):
         scene = network.scene
         super().__init__(scene, tuple(range(len(scene.robots))), parks=parks)
         self._schedule, self.first, self.last = schedule, 0, len(schedule.steps)
-        self._heavy = unbearable((scene, *worlds), schedule.steps, schedule.begin)
-        self._before = schedule.steps[0].number - 1
+        self._heavy = unbearable((scene, *worlds), schedule.steps, None)
         self._holds = {
             (hold.robot, number): hold
             for hold in holds(scene, schedule.steps)
@@ -347,17 +346,15 @@ class ScheduleTables(_Tables):
 
     def start(self) -> Ints:
         """Return the state before the first step, (1, robots) int."""
-        site, none = self._schedule.begin, (None,) * self.robots
-        return self.row(none) if site is None else self.row(site.grips or none, site.stays)
+        return self.row((None,) * self.robots)
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand after so many steps."""
-        begin = self._schedule.begin.bricks if self._schedule.begin else 0
-        return max((step.bricks for step in self._schedule.steps[:level]), default=begin)
+        return max((step.bricks for step in self._schedule.steps[:level]), default=0)
 
     def successors(self, level: int, states: Ints) -> Iterator[Transitions]:
         """Yield the successors of states (n, robots) by the next step, if there is one."""
-        number = self._before + level + 1
+        number = level + 1
         if level == self.last or number in self._heavy:
             return
         source, after, distance = np.arange(len(states)), states, np.zeros(len(states))
@@ -385,7 +382,7 @@ class ScheduleTables(_Tables):
     def certain(self) -> Iterator[tuple[int, Ints]]:
         """Yield the level and the places held (1, robots) of steps in which no hold is chosen."""
         for level in range(self.last, 0, -1):
-            own = [self._holds.get((robot, self._before + level)) for robot in range(self.robots)]
+            own = [self._holds.get((robot, level)) for robot in range(self.robots)]
             if all(hold is None or hold.move is None for hold in own):
                 yield level, np.array([[0 if h is None else self._wanted(h)[0] for h in own]])
 

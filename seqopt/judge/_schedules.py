@@ -197,7 +197,7 @@ def _as_claimed(problem: States, selection: Solution, steps: Sequence[Step]) -> 
     """Return the recomputed values of feasible steps; a `SolverError` if others were claimed."""
     if isinstance(problem.rules, Schedule):
         _check_scheduled(problem.rules, steps)
-        check_carried(problem.network.scene, problem.rules, steps, problem.worlds)
+        check_carried(problem.network.scene, steps, problem.worlds)
     else:
         check_free(problem.network, problem.rules, steps, problem.worlds)
     check_postures(problem.network.scene, steps)

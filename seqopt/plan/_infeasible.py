@@ -16,7 +16,6 @@ from itertools import chain, combinations
 import numpy as np
 
 from seqopt.arrays import Ints
-from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
@@ -43,7 +42,6 @@ from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
 from seqopt.sequence._rule_check import RuleBook, unbearable
-from seqopt.sequence.methods import _enough_reach
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import OpenStep, loads
 
@@ -333,10 +331,6 @@ def _ways(problem: States, look: Look, *, finished: bool = False) -> Iterator[Wa
             if key not in done and look.exists(relaxed):
                 done.add(key)
                 yield each.name, text, relaxed
-    scene, able = problem.network.scene, recipe_of(problem.engine) is not None
-    if able and not (finished or problem.scenarios or scene.has_arms):
-        for text in _enough_reach(scene, lambda other: look.exists(problem.in_scene(other))):
-            yield "reach", text, problem
 
 
 def _enough(problem: States, look: Look, name: str, text: str, relaxed: States) -> str:

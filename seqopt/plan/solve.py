@@ -284,7 +284,7 @@ def _checked(steps: tuple[Step, ...], graph: States, decisions: Decisions) -> tu
         check_postures(schedule.scene, steps)
         for each in graph.scenarios or (graph.engine,):
             check_shape(each, steps, limits)
-        check_carried(graph.network.scene, schedule, steps, graph.worlds)
+        check_carried(graph.network.scene, steps, graph.worlds)
     except StepError as error:
         raise SolverError(f"a choice is not allowed: {error}") from error
     return steps

@@ -7,12 +7,11 @@ kg/m³, forces in N, stiffnesses in N/m and N m/rad.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from numbers import Real
 from operator import mul
-from typing import Self
 
 import numpy as np
 
@@ -110,36 +109,20 @@ def _convex_polygon(
     return tuple(points)
 
 
-class _Region:
-    """What is within reach of a robot."""
-
-    def lack(self, point: Vector) -> float:
-        """Return how far a point is out of reach, m; negative within."""
-        raise NotImplementedError
-
-    def covers(self, point: Vector) -> bool:
-        """Return whether a point is within reach."""
-        return self.lack(point) <= 0
-
-    def longer(self, more: float) -> Self:  # what ends nowhere
-        """Return a reach that is longer, m."""
-        return self
-
-
 @dataclass(frozen=True)
-class Anywhere(_Region):
+class Anywhere:
     """A mobile robot: every node is within reach."""
 
-    def lack(self, point: Vector) -> float:
-        """Return how far a point is out of reach, m: it is not."""
-        return -math.inf
+    def covers(self, point: Vector) -> bool:
+        """Return whether a point is within reach: it is."""
+        return True
 
     def __str__(self) -> str:
         return "anywhere"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Side(_Region):
+class Side:
     """A robot beside the structure reaches every point of a half-space.
 
     ``toward``: unit vector to the robot's side; ``point``: of the plane that bounds the reach, m.
@@ -153,22 +136,17 @@ class Side(_Region):
         if abs(math.fsum(x * x for x in self.toward) - 1) > _UNIT:
             raise SceneError(f"reach: toward is {list(self.toward)}; give a unit vector")
 
-    def lack(self, point: Vector) -> float:
-        """Return how far a point is out of reach, m; negative within."""
-        lacking: float = sum(map(mul, self.toward, self.point)) - sum(map(mul, self.toward, point))
-        return lacking
-
-    def longer(self, more: float) -> Side:
-        """Return a reach that is longer, m."""
-        x, y, z = (p - more * t for p, t in zip(self.point, self.toward, strict=True))
-        return replace(self, point=(x, y, z))
+    def covers(self, point: Vector) -> bool:
+        """Return whether a point is within reach."""
+        at, bound = (sum(map(mul, self.toward, each)) for each in (point, self.point))
+        return bool(at >= bound)
 
     def __str__(self) -> str:
         return "the side toward ({:g}, {:g}, {:g})".format(*self.toward)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sphere(_Region):
+class Sphere:
     """A robot at a fixed base reaches every point within a radius.
 
     Parameters
@@ -194,13 +172,9 @@ class Sphere(_Region):
     def __post_init__(self) -> None:
         check(self, "reach", center=vector, radius=length)
 
-    def lack(self, point: Vector) -> float:
-        """Return how far a point is out of reach, m; negative within."""
-        return math.dist(self.center, point) - self.radius
-
-    def longer(self, more: float) -> Sphere:
-        """Return a reach that is longer, m."""
-        return replace(self, radius=self.radius + more)
+    def covers(self, point: Vector) -> bool:
+        """Return whether a point is within reach."""
+        return math.dist(self.center, point) <= self.radius
 
     def __str__(self) -> str:
         return "{:g} m around ({:g}, {:g}, {:g})".format(self.radius, *self.center)
@@ -549,19 +523,14 @@ class _GripKinds(FrozenValue):
         return numbers - self.span * kind, kind
 
 
-_NEAR = 1.0  # of a node from where a prop is said to be, over the smallest side of its brick
-
-
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Prop(Terse):
     """What holds a node of a brick that stands, as a robot would, and stays there.
 
     Parameters
     ----------
-    node : int, optional
+    node : int
         The inner node that it holds.
-    position : Vector, optional
-        In place of a node: a point, m; the nearest node is held.
     stiffness : float or Vector, optional
         As of a `Robot`, N/m; rigid by default.
     direction : Vector, optional
@@ -575,16 +544,13 @@ class Prop(Terse):
     Prop(node=13, direction=(0, 0, 1))
     """
 
-    node: int = None  # type: ignore[assignment]  # that next to the position
-    position: Vector | None = None
+    node: int
     stiffness: float | Vector | None = None
     direction: Vector | None = None
     capacity: float | None = None
 
     def __post_init__(self) -> None:
-        check(self, "prop", node=whole, position=vector)
-        if (self.node is None) == (self.position is None):
-            raise SceneError("prop: give the node that it holds, or a position near one")
+        check(self, "prop", node=whole)
         newtons = partial(positive, unit="N")
         check(self, self.label, stiffness=_each_shift, direction=vector, capacity=newtons)
         if self.direction is not None:
@@ -598,27 +564,4 @@ class Prop(Terse):
     @property
     def label(self) -> str:
         """What messages call it."""
-        return f"prop at {f'node {self.node}' if self.position is None else list(self.position)}"
-
-
-def _settled_props(props: Sequence[Prop], bricks: Mapping[int, Brick]) -> tuple[Prop, ...]:
-    """Return props, those given by a position at the nearest nodes of bricks."""
-    out = dict[int, Prop]()
-    for given in props:
-        prop = given
-        if (at := prop.position) is not None:
-            away, node = min((math.dist(b.node_position(n), at), n) for n, b in bricks.items())
-            most = _NEAR * min(bricks[node].dimensions)
-            if away > most:
-                raise SceneError(
-                    f"{prop.label}: the nearest node, {node}, is {away:.3g} m away; give a point "
-                    f"at most {most:.3g} m from one"
-                )
-            prop = replace(prop, node=node, position=None)
-        if prop.node not in bricks:
-            known = f"{min(bricks)} to {max(bricks)}"
-            raise SceneError(f"{prop.label}: there is no such node; give one of {known}")
-        if prop.node in out:
-            raise SceneError(f"{prop.label}: another one holds it; give each its own node")
-        out[prop.node] = prop
-    return tuple(out.values())
+        return f"prop at node {self.node}"

@@ -17,17 +17,7 @@ from seqopt.arrays import Vector
 from seqopt.errors import SceneError, did_you_mean
 from seqopt.scene._checks import check, not_negative, printable, settle, short, vector, wholes
 from seqopt.scene.arm import Arm, HeldPostures, _durations_in_words, from_arms
-from seqopt.scene.parts import (
-    Brick,
-    Ground,
-    Joint,
-    Load,
-    Prop,
-    Reach,
-    Robot,
-    _GripKinds,
-    _settled_props,
-)
+from seqopt.scene.parts import Brick, Ground, Joint, Load, Prop, Reach, Robot, _GripKinds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -172,8 +162,10 @@ class Scene(Shown):
             at, far = load.position, _FAR * max(by_name[load.brick].dimensions)
             if at and max(map(abs, at)) > far:
                 raise SceneError(f"{load.label}: position is {list(at)}; move it to its brick")
-        held = {n: b for n, b in self.brick_of_node.items() if n not in self.blocked_nodes}
-        settle(self, props=_settled_props(self.props, held))
+        _unique(f"{where}: a prop at node", (prop.node for prop in self.props))
+        held = {*self.brick_of_node} - {*self.blocked_nodes}
+        for prop in self.props:
+            _known(prop.label, "free node", (prop.node,), held)
         if math.hypot(*self.wind) > _STORM:
             raise SceneError(f"{where}: wind is {list(self.wind)}; give shares of the weight")
 

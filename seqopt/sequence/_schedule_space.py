@@ -23,7 +23,7 @@ from seqopt.sequence._rule_space import (
 )
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import OpenGrip, Schedule, can_carry, carried
-from seqopt.sequence.steps import Step, StepKind, _begin_step, check_sequence
+from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,11 +54,7 @@ class ScheduleSpace(StateRows):
 
     def bricks_at(self, level: int) -> int:
         """Return the brick count after a number of steps."""
-        return self.rules.steps[level - 1].bricks if level else self._begin.bricks
-
-    @cached_property
-    def _begin(self) -> Step:
-        return _begin_step(self.network.scene, self.rules.begin)
+        return self.rules.steps[level - 1].bricks if level else 0
 
     def may_place(self, level: int, states: Ints) -> Bools:
         """Return from which states the next step is feasible: all, (n,)."""
@@ -76,15 +72,12 @@ class ScheduleSpace(StateRows):
         """Numbers of the steps in which a brick exceeds the payload of its robot."""
         scene = self.network.scene
         able = [can_carry((scene, *self.worlds), robot) for robot in range(self.robots)]
-        every = carried(scene, (self._begin, *self.rules.steps))
+        every = carried(scene, self.rules.steps)
         return frozenset(c.step for c in every if not able[c.robot][scene.since[c.brick] - 1])
 
     def start(self) -> Ints:
         """Return the initial state, (1, robots) int."""
-        held, site = self._begin.grips, self.rules.begin
-        stays = site.stays if site and site.stays and self.parks else (None,) * self.robots
-        out = [self._place.get(n, -self._place.get(s, 0)) for n, s in zip(held, stays, strict=True)]
-        return np.array([out], dtype=np.int32)
+        return np.zeros((1, self.robots), dtype=np.int32)
 
     def within(
         self, level: int, states: Ints, *, regrips: bool = True
@@ -95,7 +88,7 @@ class ScheduleSpace(StateRows):
     def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves to the next step, and whether they are regrips."""
         step = self.rules.steps[level]
-        before = self.rules.steps[level - 1].grips if level else self._begin.grips
+        before = self.rules.steps[level - 1].grips if level else (None,) * self.robots
         after, fresh = states.copy(), []
         for robot, grip in enumerate(step.grips):
             if grip is None:
@@ -146,7 +139,7 @@ class ScheduleSpace(StateRows):
             Step(s.number, s.kind, s.bricks, tuple(nodes))
             for s, nodes in zip(self.rules.steps, grips, strict=True)
         ]
-        return check_sequence(self.network.scene, steps, self._begin)
+        return check_sequence(self.network.scene, steps)
 
 
 def _space_of(

@@ -6,95 +6,28 @@ and `_steps` makes steps of them.
 
 from __future__ import annotations
 
-import math
-import typing
-from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
-from contextlib import suppress
-from dataclasses import replace
-from functools import cache, wraps
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from functools import cache
 from itertools import permutations
-from typing import Any, TypeVar
 
 import numpy as np
 
 from seqopt.errors import StepError, did_you_mean
-from seqopt.network.build import build_network, network_of
+from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind
 from seqopt.scene._armed import reachable, within_reach
-from seqopt.scene.parts import Brick, Reach, Robot, Side, Sphere
+from seqopt.scene.parts import Brick, Robot, Side
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind
 
-_Make = TypeVar("_Make", bound=Callable[..., Any])
 _Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
 _Way = tuple[int, tuple[_Pair, ...]]  # changes so far, pairs so far
 _Grip = int | OpenGrip | None
 _Act = tuple[StepKind, int, Mapping[int, _Grip]]  # kind, brick count, and grips that change
 
-ASKS = "extend a reach"  # of errors: what says so is answered by the reach that is enough
-_MM = 1000.0
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
-
-
-def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str]:
-    """Yield the least sufficient reach of a single robot, else of all robots, in words.
-
-    ``exists``: whether the problem is feasible in a scene with other reaches. Only lengths at which
-    a further node is reached are tried, in whole mm.
-    """
-    points = [scene.node_position(node) for node in scene.placed_nodes]
-
-    def least(reaches: Mapping[str, Reach]) -> float:
-        lacks = (reach.lack(point) for reach in reaches.values() for point in points)
-        steps = sorted({math.ceil(_MM * lack - 1e-6) / _MM for lack in lacks if lack > 0})
-
-        def is_enough(more: float) -> bool:
-            longer = {name: reach.longer(more) for name, reach in reaches.items()}
-            robots = (replace(r, reach=longer.get(r.name, r.reach)) for r in scene.robots)
-            return exists(scene.with_robots(*robots))
-
-        if not steps or not is_enough(steps[-1]):
-            return 0.0
-        return steps[bisect_left(steps, 1, hi=len(steps) - 1, key=is_enough)]
-
-    own = {robot.name: robot.reach for robot in scene.robots if robot.arm is None}
-    alone = {name: more for name, reach in own.items() if (more := least({name: reach}))}
-    for name, more in alone.items():
-        if isinstance(reach := own[name], Sphere):
-            radius = math.ceil(_MM * (reach.radius + more) - 1e-6) / _MM
-            yield f"a reach of {radius:.6g} m of {name} ({reach.radius:.6g} m now)"
-        else:
-            yield f"a reach of {name} that is {more:.6g} m longer"
-    if not alone and len(own) > 1 and (more := least(own)):
-        yield f"a reach that is {more:.6g} m longer of every robot that does not reach everything"
-
-
-def _says_reach(make: _Make) -> _Make:
-    """Decorate a method so that errors about reach name the least sufficient one."""
-
-    @wraps(make)
-    def made(network: Network | Scene, robots: int | Sequence[str] = ()) -> object:
-        try:
-            return make(network, robots)
-        except StepError as error:
-            said = str(error)
-            if ASKS not in said:
-                raise
-
-        def exists(other: Scene) -> bool:
-            with suppress(StepError):
-                make(build_network(other), robots)
-                return True
-            return False
-
-        scene = network if isinstance(network, Scene) else network.scene
-        ways = " or ".join(_enough_reach(scene, exists))
-        raise StepError(said.replace(ASKS, f"give {ways}") if ways else said)
-
-    return typing.cast(_Make, made)
 
 
 def _in_words(number: int) -> str:
@@ -297,7 +230,6 @@ def _alternate(
     return _steps(scene, acts)
 
 
-@_says_reach
 def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
     """Two robots take turns: one places the next brick while the other holds the last one.
 
@@ -336,7 +268,6 @@ def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     return open_schedule("sequential", network, steps).fill(())
 
 
-@_says_reach
 def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
     """One robot holds, the other places bricks up to one that lies along; then they swap.
 
@@ -376,7 +307,6 @@ METHODS: dict[str, Callable[..., tuple[Step, ...]]] = {
 }
 
 
-@_says_reach
 def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the loop of two robots: the sequential method with every grip open.
 
@@ -389,7 +319,6 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
     return open_schedule("two-robot", network, steps)
 
 
-@_says_reach
 def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of any number of robots whose roles rotate.
 
@@ -439,7 +368,6 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
     return open_schedule(f"{_in_words(count)}-robot", network, _steps(scene, acts))
 
 
-@_says_reach
 def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of three robots whose roles rotate.
 
@@ -482,7 +410,6 @@ def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sc
     return robot_loop(network, robots or 3)
 
 
-@_says_reach
 def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the sequential method with a third support, chosen again after every brick.
 

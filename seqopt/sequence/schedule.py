@@ -14,7 +14,7 @@ from functools import cache, cached_property, partial
 from itertools import groupby
 from numbers import Integral
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import AnyStep, Site, Step, StepKind, _begin_step, check_sequence
+from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -157,8 +157,6 @@ class Schedule(Shown):
         In the order in which they are made.
     left_out : str, optional
         How candidates were left out, in words; empty if all are open.
-    begin : Site, optional
-        What stands before the first step; by default nothing.
 
     Examples
     --------
@@ -176,7 +174,8 @@ class Schedule(Shown):
     steps: tuple[OpenStep, ...]
     moves: tuple[Move, ...]
     left_out: str = ""
-    begin: Site | None = None
+
+    begin: ClassVar[None] = None  # it builds from the empty site
 
     def require_pairs(self) -> None:
         """Raise a `StepError` if more than two moves, or two not neighboring, share a step.
@@ -201,8 +200,8 @@ class Schedule(Shown):
     def free(self) -> NoReturn:
         """Raise a `ProblemError`: steps are given."""
         raise ProblemError(
-            f"schedule {self.method}: its steps are given; orders, and steps or regrips in a "
-            "Pareto set, go with the free schedule"
+            f"schedule {self.method}: its steps are given; orders, parts of builds, and steps or "
+            "regrips in a Pareto set, go with the free schedule"
         )
 
     def begun(self, scene: Scene) -> Schedule:
@@ -258,7 +257,7 @@ class Schedule(Shown):
         for s in self.steps:
             grips = tuple(nodes[g.move] if isinstance(g, OpenGrip) else g for g in s.grips)
             steps.append(Step(s.number, s.kind, s.bricks, grips))
-        return check_sequence(self.scene, steps, _begin_step(self.scene, self.begin))
+        return check_sequence(self.scene, steps)
 
 
 def thin(schedule: Schedule, rule: str) -> Schedule:

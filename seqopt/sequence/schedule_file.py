@@ -6,17 +6,14 @@ import csv
 import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from seqopt._files import Row, harmless, parse_json, read_table, read_text
 from seqopt.errors import SceneError, StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
-from seqopt.scene._checks import LARGEST_NUMBER, as_float, short, whole
+from seqopt.scene._checks import short, whole
 from seqopt.scene.parts import Robot
-from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.methods import SCHEDULES, open_schedule, robot_loop
 from seqopt.sequence.rules import FREE
@@ -155,7 +152,7 @@ def _integer(cell: str, where: str, wanted: str = "a whole number") -> int:
         raise StepError(f"{where} is {short(text)}; give {wanted}") from error
 
 
-KEYS = ("bricks", "grips", "last", "regrips", "step", "measured", "ages")
+KEYS = ("bricks", "grips", "last", "regrips", "step", "ages")
 _MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
 MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.
 
@@ -300,7 +297,6 @@ def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
             hint = did_you_mean(key, KEYS)
             raise StepError(f"{where}: {key} is not known{hint}; give {', '.join(KEYS)}")
     scene, count = _standing(scene, told["bricks"], where)
-    scene = _measured(scene, told.get("measured", {}), where)
     grips = _by_robot(scene, told.get("grips"), f"{where}, grips")
     last = _by_robot(scene, told.get("last", {}), f"{where}, last") or ()
     more = {key: told[key] for key in ("regrips", "step") if key in told}
@@ -316,19 +312,6 @@ def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
     except (SceneError, StepError) as error:
         raise StepError(f"{where}: {error}") from None
     return scene, site
-
-
-def _measured(scene: Scene, told: object, where: str) -> Scene:
-    """Return a scene with bricks at measured positions, m.
-
-    Coordinates beyond `LARGEST_NUMBER` are refused: their products lose precision.
-    """
-    points: Mapping[str, Any] = told if isinstance(told, Mapping) else {"": told}
-    for name, point in points.items():
-        right = name.isdecimal() and isinstance(point, list) and len(point) == 3
-        if not (right and all(abs(as_float(value)) <= LARGEST_NUMBER for value in point)):
-            raise StepError(f"{where}: measured {short(told)}; give x, y, z by brick, m")
-    return as_built(scene, {int(n): tuple(map(as_float, at)) for n, at in points.items()})
 
 
 def _standing(scene: Scene, told: object, where: str) -> tuple[Scene, int]:
@@ -353,48 +336,3 @@ def _by_robot(scene: Scene, told: object, where: str) -> tuple[int | None, ...] 
     if not isinstance(told, Mapping) or any(name not in names for name in told):
         raise StepError(f"{where}: {short(told)}; give nodes by robot, of {', '.join(names)}")
     return tuple(told.get(name) for name in names)
-
-
-def _what_is_left(schedule: Schedule, done: Sequence[Step], to: Site | None = None) -> Schedule:
-    """Return the rest of a schedule after completed steps, whose grips are fixed.
-
-    ``to``: an end before its last step; grips held there are fixed. Raises `StepError` if the
-    completed steps do not follow the schedule, or nothing is left.
-    """
-    last = len(schedule.steps) if to is None else to.step
-    if not len(done) < last <= len(schedule.steps):
-        raise StepError(
-            f"schedule {schedule.method} has {len(schedule.steps)} steps: none is left from "
-            f"step {len(done)} to {last}"
-        )
-    for step, planned in zip(done, schedule.steps, strict=False):
-        same = replace(planned, grips=()) == OpenStep(step.number, step.kind, step.bricks, ())
-        for node, grip in zip(step.grips, planned.grips, strict=True):
-            open_ = isinstance(grip, OpenGrip) and node in schedule.moves[grip.move].candidates
-            same &= open_ or node == grip
-        if not same:
-            raise StepError(
-                f"step {step.number} of what was done is none of schedule {schedule.method}; go "
-                "on with the free schedule"
-            )
-    held = [(len(done), done[-1].grips)] if done else []  # after how many steps, by whom
-    held += [(last, to.grips)] if to is not None and to.grips is not None else []
-    choice: dict[object, Any] = {
-        grip: node
-        for count, nodes in held
-        for grip, node in zip(schedule.steps[count - 1].grips, nodes, strict=True)
-        if isinstance(grip, OpenGrip)
-    }
-    rest = schedule.steps[len(done) : last]
-    left = sorted({m for step in rest for m in step.moves if OpenGrip(m) not in choice})
-    choice |= {OpenGrip(move): OpenGrip(k) for k, move in enumerate(left)}
-    steps = tuple(replace(s, grips=tuple(choice.get(g, g) for g in s.grips)) for s in rest)
-    moves = []
-    for k, move in enumerate(schedule.moves[move] for move in left):
-        taken = {grip for step in steps if k in step.moves for grip in step.grips}
-        free = tuple(node for node in move.candidates if node not in taken)
-        if not free:
-            raise StepError(f"step {move.step}: others hold every node that {move.robot} may hold")
-        moves.append(replace(move, candidates=free))
-    begin = Site.after(done, done[-1].number) if done else None
-    return replace(schedule, steps=steps, moves=tuple(moves), begin=begin)

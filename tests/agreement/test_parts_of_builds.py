@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.errors import InfeasibleError, SolverError, StepError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
 from seqopt.graph._orders import order_rules
 from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.judge._schedules import judge_schedule
@@ -20,10 +20,9 @@ from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import Orders
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import in_order
-from seqopt.sequence.methods import three_robot_loop
 from seqopt.sequence.rules import FreeRules, with_robots
-from seqopt.sequence.schedule_file import _what_is_left
 from seqopt.sequence.steps import Site, StepKind
+from seqopt.workflow import Part
 from tests.brute_force import ONES, best_values
 from tests.builders import from_both_sides, small_arch
 
@@ -128,27 +127,9 @@ def test_the_rest_of_the_best_plan_is_the_best_rest(aim):
             assert values_of(rest) == pytest.approx(values_of(plan), rel=1e-9)
 
 
-def test_loops_go_on_from_their_steps_and_end_at_them():
-    scene = small_arch(7)
-    engine = seqopt.make_engine("compliance", scene)
-    loop = three_robot_loop(engine.network)
-    for how in ("minimax", "cascade"):
-        plan = seqopt.solve(seqopt.pose(engine, loop, ONES), how)
-        for count in (1, 8):
-            left = _what_is_left(loop, plan.steps[:count])
-            rest = seqopt.solve(seqopt.pose(engine, left, ONES), how)
-            assert rest.steps[0].number == count + 1
-            assert [s.kind for s in rest.steps] == [s.kind for s in plan.steps[count:]]
-            if how != "minimax":  # a worst step may lie behind
-                assert [s.grips for s in rest.steps] == [s.grips for s in plan.steps[count:]]
-            ends = Site.after(plan.steps, len(plan.steps) - 2)
-            part = _what_is_left(loop, plan.steps[:count], ends)
-            short = seqopt.solve(seqopt.pose(engine, part, ONES), how)
-            assert short.steps[-1].grips == ends.grips
-    with pytest.raises(StepError, match="step 1 of what was done is none of schedule three-robot"):
-        _what_is_left(loop, [replace(plan.steps[0], grips=(2, None, None))])
-    with pytest.raises(StepError, match="none is left"):
-        _what_is_left(loop, plan.steps)
+def test_parts_of_builds_are_of_the_free_schedule():
+    with pytest.raises(ProblemError, match="three-robot: its steps are given; orders, parts of"):
+        seqopt.optimize(small_arch(7), Part(schedule="three-robot", to=4), ONES)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
 import pytest
 
 from seqopt import Prop, load_scene, save_scene
@@ -13,21 +12,12 @@ from seqopt.scene.scene_file import scene_to_dict
 from tests.builders import small_arch
 
 
-def test_a_position_names_the_node_next_to_it():
-    scene = small_arch(5)
-    node = scene.placed[2].nodes[1]
-    near = np.add(scene.node_position(node), (0.002, 0.001, -0.003))
-    (prop,) = scene.with_props(Prop(position=near, capacity=80)).props
-    assert prop == Prop(node=node, capacity=80)
-
-
 @pytest.mark.parametrize(
     ("props", "said"),
     [
-        ([{"position": (9, 9, 9)}], "the nearest node, .* m away; give a point at most"),
-        ([{"node": 99}], "prop at node 99: there is no such node; give one of"),
-        ([{"node": 3}, {"node": 3}], "prop at node 3: another one holds it; give each its own"),
-        ([{"node": 0}], "prop at node 0: there is no such node"),  # it is blocked
+        ([{"node": 99}], "prop at node 99: there is no free node 99; known are"),
+        ([{"node": 3}, {"node": 3}], "a prop at node 3 occurs twice; give each its own"),
+        ([{"node": 0}], "prop at node 0: there is no free node 0"),  # it is blocked
     ],
 )
 def test_props_that_do_not_fit_a_scene(props, said):
@@ -38,7 +28,7 @@ def test_props_that_do_not_fit_a_scene(props, said):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ({"node": 3, "position": (0, 0, 0)}, "give the node that it holds, or a position"),
+        ({"node": 0.5}, "prop: node is 0.5; give a whole number"),
         ({"node": 3, "direction": (0, 0, 0)}, "direction is .* give one that is not zero"),
         ({"node": 3, "stiffness": -1}, "prop at node 3: stiffness is -1; give one number or three"),
     ],

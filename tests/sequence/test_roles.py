@@ -122,7 +122,7 @@ def test_a_brick_that_nobody_reaches_is_named():
     scene = small_arch(5)
     net = with_robots(scene, near(scene, "a", 1, 2), near(scene, "b", 1, 2))
     with pytest.raises(
-        StepError, match=r"brick 3: a and b reach none of its free nodes \[4, 5\]; give a reach "
+        StepError, match=r"brick 3: a and b reach none of its free nodes \[4, 5\]; extend a reach"
     ):
         sequential(net)
     mixed = with_robots(scene, near(scene, "a", 1, 2), *anywhere(1))

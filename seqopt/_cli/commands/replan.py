@@ -188,7 +188,7 @@ class Change:
             scene = as_built(scene, found)
         scene, site = without(scene, begin.site, self.lost, [*map(int, self.missing)])
         left = tuple(robot.name for robot in scene.robots if robot.name not in self.lost)
-        return scene, _Place(site, None), left if self.lost else ()
+        return scene, _Place(site), left if self.lost else ()
 
 
 def _answer(folder: Path, change: Change, new: Found) -> Answer[Plan]:
