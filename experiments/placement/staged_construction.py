@@ -28,11 +28,17 @@ import pandas as pd
 
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.scenes import arch25, method_steps
+from experiments.placement.parts.staged import (
+    Placing,
+    StagedState,
+    next_state,
+    staged_fields,
+    state_fields,
+)
 from seqopt import Network, Step, three_robot_loop
 from seqopt.engines.interface import Fields
 from seqopt.engines.rigid._mechanism import Ungripped, ungripped_system
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.responses._staged import Placing, StagedState, next_state, staged_fields, state_fields
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, TO_1E_3MM, lengths
 from seqopt.responses.table import step_fields
 from seqopt.sequence.methods import METHODS

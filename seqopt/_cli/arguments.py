@@ -47,7 +47,6 @@ GONE = {
     "--keep": "--to 12 leaves the first 12 bricks of --order",
     "--load-factor": "in Python seqopt.stability.load_factors has it",
     "--seconds": "it is --time-limit, as of any command",
-    "--staged": "in Python seqopt.responses.analyze_staged has it",
     "--stiffens": "give a scene whose joints are softer, as seqopt scene --export writes it",
 }  # options that there were, and what to do in their place
 

@@ -1,9 +1,8 @@
 """Responses: the few numbers that describe how a partial structure carries its weight.
 
 An engine gives forces and displacements everywhere; a response is one number of these, such as the
-largest tension. `analyze` returns them as a table for given steps, each computed from scratch, and
-`analyze_staged` with the forces that earlier steps lock in. `Evaluation` computes them for all
-choices in steps with open grips.
+largest tension. `analyze` returns them as a table for given steps, each computed from scratch.
+`Evaluation` computes them for all choices in steps with open grips.
 
 >>> from seqopt.engines.registry import make_engine
 >>> from seqopt.network.build import build_network
@@ -30,16 +29,10 @@ bit:
 True
 """
 
-from typing import TYPE_CHECKING
-
-from seqopt._later import later
 from seqopt.responses._choices import Evaluation, StepChoices
 from seqopt.responses.quantities import RESPONSES, Response, responses_of
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import analyze
-
-if TYPE_CHECKING:
-    from seqopt.responses._staged import analyze_staged
 
 __all__ = [
     "RESPONSES",
@@ -48,7 +41,5 @@ __all__ = [
     "Response",
     "StepChoices",
     "analyze",
-    "analyze_staged",
     "responses_of",
 ]
-__getattr__, __dir__ = later(__name__, {"analyze_staged": "_staged"})

@@ -49,18 +49,12 @@ class Enough(Terse):
         return f"enough: {self.engine}; {self.others}", f"left out: {'; '.join(self.left_out)}"
 
 
-def what_was_enough(
-    within: LinearRange, builds: Mapping[str, _Columns], *, staged: bool = False
-) -> Enough:
-    """Return the sufficient model of builds, given their tables of responses.
-
-    ``within``: the linear range of their engine; ``staged``: whether steps include locked-in forces
-    of earlier ones; the margins of joints to their limits are then not known.
-    """
+def what_was_enough(within: LinearRange, builds: Mapping[str, _Columns]) -> Enough:
+    """Return the sufficient model of builds by their tables; ``within``: their engine's range."""
     engine, recipe = within.engine, recipe_of(within.engine)
     each = [(*within.closest(table), name) for name, table in builds.items()]
     below, joint, number, build = min(each, key=lambda one: np.nan_to_num(one[0], nan=np.inf))
-    known = not (staged or np.isnan(below))
+    known = not np.isnan(below)
     step = f"step {number}{f' of {build}' if len(builds) > 1 else ''}" if known else ""
     where, unknown = f"{joint} in {step}", "what discrete elements would change is not known: "
     if isinstance(engine, OpeningEngine):
@@ -69,7 +63,7 @@ def what_was_enough(
         others = "what another one would change is not known"
     elif not known:
         unchecked = "; ".join(within.unchecked) or str(getattr(engine, "unchecked", ""))
-        others = unknown + (unchecked or "steps build on earlier ones")
+        others = unknown + unchecked
     elif below >= 0:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
         own = f" {_with_mortar(_mortar_name(within.mortar))}"  # whose limits they are
@@ -80,14 +74,12 @@ def what_was_enough(
     else:
         others = f"{unknown}{where} leaves its limits; the engine discrete says it"
     name = type(engine).__name__ if recipe is None else recipe.name
-    left_out = tuple(_left_out(within, builds, staged=staged))
+    left_out = tuple(_left_out(within, builds))
     margin = below if known else None
     return Enough(name, others, joint if known else "", step, margin, left_out)
 
 
-def _left_out(
-    within: LinearRange, builds: Mapping[str, _Columns], *, staged: bool
-) -> Iterator[str]:
+def _left_out(within: LinearRange, builds: Mapping[str, _Columns]) -> Iterator[str]:
     """Yield effects that the model neglects and that may matter in these builds."""
     every, moved = within.engine.network.scene.robots, RESPONSES["D_max"]
     kinds = within.engine.network.scene.grip_kinds
@@ -102,7 +94,7 @@ def _left_out(
         yield "compliance of props"
     if any(prop.direction for prop in props):
         yield "that props lift off which only push (plans in which one would pull are not allowed)"
-    if not staged and any(len(table["step"]) > 1 for table in tables):
+    if any(len(table["step"]) > 1 for table in tables):
         yield "what earlier steps lock in"
     if not isinstance(within.engine, OpeningEngine):
         most = max(float(np.max(t[moved.column])) / moved.scale for t in tables) / within.far

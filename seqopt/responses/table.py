@@ -105,12 +105,8 @@ class LinearRange:
         except SceneError as error:
             self.unchecked = (f"stresses in joints are not checked: {error}",)
 
-    def departures(
-        self, table: _Columns, fields: Iterable[Fields] | None = None
-    ) -> tuple[Departure, ...]:
-        """Return the limits that the steps of a build exceed.
-
-        ``table``: of `seqopt.analyze`; ``fields``: of every step; by default the engine's.
+    def departures(self, table: _Columns) -> tuple[Departure, ...]:
+        """Return the limits that the steps of a build exceed, by their table of `seqopt.analyze`.
 
         Examples
         --------
@@ -123,9 +119,7 @@ class LinearRange:
         """
         shift, far = RESPONSES["D_max"], self.far
         moved = np.asarray(table[shift.column], dtype=float) / shift.scale
-        of_fields = None if fields is None else [self._of(each) for each in fields]
-        measures = self._measured(table) if of_fields is None else np.concatenate(of_fields)
-        turned, strained, stressed = measures[:, :3].T
+        turned, strained, stressed = self._measured(table)[:, :3].T
         stressed = np.where(self._breaks, -np.inf, stressed)
         steps = np.asarray(table["step"], dtype=int)
         within = f", more than {length_text(far)}, a tenth of the smallest side of a brick"

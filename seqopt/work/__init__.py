@@ -1,7 +1,7 @@
 """Work: one function over many tasks, in this process, in others, or on any executor.
 
-Results are those of a loop and come in the same order, whichever worker computes them. If a worker
-dies, its unfinished tasks are dispatched again.
+Results are those of a loop and come in the same order, whichever worker computes them. A worker
+that dies ends in an error of one line.
 
 >>> from seqopt.work import hire, map_ordered
 >>> with hire(workers=1) as crew:  # more workers are processes

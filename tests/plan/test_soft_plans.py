@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import seqopt
+from experiments.placement.parts.staged import analyze_staged
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
-from seqopt.responses._staged import analyze_staged
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scenarios import require_alike
 from seqopt.workflow import Robust

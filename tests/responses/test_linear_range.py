@@ -13,8 +13,7 @@ from seqopt._cli.main import main
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.network.build import build_network
-from seqopt.responses._staged import staged_fields
-from seqopt.responses.table import _STRAIN, LinearRange, analyze, response_table
+from seqopt.responses.table import _STRAIN, LinearRange, analyze
 from seqopt.scene.scene_file import _scene_by_words, save_scene
 from seqopt.sequence.methods import cantilever, sequential
 from seqopt.study.published import published_plan
@@ -78,12 +77,14 @@ def test_every_limit_is_told_from_the_others(arch25, soft):
 def test_bricks_that_turn_about_their_own_axis_are_seen(arch25):
     """No node moves far where a brick turns about the line of its nodes."""
     made = make_engine("compliance", build_network(arch25))
-    table = analyze(made, sequential(made.network)).iloc[:1]
-    fields = made.solve(1, np.array([[int(table["rob1_node"][0])]]), Want.ALL)
+    (step, *_) = sequential(made.network)
+    table, within = analyze(made, [step]), LinearRange(made)
+    fields = made.solve(1, np.array([step.held]), Want.ALL)
     fields.brick_twist.flags.writeable = False
     turned = np.array(fields.brick_twist)
     turned[0, 0, 3:] = 0.2
-    (left,) = LinearRange(made).departures(table, [replace(fields, brick_twist=turned)])
+    within.seen(step, replace(fields, brick_twist=turned))
+    (left,) = within.departures(table)
     assert (left.what, left.steps) == ("rotation", (1,))
 
 
@@ -92,18 +93,6 @@ def test_what_is_not_a_number_is_not_within(arch25):
     table = analyze(made, sequential(made.network))
     table.loc[4, "D_max_1e-3mm"] = np.nan
     assert [each.steps for each in LinearRange(made).departures(table)] == [(5,)]
-
-
-def test_staged_builds_are_judged_by_what_they_lock_in(soft):
-    made = make_engine("compliance", build_network(soft))
-    steps = sequential(made.network)
-    fields = list(staged_fields(made.network, steps))
-    table = response_table(made.network, zip(steps, fields, strict=True))
-    own = {each.what: each.steps for each in LinearRange(made).departures(table, fields)}
-    scratch = {each.what: each.steps for each in LinearRange(made).departures(table)}
-    assert own["displacement"] == scratch["displacement"]
-    turns = np.array([np.abs(each.brick_twist[0, :, 3:]).max(initial=0.0) for each in fields])
-    assert ("rotation" in own) == bool((turns > 0.1).any())
 
 
 def moved(scene, network, twist):

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import seqopt
+from experiments.placement.parts.staged import analyze_staged
 from seqopt import Prop, Robot
 from seqopt.engines.interface import Want
-from seqopt.responses._staged import analyze_staged
 from seqopt.responses.quantities import _excess_of
 from tests.builders import small_arch
 

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg
 
+from experiments.placement.parts.staged import Placing, analyze_staged, staged_fields
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import MechanismError, StepError
 from seqopt.network._mechanics import node_motion, spring_maps
 from seqopt.network.build import build_network
-from seqopt.responses._staged import Placing, analyze_staged, staged_fields
 from seqopt.scene.parts import Joint
 from seqopt.sequence.methods import cantilever, sequential
 from seqopt.sequence.steps import Step, StepKind

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import seqopt
+from experiments.placement.parts.staged import analyze_staged
 from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.graph._orders import among_orders, order_rules
 from seqopt.graph.states.states import build_states
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status
-from seqopt.responses import analyze_staged
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Site, Step, StepKind, check_sequence
 from tests.brute_force import ONES, allowed, best_values

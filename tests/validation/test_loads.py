@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import seqopt
+from experiments.placement.parts.staged import staged_fields
 from seqopt.engines.diagnosis import residual
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.responses._staged import staged_fields
 from seqopt.scene import Load
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.library import WallShape, chain, wall

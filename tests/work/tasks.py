@@ -60,10 +60,6 @@ def die_while_sending(folder, number):
     return answer
 
 
-def die(number):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
 def own_error(number):
     class OddError(Exception):
         """One that cannot be sent."""

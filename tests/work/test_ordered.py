@@ -1,4 +1,4 @@
-"""Work that splits: as a loop, whoever works; workers that die lose nothing and leave nothing."""
+"""Work that splits: as a loop, whoever works; workers that die end in a line, and leave nothing."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 
 import pytest
 
 from seqopt.errors import SolverError, WorkerError
-from seqopt.work import Progress, hire, map_ordered
-from seqopt.work._workers import _Processes
+from seqopt.work import Progress, _workers, hire, map_ordered
 from tests.builders import ROOT
-from tests.work.tasks import die, die_once, die_while_sending, own_error, square, square_or_fail
+from tests.work.tasks import die_once, die_while_sending, own_error, square, square_or_fail
 
 TASKS = range(12)
 WANTED = [number * number for number in range(12)]
@@ -61,27 +60,14 @@ def test_the_first_error_is_raised_whoever_works():
 
 
 @pytest.mark.slow
-def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path):
-    with hire(workers=2) as crew:
-        assert list(map_ordered(partial(die_once, tmp_path), TASKS, crew)) == WANTED
-    assert len(list(tmp_path.iterdir())) == 2  # they did die
-
-
-@pytest.mark.slow
-def test_a_worker_that_dies_while_it_sends_keeps_nobody_waiting(tmp_path):
-    """The rest of its answer was waited for without end."""
-    with hire(workers=2) as crew:
-        answers = map_ordered(partial(die_while_sending, tmp_path), TASKS[:3], crew)
-        assert [float(answer.max()) for answer in answers] == [0.0, 1.0, 2.0]
-    assert len(list(tmp_path.iterdir())) == 1
-
-
-@pytest.mark.slow
-def test_workers_that_always_die_end_in_a_line():
-    wanted = pytest.raises(WorkerError, match=r"workers ended 4 times .*BrokenProcessPool")
+@pytest.mark.parametrize("task", [die_once, die_while_sending])
+def test_a_worker_that_dies_ends_in_a_line_and_keeps_nobody_waiting(tmp_path, task):
+    """Amid an answer, the rest of it was waited for without end."""
+    wanted = pytest.raises(WorkerError, match=r"ended without an answer .*BrokenProcessPool")
     with wanted as caught, hire(workers=2) as crew:
-        list(map_ordered(die, TASKS[:3], crew))
+        list(map_ordered(partial(task, tmp_path), TASKS, crew))
     assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir())  # it did die
     assert multiprocessing.active_children() == []
 
 
@@ -91,16 +77,16 @@ def test_a_run_that_is_ended_leaves_no_error_behind(monkeypatch, cancels):
     """Many calls wait when processes end; the control cancels them, over which a pool stumbles."""
     seen = []
     monkeypatch.setattr(threading, "excepthook", lambda seen_: seen.append(seen_.exc_type))
-    if cancels:
-        monkeypatch.setattr(_Processes, "drop", lambda self, calls: [c.cancel() for c in calls])
     with hire(workers=2) as crew:
-        calls = [crew.submit(time.sleep, seconds) for seconds in (0.0, *[30.0] * 20)]
-        calls[0].result()
+        if cancels:  # as calls of an executor of others
+            monkeypatch.setattr(_workers, "_Processes", type(None))
+        results = map_ordered(time.sleep, (0.0, *[30.0] * 20), crew)
+        next(results)
         time.sleep(0.5)  # until the pool has nothing to do but wait
-        crew.drop(calls)
-        for process in crew._started:
+        results.close()
+        for process in crew.executor._processes.values():
             process.kill()
-        wait(calls, 2)
+        time.sleep(1.0)
     old = sys.version_info < (3, 12)  # its pools have the fault
     assert [error.__name__ for error in seen] == ["InvalidStateError"] * (cancels and old)
 
@@ -112,14 +98,16 @@ def test_an_executor_of_others_that_breaks_is_named(tmp_path):
 
 
 class Forgetful(Executor):
-    """Loses every third task, as a cluster does whose machines come and go."""
+    """Loses every third task, or takes none: a cluster whose machines come and go."""
 
-    def __init__(self):
-        self.calls = 0
+    def __init__(self, error):
+        self.calls, self.error = 0, error
 
     def submit(self, function, /, *arguments, **named):
         self.calls += 1
         future = Future()
+        if self.error:
+            raise OSError(self.error)
         if self.calls % 3:
             future.set_result(function(*arguments, **named))
         else:
@@ -127,30 +115,10 @@ class Forgetful(Executor):
         return future
 
 
-def test_what_an_executor_of_others_loses_is_given_out_again():
-    with hire(Forgetful(), workers=2) as crew:
-        assert list(map_ordered(square, range(12), crew)) == WANTED
-
-
-class Reluctant(Forgetful):
-    """Takes no work the first times it is asked, as a cluster does that starts its machines."""
-
-    def __init__(self, times):
-        super().__init__()
-        self.times = times
-
-    def submit(self, function, /, *arguments, **named):
-        if arguments and self.times:
-            self.times -= 1
-            raise OSError("no machine yet")
-        return super().submit(function, *arguments, **named)
-
-
-def test_an_executor_of_others_may_take_no_work_at_first():
-    with hire(Reluctant(3), workers=2) as crew:
-        assert list(map_ordered(square, range(2), crew)) == WANTED[:2]
-    wanted = pytest.raises(WorkerError, match=r"without an answer .*no machine yet")
-    with wanted, hire(Reluctant(100), workers=2) as crew:
+@pytest.mark.parametrize("error", ["", "no machine yet"])
+def test_what_an_executor_of_others_loses_is_named(error):
+    wanted = pytest.raises(WorkerError, match=f"answer .*{error or 'connection lost'}")
+    with wanted, hire(Forgetful(error), workers=2) as crew:
         list(map_ordered(square, range(12), crew))
 
 
