@@ -269,11 +269,7 @@ class Proof:
         if found is not None:
             return found
         bounds = partial(lexicographic_bounds, values=values)
-        out = self._where_states_stand(self.rebuilt(Filter(values)), values, bounds)
-        if self._leaves_room(values, out):
-            exact = self.rebuilt(Filter(values, exact=True))
-            out = self._where_states_stand(exact, values, bounds)
-        return out
+        return self._where_states_stand(self.rebuilt(Filter(values)), values, bounds)
 
     def bounds_first(self, value: float) -> bool:
         """Return whether a value is a lower bound of the first goal, if that is a worst value."""
@@ -342,7 +338,7 @@ class Proof:
         """Return Lagrangian bounds of plans within budgets, by multipliers that are claimed."""
         caps, margins = self.evaluator.problem.budgets, values[: self.evaluator.margins]
         stand = margins if self.evaluator.demands(margins) else None
-        rebuilt = self.rebuilt(Filter(values, stand, exact=True))
+        rebuilt = self.rebuilt(Filter(values, stand))
         self.states = sum(map(len, rebuilt.states))
         return budget_bounds(rebuilt.graph(), values, claimed, (caps, multipliers))
 
@@ -351,7 +347,7 @@ class Proof:
 
         Raises `SolverError` if labels are given that do not prove what is claimed.
         """
-        rebuilt = self.rebuilt(Filter(values, exact=True))
+        rebuilt = self.rebuilt(Filter(values))
         by_labels = _LabelBounds(self.evaluator, rebuilt, values, found)
         return self._where_states_stand(rebuilt, values, by_labels.bounds)
 

@@ -17,16 +17,12 @@ from seqopt.judge._rule_moves import RuleTables, ScheduleTables, Transitions
 from seqopt.judge._step_checks import props_that_hold
 from seqopt.judge._twin import exceeds, own_values, twin_of
 from seqopt.problem.amounts import LARGEST, NONE, MoveArrays, StateArrays
-from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import solve_sets
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.schedule import Schedule
-
-FEW = 500  # grip sets below which full precision is as fast as screening
-BAND = 1e-3  # share of a value within which six digits do not decide, far more than they err
 
 Tables: TypeAlias = RuleTables | ScheduleTables
 """What rules or a schedule allow, level by level."""
@@ -46,31 +42,28 @@ class Answers(NamedTuple):
     models: int
 
 
-def ask(
-    problem: States, bricks: int, grips: Ints, most: float = np.inf, *, low_precision: bool = False
-) -> Answers:
+def ask(problem: States, bricks: int, grips: Ints, most: float = np.inf) -> Answers:
     """Return the engine's responses to grip sets (S, r), nodes held.
 
-    ``most``: over scenarios, what the first goal takes more of in one is not asked of the next;
-    ``low_precision``: whether six digits are enough.
+    ``most``: over scenarios, what the first goal takes more of in one is not asked of the next.
     """
     if not problem.each:
-        return _ask_engine(problem, bricks, grips, low_precision=low_precision)
+        return _ask_engine(problem, bricks, grips)
     out = np.zeros((len(grips), len(problem.goals)))
     forces, fit, models = np.zeros(grips.shape), np.ones(len(grips), dtype=bool), 0
     for number, each in enumerate(problem.each):
         rows = np.flatnonzero(fit & (out[:, 0] <= most))
-        found = ask(each, bricks, grips[rows], low_precision=low_precision)
+        found = ask(each, bricks, grips[rows])
         out[rows] = problem.joined(out[rows], found.values, number)
         forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
         models += found.models
     return Answers(out, forces, fit, models)
 
 
-def _ask_engine(problem: States, bricks: int, grips: Ints, *, low_precision: bool) -> Answers:
+def _ask_engine(problem: States, bricks: int, grips: Ints) -> Answers:
     names = tuple(name for name in problem.named if name != LARGEST)
-    held = props_that_hold(problem.network.scene, bricks, grips.shape[1])
-    block = Block(bricks, grips, names, low_precision, tuple(number for number, _ in held))
+    held = tuple(n for n, _ in props_that_hold(problem.network.scene, bricks, grips.shape[1]))
+    block = Block(bricks, grips, names, screen=False, props=held)
     rows = solve_sets(problem.engine, block, problem.resources)
     found, forces = dict(zip(names, rows.T, strict=False)), rows[:, len(names) :]
     found[LARGEST] = forces.max(axis=1, initial=0.0)
@@ -100,14 +93,12 @@ class Filter(NamedTuple):
 
     ``values``: of goals; the first that is about no margin bounds states, if it is about a worst
     step; ``margins``: of first goals, with which states must stand, as demanded; None does not
-    ask; ``exact``: whether all values have all digits, or those that decide about these;
-    ``strict``: whether states must be below that value, not at most at it; ``steps``: of paths
-    through a state, counted to it and at least from there.
+    ask; ``strict``: whether states must be below that value, not at most at it; ``steps``: of
+    paths through a state, counted to it and at least from there.
     """
 
     values: Sequence[float] = ()
     margins: Sequence[float] | None = None
-    exact: bool = False
     strict: bool = False
     steps: float = np.inf
 
@@ -154,10 +145,8 @@ class StateEvaluator:
         self._numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
         self._beyond = len(nodes) * kinds.of_robot[team]
         self._standing = dict[Standing, tuple[StandingSets, ...]]()
-        ratios = isinstance(problem.criterion, WorstRatio)
-        of_states = (goal for goal in problem.goals if goal.states is not None)
-        peaks = all(goal.has_few_digits and (ratios or not goal.of_criterion) for goal in of_states)
-        self._exact = not peaks or bool(problem.limits or problem.filters)  # six digits do not do
+        twins = (twin_of(goal) for goal in problem.goals if not goal.is_peak)
+        self._to_go = next((twin.to_go for twin in twins if twin and twin.to_go), None)
         self.models = 0  # how often the engine was asked of a grip set, in any scenario
 
     def least(self) -> tuple[float, ...]:
@@ -169,7 +158,7 @@ class StateEvaluator:
         end = dict(tables.certain()).get(tables.last)
         last = np.full(len(goals), -np.inf if end is None else 0.0)
         if end is not None and tables.bricks_at(tables.last):
-            last = self.valued(tables.last, end, Filter(exact=True))[0][0]
+            last = self.valued(tables.last, end, Filter())[0][0]
         out = np.where([goal.is_peak for goal in goals], last, -np.inf)
         for k, twin in enumerate(map(twin_of, goals)):
             if twin is not None and twin.to_go is not None:
@@ -178,7 +167,7 @@ class StateEvaluator:
 
     def bars(self, margins: Sequence[float]) -> bool:
         """Return whether a state that every plan passes is infeasible, or lacks such margins."""
-        asked = Filter((), margins, exact=True)
+        asked = Filter((), margins)
         return any(not self.valued(*state, asked)[1].all() for state in self.tables.certain())
 
     def reachable(self, level: int, entries: Ints, spent: Floats, asked: Filter) -> Reachable:
@@ -195,8 +184,8 @@ class StateEvaluator:
             own = self.tables.codes(fresh)
             first = np.lexsort((spent, own))
             first = first[np.unique(own[first], return_index=True)[1]]
-            if limited:
-                to_go = self._steps_to_go(level, fresh[first])
+            if limited and self._to_go is not None:
+                to_go = self._to_go(self.tables, level, fresh[first])
                 first = first[spent[first] + to_go <= asked.steps]
             order = np.argsort(codes, kind="stable")
             at = np.searchsorted(codes, own[first], sorter=order).clip(max=len(codes) - 1)
@@ -227,12 +216,6 @@ class StateEvaluator:
         onward = [move._replace(source=number[move.source]) for move in onward]
         return Reachable(codes[ok], states[ok], values[ok], onward, steps[ok])
 
-    def _steps_to_go(self, level: int, states: Ints) -> Floats:
-        """Return how many steps builds have at least from states on, where steps are limited."""
-        twins = (twin_of(goal) for goal in self.problem.goals if not goal.is_peak)
-        to_go = next(twin.to_go for twin in twins if twin is not None and twin.to_go is not None)
-        return to_go(self.tables, level, states)
-
     def valued(self, level: int, states: Ints, asked: Filter) -> tuple[Floats, Bools]:
         """Return values of goals in states (n, g), and which states pass a filter (n,)."""
         goals, bricks, k = self.problem.goals, self.tables.bricks_at(level), self.margins
@@ -242,7 +225,7 @@ class StateEvaluator:
         if len(asked.values) > k and goals[k].is_peak:
             below = (strictly_below if asked.strict else tied)(asked.values[k])
         held, payload = self._held(states, self._most, self._beyond)
-        values, forces, ok = self._answers(bricks, held, asked, np.inf if k else below)
+        values, forces, ok = self._answers(bricks, held, np.inf if k else below)
         ok &= (forces <= payload).all(axis=1) & (values[:, k : k + 1] <= below).all(axis=1)
         if asked.margins is not None:
             ok[ok] = self.may_stand(level, states[ok], asked.margins)
@@ -294,44 +277,24 @@ class StateEvaluator:
         order = np.argsort(grips, axis=1, kind="stable")
         return np.take_along_axis(grips, order, axis=1), most[order]
 
-    def _answers(
-        self, bricks: int, held: Ints, asked: Filter, below: float
-    ) -> tuple[Floats, Floats, Bools]:
+    def _answers(self, bricks: int, held: Ints, below: float) -> tuple[Floats, Floats, Bools]:
         """Return values (n, g), forces (n, r) and feasibility (n,) of places held.
 
         Over scenarios they are those of the first that exceeds a value of the first goal.
         """
-        goals, robots = len(self.problem.goals), held.shape[1]
-        out = np.zeros((len(held), goals + robots + 1))
+        values = np.zeros((len(held), len(self.problem.goals)))
+        forces, fit = np.zeros(held.shape), np.zeros(len(held), dtype=bool)
         count = np.count_nonzero(held, axis=1)
         for grips in np.unique(count).tolist():
             rows = np.flatnonzero(count == grips)
-            places = held[rows, robots - grips :]
+            places = held[rows, held.shape[1] - grips :]
             codes = places @ len(self._numbers) ** np.arange(grips)
             _, first, again = np.unique(codes, return_index=True, return_inverse=True)
-            numbers = self._numbers[places[first]]
-            found = self._computed(bricks, numbers, asked, below)[again]
-            out[rows, :goals] = found[:, :goals]
-            out[rows, goals + robots - grips :] = found[:, goals:]
-        return out[:, :goals], out[:, goals:-1], out[:, -1] > 0
-
-    def _computed(self, bricks: int, grips: Ints, asked: Filter, below: float) -> Floats:
-        """Return values, forces and feasibility of grip sets, side by side.
-
-        Six digits are enough where no value or payload that decides is close.
-        """
-        exact, goals = asked.exact or self._exact or len(grips) <= FEW, len(self.problem.goals)
-        *found, models = ask(self.problem, bricks, grips, below, low_precision=not exact)
-        out = np.column_stack(found)
-        if not exact:
-            close = _near(out[:, goals:-1], self._most)
-            for k, value in enumerate(asked.values):
-                if self.problem.goals[k].is_peak:
-                    close |= _near(out[:, [k]], np.array([value]))
-            *found, more = ask(self.problem, bricks, grips[close], below)
-            out[close], models = np.column_stack(found), models + more
-        self.models += models
-        return out
+            found = ask(self.problem, bricks, self._numbers[places[first]], below)
+            values[rows], fit[rows] = found.values[again], found.fit[again]
+            forces[rows, held.shape[1] - grips :] = found.forces[again]
+            self.models += found.models
+        return values, forces, fit
 
     def amounts(self, values: Floats, found: Transitions) -> Floats:
         """Return the values (m, g) of goals of moves to states with such values."""
@@ -367,9 +330,3 @@ def interchangeable(
         key = (book.reached[r, last], nodes, may, most[r], grip, arm, takes)
         groups.setdefault(key, []).append(r)
     return [tuple(group) for group in groups.values() if len(group) > 1]
-
-
-def _near(values: Floats, bounds: Floats) -> Bools:
-    """Return the rows (n,) with a value (n, k) too close to a bound for single precision."""
-    finite = bounds[np.isfinite(bounds)]
-    return np.asarray((np.abs(values[:, :, None] - finite) <= BAND * np.abs(finite)).any((1, 2)))
