@@ -1,17 +1,11 @@
 r"""Lower bounds of paths by what proves them: multipliers of caps, and labels.
 
 It shares nothing with the formulations that it judges. Every multiplier :math:`\lambda \ge 0` of
-the caps proves a Lagrangian bound: the least cost of any path with them. The best ones are duals of
-the best mixture :math:`w` of the paths :math:`p` found so far, with what it exceeds caps by at a
-largest multiplier :math:`\bar\lambda`,
+the caps proves a Lagrangian bound: the least cost of any path with them, by potentials that are
+checked. The best ones come by cutting planes (`seqopt.graph._budgets`); wherever they come from,
+only the bound that they prove counts.
 
-.. math::
-
-   \min_{w, \, z \ge 0} \; \sum_p c(p) \, w_p + \bar\lambda^T z
-   \quad\text{s.t.}\quad \sum_p w_p = 1, \qquad \sum_p a_b(p) \, w_p \le B_b + z_b
-   \quad \text{for every cap } b ;
-
-a path of less cost at these is added next (Dantzig and Wolfe, 1960). Then labels are extended
+Then labels are extended
 from the ends back to the start. One is dropped that cannot cost less than the answer, or exceeds a
 cap, or is dominated by another from the same state on. If none is left the answer is the best; if
 there are too many, the least bound of those pruned holds for all.
@@ -26,18 +20,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph._budgets import Plane, Polyhedron, _cheapest, highest_bound
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import _to_go, distances, least_sum, tied
+from seqopt.graph.paths import _to_go, distances, least_sum, moves_out, tied
 from seqopt.problem.resources import Resource, StepArrays
 
 MIXTURES = 80  # multipliers that are tried
-DEAREST = 1e7  # largest multiplier, over the size of costs and caps
+DEAREST = 1e7  # largest multiplier, over what a path costs per unit of a cap
 MOST = 5_000  # partial paths that are kept at a level
 SLACK = 1e-9  # of a cap or a cost: what sums are off by; caps have as much more
 EPS = float(np.finfo(float).eps)
@@ -134,57 +128,31 @@ class _Ascent(NamedTuple):
     met: bool
 
 
-def _best_multipliers(case: _Case, prices: Floats) -> _Ascent:
-    best, paths, ask = _Ascent(prices, -np.inf, met=False), list[tuple[float, Floats]](), prices
-    for _ in range(MIXTURES):
-        bound, cost, over = _least(case, ask)
+def _best_multipliers(case: _Case, start: Floats) -> _Ascent:
+    """Return the best multipliers found from some on; each bound is checked here."""
+    best, graph = _Ascent(start, -np.inf, met=False), case.graph
+
+    def asked(prices: Floats) -> Plane | None:
+        nonlocal best
+        costs = case.costs + case.takes @ prices
+        moves = _cheapest(graph, costs)
+        if moves is None:
+            best = best._replace(bound=np.inf)
+            return None
+        rounding = EPS * (graph.states + 1) * float(prices @ (1 + np.abs(case.caps)))
+        bound = least_sum(graph, costs) - float(prices @ case.caps) - rounding
+        over = case.takes[moves].sum(axis=0) - case.caps
         best = best._replace(met=best.met or bool((over <= 0).all()))
         if bound > best.bound:
-            best = best._replace(multipliers=ask, bound=bound)
-        if case.value - best.bound <= case.slack:
-            break
-        paths.append((cost, over))
-        ask, mixed = _mixed(case, paths)
-        if mixed - best.bound <= SLACK * abs(mixed):
-            break
+            best = best._replace(multipliers=prices, bound=bound)
+        return Plane(float(case.costs[moves].sum()), over, bound)
+
+    def ended(bound: float) -> bool:
+        return case.value - bound <= case.slack
+
+    region = Polyhedron(DEAREST, units=np.ones(len(start)))
+    highest_bound(asked, start, region, ended, rounds=MIXTURES, closed=SLACK)
     return best._replace(bound=best.bound - SLACK**0.5 * case.slack)
-
-
-def _mixed(case: _Case, paths: Sequence[tuple[float, Floats]]) -> tuple[Floats, float]:
-    """Return the multipliers of the best mixture of paths, and its cost."""
-    from scipy.optimize import linprog  # noqa: PLC0415  # slow to import, for budgets only
-
-    costs, over = np.array([cost for cost, _ in paths]), np.array([own for _, own in paths])
-    most = np.full(over.shape[1], DEAREST * case.slack / SLACK)
-    found = linprog(
-        np.concatenate([costs, most]),
-        A_ub=np.hstack([over.T, -np.eye(len(most))]),
-        b_ub=np.zeros(len(most)),
-        A_eq=[[*np.ones(len(costs)), *np.zeros(len(most))]],
-        b_eq=[1.0],
-        method="highs",
-    )
-    if found.x is None or found.fun is None:
-        return np.zeros(len(most)), -np.inf
-    return np.clip(-found.ineqlin.marginals, 0.0, most), float(found.fun)
-
-
-def _least(case: _Case, prices: Floats) -> tuple[float, float, Floats]:
-    """Return the least Lagrangian cost of any path, that path's cost, and its excess of caps."""
-    graph, costs = case.graph, case.costs + case.takes @ prices
-    matrix: Any = graph.matrix(costs)
-    (reached,), (before,) = dijkstra(matrix, indices=[0], return_predecessors=True)
-    ends, moves = np.flatnonzero(graph.ends), list[int]()
-    at = int(ends[np.argmin(reached[ends])]) if len(ends) else 0
-    if not len(ends) or not np.isfinite(reached[at]):
-        return np.inf, np.inf, np.full(len(prices), np.inf)
-    rounding = EPS * (graph.states + 1) * float(prices @ (1 + np.abs(case.caps)))
-    least = float(reached[at] - prices @ case.caps - rounding)
-    while at:
-        own = np.flatnonzero((graph.source == before[at]) & (graph.target == at))
-        moves.append(int(own[np.argmin(costs[own])]))
-        at = int(before[at])
-    return least, float(case.costs[moves].sum()), case.takes[moves].sum(axis=0) - case.caps
 
 
 def _laid_down(case: _Case, prices: Floats) -> tuple[float, bool]:
@@ -195,19 +163,16 @@ def _laid_down(case: _Case, prices: Floats) -> tuple[float, bool]:
     graph, priced = case.graph, case.costs + case.takes @ prices
     begun = distances(graph, priced) - float(prices @ case.caps)
     spared = np.column_stack([distances(graph, takes) for takes in case.takes.T])
-    order = np.argsort(graph.target, kind="stable")
-    starts = np.searchsorted(graph.target[order], np.arange(graph.states + 1))
+    amounts = np.column_stack([priced, case.costs, case.takes])
+    back = Graph(graph.target, graph.source, amounts, (True,) * amounts.shape[1], graph.ends)
     ends = np.flatnonzero(graph.ends)
     zero = np.zeros(len(ends))
     now, aside = _Parts(ends, zero, zero, np.zeros((len(ends), len(case.caps))), zero), np.inf
     while (now.at > 0).any():
-        count = starts[now.at + 1] - starts[now.at]
-        row = np.repeat(np.arange(len(now.at)), count)
-        first = np.repeat(starts[now.at] - np.cumsum(count) + count, count)
-        move = order[first + np.arange(len(row))]
-        to, behind = graph.source[move].astype(np.int64), now.behind[row] + priced[move]
-        bound, taken = behind + begun[to], now.taken[row] + case.takes[move]
-        grown = _Parts(to, behind, now.cost[row] + case.costs[move], taken, bound)
+        row, move = moves_out(back, now.at)
+        to, behind = back.target[move].astype(np.int64), now.behind[row] + back.amounts[move, 0]
+        bound, taken = behind + begun[to], now.taken[row] + back.amounts[move, 2:]
+        grown = _Parts(to, behind, now.cost[row] + back.amounts[move, 1], taken, bound)
         fits = (taken + spared[to] <= case.caps).all(axis=1)
         now = grown.of(fits & (bound < case.value - case.slack))
         now = now.of(_undominated(now.at, now.cost, now.taken))
@@ -310,7 +275,8 @@ class Closed:
     """
 
     def __init__(self, graph: Graph, move: Ints, books: Sequence[Book]) -> None:
-        self._graph, self._source, self._target = graph, graph.source[move], graph.target[move]
+        rows = graph.source[move], graph.target[move]
+        self._graph, self._arcs = graph, Graph(*rows, np.zeros((len(move), 0)), (), graph.ends)
         cuts = np.cumsum([0, *(len(book.first) for book in books)]).tolist()
         self._books = [(b, slice(*cut)) for b, cut in zip(books, pairwise(cuts), strict=True)]
         self.width = cuts[-1]
@@ -325,16 +291,13 @@ class Closed:
         first = np.concatenate([book.first for book, _ in self._books])[None]
         start = np.zeros(1, dtype=np.int64)
         missing = [start[self._lacks(known, start, first)]]
-        starts = np.searchsorted(self._source, np.arange(self._graph.states + 1))
-        counts = np.diff(starts)[known[0]]
+        counts = np.bincount(self._arcs.source, minlength=self._graph.states)[known[0]]
         cuts = np.searchsorted(np.cumsum(counts), np.arange(CHUNK, counts.sum() + CHUNK, CHUNK))
         for rows in np.split(np.arange(len(counts)), np.unique(cuts)):
-            own, label = counts[rows], np.repeat(rows, counts[rows])
-            arc = np.repeat(starts[known[0][rows]] - np.cumsum(own) + own, own)
-            arc = arc + np.arange(len(label))
-            before = known[1][label]
+            row, arc = moves_out(self._arcs, known[0][rows])
+            before = known[1][rows[row]]
             after = np.hstack([book.follow(arc, before[:, own]) for book, own in self._books])
-            to, ever = self._target[arc].astype(np.int64), np.isfinite(after).all(axis=1)
+            to, ever = self._arcs.target[arc].astype(np.int64), np.isfinite(after).all(axis=1)
             missing.append(to[ever][self._lacks(known, to[ever], after[ever])])
         return self._are_dead(np.unique(np.concatenate(missing)), excused)
 

@@ -67,22 +67,18 @@ def judge_schedule(
     if problem.is_timed:
         proves = _path_twin(problem) is not None and bool(np.isfinite(selection.bound).any())
     is_claimed = not proves and (selection.stopped or by_labels)
-    try:
+    bounds = _with_counts(problem, values, none)  # bounds are claimed alone
+    with suppress(TooManyPartsError):
         if not is_claimed and _has_twins(problem):
             return _proven(problem, selection, values, hint, exact=exact)
-    except TooManyPartsError:
-        left = _gap(problem.goals, values, _closed(values, selection.bound))
-        return Certificate(values, none, np.inf, left)
-    bounds = _with_counts(problem, values, none)  # bounds are claimed alone
-    first = replace(problem, budgets=(), goals=problem.goals[:1])
-    is_sought = selection.stopped not in ENDED and not by_labels and _has_twins(first)
-    if is_sought and np.isfinite(least := selection.bound[0]):
-        with suppress(TooManyPartsError):
+        first, least = replace(problem, budgets=(), goals=problem.goals[:1]), selection.bound[0]
+        is_sought = selection.stopped not in ENDED and not by_labels and _has_twins(first)
+        if is_sought and np.isfinite(least):
             if not Proof(first).bounds_first(least):
                 raise SolverError(f"{least:.9g} is promised as the least; a plan has less")
             bounds = (least, *bounds[1:])
     gap = _gap(problem.aims, values, bounds)
-    left = gap if is_claimed else _gap(problem.aims, values, selection.bound)
+    left = gap if is_claimed else _gap(problem.aims, values, _closed(values, selection.bound))
     return Certificate(values, bounds, gap, left, basis=Basis.REBUILT)
 
 
@@ -112,10 +108,7 @@ def _proven(
     if problem.is_timed or problem.paths:
         found = proof.label_bounds(values, selection)
     elif budgets:
-        multipliers = selection.prices
-        if len(multipliers) < aims or any(len(each) < len(budgets) for each in multipliers):
-            raise SolverError("there is no multiplier for every budget and goal")
-        found = proof.budget_bounds(values, claimed, multipliers)
+        found = proof.budget_bounds(values, claimed, selection.prices)
     else:
         found = proof.bounds(values) if len(margins) < len(values) else margins
     bounds = _with_counts(problem, values, _closed(values, (*margins, *found[len(margins) :])))

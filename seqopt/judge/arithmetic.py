@@ -306,9 +306,10 @@ def budget_bounds(
     first, out = len(graph.peaks) - len(caps), list[float]()
     stage = Stage(graph, tuple(("", c, cap) for c, cap in enumerate(caps, start=first)))
     for k in range(first):
-        own = np.maximum(multipliers[k], 0.0).tolist()
+        own = [max(price, 0.0) for price in (multipliers[k] if k < len(multipliers) else ())]
         if len(own) != len(stage.limited) or not np.isfinite(own).all():
-            raise SolverError(f"{len(own)} prices where {len(stage.limited)} numbers belong")
+            counts = f"{len(own)} where {len(stage.limited)} numbers belong"
+            raise SolverError(f"there is no multiplier for every budget and goal: {counts}")
         limited = [(price, c, most) for price, (_, c, most) in zip(own, stage.limited, strict=True)]
         goal = _Target("", PEAK if graph.peaks[k] else SUM, (k,))
         if graph.peaks[k]:
@@ -321,10 +322,7 @@ def budget_bounds(
 
 
 def _peak(
-    stage: Stage,
-    goal: _Target,
-    claimed: float | None,
-    limited: Sequence[tuple[float, int, float]],
+    stage: Stage, goal: _Target, claimed: float | None, limited: Sequence[tuple[float, int, float]]
 ) -> float:
     """Return the bound of a peak: as claimed if multipliers leave no path below it, or a cut.
 

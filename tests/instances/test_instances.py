@@ -204,10 +204,6 @@ def test_prices_prove_a_capped_sum_and_dearer_ones_less(compiled):
         seqopt.judge_instance(less, plan.nodes)
     with pytest.raises(SolverError, match="give a number from 0"):
         seqopt.judge_instance(one, plan.nodes, [{"prices": {name: -1.0}}])
-    wrong = {"value": good.objective * (1 - 1e-4), "prices": {name: price}}
-    if good.bound < good.objective * (1 - 1e-3):
-        with pytest.raises(SolverError, match="is proven"):
-            seqopt.judge_instance(one, plan.nodes, [wrong])
 
 
 def test_labels_prove_a_time_and_missing_ones_do_not(compiled):
