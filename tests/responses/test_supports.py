@@ -8,42 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
-from seqopt.problem.criteria import WeightedSum
 from seqopt.responses.quantities import RESPONSES, responses_of, support_forces, support_moments
 from seqopt.responses.table import analyze, support_columns
-from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Step, StepKind
 from tests.builders import from_both_sides, small_arch
-
-MOMENT = WeightedSum("moment", (("M_sup", 1.0, 1.0),))
 
 
 @pytest.fixture(scope="module")
 def arch():
     return ComplianceEngine(build_network(from_both_sides(9, "VLR")))
-
-
-def one_move(engine, bricks, held=None):
-    """Return one move of the scene's last robot at a brick count; its first may hold a node."""
-    scene = engine.network.scene
-    taken = {*scene.blocked_nodes, held}
-    nodes = tuple(n for b in scene.placed[:bricks] for n in b.nodes if n not in taken)
-    idle = (None,) * (len(scene.robots) - 2)
-    step = OpenStep(1, StepKind.REPOSITION, bricks, (held, *idle, OpenGrip(0)))
-    return Schedule("one move", scene, (step,), (Move(scene.robots[-1].name, 1, bricks, nodes),))
-
-
-def moments(engine, schedule):
-    """Return the moment at each end for every candidate, taken from the fields by hand."""
-    (move,), (step,) = schedule.moves, schedule.steps
-    fixed = [node for node in step.grips if isinstance(node, int)]
-    grips = [[*fixed, node] for node in move.candidates]
-    fields = engine.solve(move.bricks, grips, Want.SUPPORT)
-    return np.linalg.norm(fields.support[:, :, 3:], axis=2)
 
 
 def test_an_arch_built_from_both_sides_reports_its_worse_support(arch25):
@@ -56,15 +31,6 @@ def test_an_arch_built_from_both_sides_reports_its_worse_support(arch25):
     assert (each.argmax(axis=1) == [1, 0]).all()
     assert (each.max(axis=1) > 4 * each.min(axis=1)).all()
     assert (seen == each.max(axis=1)).all()
-
-
-@pytest.mark.parametrize("bricks", [6])
-def test_criteria_see_the_largest(arch, bricks):
-    schedule = one_move(arch, bricks)
-    each = moments(arch, schedule)
-    problem = pose_decisions(arch, schedule, MOMENT)
-    assert problem.sums.single[0] == pytest.approx(each.max(axis=1), rel=1e-12)
-    assert len(set(each.argmax(axis=1))) == 2  # each end is the worse one for some candidate
 
 
 def test_the_largest_force_keeps_its_sign():

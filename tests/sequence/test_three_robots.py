@@ -5,17 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from seqopt.errors import StepError
-from seqopt.network.build import build_network
-from seqopt.sequence.methods import modified_sequential, sequential, three_robot_loop
+from seqopt.sequence.methods import modified_sequential, sequential
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.study.published import printed
-from tests.builders import far_reaching
-from tests.strategies import arches
 
 
 def test_who_moves_when(loop25):
@@ -26,22 +21,6 @@ def test_who_moves_when(loop25):
     for step in loop25.steps[2:]:
         named = {f"rob{number}" for number in str(printed_robots[step.number]).split(";")}
         assert {loop25.moves[m].robot for m in step.moves} == named
-
-
-@given(scene=arches(max_bricks=9).map(far_reaching), data=st.data())
-def test_any_chain_can_be_looped(scene, data):
-    if len(scene.bricks) < 4:
-        with pytest.raises(StepError, match="needs three robots and four bricks"):
-            three_robot_loop(build_network(scene))
-        return
-    schedule = three_robot_loop(build_network(scene))
-    nodes = []
-    for move in schedule.moves:
-        free = [n for n in move.candidates if not nodes or n != nodes[-1]]
-        nodes.append(data.draw(st.sampled_from(free)))
-    for step in schedule.fill(nodes)[1:]:
-        assert len(step.held) >= 2
-        assert set(step.held) & set(scene.placed[step.bricks - 1].nodes)
 
 
 def test_the_modified_sequential_method(engine25):

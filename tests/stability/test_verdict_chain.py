@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import sparse
-from scipy.optimize import linprog
 
 from experiments.harness.scenes import running_bond
 from seqopt.contact.assembly import Assembly
@@ -214,62 +212,6 @@ def test_nonsense_that_is_remembered_turns_no_verdict(arch, mortar, monkeypatch)
 
 
 # numbers from elsewhere
-
-
-def feasible(assembly, friction, sides, *, around):
-    """Whether a linear program of its own finds forces: cones around the true ones, or within."""
-    columns, most = [], []
-
-    def push(bodies, point, force):
-        column = np.zeros(6 * len(assembly.centroid))
-        for body, sign in zip(bodies, (-1.0, 1.0), strict=True):
-            if body >= 0:
-                arm = point - assembly.centroid[body]
-                column[6 * body : 6 * body + 3] += sign * force
-                column[6 * body + 3 : 6 * body + 6] += sign * np.cross(arm, force)
-        columns.append(column)
-
-    angles = 2 * np.pi * np.arange(sides) / sides
-    slope = friction / np.cos(np.pi / sides) if around else friction
-    for corner, contact in zip(assembly.corner, assembly.contact, strict=True):
-        normal = assembly.normal[contact]
-        side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-        side /= np.linalg.norm(side)
-        for angle in angles:
-            along = np.cos(angle) * side + np.sin(angle) * np.cross(normal, side)
-            push(assembly.bodies[contact], corner, normal + slope * along)
-            most.append((0.0, None))
-    largest = np.linalg.norm(assembly.weight, axis=1).max()
-    share = 1.0 if around else 1 / np.sqrt(3)
-    grips = assembly.grip_block, assembly.grip_position, assembly.payload * share / largest
-    for body, point, payload in zip(*grips, strict=True):
-        for axis in np.eye(3):
-            push((-1, body), point, axis)
-            most.append((-payload, payload))
-    load = np.pad(assembly.weight / largest, ((0, 0), (0, 3))).ravel()
-    matrix = sparse.csc_array(np.array(columns).T)
-    return linprog(np.zeros(len(most)), A_eq=matrix, b_eq=-load, bounds=most).status == 0
-
-
-ARCHES = {  # steps and how many of them fall dry
-    "arch:span=2,rise=0.8,pattern=VLR": {"sequential": (37, 18), "cantilever": (37, 20)},
-    "arch:span=3,rise=1.5,pattern=VLR": {"sequential": (65, 49), "cantilever": (65, 48)},
-}
-
-
-@pytest.mark.parametrize("name", [*ARCHES][:1])
-def test_arches_fall_dry_where_a_program_of_its_own_finds_no_forces(name):
-    """Every sixth step: cones around the true ones are too weak, or cones within them enough."""
-    network = build_network(load_scene(name))
-    for method, counts in ARCHES[name].items():
-        steps = METHODS[method](network)
-        found = step_verdicts(network, steps, DRY)
-        assert (len(found), found.count(Verdict.FALLS)) == counts
-        assert found.count(Verdict.UNDECIDED) == 0
-        for step, own in [*zip(steps, found, strict=True)][::6]:
-            assembly = step_assembly(network, step.bricks, step.grips)
-            falls = own is Verdict.FALLS
-            assert feasible(assembly, DRY.friction, 16, around=falls) is not falls
 
 
 def near_verdicts(network, steps, mortar):
