@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
+from seqopt.contact.mortar import DRY, Mortar
+from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import MechanismError, SolverError
+from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.build import build_network
-from seqopt.responses.table import step_fields
+from seqopt.responses.table import analyze, step_fields
+from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import METHODS
+from seqopt.stability._steps import assess_steps
+from seqopt.stability.assessment import Verdict
 from seqopt.study.published import published_plan
-from tests.builders import block, hinged, scaled
+from tests.blocks import with_shapes
+from tests.builders import block, hinged, largest_difference, scaled, six_bricks
 from tests.direct_solve import solve_dense
 from tests.strategies import arches, both_sided, loosened, states, walls
 
@@ -154,3 +163,100 @@ def test_a_brick_on_springs_without_stiffness_is_loose(engine_type, grips):
     none = {f"{way}_stiffness": (0.0, 0.0, 0.0) for way in ("translational", "rotational")}
     with pytest.raises(MechanismError, match="nothing resists a motion of brick 1"):
         engine_type(build_network(block(**none))).solve(1, [grips])
+
+
+# the levels of fidelity: each equals the next where its condition is met, and says where not
+
+
+@settings(max_examples=8)
+@given(states(scenes=st.one_of(arches(max_bricks=5), walls(), both_sided())))
+def test_within_the_elastic_limits_discrete_elements_are_rigid_bricks(state):
+    scene, bricks, grips = state
+    net = build_network(scene)
+    strong = Mortar(friction=1.0, tensile_strength=1e12, cohesion=1e12)
+    try:
+        found = DiscreteEngine(net, strong).solve(bricks, grips, Want.ALL)
+    except SceneError:  # bent so far that bricks interpenetrate
+        reject()
+    exact = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
+    assert largest_difference(found, exact, net) <= 1e-7
+
+
+@pytest.mark.parametrize(
+    "number", [3, 9, *(pytest.param(n, marks=pytest.mark.slow) for n in (7, 20, 24))]
+)
+def test_what_comes_to_rest_is_proven_to_stand(number):
+    """Forces within the limits are there: the certificate must find some too, without bonds."""
+    net = build_network(load_scene("arch25"))
+    step = METHODS["sequential"](net)[number - 1]
+    (result,) = assess_steps(net, [step], DRY)
+    engine = DiscreteEngine(net, DRY)
+    if result.verdict is Verdict.FALLS:
+        assert number in (9, 20)
+        with pytest.raises((MechanismError, SolverError)):
+            engine.solve(step.bricks, [list(step.held)])
+    else:
+        fields = engine.solve(step.bricks, [list(step.held)])
+        total = fields.grip_force[0].sum(axis=0) + fields.support[0, :, :3].sum(axis=0)
+        weight = -net.weight[: step.bricks].sum(axis=0)
+        assert total == pytest.approx(weight, abs=1e-6 * np.abs(weight).max())
+
+
+# boxes written as polyhedra with faces of their own: the same answers by every engine
+
+
+PLAIN = build_network(six_bricks())
+SHAPED = build_network(with_shapes(six_bricks()))
+
+
+def numbers(engine, network):
+    table = analyze(make_engine(engine, network), METHODS["cantilever"](network, ()))
+    return table.select_dtypes("number").to_numpy()
+
+
+@pytest.mark.parametrize("engine", ["compliance", "frame", "discrete", "auto"])
+def test_every_engine(engine):
+    one, other = (numbers(engine, network) for network in (PLAIN, SHAPED))
+    assert other == pytest.approx(one, rel=1e-7, abs=1e-7 * np.nanmax(np.abs(one)), nan_ok=True)
+
+
+def test_stability():
+    one, other = (
+        assess_steps(network, METHODS["cantilever"](network, ())[::4], DRY, ["bond", "friction"])
+        for network in (PLAIN, SHAPED)
+    )
+    assert [s.verdict for s in one] == [s.verdict for s in other]
+    assert [s.bond for s in one] == pytest.approx([s.bond for s in other], rel=1e-6)
+    assert [s.friction for s in one] == pytest.approx([s.friction for s in other], rel=1e-6)
+
+
+def moved_nodes(scene, *offsets):
+    """A scene whose second brick is held where offsets from its centroid say."""
+    bricks = [replace(b, node_offsets=offsets) if b.name == 2 else b for b in scene.bricks]
+    return build_network(replace(scene, bricks=tuple(bricks)))
+
+
+def turned(brick, *shares):
+    """Points on a brick's long axis, shares of its length from its centroid."""
+    return [tuple(s * brick.dimensions[0] * x for x in brick.length_axis) for s in shares]
+
+
+@pytest.mark.parametrize("shares", [(-0.1, 0.4), (0.05, 0.3)])
+def test_weights_act_at_centroids_wherever_nodes_are(shares):
+    """Nodes on the long axis but not on either side: exact bricks and frame find the same."""
+    scene = six_bricks("V")
+    network = moved_nodes(scene, *turned(scene.bricks[1], *shares))
+    one, other = (numbers(engine, network) for engine in ("compliance", "frame"))
+    assert one == pytest.approx(other, rel=1e-6, abs=1e-6 * np.nanmax(np.abs(one)), nan_ok=True)
+    free = make_engine("compliance", network).solve(4, np.zeros((1, 0), int))
+    plain = make_engine("compliance", build_network(scene)).solve(4, np.zeros((1, 0), int))
+    assert free.support == pytest.approx(plain.support, rel=1e-9, abs=1e-9)
+    assert free.brick_twist == pytest.approx(plain.brick_twist, rel=1e-9, abs=1e-18)
+
+
+def test_nodes_above_the_centroid_will_do_and_nodes_beside_it_not():
+    scene = six_bricks("V")
+    moved_nodes(scene, (-0.05, 0.0, 0.05), (0.05, 0.0, 0.05)).inner_weight.sum()
+    network = moved_nodes(scene, (-0.05, 0.05, 0.0), (0.05, 0.05, 0.0))
+    with pytest.raises(SceneError, match="weight turns it about the line through its nodes"):
+        network.inner_weight.sum()

@@ -12,7 +12,7 @@ from seqopt.arms import find_postures
 from seqopt.arms._model import ArmModel
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene.arm import Arm
-from tests.arms.boxes import beside_a_wall, boxes
+from tests.arms.scenes import beside_a_wall, boxes
 
 pytest.importorskip("pinocchio")
 pytest.importorskip("coal")

@@ -10,12 +10,13 @@ import pytest
 
 import seqopt
 from seqopt._cli.main import main
-from seqopt.arms import find_postures
+from seqopt.arms import _tables, find_postures
 from seqopt.arms._permits import reach_table
 from seqopt.arms._plan_postures import plan_postures
+from seqopt.arms._tables import _known
 from seqopt.scene.parts import Sphere
 from seqopt.sequence.steps import Step, StepKind
-from tests.arms.boxes import beside_a_wall, boxes
+from tests.arms.scenes import beside_a_wall, boxes
 
 pytest.importorskip("pinocchio")
 pytest.importorskip("coal")
@@ -93,3 +94,41 @@ def test_the_command_lists_nodes_by_reason(tmp_path, capsys):
     said = " ".join(capsys.readouterr().out.split())
     assert "never: 8, 9, 10, 11, 12, 13 (link gripper hits the brick that it grips; it" in said
     assert "flange=tcp" in (tmp_path / "reach" / "reach.csv").read_text()
+
+
+# every command that computes postures keeps them in a folder, and takes them from there
+
+
+pytest.importorskip("pinocchio")
+pytest.importorskip("coal")
+
+FREE = ("--schedule", "free", "--rule", "least_grips=0", "--rule", "newest=free")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, capsys):
+    """A plan of a wall with an arm; commands run beside it, in processes without any posture."""
+    monkeypatch.chdir(tmp_path)
+    scene = beside_a_wall(boxes(tmp_path / "arm.urdf"), faces=("thickness",))
+    seqopt.save_scene(scene, "s.json")
+    assert main(["optimize", "s.json", *FREE, "--aim", "steps", "--out", "plan"]) == 0
+    capsys.readouterr()
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["report", "plan", "--no-stability"],
+        ["replan", "plan", "--no-stability"],
+        ["export", "plan", "--format", "tasks"],
+        ["reach", "s.json"],
+    ],
+)
+def test_postures_are_kept_and_taken(folder, words, monkeypatch):
+    _known.cache_clear()
+    assert main([*words, "--cache", "kept"]) == 0
+    assert [*(folder / "kept").glob("postures-*.npz")]
+    _known.cache_clear()
+    monkeypatch.setattr(_tables, "_compute_table", lambda *_: pytest.fail("computed again"))
+    assert main([*words, "--cache", "kept"]) == 0

@@ -7,13 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments.harness.scenes import running_bond
+from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import DRY, EPOXY, BedStiffness, Mortar
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Want
+from seqopt.engines.registry import REASONS, AutoEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SceneError
 from seqopt.network.build import build_network
 from seqopt.responses.table import step_fields
+from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import sequential
 from seqopt.study.published import STUDY_BED
@@ -68,3 +72,44 @@ def test_soft_joints_that_hold_are_no_mechanism_however_far_they_give():
     exact = ComplianceEngine(network).solve(4, [[7]], Want.ALL)
     assert np.abs(found.displacement).max() > scene.bricks[0].dimensions[0]
     assert largest_difference(found, exact, network) <= 1e-6
+
+
+# the cheapest level that is enough is taken, and counted
+
+
+def test_the_cheapest_level_is_taken_and_counted():
+    net = build_network(arch_scene(ArchShape(pitch=[1.2, 0.8, 0.4, 0.0], pattern="V")))
+    engine, sets = AutoEngine(net), np.array([[7], [1]])
+    for moved in (None, np.full((2, 1, 3), 1e-6)):
+        found = engine.solve(4, sets, Want.EDGES, moved)
+        assert found.joint_wrench.shape == (2, 0, 6)
+        exact = ComplianceEngine(net).solve(4, sets, Want.EDGES, moved)
+        assert largest_difference(found, exact, net) <= 1e-9
+    assert engine.tally == {"compliance": 4}
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_contact_is_modeled_where_a_joint_would_leave_its_limits(share):
+    net = build_network(load_scene("arch25"))
+    weak = Mortar(friction=EPOXY.friction, tensile_strength=0.0, cohesion=1e9)
+    wrench = ComplianceEngine(net).solve(6, [[11]], Want.JOINTS).joint_wrench
+    tension = float(find_elastic_limits(net, weak).excess(wrench).max())
+    assert tension > 0
+    engine = AutoEngine(net, replace(weak, tensile_strength=share * tension))
+    engine.solve(6, [[11]])
+    assert [*engine.tally] == ["discrete" if share < 1 else "compliance"]
+    assert engine.tally.keys() <= REASONS.keys()
+
+
+@pytest.mark.parametrize("mortar", [EPOXY, DRY], ids=["epoxy", "dry"])
+def test_levels_join_where_a_joint_has_no_stiffness(mortar):
+    """Rigid bricks then answer with more than was asked for."""
+    wall = running_bond(2, 2)
+    loose = replace(wall.grounds[1], translational_stiffness=(1e8, 0.0, 0.0))
+    net = build_network(replace(wall, grounds=(wall.grounds[0], loose)))
+    engine = AutoEngine(net, mortar)
+    found = engine.solve(2, np.array([[2, 4], [4, 2], [3, 5]]), Want.RESPONSES)
+    assert found.brick_twist.shape == (3, 0, 6)
+    exact = ComplianceEngine(net).solve(2, np.array([[2, 4], [4, 2], [3, 5]]), Want.RESPONSES)
+    assert found.displacement.shape == exact.displacement.shape
+    assert np.isfinite(found.displacement).all()

@@ -15,7 +15,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError
 from seqopt.network.build import build_network
 from seqopt.scene._armed import can_hold
-from tests.arms.joints import compliances, with_joints
+from tests.arms.scenes import compliances, with_joints
 from tests.builders import block, six_bricks
 from tests.limit_scenes import softened
 from tests.soft_bodies import SoftBodies

@@ -105,23 +105,7 @@ def wrong_words(rng: np.random.Generator, words: tuple[str, ...]) -> tuple[str, 
     return tuple(out)
 
 
-ODD_NUMBERS = (
-    0,
-    -1,
-    1,
-    2,
-    0.5,
-    -0.0,
-    1e-320,
-    1e-160,
-    1e-9,
-    1e9,
-    1e30,
-    1e160,
-    1e308,
-    10**20,
-    10**400,
-)
+ODD_NUMBERS = (0, -1, 1, 0.5, -0.0, 1e-320, 1e-160, 1e-9, 1e9, 1e30, 1e160, 1e308, 10**20, 10**400)
 ODD_WORDS = (
     "",
     "sup",
@@ -297,16 +281,8 @@ def _list(document: dict[str, Any], key: str) -> list[dict[str, Any]]:
     return [x for x in found if isinstance(x, dict)] if isinstance(found, list) else []
 
 
-CHANGES: tuple[Callable[[np.random.Generator, dict[str, Any]], None], ...] = (
-    _replaced,
-    _scaled,
-    _scaled,
-    _removed,
-    _doubled,
-    _swapped,
-    _plausible,
-    _plausible,
-)
+Change = Callable[[np.random.Generator, dict[str, Any]], None]
+CHANGES: tuple[Change, ...] = (_replaced, _removed, _doubled, _swapped, *(_scaled, _plausible) * 2)
 
 
 def _noise(rng: np.random.Generator, text: str) -> str:

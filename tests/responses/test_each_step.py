@@ -10,9 +10,16 @@ import pytest
 import seqopt
 from seqopt.engines.interface import FLAGS, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import MechanismError
+from seqopt.errors import MechanismError, ProblemError
+from seqopt.graph.decisions import pose_decisions
+from seqopt.problem.criteria import RankSum, equal
+from seqopt.responses import _blocks as batches
+from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
+from seqopt.responses.quantities import responses_of
 from seqopt.responses.table import _analyze_builds, _each_fields, analyze, step_fields
+from seqopt.sequence.methods import SCHEDULES, three_robot_loop
 from seqopt.sequence.steps import Step, StepKind
+from seqopt.study.published import EQUATIONS
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +77,55 @@ def test_an_error_names_the_step_whose_it_is(engine, builds):
     loose = Step(7, StepKind.RELEASE, 3, (None,) * len(scene.robots))
     with pytest.raises(MechanismError, match=r"^step 7: "):
         [*_each_fields(hinged, [held, loose])]
+
+
+# the responses of all choices: those of the steps, and no more than is asked
+
+
+COMPARED = ("T_max", "M_sup", "D_max")
+
+
+@pytest.mark.parametrize("method", SCHEDULES)
+def test_states_hold_the_responses_of_their_steps(engine25, method):
+    """Every response of a random filled schedule is found again in the problem's steps."""
+    schedule = SCHEDULES[method](engine25.network)
+    also = ("F_largest", "F_move", "F_rob1", "F_rob2", "F_rob3", *COMPARED, "C_max")
+    problem = pose_decisions(engine25, schedule, EQUATIONS, also=also)
+    rng = np.random.default_rng(1)
+    choice: list[int] = []
+    for k, move in enumerate(schedule.moves):
+        allowed = np.flatnonzero(np.isfinite(problem.sums.shared[k][choice[-1] if choice else 0]))
+        choice.append(int(rng.choice(allowed)))
+        assert len(move.candidates) > choice[-1]
+    steps = {s.number: s for s in schedule.fill(problem.nodes(choice))}
+    for choices in problem.evaluation.steps:
+        chosen = tuple(choice[m] for m in choices.moves)
+        step = steps[choices.step.number]
+        want = responses_of(engine25.network, step_fields(engine25, step))
+        for name in COMPARED:
+            assert choices.responses[name][chosen] == pytest.approx(want[name][0])
+        compressed = choices.responses["C_max"][chosen]
+        assert compressed == pytest.approx(max(0.0, -want["F_min"][0]))
+        forces = iter(np.abs(want["F_rob"][0]))
+        for i, node in enumerate(step.grips):
+            found = choices.responses[f"F_rob{i + 1}"][chosen]
+            assert np.isnan(found) if node is None else found == pytest.approx(next(forces))
+
+
+def test_unknown_responses_are_refused(engine25, loop25):
+    with pytest.raises(ProblemError, match="response F_rob9 does not exist; give C_max, D_max"):
+        pose_decisions(engine25, loop25, RankSum("x", equal("F_rob9"), equal("F_rob9")))
+
+
+def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):
+    schedule = three_robot_loop(engine25.network)
+    monkeypatch.setattr(batches, "BLOCK", 10**9)
+    whole = Evaluation(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
+    assert whole.steps
+    monkeypatch.setattr(batches, "BLOCK", 100)
+    parts = Evaluation(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
+    assert parts.models == whole.models
+    for a, b in zip(parts.steps, whole.steps, strict=True):
+        for name in CHOICE_RESPONSES:
+            most = 1e-11 * np.nanmax(np.abs(b.responses[name]), initial=0.0)
+            assert a.responses[name] == pytest.approx(b.responses[name], abs=most, nan_ok=True)

@@ -78,3 +78,55 @@ def test_what_is_given_beside_a_file_is_named(tmp_path, given, said):
     path.write_text("x,y,z,length,width,height\n0,0,1,2,1,2\n0,0,2.5,2,1,1\n", "utf-8")
     with pytest.raises(SceneError, match=said):
         import_scene(path, given=Given(**{"unit": "m", "density": 2000.0, **given}))
+
+
+# where the parts of a scene lie: what leaves nothing to compute is refused in the scene
+
+
+def with_part(scene, kind, index, **change):
+    """The scene with one brick, joint or ground end changed."""
+    parts = list(getattr(scene, kind))
+    parts[index] = replace(parts[index], **change)
+    return replace(scene, **{kind: tuple(parts)})
+
+
+NODE = SCENE.node_position(3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "index", "change", "named"),
+    [
+        (
+            "joints",
+            1,
+            {"position": tuple(x + 1e-9 for x in NODE)},
+            r"joint \(2, 3\): position is that of node 3",
+        ),
+        ("grounds", 0, {"position": SCENE.node_position(0)}, "ground end of brick 1: .* node 0"),
+        ("grounds", 0, {"anchor": (1e-200, 0.0, 0.0)}, "anchor and position are one point"),
+        ("bricks", 1, {"position": (1e308, 1e308, 0.0)}, "brick 2: position .* move the scene"),
+        ("bricks", 1, {"dimensions": (1e-200,) * 3}, "brick 2: dimensions .* give meters"),
+        ("bricks", 1, {"density": 1e308}, r"brick 2: it weighs .*1e\+308 kg/m³"),
+        (
+            "joints",
+            1,
+            {"translational_stiffness": (1e300,) * 3},
+            r"joint \(2, 3\): a stiffness is 1e\+300",
+        ),
+        (
+            "joints",
+            1,
+            {"rotational_stiffness": (1e-160, 1e6, 1e6)},
+            r"joint \(2, 3\): a stiffness is 1e-160; give 0",
+        ),
+    ],
+)
+def test_what_leaves_nothing_to_compute_is_refused(kind, index, change, named):
+    with pytest.raises(SceneError, match=named):
+        with_part(SCENE, kind, index, **change)
+
+
+@pytest.mark.parametrize("pull", [1e160, 1e-160])
+def test_a_weight_beyond_all_bounds_is_refused(pull):
+    with pytest.raises(SceneError, match=r"brick 1: it weighs .* gravity (1e.|9.99989e-)[13]"):
+        replace(SCENE, gravity=(0.0, 0.0, -pull))

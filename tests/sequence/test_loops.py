@@ -9,9 +9,17 @@ import pytest
 import seqopt
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
-from seqopt.sequence.methods import SCHEDULES, _two_robot_loop, placing_node, robot_loop, sequential
-from seqopt.sequence.steps import idle_robots
-from seqopt.study.published import EQUATIONS, WEIGHTED
+from seqopt.sequence.methods import (
+    SCHEDULES,
+    _two_robot_loop,
+    modified_sequential,
+    placing_node,
+    robot_loop,
+    sequential,
+)
+from seqopt.sequence.schedule import OpenGrip, Schedule, thin
+from seqopt.sequence.steps import StepKind, idle_robots
+from seqopt.study.published import EQUATIONS, WEIGHTED, printed
 from tests.builders import anywhere, small_arch
 
 
@@ -61,3 +69,63 @@ def test_too_few_robots_or_bricks_are_counted():
             SCHEDULES["loop"](build_network(scene))
     with pytest.raises(StepError, match="3 robots and 7 bricks; this method needs four robots"):
         robot_loop(build_network(replace(small_arch(7), robots=anywhere(3))), 4)
+
+
+# the three-robot loop and the modified sequential method as schedules
+
+
+def test_who_moves_when(loop25):
+    """Table B.1: 22 moves, at step 3 and every fourth after it, by robots 3, 2, 1 in turn."""
+    assert [m.step for m in loop25.moves] == list(range(3, 88, 4))
+    assert [m.robot for m in loop25.moves] == [f"rob{3 - k % 3}" for k in range(22)]
+    printed_robots = printed("three_robot_plan").set_index("step")["optimized_robot"]
+    for step in loop25.steps[2:]:
+        named = {f"rob{number}" for number in str(printed_robots[step.number]).split(";")}
+        assert {loop25.moves[m].robot for m in step.moves} == named
+
+
+def test_the_modified_sequential_method(engine25):
+    """A third support for three steps; without it the sequential method is left."""
+    schedule = modified_sequential(engine25.network)
+    assert len(schedule.moves) == 23
+    for k in range(len(schedule.moves)):
+        kinds = [s.kind for s in schedule.steps if k in s.moves]
+        assert kinds == [StepKind.REPOSITION, StepKind.RELEASE, StepKind.PLACE]
+    plain = [(s.bricks, s.grips[:2]) for s in sequential(engine25.network)]
+    bare = [(s.bricks, s.grips[:2]) for s in schedule.steps if s.kind is not StepKind.REPOSITION]
+    assert [b for i, b in enumerate(bare) if i == 0 or b != bare[i - 1]] == plain
+    nodes = [m.candidates[0] for m in schedule.moves]
+    assert len(schedule.fill(nodes)) == len(schedule.steps)
+
+
+def test_schedules_are_checked(loop25):
+    with pytest.raises(StepError, match="3 nodes for 22 moves"):
+        loop25.fill((1, 2, 3))
+    far = replace(loop25.steps[0], grips=(OpenGrip(0), OpenGrip(5), None))
+    with pytest.raises(StepError, match="at most two neighboring"):
+        Schedule("x", loop25.scene, (far,), loop25.moves).require_pairs()
+
+
+# fewer candidates: those near the newest bricks, never none, and the schedule says so
+
+
+@pytest.mark.parametrize("method", SCHEDULES)
+def test_on_a_chain_joints_are_counted(arch25, method):
+    schedule = SCHEDULES[method](arch25)
+    thinned = thin(schedule, "near:4")
+    place = {brick.name: i for i, brick in enumerate(arch25.placed)}
+    for few, whole in zip(thinned.moves, schedule.moves, strict=True):
+        newest = range(max(0, whole.bricks - 2), whole.bricks)
+        away = {
+            node: min(abs(place[arch25.brick_of_node[node].name] - end) for end in newest)
+            for node in whole.candidates
+        }
+        limit = max(4, min(away.values()))
+        assert few.candidates == tuple(n for n in whole.candidates if away[n] <= limit)
+    assert thinned.steps == schedule.steps
+
+
+@pytest.mark.parametrize("rule", ["near:", "near:-1", "far:3", 3])
+def test_what_is_no_rule_is_refused(loop25, rule):
+    with pytest.raises(StepError, match="give near:JOINTS or within:METERS"):
+        thin(loop25, rule)

@@ -9,8 +9,11 @@ from itertools import count
 import numpy as np
 
 import seqopt
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import EPOXY, _find_curing
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.steps import StepKind
+from seqopt.stability.assessment import Verdict, verdict
 from tests.brute_force import ONES, allowed, distance
 from tests.builders import small_arch
 from tests.plain_rules import PlainBook
@@ -108,3 +111,92 @@ def acted(scene, kind, states, label):
         for r in gone:
             since[r] = then
     return then, tuple(since), tuple(last)
+
+
+# builds whose mortar cures by enumeration: every order of acts, and every wait on a grid
+
+
+def stands_with(network, mortar=EPOXY):
+    """A function that says by the cone program alone whether a state stands with some bonds."""
+
+    @cache
+    def stands(bricks, grips, bond):
+        assembly = step_assembly(network, bricks, grips).with_bond(np.array(bond))
+        return verdict(assembly, mortar) is Verdict.STANDS
+
+    return stands
+
+
+def bonds(network, curing, bricks, placed, now):
+    """The share of bond of every joint of a state, from when its bricks were placed."""
+    names = step_assembly(network, bricks, (None,) * len(network.scene.robots)).contact_name
+    which = {str(brick.name): i for i, brick in enumerate(network.scene.placed)}
+    out = []
+    for name in names:
+        ends = [which[part] for part in name.split("-") if part != "ground"]
+        age = now - max(placed[i] if i < len(placed) else now for i in ends)
+        points = curing.points_of(name)
+        out.append(max((share for at, share in points if at <= age + 1e-9), default=0.0))
+    return tuple(out)
+
+
+def least_cured_makespan(engine, rules, words, most=np.inf):
+    """The least makespan of any plan, each step at any time at which some joint gets stronger.
+
+    Nothing is taken for granted of waits: a step is tried at its earliest time and at all later
+    ones of the grid, as far as builds that end by a time could do it. Infinite where none does.
+    """
+    book, tick = PlainBook(engine.network, rules), count()
+    worst, stands = worsts(engine, rules), stands_with(engine.network)
+    curing, none = _find_curing(words), (None,) * len(engine.network.scene.robots)
+    (first, grips, _), _ = begun(engine.network.scene, rules)
+    ages = () if rules.begin is None else rules.begin.ages
+    placed = (*(-age for age in ages), *[0.0] * (first - len(ages)))
+    heap, seen = [(0.0, next(tick), (first, grips), (0.0,) * len(none), placed)], set()
+    while heap:
+        end, _, (bricks, grips), since, placed = heapq.heappop(heap)
+        if book.ends(bricks, grips) and bricks and end:
+            return end
+        key = (bricks, grips, round(end, 6), tuple(np.round(since, 6)), tuple(np.round(placed, 6)))
+        if key in seen:
+            continue
+        seen.add(key)
+        for kind, after_bricks, after, _ in book.follow(bricks, grips, 0):
+            if np.isinf(worst(after_bricks, after)):
+                continue
+            follows = at_all_times(
+                engine.network, curing, (kind, grips, after), (end, since, placed)
+            )
+            for now, then, free, put in follows:
+                bond = bonds(engine.network, curing, after_bricks, placed, now)
+                if then <= most and stands(after_bricks, after, bond):
+                    heapq.heappush(heap, (then, next(tick), (after_bricks, after), free, put))
+    return np.inf
+
+
+def at_all_times(network, curing, step, label):
+    """What follows from a label by a step, started at its earliest time or when joints change."""
+    (kind, grips, after), (end, since, placed) = step, label
+    begin, acts, gone = started(network.scene, kind, (grips, after), (end, since))
+    points = [curing.points, *dict(curing.joints).values()]
+    ages = {age for each in points for age, _ in each}
+    for now in sorted({begin, *(t + age for t in placed for age in ages if t + age > begin)}):
+        then = now + acts
+        free = tuple(
+            0.0 if after[r] is not None else then if r in gone else since[r]
+            for r in range(len(after))
+        )
+        yield now, then, free, (*placed, then) if kind is StepKind.PLACE else placed
+
+
+def started(scene, kind, states, label):
+    """When a step may start, how long it takes, and who lets go."""
+    (before, after), (end, since) = states, label
+    placing = kind is StepKind.PLACE
+    for r, robot in enumerate(scene.robots):
+        if before[r] is None and after[r] is not None:
+            own = robot.durations
+            ready = since[r] + (own.fetch if placing else own.approach)
+            return max(end, ready), own.place if placing else own.grip, ()
+    gone = [r for r in range(len(before)) if before[r] is not None and after[r] is None]
+    return end, max((scene.robots[r].durations.release for r in gone), default=0.0), gone

@@ -16,8 +16,7 @@ from seqopt.sequence.steps import Site
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
 from tests.brute_force import ONES
-from tests.times.builders import RULES, engine_of, least_makespan
-from tests.times.curing import least_cured_makespan
+from tests.times.builders import RULES, engine_of, least_cured_makespan, least_makespan
 
 ALONE = FreeRules(least_grips=1)
 CURES = "5min=1"

@@ -19,8 +19,7 @@ from seqopt.sequence.rules import FreeRules
 from seqopt.times._curing import CuringBuilds, JointsInTime
 from seqopt.times._step_check import check_cured
 from tests.brute_force import ONES
-from tests.times.builders import engine_of
-from tests.times.curing import least_cured_makespan
+from tests.times.builders import engine_of, least_cured_makespan
 
 ALONE = FreeRules(least_grips=1)
 LONG = (pytest.mark.slow, pytest.mark.long)
