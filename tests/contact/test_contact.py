@@ -1,4 +1,4 @@
-"""Assemblies and mortars, faces and joints: what they are, and one line where something is wrong."""
+"""Assemblies and mortars, faces and joints: what they are, and one line where one is wrong."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from experiments.harness.scenes import grip_sets, half_circle, running_bond
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import _growth as growth
 from seqopt.engines.rigid import _refinement as refinement
+from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid import compliance as trial
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mixed import solve_mixed
@@ -22,6 +24,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from tests.builders import solve_batch
 from tests.strategies import arches, both_sided, walls
+
+PER_PAIR = 8 * 36 * 8  # bytes: arrays of bricks by bricks (3) and by springs (2 × 2), and a rest
 
 
 def error(fields, exact):
@@ -138,6 +142,28 @@ def test_a_screen_is_not_corrected_where_six_digits_are_enough(monkeypatch):
 
 
 # what is kept
+
+
+def kept_bytes(net, most=compliance._KEPT):
+    """The bytes of all arrays after every brick count was asked for grips at all its nodes."""
+    engine = ComplianceEngine(net)
+    with patch.object(compliance, "_KEPT", most):
+        for bricks in range(1, len(net.inner) + 1):
+            known, index = net.index_of_grip
+            engine.solve(bricks, known[index < 2 * bricks][:, None], Want.EDGES)
+    operators = engine._kept.values()
+    return engine._builder.growth.nbytes + sum(operator.nbytes for operator in operators)
+
+
+@pytest.mark.parametrize("make", [half_circle, lambda n: build_network(running_bond(n // 8, 8))])
+def test_memory_grows_as_the_square_of_the_bricks(make):
+    for count in (16, 48):
+        assert kept_bytes(make(count), most=0) <= PER_PAIR * count**2 + 2e5
+
+
+def test_an_operator_per_brick_count_would_be_seen():
+    """Negative control: keeping all of them grows as the cube."""
+    assert kept_bytes(half_circle(64), most=np.inf) > PER_PAIR * 64**2 + 2e5
 
 
 def test_the_last_brick_count_but_one_is_recalled():
