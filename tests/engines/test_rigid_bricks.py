@@ -53,6 +53,17 @@ def test_grips_beyond_a_loose_joint(factor, only_turning):
             assert error(net, fields, row, sets[row]) <= accuracy
 
 
+def test_a_batch_of_many_passes(monkeypatch):
+    net = build_network(chain(8))
+    sets = [(1, 9, 14), (14, 15, 3), (4, 5, 2), (12, 10, 7), (8, 9, 15)]
+    whole = ComplianceEngine(net).solve(8, sets, Want.ALL)
+    monkeypatch.setattr(trial, "_CHUNK", 2)
+    parts = ComplianceEngine(net).solve(8, sets, Want.ALL)
+    for name in ("edge_force", "displacement", "grip_force", "support"):
+        gap = np.abs(getattr(parts, name) - getattr(whole, name)).max()
+        assert gap <= 1e-12 * np.abs(getattr(whole, name)).max()
+
+
 def test_grips_close_together_on_a_long_chain():
     net = build_network(chain(150))
     sets = [(296, 297, 299), (297, 298, 299), (297, 299, 295)]
