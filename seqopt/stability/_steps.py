@@ -9,13 +9,14 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import lru_cache, partial
-from itertools import accumulate, groupby, islice
+from itertools import groupby
 from operator import attrgetter
 from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
 
+from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import PartialAssemblies
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, SceneWarning, did_you_mean
@@ -24,8 +25,8 @@ from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import _find_overlapping
 from seqopt.sequence.steps import Grips, Step, require_steps
-from seqopt.stability._prover import DIRECTIONS
-from seqopt.stability._verdict_chain import VerdictChain
+from seqopt.stability._prover import DIRECTIONS, Proven
+from seqopt.stability._verdict_chain import VerdictChain, Way
 from seqopt.stability.assessment import (
     MARGINS,
     Stability,
@@ -119,7 +120,6 @@ def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.D
 
 _CHUNKS = 8  # for every worker, of neighboring steps, which are proven by one another
 _LARGE = 50  # bricks from which on steps are proven one by one, by the grips they have in common
-_TOGETHER = 1500  # bricks in all steps that are proven beside each other, where there are fewer
 
 
 _Found = TypeVar("_Found")
@@ -146,58 +146,33 @@ def each_verdict(
     """
     prove = VerdictChain(parts_of(built, steps), mortar, compiled)
     found: dict[tuple[int, Grips], Stability] = {}
-    for step, before in _with_searches(prove, steps):
-        key = step.bricks, step.grips
-        if not step.bricks:
-            found[key] = _NOTHING
-        if key not in found:
-            assembly, proven, way = prove(*key, before)
-            verdict, motion = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
-            if verdict is Verdict.FALLS:
-                motion = proven.answer.motion / np.abs(proven.answer.motion).max()
-            block, contact = _first_to_fail(assembly, motion)
-            found[key] = Stability(
-                verdict,
-                proof=way.value,
-                motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
-                first_block=block,
-                first_contact=contact,
-                unproven=int(verdict is Verdict.UNDECIDED),
-            )
-        yield found[key]
-
-
-def _with_searches(
-    prove: VerdictChain, steps: Sequence[Step]
-) -> Iterator[tuple[Step, Callable[[], object] | None]]:
-    """Yield every step, and what may prove it together with others, if no earlier proof does.
-
-    Small structures are proven beside each other. Forces that hold a large one by the grips that
-    steps of as many bricks have in common hold it in all of these; a trial is never a verdict.
-    """
-    at = 0
     for bricks, same in groupby(steps, attrgetter("bricks")):
         group = [*same]
-        common = tuple(
-            held[0] if len({*held}) == 1 else None
-            for held in zip(*(step.grips for step in group), strict=True)
-        )
-        for number, step in enumerate(group):
-            if bricks <= _LARGE:
-                yield step, partial(_search, prove, steps, at + number)
-            else:
-                shared = number == 0 and common != step.grips
-                yield step, partial(prove, bricks, common) if shared else None
-        at += len(group)
+        each = (set(held) for held in zip(*(step.grips for step in group), strict=True))
+        common = tuple(held.pop() if len(held) == 1 else None for held in each)
+        if bricks > _LARGE and common != group[0].grips:
+            prove(bricks, common)  # a trial: forces that hold it hold all of these
+        for step in group:
+            key = bricks, step.grips
+            if key not in found:
+                found[key] = _proven_state(*prove(*key)) if bricks else _NOTHING
+            yield found[key]
 
 
-def _search(prove: VerdictChain, steps: Sequence[Step], first: int) -> None:
-    """Seek proofs of a step and those after it, as many as go together."""
-    near = [*islice(steps, first, first + _TOGETHER)]
-    total = accumulate(step.bricks for step in near)
-    few = [step for step, bricks in zip(near, total, strict=True) if bricks <= _TOGETHER]
-    small = (step for step in few if 0 < step.bricks <= _LARGE)
-    prove.search([*dict.fromkeys((step.bricks, step.grips) for step in small)])
+def _proven_state(assembly: Assembly, proven: Proven, way: Way) -> Stability:
+    """Return what a chain proves of a partial structure."""
+    verdict, motion = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
+    if verdict is Verdict.FALLS:
+        motion = proven.answer.motion / np.abs(proven.answer.motion).max()
+    block, contact = _first_to_fail(assembly, motion)
+    return Stability(
+        verdict,
+        proof=way.value,
+        motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
+        first_block=block,
+        first_contact=contact,
+        unproven=int(verdict is Verdict.UNDECIDED),
+    )
 
 
 _NOTHING = Stability(

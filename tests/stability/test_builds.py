@@ -100,9 +100,9 @@ def test_what_is_tried_ahead_changes_no_verdict(flat, builds, found, monkeypatch
     """Steps of as many bricks are tried by what they have in common, of use or not."""
     tried, real = [], VerdictChain.__call__
 
-    def counted(self, bricks, grips, before=None):
+    def counted(self, bricks, grips):
         tried.append(grips)
-        return real(self, bricks, grips, before)
+        return real(self, bricks, grips)
 
     monkeypatch.setattr(VerdictChain, "__call__", counted)
     monkeypatch.setattr(_steps, "_LARGE", 0)
