@@ -5,10 +5,8 @@ What stands with one mortar stands with a stronger one, and what falls falls wit
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -19,14 +17,11 @@ from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._steps import each_by_workers, each_verdict
+from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import Verdict
-from seqopt.work._threads import cores
-from seqopt.work._workers import Crew, hire
 from seqopt.work.progress import Tell, with_progress
 
 SHOWN = {"dry": DRY, "epoxy": EPOXY}  # with which it is said what stands
-_SHARED = 5e4  # bricks in all steps from which on a process more takes less than it saves
 _SMALL = 0.1  # of a brick's smallest side: ground that turns and shifts no more changes no balance
 _State = tuple[int, Grips]  # bricks that stand, and nodes held
 WORDS = {Verdict.STANDS: "stands", Verdict.FALLS: "falls", Verdict.UNDECIDED: "is undecided"}
@@ -99,7 +94,6 @@ class BuildProver:
         self.network, self.mortars, self._progress = network, mortars, progress
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
         self._parts: PartialAssemblies | None = None  # of as many bricks as any step had so far
-        self._crew: Crew | None = None
         self.refusal, self.proven = "", 0
 
     @property
@@ -116,17 +110,6 @@ class BuildProver:
             for build, steps in builds.items()
             if self._ask(chain.from_iterable(builds.values()))
         }
-
-    @contextmanager
-    def begun(self, steps: Sequence[Step]) -> Iterator[None]:
-        """Share a large build between two processes: for commands, which may start them."""
-        work = sum(step.bricks for step in steps) * len(self.mortars)
-        with hire(workers=2 if work >= _SHARED and cores() > 1 else 1) as crew:
-            self._crew = crew
-            try:
-                yield
-            finally:
-                self._crew = None
 
     def _ask(self, steps: Iterable[Step]) -> bool:
         """Find the verdicts that are not cached; return whether there are verdicts at all."""
@@ -151,8 +134,7 @@ class BuildProver:
         most = max(step.bricks for step in new) or 1
         if self._parts is None or self._parts.bricks < most:
             self._parts = PartialAssemblies(self.network, most)
-        find = partial(each_verdict, mortar=mortar)
-        each = each_by_workers(self._parts, find, new, self._crew)
+        each = each_verdict(self._parts, new, mortar)
         found = dict[_State, Verdict]()
         for step, one in zip(with_progress(what, new, self._progress), each, strict=True):
             self._known[name][_state(step)] = found[_state(step)] = one.verdict

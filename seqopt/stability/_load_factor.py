@@ -170,21 +170,3 @@ def load_factor_table(steps: Sequence[Step], results: Sequence[LoadFactor]) -> p
         for step, result in zip(steps, results, strict=True)
     ]
     return pd.DataFrame(rows)
-
-
-def format_load_factors(steps: Sequence[Step], results: Sequence[LoadFactor]) -> str:
-    """Return in a line the least load factor of all steps, and how many are not proven."""
-    pairs = [*zip(steps, results, strict=True)]
-    known = [(result.factor, step.number) for step, result in pairs if not np.isnan(result.factor)]
-    loaded = sum(result.load > 0 for result in results)
-    said = "none proven"
-    if known:
-        factor, number = min(known)
-        where = f", of step {number}" if np.isfinite(factor) else ""
-        said = f"the least load factor is {factor:.6g}{where}"
-    bare = sum(result.unloaded is Verdict.FALLS for result in results)
-    fall = "falls" if bare == 1 else "fall"
-    never = sum(result.factor == 0 for result in results)
-    more = f"; {bare} {fall} before any load acts, {never} with any (factor 0)" if bare else ""
-    unproven = sum(result.load > 0 and np.isnan(result.factor) for result in results)
-    return f"{loaded} of {len(steps)} steps are loaded: {said}, {unproven} unproven{more}"

@@ -50,17 +50,6 @@ def test_they_are_those_of_every_step_on_its_own(flat, builds, found):
     assert counts == {"sequential": [18, 0], "cantilever": [20, 0]}
 
 
-@pytest.mark.slow
-def test_another_process_that_begins_says_the_same(flat, builds, found, monkeypatch):
-    monkeypatch.setattr(_builds, "_SHARED", 0)
-    monkeypatch.setattr(_builds, "cores", lambda: 2)
-    prover, steps = BuildProver(flat), builds["cantilever"]
-    with prover.begun(steps):
-        assert prover._crew is not None
-        assert prover.of_builds({"cantilever": steps})["cantilever"] == found["cantilever"]
-    assert prover._crew is None
-
-
 @pytest.mark.parametrize(("names", "left"), [(("dry", "epoxy"), True)])
 def test_what_one_mortar_proves_is_not_proven_with_another(flat, builds, monkeypatch, names, left):
     """What stands dry stands with epoxy; what falls with epoxy falls dry, and here nothing does."""
@@ -113,15 +102,11 @@ def test_what_is_tried_ahead_changes_no_verdict(flat, builds, found, monkeypatch
     assert len(tried) > 2 * sum(map(len, builds.values()))  # some were tried ahead
 
 
-@pytest.mark.parametrize("shared", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_what_was_asked_before_fails_alike_after_lower_builds(flat, builds, monkeypatch, shared):
-    if shared:
-        monkeypatch.setattr(_builds, "_SHARED", 0)
+def test_what_was_asked_before_fails_alike_after_lower_builds(flat, builds):
     late = [step for step in builds["sequential"] if step.bricks >= 15]
     early = [step for step in builds["sequential"] if step.bricks <= 6]
     prover, mortars = BuildProver(flat), tuple(SHOWN)
-    with prover.begun(late):
-        first = prover.of_builds({"late": late})["late"]
+    first = prover.of_builds({"late": late})["late"]
     assert [each.mortar for each in first if each.first] == [mortars[0]]  # dry, it falls
     assert prover.of_builds({"early": early, "late": late})["late"] == first
 

@@ -186,12 +186,6 @@ def test_nonsense_that_is_remembered_turns_no_verdict(arch, mortar, monkeypatch)
 # numbers from elsewhere
 
 
-def near_verdicts(network, steps, mortar):
-    parts = PartialAssemblies(network, max(step.bricks for step in steps))
-    prove = chain.VerdictChain(parts, mortar)
-    return tuple(_verdict_of(prove(step.bricks, step.grips)[1]) for step in steps)
-
-
 @pytest.mark.parametrize("lie", [False, True])
 def test_what_is_sought_near_what_fell_is_proven_of_the_whole(lie, monkeypatch):
     """Also where what is said to fall with it does not: then it proves nothing."""

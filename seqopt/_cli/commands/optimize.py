@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import isfinite
@@ -183,13 +182,11 @@ def find(
 
 def answered(found: Found) -> Answer[Plan]:
     """Write a plan, and return its answer, without the parts that exceed the time limit."""
-    proving = found.prover.begun(found.plan.steps) if found.clock.left else nullcontext()
-    with proving:  # in another process, as commands may, unlike scripts
-        if found.out.path is not None and found.analyzed and found.summary:  # says most: first
-            tables = partial(outputs.plan_files, found.plan)
-            found.tables.update(found.clock.spare("its tables", tables, {}))
-        _ = found.verdicts
-        return _answer(found, found.out.write(found.tell, lambda: _files(found)))
+    if found.out.path is not None and found.analyzed and found.summary:  # says most: first
+        tables = partial(outputs.plan_files, found.plan)
+        found.tables.update(found.clock.spare("its tables", tables, dict[str, bytes | str]()))
+    _ = found.verdicts
+    return _answer(found, found.out.write(found.tell, lambda: _files(found)))
 
 
 def _files(found: Found) -> dict[str, bytes | str]:
