@@ -1,9 +1,6 @@
+from seqopt._registry import Command as Command
 from seqopt.contact.mortar import DRY as DRY
 from seqopt.contact.mortar import EPOXY as EPOXY
-from seqopt.doors import assess as assess
-from seqopt.doors import compare as compare
-from seqopt.doors import pareto as pareto
-from seqopt.doors import replan as replan
 from seqopt.engines.interface import Engine as Engine
 from seqopt.engines.registry import make_engine as make_engine
 from seqopt.errors import SeqoptError as SeqoptError
@@ -16,6 +13,7 @@ from seqopt.instances.compiled import compile_instance as compile_instance
 from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
 from seqopt.plan.build import GivenSequence as GivenSequence
+from seqopt.plan.front import find_front as find_front
 from seqopt.plan.plan import Plan as Plan
 from seqopt.plan.pose import pose as pose
 from seqopt.plan.solve import solve as solve
@@ -23,6 +21,7 @@ from seqopt.problem.criteria import StepCost as StepCost
 from seqopt.problem.filters import register as register
 from seqopt.problem.problem import Problem as Problem
 from seqopt.problem.requirements import Limit as Limit
+from seqopt.report.comparison import compare as compare
 from seqopt.responses.table import analyze as analyze
 from seqopt.scene.arch import ArchShape as ArchShape
 from seqopt.scene.arch import arch_scene as arch_scene
@@ -46,6 +45,7 @@ from seqopt.sequence.steps import Step as Step
 from seqopt.stability._steps import assess_steps as assess_steps
 from seqopt.stability.assessment import Stability as Stability
 from seqopt.study.published import CRITERIA as CRITERIA
+from seqopt.workflow import Part as Part
 from seqopt.workflow import Robust as Robust
 from seqopt.workflow import Search as Search
 from seqopt.workflow import optimize as optimize

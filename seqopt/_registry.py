@@ -70,7 +70,7 @@ class Command(Part):
         The word for it.
     function : callable or str
         Its docstring is the help, its annotations and defaults say how options are read. It returns
-        a text, a table or an `Answer`. ``"module:function"`` is loaded on demand.
+        a text or a table. ``"module:function"`` is loaded on demand.
     about : str, optional
         A line in the list of all commands; by default the first line of the docstring.
 

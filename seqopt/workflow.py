@@ -22,7 +22,7 @@ from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import graph_of, in_layers, pose
 from seqopt.plan.solve import _solve_run
-from seqopt.problem.criteria import WORST_OVER_METHODS, Ranked, RankSum
+from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.filters import Filter, parse_limits
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
 from seqopt.problem.requirements import LARGEST, Criterion, Limit
@@ -36,7 +36,7 @@ from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules, with_robots
 from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.schedule_file import find_schedule, read_plan, read_site
+from seqopt.sequence.schedule_file import find_schedule, read_plan, read_site, without
 from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.study.published import EQUATIONS, find_criterion
 from seqopt.work.progress import Clock, Tell, within
@@ -70,9 +70,8 @@ class Search:
         it is done, it leaves its best choice and a bound; with an aim, and of a free schedule it is
         done at any rate.
     time_limit : float, optional
-        Seconds that choosing may take, of commands all that they do, with proof, verdicts and page;
-        the best choice by then has a lower bound, and what there was no time for is named; without
-        proof, where choosing and computing are one, the moves that were chosen by then.
+        Seconds that posing, choosing and proof may take; the best choice by then has a lower bound;
+        without proof, where choosing and computing are one, the moves that were chosen by then.
     workers : int, optional
         Processes to share the work among; pays from about ten seconds (default: {default}).
     executor : concurrent.futures.Executor, optional
@@ -82,8 +81,6 @@ class Search:
     max_memory : float or str, optional
         What responses and costs may take, bytes, or as 500MB or 2GB (default: four fifths of what
         is free); of a free schedule states and moves, with a bound where it ends.
-    clock : Clock, optional
-        One that runs already, in place of ``time_limit``.
 
     Examples
     --------
@@ -99,7 +96,6 @@ class Search:
     executor: Executor | None = None
     cache: Path | str | None = None
     max_memory: float | str | None = None
-    clock: Clock | None = None
 
     def parse_options(self, formulation: Formulation) -> dict[str, Any]:
         """Return the options of a formulation; words are typed by those of its ``solve``."""
@@ -197,7 +193,7 @@ class _Place:
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """Which steps a build may have, between which states.
+    """Which steps a build may have, between which states, after which changes.
 
     Parameters
     ----------
@@ -205,28 +201,35 @@ class Part:
         free: any robot may release, hold or place next, or a sequence with open grips, by name (of
         all robots), or a CSV file of steps; open grips are marked ? in it (default: the loop of
         three robots, or of two where there is no third).
-    begin : _Place, int or str, optional
+    begin : Site, int or str, optional
         Where the build begins: after a step of a plan (its folder or CSV file); in a state of a
         JSON file (bricks that stand, by names or how many, grips by robot, ages of bricks in s
         where mortar cures, else just placed); or with so many bricks that nobody holds.
-    to : _Place, int or str, optional
+    to : Site, int or str, optional
         Where it ends, said in the same ways; a number of bricks, of a take-down those that stay,
         leaves grips to the rule ending.
     direction : str, optional
         Of a free schedule: take-down removes bricks, the newest first, from the whole structure to
         the empty site, if nothing else is said.
+    lost : sequence of str, optional
+        Robot that lets go where the build begins, and takes no further part.
+    missing : sequence of int, optional
+        Brick that is not there: one that stood is placed again next, one that was still to come
+        waits until all are placed that do not hang on it.
     """
 
     schedule: Schedule | Path | str | None = None
-    begin: _Place | int | str | None = None
-    to: _Place | int | str | None = None
+    begin: Site | _Place | int | str | None = None
+    to: Site | _Place | int | str | None = None
     direction: str | None = None
+    lost: Sequence[str] = ()
+    missing: Sequence[int | str] = ()
 
 
 def optimize(  # noqa: PLR0913  # every question is a word of its own
     scene: Scene | str | Path,
     schedule: Schedule | Part | Path | str | None = None,
-    criterion: Criterion | Ranked | str | None = None,
+    criterion: Criterion | str | None = None,
     formulation: str | None = None,
     engine: str = DEFAULT,
     *,
@@ -253,8 +256,10 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     schedule : Schedule, Part, pathlib.Path or str, optional
         The schedule, its file, a name in `seqopt.sequence.methods.SCHEDULES`, or ``"free"``; a
         `Part` says where the build begins and ends.
-    criterion : Criterion, Ranked or str, optional
-        What a step costs, a name in `seqopt.CRITERIA`, or how the usual one ranks.
+    criterion : Criterion or str, optional
+        What a step costs: equations-2-3 (of Bruun et al.), worst-ratio (over the least worst of
+        fixed methods), or responses to rank with weights, as T_max,M_sup=2,F_move; by default
+        equations-2-3, with --aim, --stands or --schedule free worst-ratio.
     formulation : str, optional
         Which mathematical program chooses (default: overlap_dp, which is exact and the fastest,
         labels with budgets, minimax with worst-peak over scenarios, scenario_search with other
@@ -328,100 +333,63 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     Plan('arch25', 'free', by schedule_search: 50 steps, minmax 0.840088, steps 50, optimal)
     """
     asked, start = locals(), time.perf_counter()  # all of its parameters
-    clock = search.clock or Clock()
-    limit = search.time_limit if search.clock is None else math.inf
+    clock = Clock(search.time_limit)
     with clock.needed("posing the problem"):
-        problem = _pose_build(**asked)
+        problem = pose_build(asked)
         found = as_formulation(formulation or graph_of(problem).default_formulation)
         options = search.parse_options(found)
     tell = within(progress, clock.left) if progress and not found.of_states else progress
-    run = Run(limit, tell, search.proof, search.lazy, options, clock=clock)
+    run = Run(search.time_limit, tell, search.proof, search.lazy, options, clock=clock)
     assemble = time.perf_counter() - start
-    try:
-        plan = _solve_run(problem, found, run)
-    except KeyboardInterrupt:
-        clock.interrupted = True
-        raise
+    plan = _solve_run(problem, found, run)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
 
 
-def _pose_build(  # noqa: PLR0913  # as of `optimize`
-    scene: Scene | str | Path,
-    schedule: Schedule | Part | Path | str | None = None,
-    criterion: Criterion | Ranked | str | None = None,
-    formulation: str | None = None,
-    engine: str = DEFAULT,
-    *,
-    aim: str | None = None,
-    limits: Sequence[Limit | Filter | str] | str = (),
-    budgets: Sequence[str] | str = (),
-    stands: Standing | Mortar | str | None = None,
-    also: Sequence[str] = (),
-    robust: Robust | None = None,
-    order: str | Sequence[int] | None = None,
-    mortar: Mortar | str | None = None,
-    robots: int | Sequence[str] | None = None,
-    candidates: str | None = None,
-    rules: FreeRules | Sequence[str] | str = (),
-    search: Search = Search(),  # it is frozen
-    progress: Tell | None = None,
-) -> Problem:
-    """Return the problem that `optimize` solves.
-
-    Parameters
-    ----------
-    scene, schedule, criterion, formulation, engine, aim, limits, budgets, stands, also, robust
-        As of `optimize`.
-    order, mortar, robots, candidates, rules, search, progress
-        As of `optimize`.
-    """
-    part = schedule if isinstance(schedule, Part) else Part(schedule=schedule)
-    free, sought = part.schedule == FREE, isinstance(order, str) and order == SEARCH
-    found = load_scene(scene) if isinstance(scene, str | Path) else scene
-    found = in_order(found, None if sought else order)
-    if isinstance(robots, int) and free:
-        found, robots = with_robots(found, robots), None
+def pose_build(asked: Mapping[str, Any]) -> Problem:
+    """Return the problem that `optimize` solves, of the values of all of its parameters."""
+    given, robots, order = asked["schedule"], asked["robots"], asked["order"]
+    stands, robust, search = asked["stands"], asked["robust"], asked["search"]
+    part = given if isinstance(given, Part) else Part(schedule=given)
+    free, sought = part.schedule == FREE, order == SEARCH
+    scene = asked["scene"]
+    scene = load_scene(scene) if isinstance(scene, str | Path) else scene
+    scene = in_order(scene, None if sought else order)
+    if isinstance(robots, int):
+        scene, robots = with_robots(scene, robots), None
     if part.direction == Direction.TAKE_DOWN.value and not free:
         raise ProblemError(f"direction {part.direction}: it goes with schedule={FREE!r}")
-    found, begin = _find_start(found, part.begin, stands)
-    if (turned := _find_place(part.to, "to", found))[0] != found:
+    scene, begin = _find_start(scene, part, stands)
+    if part.lost:
+        robots = [robot.name for robot in scene.robots if robot.name not in part.lost]
+    if (turned := _find_place(part.to, "to", scene))[0] != scene:
         raise StepError(f"to {part.to}: its bricks are not those that follow in this order")
-    find_postures(found, search.cache, progress)
-    own = make_engine(engine, build_network(found), mortar)
-    moves = _find_moves(own.network, part, robots, candidates, rules)
+    find_postures(scene, search.cache, asked["progress"])
+    own = make_engine(asked["engine"], build_network(scene), asked["mortar"])
+    moves = _find_moves(own.network, part, robots, asked["candidates"], asked["rules"])
     if begin.site is not None or turned[1].site is not None:
         moves = replace(moves.free(), begin=begin.site, finish=turned[1].site)
-    asked: Sequence[Any] = parse_limits(limits, found)
-    states = _chooses_states(moves, formulation, asked, (aim, stands, sought))
+    limits: Sequence[Any] = parse_limits(asked["limits"], scene)
+    others = (asked["aim"], stands, sought)
+    states = _chooses_states(moves, asked["formulation"], limits, others)
     over: RobustAim | str = WORST_PEAK if robust is None else robust.aim
     usual, minimized = DEFAULTS[FREE if states else "any other"]
     minimized = minimized if str(over) == str(WORST_PEAK) else ""  # totals are of sums
     return pose(
         own,
         moves,
-        _choose_criterion(criterion, usual),
-        aim or minimized or (),
-        asked,
-        budgets=budgets,
+        find_criterion(asked["criterion"] or usual),
+        asked["aim"] or minimized or (),
+        limits,
+        budgets=asked["budgets"],
         stands=stands,
-        scenarios=() if robust is None else robust.scenes or robust.draw(found),
+        scenarios=() if robust is None else robust.scenes or robust.draw(scene),
         over=over,
         orders=Orders.TIED if sought else None,
-        also=also,
+        also=asked["also"],
         resources=Resources(
-            search.workers, search.executor, search.memory, None if states else progress
+            search.workers, search.executor, search.memory, None if states else asked["progress"]
         ),
     )
-
-
-def _choose_criterion(given: Criterion | Ranked | str | None, usual: Criterion | str) -> Criterion:
-    """Return a criterion, or the usual one, also with ranks that are taken in a given way."""
-    found = find_criterion(usual if given is None or isinstance(given, Ranked) else given)
-    if not isinstance(given, Ranked):
-        return found
-    if not isinstance(found, RankSum):
-        raise ProblemError(f"--ranked {given.value}: {found.name} has no ranks; leave it out")
-    return replace(found, ranked=given)
 
 
 def _chooses_states(
@@ -454,12 +422,14 @@ def _find_moves(
     return opened if candidates is None else thin(opened, candidates)
 
 
-def _find_place(given: _Place | int | str | None, name: str, scene: Scene) -> tuple[Scene, _Place]:
+def _find_place(
+    given: Site | _Place | int | str | None, name: str, scene: Scene
+) -> tuple[Scene, _Place]:
     """Return where a build begins or ends, and the scene in an order that begins so."""
     text = str(given)
     try:
-        if given is None or isinstance(given, _Place):
-            return scene, given or _Place()
+        if given is None or isinstance(given, Site | _Place):
+            return scene, _Place(given) if isinstance(given, Site) else given or _Place()
         if text.isdecimal():
             site = Site(int(text), (None,) * len(scene.robots) if name == "begin" else None)
             site.holds(scene)
@@ -491,18 +461,30 @@ def _of_plan(scene: Scene, path: Path, step: int) -> _Place:
 
 
 def _find_start(
-    scene: Scene, given: _Place | int | str | None, stands: Standing | Mortar | str | None
+    scene: Scene, part: Part, stands: Standing | Mortar | str | None
 ) -> tuple[Scene, _Place]:
-    """Return where a build begins, and the scene in an order that begins with its bricks."""
-    scene, begin = _find_place(given, "begin", scene)
-    cures = isinstance(stands, Standing) and stands.curing is not None
-    if begin.site is None or not begin.done or not cures:
+    """Return where a build begins after changes, and the scene in an order of those bricks."""
+    scene, begin = _find_place(part.begin, "begin", scene)
+    if wrong := [name for name in part.missing if not str(name).isdecimal()]:
+        raise StepError(f"missing {wrong[0]}: give the number of a brick")
+    if begin.site is None:
+        for name, gone in (("lost", part.lost), ("missing", part.missing)):
+            if gone:
+                said = "a build that goes on has changed; say where it begins"
+                raise StepError(f"{name} {gone[0]}: {said}")
         return scene, begin
-    waits = offered("mortar_waits")(build_network(scene), stands)
-    try:
-        times = offered("step_times")(scene, begin.done, waits)
-    except StepError as error:
-        raise StepError(f"{error}; or give a STATE.json with the ages of its bricks") from None
-    ends = [t.end for t, s in zip(times, begin.done, strict=True) if s.kind is StepKind.PLACE]
-    ages = tuple(times[-1].end - end for end in ends)
-    return scene, replace(begin, site=replace(begin.site, ages=ages))
+    if begin.done and isinstance(stands, Standing) and stands.curing is not None:
+        waits = offered("mortar_waits")(build_network(scene), stands)
+        try:
+            times = offered("step_times")(scene, begin.done, waits)
+        except StepError as error:
+            said = f"{error}; or give a STATE.json with the ages of its bricks"
+            raise StepError(said) from None
+        ends = [t.end for t, s in zip(times, begin.done, strict=True) if s.kind is StepKind.PLACE]
+        ages = tuple(times[-1].end - end for end in ends)
+        begin = replace(begin, site=replace(begin.site, ages=ages))
+    if not (part.lost or part.missing):
+        return scene, begin
+    assert begin.site is not None
+    scene, site = without(scene, begin.site, part.lost, [*map(int, part.missing)])
+    return scene, _Place(site)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum, IntEnum
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from seqopt._cli.terminal import complain, show, show_text
 from seqopt.errors import (
@@ -25,9 +25,6 @@ from seqopt.errors import (
 
 NOT_IN_JSON = {"NaN": None, "Infinity": "inf", "-Infinity": "-inf"}  # and what is said in its place
 LESS = "take fewer bricks, robots that reach less, or a computer with more memory"
-
-
-_Value = TypeVar("_Value")
 
 
 class Status(IntEnum):
@@ -69,7 +66,7 @@ def status_of(error: BaseException, said: Callable[[str], str] = str) -> Status:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Answer(Generic[_Value]):
+class Answer:
     """The answer of a command: facts for scripts and text for people."""
 
     facts: Mapping[str, object]  # values, mappings, sequences, tables, and what makes them if asked
@@ -79,16 +76,7 @@ class Answer(Generic[_Value]):
     notes: tuple[str, ...] = ()  # further remarks: lines on standard error
     failures: tuple[str, ...] = ()  # what went wrong although there is an answer: as notes
     status: Status = Status.DONE
-    faults: tuple[str, ...] = ()  # what --strict makes failures
-    value: _Value = None  # type: ignore[assignment]  # what Python gets
     scene: Any = None  # of which it is
-
-    def strictly(self) -> Answer[_Value]:
-        """Return the answer of --strict: its violations set the exit status."""
-        if not self.faults or self.status not in (Status.DONE, Status.DOES_NOT_HOLD):
-            return self
-        failures = (*self.failures, *self.faults)
-        return replace(self, failures=failures, status=Status.DOES_NOT_HOLD)
 
     def document(self, command: str) -> Any:
         """Return facts and status of a command, ready for JSON."""
@@ -105,24 +93,14 @@ class Answer(Generic[_Value]):
         return plain(said)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Result(Generic[_Value]):
-    """What a command found, for Python, and its answer, made and written where it is asked for."""
-
-    value: _Value
-    answer: Callable[[], Answer[Any]]
-
-
-def answer_of(result: Any) -> Answer[Any]:
-    """Return the answer of what a command returns: an answer, a result, a table or a text."""
-    if isinstance(result, Result):
-        return result.answer()
+def answer_of(result: Any) -> Answer:
+    """Return the answer of what a command returns: an answer, a table or a text."""
     if hasattr(result, "to_csv"):
-        return Answer({"rows": result}, data=result.to_csv(index=False), value=result)
+        return Answer({"rows": result}, data=result.to_csv(index=False))
     if isinstance(result, str | None):
-        return Answer({"text": result or ""}, text=result or "", value=result)
+        return Answer({"text": result or ""}, text=result or "")
     if not isinstance(result, Answer):
-        said = f"it returns {type(result).__name__}; return a text, a table or an Answer"
+        said = f"it returns {type(result).__name__}; return a text or a table"
         raise ProblemError(f"the command cannot be answered: {said}")
     return result
 
@@ -138,7 +116,7 @@ def scene_facts(scene: Any) -> dict[str, object]:
     }
 
 
-def print_answer(answer: Answer[Any], command: str, *, quiet: bool, as_json: bool) -> Status:
+def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) -> Status:
     """Print an answer as text, paths or JSON; a closed output is no error if files are written."""
     if as_json:
         show(json.dumps(answer.document(command), indent=2, allow_nan=False) + "\n")

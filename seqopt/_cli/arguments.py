@@ -9,13 +9,13 @@ from __future__ import annotations
 import argparse
 import re
 from argparse import SUPPRESS
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, NoReturn
 
-from seqopt._cli.answer import Status
+from seqopt._cli.answer import Answer, Status, answer_of
 from seqopt._cli.terminal import columns, complain, show
 from seqopt._later import Later
 from seqopt._registry import COMMANDS, every_command, find_command
@@ -38,16 +38,24 @@ LINES = 40  # of a screen
 ALL = "--help-all"
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
-LEADS = {each: each for each in ("begin", "criterion", "direction", "engine", "rules", "to")}
-LEADS |= {"limit": "limits", "option": "options"}  # first words of messages, and their parameters
+LEADS = {"limit": "limits", "option": "options"}  # first words of messages, and their parameters
+LEADS |= {n: n for n in ("begin", "criterion", "direction", "engine", "lost", "missing", "rules")}
+LEADS["to"] = "to"
 GIVEN = re.compile(r"\b(\w+)='([\w-]+)'")
-PRINTED = ("quiet", "json", "strict")  # what concerns the printed answer alone
 GONE = {
+    "--cohesion": "give --mortar bond=STRENGTH, or in Python a Mortar",
     "--crown": "in Python dataclasses.replace(seqopt.CRITERIA[...], crown=...) has it",
+    "--fields": "in Python seqopt.responses.step_fields has them",
     "--keep": "--to 12 leaves the first 12 bricks of --order",
     "--load-factor": "in Python seqopt.stability.load_factors has it",
+    "--pick": "seqopt optimize --schedule free --aim D_max --limit F_largest=250 plans it",
+    "--ranked": "in Python RankSum(..., ranked=Ranked.CONDITIONAL) has it",
     "--seconds": "it is --time-limit, as of any command",
+    "--steps": "give --margins without it, or in Python seqopt.assess_steps some steps",
     "--stiffens": "give a scene whose joints are softer, as seqopt scene --export writes it",
+    "--strict": "--json lists payloads_exceeded, outside_linear_range and arms_cannot",
+    "--tensile-strength": "give --mortar bond=STRENGTH, or in Python a Mortar",
+    "--under": "seqopt optimize --schedule free --aim D_max --limit F_largest=250 plans it",
 }  # options that there were, and what to do in their place
 
 
@@ -144,14 +152,14 @@ class Request:
 
     name: str
     values: Mapping[str, Any]
-    quiet: bool = False
-    json: bool = False
-    strict: bool = False
+    quiet: bool
+    json: bool
 
-    def result(self, progress: Any = None) -> Any:
-        """Run the command and return its result; ``progress`` is called with its progress."""
+    def answer(self, progress: Callable[[object], object]) -> Answer:
+        """Run the command; ``progress`` is called with its progress."""
         function = find_command(self.name).load()
-        return SIGNATURES.signature_of(function).call({**self.values, "progress": progress})
+        values = SIGNATURES.signature_of(function).values({**self.values, "progress": progress})
+        return answer_of(function(**values))
 
     def spoken(self, message: str) -> str:
         """Return a message about parameters of Python as one about options."""
@@ -170,11 +178,10 @@ def request(words: Sequence[str]) -> Request:
     """Parse words into a command and its options; a wrong word ends the program."""
     helps = any(word.startswith(("-h", "--h")) for word in words)  # argparse takes it shortened
     values = vars(parser(named_command(words), helps=helps).parse_args(words))
-    printed = {name: values.pop(name) for name in PRINTED if name in values}
     name = values.pop("command")
     if name == "instance":
         values["made_by"] = words
-    return Request(name, values, **printed)
+    return Request(name, values, quiet=values.pop("quiet"), json=values.pop("json"))
 
 
 def first_screen(command: argparse.ArgumentParser) -> str:

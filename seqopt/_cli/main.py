@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 
-from seqopt._cli.answer import Status, answer_of, print_answer, status_of
+from seqopt._cli.answer import Status, print_answer, status_of
 from seqopt._cli.arguments import EXAMPLES, Request, named_command, parser, request
 from seqopt._cli.terminal import flush, quiet_numbers, show, silence
 from seqopt._later import Later
@@ -70,6 +70,5 @@ def _run(words: Sequence[str], said: list[Request]) -> int:
         return int(stop.code or 0)
     said.append(asked)  # whose words an error is about
     with quiet_numbers(quiet=asked.quiet), WATCHER.Watcher(shows=not asked.quiet) as tell:
-        answer = answer_of(asked.result(tell))
-    answer = answer.strictly() if asked.strict else answer
+        answer = asked.answer(tell)
     return print_answer(answer, asked.name, quiet=asked.quiet, as_json=asked.json)

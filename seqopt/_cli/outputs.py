@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,7 +9,6 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt._cli.words import Built, is_folder
 from seqopt._files import (
     csv_text,
     require_apart,
@@ -23,7 +21,9 @@ from seqopt._later import Later
 from seqopt._showing import PAGE
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.plan import Plan
-from seqopt.scene.scene_file import builtin_scenes, dump_scene
+from seqopt.scene.scene_file import builtin_scenes
+from seqopt.sequence.methods import SCHEDULES
+from seqopt.sequence.rules import FREE
 from seqopt.work.progress import Tell
 
 CHARTS = Later("seqopt.report.charts")  # matplotlib is an extra
@@ -45,27 +45,6 @@ def picture(name: str, draw: Callable[[Any], Any]) -> dict[str, bytes]:
         return {}
     files: dict[str, bytes] = FILES.picture_files(name, draw(CHARTS))
     return files
-
-
-def steps_table(plan: ShownBuild) -> pd.DataFrame:
-    """Return the steps of a plan without responses: the columns that reading it needs."""
-    robots = plan.engine.network.scene.robots
-    rows = [(s.number, s.kind.value, s.bricks, *s.grips) for s in plan.steps]
-    names = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in robots)]
-    return pd.DataFrame(rows, columns=names).astype(
-        {name: "Int64" for name in names if name != "type"}
-    )
-
-
-def bare_files(
-    plan: ShownBuild, table: pd.DataFrame, report: Mapping[str, object]
-) -> dict[str, bytes | str]:
-    """Return the essential files of a plan by name: its steps, its scene, and its summary."""
-    return {
-        "plan.csv": csv_text(table),
-        "summary.json": json.dumps(_plain(report), indent=2) + "\n",
-        "scene.json": dump_scene(plan.engine.network.scene),
-    }
 
 
 def plan_files(plan: Plan) -> dict[str, bytes | str]:
@@ -98,11 +77,6 @@ def task_files(plan: ShownBuild) -> dict[str, str]:
     return {"tasks.json": TASKS.tasks_json(scene, tasks), "tasks.csv": TASKS.tasks_csv(tasks)}
 
 
-def _plain(value: object) -> Any:
-    """Convert a value for JSON, with null in place of numbers that are not finite."""
-    return json.loads(json.dumps(value), parse_constant=lambda _: None)
-
-
 def put_table(
     path: Path | None, table: pd.DataFrame | Sequence[Mapping[str, object]], said: str
 ) -> dict[str, Any]:
@@ -115,33 +89,27 @@ def put_table(
 
 
 def written_to(
-    folder: Path | None,
-    *,
-    page: bool = True,
-    tables: str = "the plan, its tables",
-    what: str = "it step by step",
+    folder: Path | None, *, tables: str = "the plan, its tables", what: str = "it step by step"
 ) -> str:
     """Describe the folder and its page, or how to request one; ``what``: that the page shows."""
     if folder is None:
         return f"--out DIR writes {tables} and a page that shows {what}"
-    return f"written to {folder}" + f"; {folder / PAGE} shows {what}" * page
+    return f"written to {folder}; {folder / PAGE} shows {what}"
 
 
 class Output:
     """Where a command writes, if it does, and what it reads, which it never overwrites."""
 
-    def __init__(self, out: Path | str | None, *given: object) -> None:
-        """Take values in place of a scene, a plan, a schedule; those that are paths count."""
-        self.path = None if out is None else Path(out)
-        self._given = [each.scene if isinstance(each, Built) else each for each in given]
+    def __init__(self, out: Path | None, *given: object) -> None:
+        """Take scene, plan and schedule that are given; those that are words for paths count."""
+        self.path, self._given = out, given
 
     def keep_apart(self, *outputs: Path | None) -> None:
         """Raise `FileError` if two outputs are the same file, or one is an input."""
-        named = [Path(each) for each in self._given if isinstance(each, str | Path)]
-        folders = [path for path in named if is_folder(path)]
-        inside = [path / name for path in folders for name in ("scene.json", "plan.csv")]
-        read = [path for path in (*named, *inside) if str(path) not in builtin_scenes()]
-        require_apart([path for path in outputs if path is not None], read)
+        names = {*builtin_scenes(), *SCHEDULES, FREE}
+        paths = [Path(e) for e in self._given if isinstance(e, str | Path) and str(e) not in names]
+        inside = [p / name for p in paths if p.is_dir() for name in ("scene.json", "plan.csv")]
+        require_apart([path for path in outputs if path is not None], [*paths, *inside])
 
     def require(self, *names: str) -> None:
         """Raise `FileError`, before anything is computed, if the folder cannot be created."""

@@ -1,10 +1,9 @@
-"""Notes shared by commands: levels, payloads, arms, waits, verdicts."""
+"""Notes shared by commands: levels, payloads, waits, what departs from the linear range."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
@@ -24,10 +23,6 @@ from seqopt.sequence.rules import MOST_ROBOTS, FreeRules, _usual_grips
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import BuildProver, BuildVerdicts, _settlement_said
-from seqopt.stability.assessment import Verdict
-from seqopt.work.progress import INTERRUPT, TIME, Clock
-
-_Value = TypeVar("_Value")
 
 
 def size_line(scene: Scene) -> str:
@@ -78,18 +73,12 @@ def waits_said(build: ShownBuild) -> Iterator[str]:
         return
     table = build.times()
     waits = table[table["cures_s"] > 0]
-    if len(waits):
-        yield (
-            f"{waits['cures_s'].sum():.6g} s are waits for mortar, in {len(waits)} "
-            f"step{'s' * (len(waits) > 1)}; the longest:"
-        )
-    else:
-        yield "no step waits for mortar"
+    steps, total = f"{len(waits)} step{'s' * (len(waits) > 1)}", waits["cures_s"].sum()
+    said = f"{total:.6g} s are waits for mortar, in {steps}; the longest:"
+    yield said if len(waits) else "no step waits for mortar"
     for row in waits.nlargest(3, "cures_s").to_dict("records"):
-        yield (
-            f"  step {row['step']} ({row['type']}) waits {row['cures_s']:.6g} s for joint "
-            f"{row['joint']}"
-        )
+        step = f"step {row['step']} ({row['type']})"
+        yield f"  {step} waits {row['cures_s']:.6g} s for joint {row['joint']}"
     yield "every state is proven to stand with the bond that its joints have when it begins"
 
 
@@ -105,68 +94,33 @@ def settlement_notes(scene: Scene) -> tuple[str, ...]:
     return (f"stability: {said}",) if said else ()
 
 
-WHY = {TIME: "time is over", INTERRUPT: "interrupted"}
-
-
-def in_time(answer: Answer[_Value], clock: Clock, interrupted: str) -> Answer[_Value]:
-    """Return an answer with the parts skipped by the time limit, or its interrupt."""
-    left = clock.left_out.values()
-    each = {why: [what for what, own in clock.left_out.items() if own == why] for why in left}
-    said = (f"not done, {WHY[why]}: {', '.join(names)}" for why, names in each.items())
-    answer = replace(answer, notes=(*answer.notes, *said))
-    if not clock.interrupted or answer.status is Status.INTERRUPTED:
-        return answer
-    failures = (*answer.failures, interrupted)
-    return replace(answer, failures=failures, status=Status.INTERRUPTED)
-
-
-def marked(answer: Answer[_Value], outside: Sequence[object]) -> Answer[_Value]:
-    """Return an answer preceded by exceeded limits of the linear range, and the remedy."""
-    left = [str(departure) for departure in outside]
-    answer = replace(answer, facts={**answer.facts, "outside_linear_range": left})
-    if not left:
-        return answer
-    lines = (*(f"{OUTSIDE}: {each}" for each in left), REMEDY)
-    if not answer.text:
-        return replace(answer, notes=(*lines, *answer.notes))
-    return replace(answer, text="\n".join([*map(wrapped, lines), answer.text]))
-
-
-def kept_range(answer: Answer[_Value], beyond: str | None) -> Answer[_Value]:
+def kept_range(answer: Answer, beyond: str | None) -> Answer:
     """Return an answer whose status reports a plan beyond the limit on the linear range."""
-    if beyond is None or answer.status is not Status.DONE:
+    if not beyond or answer.status is not Status.DONE:
         return answer
     said = f"seqopt: {OUTSIDE}: {beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
     return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
 
 
-def held_to(
-    answer: Answer[_Value],
-    over: Sequence[str],
-    outside: Sequence[object] = (),
+def marked(
+    answer: Answer,
+    outside: Sequence[object],
+    over: Sequence[str] | None = None,
     verdicts: Mapping[str, Sequence[BuildVerdicts]] | None = None,
     unreached: Sequence[str] = (),
-) -> Answer[_Value]:
-    """Return a `marked` answer with `exceeded` payloads, which --strict turns into its status.
+) -> Answer:
+    """Return an answer that says, and begins with it, how plans leave the linear range.
 
-    ``verdicts``: by build, the decisive mortar last; ``unreached``: steps infeasible for arms.
+    Its facts have that, `exceeded` payloads, verdicts by build, and steps that arms cannot do.
     """
-    answer, falls = marked(answer, outside), list[str]()
-    facts = {**answer.facts, "payloads_exceeded": list(over)}
+    lines = [*(f"{OUTSIDE}: {each}" for each in outside), *[REMEDY] * bool(outside)]
+    facts = {**answer.facts, "outside_linear_range": [*map(str, outside)]}
+    facts |= {} if over is None else {"payloads_exceeded": [*over]}
     if verdicts is not None:
         found = {n: {each.mortar: each.facts() for each in own} for n, own in verdicts.items()}
         facts["stability"] = found
-        last = {name: own[-1] for name, own in verdicts.items()}
-        falls = [f"{name}, {own}" for name, own in last.items() if own.count(Verdict.FALLS)]
-    if unreached:
-        facts["arms_cannot"] = list(unreached)
-    notes = (*answer.notes, *(f"arms: {each}" for each in unreached))
-    answer = replace(answer, facts=facts, notes=notes)
-    wrong = {
-        "payload exceeded": over,
-        "arms cannot": unreached,
-        OUTSIDE: [*map(str, outside)],
-        "does not stand": falls,
-    }
-    faults = (f"seqopt: {name}: {'; '.join(each)}" for name, each in wrong.items() if each)
-    return replace(answer, faults=(*faults,))
+    facts |= {"arms_cannot": [*unreached]} if unreached else {}
+    text, notes = answer.text, (*answer.notes, *(f"arms: {each}" for each in unreached))
+    if text:
+        text = "\n".join([*map(wrapped, lines), text])
+    return replace(answer, facts=facts, text=text, notes=notes if text else (*lines, *notes))

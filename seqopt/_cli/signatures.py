@@ -2,59 +2,48 @@
 
 A command is a function. Its parameters are its options: of a type and a default, with the help text
 that its docstring has for them. A parameter that takes a value made of several words is spread: the
-fields of the value are options (`seqopt._cli.words`). So the command line is made from Python.
+fields of the value are options (`seqopt._cli.words`). A parameter that is a `Call` has the options
+of another function, as that of an analysis: all, or those that are named.
 """
 
 from __future__ import annotations
 
 import argparse
 import inspect
-import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, replace
-from functools import cache, wraps
+from functools import cache
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
-import pandas as pd
-
-from seqopt._cli.answer import Answer, Result
-from seqopt._cli.terminal import columns, wrapped
-from seqopt._cli.watcher import Watcher
+from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import (
     FLAGS,
     HIDDEN,
     HOW,
     MOST_WORKERS,
-    NAMES,
     QUESTIONS,
     SPREAD,
     VALUES,
     parse_count,
 )
 from seqopt._registry import COMMANDS
-from seqopt.errors import ProblemError, did_you_mean
+from seqopt.errors import ProblemError
 from seqopt.problem.requirements import number_word
 
 OWN = "What is it about?"  # of options under no question
 PRINTED = {
-    "strict": "end with exit status 1 if a robot would exceed its payload in a step, or results "
-    "leave the linear range",
     "quiet": "print errors and the paths of what is written, nothing else",
     "json": "print one JSON document, for scripts",
 }  # what concerns the printed answer alone
-STRICT = ("optimize", "compare", "analyze", "replan", "instance", "sweep")
-TOGETHER = ({"quiet", "json"}, {"method", "plan"}, {"list", "export"})  # one of each
 PATHS = ("FILE", "DIR", "FOLDER", "PLAN_DIR", "INSTANCE", "SOLUTION")
 NAMED = re.compile(r"(\w+(?:, \w+)*) :(?: (\S.*))?")  # begins what a docstring says of parameters
-SECTIONS = ("Parameters", "Returns", "Raises", "Examples", "Usage", "Notes", "Yields")
+SECTIONS = ("Parameters", "Returns", "Raises", "Examples")
 SAME = re.compile(r"As of `(\w+)`")
 WORD = re.compile(r"``(\w+)(?:=\"?([^`\"]*)\"?)?``")  # a parameter in a docstring, with its value
-_P = ParamSpec("_P")
-_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -112,39 +101,20 @@ class Option:
             parser.add_argument(self.flag, dest=self.name, required=default is MISSING, **how)
 
     def parse(self, value: Any) -> Any:
-        """Parse a value as of the command line; other Python objects stay unchanged."""
-        if isinstance(value, bool) or value is self.default:
+        """Return the value of words of the command line; other values stay unchanged."""
+        if isinstance(self.default, tuple) and isinstance(value, str | list):
+            return (value,) if isinstance(value, str) else tuple(value)
+        if not isinstance(value, str):
             return value
-        if isinstance(self.default, tuple):
-            if isinstance(value, Mapping):
-                value = [f"{name}={_text(each)}" for name, each in value.items()]
-            several = isinstance(value, Sequence) and not isinstance(value, str)
-            return tuple(map(_text, value if several else [value]))
         if self.kinds <= {float, type(None)}:
             try:
-                return number_word(str(value), self.flag, zero=self.more.get("zero", False))
+                return number_word(value, self.flag, zero=self.more.get("zero", False))
             except ProblemError as error:
                 raise ProblemError(f"{error}{self.more.get('advice', '')}") from None
         if self.kinds <= {int, type(None)}:
             least, most = self.more.get("least", 1), self.more.get("most", MOST_WORKERS)
             return parse_count(value, self.flag, most, least)
-        text, choices = _text(value), self.choices
-        if choices and text not in choices:
-            hint, known = did_you_mean(text, choices), ", ".join(choices)
-            raise ProblemError(f"{self.name} {text!r} does not exist{hint}; give {known}")
-        if "parse" in self.more and isinstance(text, str):
-            return self.more["parse"](text)
-        path = self.value in PATHS or (Path in self.kinds and str not in self.kinds)
-        return Path(text) if path and isinstance(text, str) else text
-
-
-def _text(value: Any) -> Any:
-    """Return numbers, paths and lists as words, other values unchanged."""
-    if isinstance(value, int | float | os.PathLike):
-        return os.fspath(value) if isinstance(value, os.PathLike) else f"{value!r}"
-    if isinstance(value, list | tuple | range):
-        return ",".join(str(_text(each)) for each in value)
-    return value
+        return self.more["parse"](value) if "parse" in self.more else value
 
 
 @dataclass(frozen=True)
@@ -156,7 +126,23 @@ class Call:
 
     def __call__(self, **more: Any) -> Any:
         """Call it with further words, which take the place of those that it has."""
-        return signature_of(self.function).call({**self.words, **more})
+        return self.function(**self.values(**more))
+
+    def values(self, **more: Any) -> dict[str, Any]:
+        """Return the values of all of its parameters."""
+        taken = inspect.signature(self.function).parameters
+        usual = {name: each.default for name, each in taken.items() if each.default != each.empty}
+        return usual | signature_of(self.function).values({**self.words, **more})
+
+
+class Spread(NamedTuple):
+    """A parameter whose value several words make: by what, which, and its default."""
+
+    made_by: Callable[..., Any]
+    names: Sequence[str]
+    default: Any
+    called: bool  # whether it is a `Call`
+    whole: bool  # whether the function takes it as it is, not what it stands for
 
 
 @dataclass(frozen=True)
@@ -165,42 +151,38 @@ class Signature:
 
     function: Callable[..., Any]
     options: Mapping[str, Option]
-    spread: Mapping[str, tuple[Callable[..., Any], Sequence[str], Any]]  # and its default
+    spread: Mapping[str, Spread]
 
-    def call(self, given: Mapping[str, Any]) -> Any:
-        """Call the function with values, or words for them; None means the default."""
+    def values(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Return values of parameters, of values or words for options; None means the default."""
         values = {name: each for name, each in given.items() if each is not None}
         values |= {
             n: self.options[n].parse(each) for n, each in values.items() if n in self.options
         }
-        for name, (kind, names, default) in self.spread.items():
-            words = {each: values.pop(each) for each in names if each in values}
-            if not isinstance(kind, type):  # in place of its words Python gives the first of them
-                first = {names[0]: values[name]} if name in values else {}
-                values[name] = Call(kind, {**first, **words})
-            elif len(words) == 1 and isinstance(words.get(name), kind):
-                values[name] = words[name]
-            elif words or default is MISSING:
-                first = {name: default} if name in names and default is not MISSING else {}
-                made = kind(**{**first, **words})
-                values[name] = made.parse() if hasattr(made, "parse") else made
+        for name, each in self.spread.items():
+            words = {n: values.pop(n) for n in each.names if n in values}
+            if each.called:
+                values[name] = Call(each.made_by, words)
+            elif type(words.get(name)) is each.made_by or not (words or each.default is MISSING):
+                values |= words
+            else:
+                made = each.made_by(**words)
+                values[name] = made if each.whole or not hasattr(made, "parse") else made.parse()
         taken = inspect.signature(self.function).parameters  # not all tell how far they are
-        return self.function(**{name: each for name, each in values.items() if name in taken})
+        return {name: each for name, each in values.items() if name in taken}
 
-    def texts(self) -> dict[str, tuple[str, str, str]]:
-        """Return question, word for the value, and help by option, as docstrings say them."""
-        own, out = dict[str, tuple[str, str, str]](), dict[str, tuple[str, str, str]]()
-        for part in [*getattr(self.function, "__mro__", ())[-2:0:-1], self.function]:
-            own |= _read(part.__doc__)[1]
-        for kind, names, _ in self.spread.values():
-            said = signature_of(kind).texts()
-            own |= {name: said[name] for name in names if name in said}
-        for name, (question, value, text) in own.items():
+    def texts(self) -> dict[str, tuple[str, str]]:
+        """Return word for the value, and help, by option, as docstrings say them."""
+        own, out = _read(self.function.__doc__)[1], dict[str, tuple[str, str]]()
+        for each in self.spread.values():
+            said = signature_of(each.made_by).texts()
+            own |= {name: said[name] for name in each.names if name in said}
+        for name, (value, text) in own.items():
             same = SAME.match(text)
             if same and name in self.options:
-                text = signature_of(COMMANDS[same[1]].load()).texts()[name][2]  # noqa: PLW2901
+                text = signature_of(COMMANDS[same[1]].load()).texts()[name][1]  # noqa: PLW2901
             default = self.options[name].default if name in self.options else ""
-            out[name] = question, value, text.replace("{default}", str(default))
+            out[name] = value, text.replace("{default}", str(default))
         return out
 
     @property
@@ -216,38 +198,24 @@ class Signature:
         texts = self.texts() if helps or self._foreign else {}
         command.description = wrapped(self._spoken(" ".join(lines.get("", ()))))
         own = sorted(self.options.values(), key=lambda e: not e.place or e.default is MISSING)
-        if usages := lines.get("Usage"):
-            command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
-        else:
-            places = (each for each in own if each.place)  # as report [SCENE] FOLDER
-            shown = (e.value if e.default is MISSING else f"[{e.value}]" for e in places)
-            command.usage = " ".join([command.prog, *shown, "[options]"])
+        places = (each for each in own if each.place)  # as report [SCENE] FOLDER
+        shown = (e.value if e.default is MISSING else f"[{e.value}]" for e in places)
+        command.usage = " ".join([command.prog, *shown, "[options]"])
         if examples := self.examples:
             listed = "\n".join(f"  {example}" for example in examples)
             command.epilog = f"example{'s' * (len(examples) > 1)}:\n{listed}"
-        strict = command.prog.split()[-1] in STRICT
-        own += [Option(name) for name in PRINTED if name != "strict" or strict]
         groups: dict[str, list[Option]] = {}
-        for option in own:
-            if option.name in HIDDEN:
-                continue
-            question, value, _ = texts.get(option.name, ("", "", ""))
+        for option in (*own, *map(Option, PRINTED)):
             asked = (title for title, names in QUESTIONS.items() if option.name in names.split())
-            title = question if question[-1:] == "?" else next(asked, OWN)
-            upper = value if value == value.upper() and value != "CHOICE" else ""
-            known = replace(option, more={"value": upper, **option.more}) if upper else option
-            groups.setdefault(title, []).append(known)
-        order = [*QUESTIONS]
-        for title in sorted(groups, key=lambda e: order.index(e) if e in order else -1):
-            about = wrapped(" ".join(lines.get(title, ())), columns() - 2)
-            group = command.add_argument_group(title, about or None)
-            takes: dict[str, Any] = {}
-            for names in TOGETHER:
-                if names <= {option.name for option in groups[title]}:
-                    takes |= dict.fromkeys(names, group.add_mutually_exclusive_group())
+            if option.name not in HIDDEN:
+                groups.setdefault(next(asked, OWN), []).append(option)
+        for title in sorted(groups, key=[OWN, *QUESTIONS].index):
+            group = command.add_argument_group(title)
             for option in groups[title]:
-                said = texts.get(option.name, ("", "", PRINTED.get(option.name, "")))[2]
-                option.add_to(takes.get(option.name, group), self._help(option, said))
+                value, said = texts.get(option.name, ("", PRINTED.get(option.name, "")))
+                upper = value if value == value.upper() else ""  # of packages of others
+                known = replace(option, more={"value": upper, **option.more}) if upper else option
+                known.add_to(group, self._help(option, said))
 
     @property
     def _foreign(self) -> bool:
@@ -270,7 +238,7 @@ class Signature:
         text = text.removesuffix(".")
         if text[1:2].islower() or text[1:2] == " ":
             text = text[:1].lower() + text[1:]
-        if (names := NAMES.get(option.name)) and not self._foreign:
+        if names := option.more.get("names"):
             text += f"; names: {', '.join(names())}"
         return text.replace("%", "%%")
 
@@ -282,39 +250,35 @@ def _is_foreign(function: Callable[..., Any]) -> bool:
 @cache
 def signature_of(function: Callable[..., Any]) -> Signature:
     """Return what a function, or the class of a value, is asked, by its parameters."""
-    function = inspect.unwrap(function)
     own, home = inspect.signature(function).parameters, vars(sys.modules[function.__module__])
-    options, spread = dict[str, Option](), dict[str, tuple[Any, Sequence[str], Any]]()
-    foreign = _is_foreign(function)
+    options, spread, foreign = dict[str, Option](), dict[str, Spread](), _is_foreign(function)
     for each in own.values():
         default = MISSING if each.default is each.empty else each.default
         kind = each.annotation  # evaluated alone: what is returned may load pandas
         kind = eval(kind, home) if isinstance(kind, str) else kind
-        how = {} if foreign else dict(HOW.get(each.name, {}))
-        option, more = _option(each.replace(annotation=kind), default, how)
-        spreads = SPREAD.get((function.__name__, each.name), SPREAD.get(each.name))
-        spreads = None if foreign and kind is not spreads else spreads  # names are of seqopt alone
-        kind = more.get("call") or spreads
-        if kind is None or kind is function:
+        option = _option(each.replace(annotation=kind), default, foreign=foreign)
+        called = option.more.get("call")
+        maker = called or (None if foreign else SPREAD.get(each.name))
+        if maker in (None, function):
             if each.name != "progress":
                 options[each.name] = option
             continue
-        known = signature_of(kind).options
-        names = [name for name in known if name == each.name or name not in own]
-        whole = not isinstance(kind, type)  # of a function the scene alone has no dashes
-        options |= {n: replace(known[n], place=whole and n == "scene") for n in names}
-        if each.name in known:
+        known, some = signature_of(maker).options, option.more.get("of")
+        names = [
+            n for n in known if (n not in own or n == each.name if some is None else n in some)
+        ]
+        options |= {n: replace(known[n], place=bool(called) and n == "scene") for n in names}
+        if each.name in names:
             first = known[each.name].default if default is MISSING else default
             options[each.name] = replace(known[each.name], default=first, place=option.place)
-        spread[each.name] = kind, names, default
+        spread[each.name] = Spread(maker, names, default, bool(called), maker in option.kinds)
     return Signature(function, options, spread)
 
 
-def _option(
-    parameter: inspect.Parameter, default: Any, more: dict[str, Any]
-) -> tuple[Option, dict[str, Any]]:
-    """Return the option of a parameter, and ``more``, with what its annotation says."""
+def _option(parameter: inspect.Parameter, default: Any, *, foreign: bool) -> Option:
+    """Return the option of a parameter, with what its annotation says."""
     kinds, left = set[Any](), [parameter.annotation]
+    more: dict[str, Any] = {} if foreign else dict(HOW.get(parameter.name, {}))
     while left:
         kind = left.pop()
         if get_origin(kind) is Annotated:
@@ -332,65 +296,27 @@ def _option(
     if repr(default) == "<factory>" or isinstance(default, list | dict):
         default = ()
     place = parameter.kind is not parameter.KEYWORD_ONLY
-    return Option(parameter.name, frozenset(kinds), default, place, more), more
+    return Option(parameter.name, frozenset(kinds), default, place, more)
 
 
-def _read(page: str | None) -> tuple[dict[str, list[str]], dict[str, tuple[str, str, str]]]:
-    """Return the lines of a docstring by section, and what it says of parameters.
-
-    A heading that is a question is a group of options.
-    """
-    lines, texts, title = {"": list[str]()}, dict[str, tuple[str, str, str]](), ""
+def _read(page: str | None) -> tuple[dict[str, list[str]], dict[str, tuple[str, str]]]:
+    """Return the lines of a docstring by section, and value and help of its parameters."""
+    lines, texts, title = {"": list[str]()}, dict[str, tuple[str, str]](), ""
     names: Sequence[str] = ()
     for line in inspect.cleandoc(page or "").splitlines():
         if not line or line.startswith("---"):
             continue
-        of_options = title == "Parameters" or title[-1:] == "?"
-        if line.endswith("?") or line in SECTIONS:
+        if line in SECTIONS:
             title = line
-        elif of_options and (found := NAMED.fullmatch(line)):
+        elif title == "Parameters" and (found := NAMED.fullmatch(line)):
             names = found[1].split(", ")
-            texts |= dict.fromkeys(names, (title, found[2] or "", ""))
-        elif of_options and line.startswith("    "):
-            question, value, text = texts[names[0]]
-            said = f"{text} {line.strip()}".lstrip()
-            texts |= dict.fromkeys(names, (question, value, said))
+            texts |= dict.fromkeys(names, (found[2] or "", ""))
+        elif title == "Parameters":
+            value, text = texts[names[0]]
+            texts |= dict.fromkeys(names, (value, f"{text} {line.strip()}".lstrip()))
         else:
             lines.setdefault(title, []).append(line)
     return lines, texts
-
-
-def door(function: Callable[_P, Answer[_T] | Result[_T]]) -> Callable[_P, _T]:
-    """Return a command as a function of Python, which gives its value.
-
-    Words of the command line stand for values. Progress is shown in a notebook and at a terminal.
-    """
-    places = [
-        each.name
-        for each in inspect.signature(function).parameters.values()
-        if each.kind is not each.KEYWORD_ONLY
-    ]
-
-    @wraps(function)
-    def call(*args: _P.args, **kwargs: _P.kwargs) -> _T:
-        asked, name = signature_of(function), function.__name__
-        known = {*asked.options, *asked.spread, "progress"}
-        if wrong := [each for each in kwargs if each not in known]:
-            raise TypeError(f"{name}() got an unexpected keyword argument {wrong[0]!r}")
-        if len(args) > len(places):
-            raise TypeError(f"{name}() takes {len(places)} values without names; name the others")
-        values = {**dict(zip(places, args, strict=False)), **kwargs}
-        with Watcher(shows=values.get("progress") is None) as watcher:
-            result = asked.call({"progress": watcher} | values)
-            if isinstance(result, Result) and values.get("out") is not None:
-                result.answer()
-        found: Any = pd.DataFrame(result.value) if isinstance(result.value, list) else result.value
-        if isinstance(found, pd.DataFrame) and isinstance(result, Answer):
-            found.attrs |= {"notes": [*result.notes], "failures": [*result.failures]}
-        value: _T = found
-        return value
-
-    return call
 
 
 def names_of(options: Iterable[Option]) -> dict[str, Option]:

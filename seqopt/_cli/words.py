@@ -7,20 +7,18 @@ meaning in all commands.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from math import radians
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias
 
 from seqopt.contact.mortar import MORTARS, Mortar, _find_curing, find_mortar
 from seqopt.engines.registry import ENGINES
-from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
+from seqopt.errors import FileError, ProblemError, SceneError, StepError, did_you_mean
 from seqopt.graph.formulation import formulation_names
-from seqopt.plan.build import ShownBuild
-from seqopt.problem.criteria import Ranked
 from seqopt.problem.problem import parse_robust
-from seqopt.problem.requirements import Criterion, number_word, split_word
+from seqopt.problem.requirements import number_word, split_word
 from seqopt.problem.standing import Standing
 from seqopt.scene._checks import short
 from seqopt.scene.parts import Prop
@@ -31,16 +29,11 @@ from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.rules import with_robots
 from seqopt.stability.assessment import MARGINS
 from seqopt.study.published import CRITERIA, PUBLISHED
-from seqopt.workflow import SEARCH, Part, Robust, Search, _choose_criterion
+from seqopt.workflow import Part, Robust, Search
 
-File: TypeAlias = Annotated[Path | str, ("value", "FILE")]
-Folder: TypeAlias = Annotated[Path | str, ("value", "DIR")]
-BuiltFrom: TypeAlias = Scene | ShownBuild | Path | str
-Words: TypeAlias = Sequence[str] | str
-Numbers: TypeAlias = Mapping[str, float] | Sequence[str] | str
-Bricks: TypeAlias = Sequence[int | str] | int | str
+File: TypeAlias = Annotated[Path | None, ("value", "FILE")]
+Folder: TypeAlias = Annotated[Path | None, ("value", "DIR")]
 
-_Kind = TypeVar("_Kind")
 MOST_WORKERS = 1024
 SPREADS = ("stiffness", "density", "position", "grips")
 QUESTIONS = {
@@ -48,16 +41,16 @@ QUESTIONS = {
     "durations robots",
     "Which steps may a build have?": "schedule method plan begin to direction rules reassign",
     "What has changed?": "at lost missing measured",
-    "What counts as best?": "criterion ranked aim rounding pick under speed reference",
-    "What must hold?": "stands friction tilt curing limits budgets tensile_strength cohesion",
-    "What is asked beside verdicts?": "margins steps map holds",
+    "What counts as best?": "criterion aim rounding speed reference",
+    "What must hold?": "stands friction tilt curing limits budgets",
+    "What is asked beside verdicts?": "margins map holds",
     "In which scenarios is it good?": "robust scenarios seed vary",
     "Who chooses and proves, and how long?": "formulation candidates options proof lazy time_limit "
     "workers max_memory",
     "How are responses computed?": "engine mortar tolerance cache",
     "What does the file not say?": "unit up density supports",
     "Which joints are made?": "stiffness gap detect accept_overlaps",
-    "What is written and printed?": "out name below fields figures stability strict quiet json",
+    "What is written and printed?": "out name below figures stability quiet json",
 }
 """Options by the question that they answer, in the order in which help asks them."""
 PROPS = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma push, capacity=300"
@@ -75,10 +68,10 @@ VALUES = dict(
         r"(\w+)=(\S+)",
         """
         grips=STIFFNESS props=NODES payload=NEWTON durations=WORDS curing=WORDS robots=N|NAME,NAME
-        criterion=NAME formulation=NAME pick=NAME name=NAME format=NAME margins=NAMES holds=NAMES
+        criterion=NAME formulation=NAME name=NAME format=NAME margins=NAMES holds=NAMES
         aim=NAME,NAME rules=NAME=VALUE vary=NAME=VALUE options=NAME=VALUE over=NAME=VALUES
-        rounding=NAME=STEP under=BOUND limits=LIMIT budgets=BUDGET stands=MORTAR friction=F tilt=DEG
-        tensile_strength=PA cohesion=PA schedule=NAME|FILE begin=PLAN:STEP|STATE|N
+        rounding=NAME=STEP limits=LIMIT budgets=BUDGET stands=MORTAR friction=F tilt=DEG
+        schedule=NAME|FILE begin=PLAN:STEP|STATE|N
         to=PLAN:STEP|STATE|N direction=build|take-down robust=AIM scenarios=N seed=N workers=N
         candidates=RULE time_limit=SECONDS max_memory=SIZE plan=FILE source=FILE bound=FILE
         cache=DIR at=STEP lost=ROBOT missing=BRICK
@@ -89,22 +82,19 @@ VALUES = dict(
 HOW: dict[str, dict[str, Any]] = {
     "engine": {"choices": lambda: ENGINES},
     "method": {"choices": (*METHODS, PUBLISHED)},
-    "ranked": {"choices": [each.value for each in Ranked]},
     "friction": {"zero": True},
     "tilt": {"zero": True},
     "robots": {"parse": lambda text: int(text) if text.isdecimal() else named(text)},
     "time_limit": {"zero": True},
     "scenarios": {"most": MOST},
     "seed": {"least": 0, "most": MOST},
-}  # what a parser knows of options beside their types
-HIDDEN = ("also", "executor", "clock", "made_by")  # that Python alone says
-NAMES: dict[str, Callable[[], Iterable[str]]] = {
-    "scene": builtin_scenes,
-    "schedule": lambda: SCHEDULES,
-    "criterion": lambda: CRITERIA,
-    "formulation": formulation_names,
-    "margins": lambda: MARGINS,
-}  # what help lists
+    "scene": {"names": builtin_scenes},
+    "schedule": {"names": lambda: SCHEDULES},
+    "criterion": {"names": lambda: CRITERIA},
+    "formulation": {"names": formulation_names},
+    "margins": {"names": lambda: MARGINS},
+}  # what a parser knows of options beside their types; names are what help lists
+HIDDEN = ("also", "executor", "made_by")  # that Python alone says
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +103,7 @@ class Built:
 
     Parameters
     ----------
-    scene : Scene, ShownBuild, pathlib.Path or str
+    scene : str
         A built-in scene, a JSON file, a plan's folder, or words as arch:span=2,rise=0.8 (default:
         arch25); seqopt scene --list shows all.
     order : str
@@ -132,47 +122,7 @@ class Built:
     payload : float or str
         What every robot may carry, N, if not as the scene says; of one robot with its name before,
         as rob1=250.
-    """
-
-    scene: Any = "arch25"
-    order: Bricks | None = None
-    grips: float | str | None = None
-    props: Bricks | None = None
-    payload: float | Numbers = ()
-
-    @property
-    def own(self) -> Scene:
-        """The scene as it is, of a plan or its folder too."""
-        if isinstance(self.scene, ShownBuild):
-            return self.scene.engine.network.scene
-        if isinstance(self.scene, Scene):
-            return self.scene
-        path = Path(self.scene)
-        return load_scene(path / "scene.json" if is_folder(path) else self.scene)
-
-    def read(self, robots: int | Words | None = None) -> Scene:
-        """Return the scene; ``robots``: how many there are, or names, which change nothing."""
-        if self.order == SEARCH:
-            raise ProblemError(
-                "--order search: only the free schedule has it; give optimize --schedule free"
-            )
-        scene = in_order(self.own, None if self.order is None else str(self.order))
-        for text in listed(self.payload):
-            scene = with_payload(text, scene)
-        if (count := str(robots)).isdecimal():
-            scene = with_robots(scene, int(count))
-        if self.props is not None:
-            scene = scene.with_props(*parse_props(str(self.props), scene))
-        return scene if self.grips is None else with_grips(self.grips, scene)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Timed(Built):
-    """A scene, and what is other than it says.
-
-    Parameters
-    ----------
-    durations : str or sequence of str
+    durations : sequence of str
         How long robots take, s: fetch=30,place=10,approach=10,grip=5,release=5 or speed=0.2 (m/s,
         of ways between grips); that is to bring the next brick, to place it, to come to one that
         stands, to grip it, to let go; who is free fetches and approaches while others act; of one
@@ -180,20 +130,44 @@ class Timed(Built):
         says).
     """
 
-    durations: Words = ()
+    scene: Any = "arch25"
+    order: str | None = None
+    grips: str | None = None
+    props: str | None = None
+    payload: Sequence[str] = ()
+    durations: Sequence[str] = ()
 
-    def read(self, robots: int | Words | None = None) -> Scene:
-        """Return the scene; as of `Built`."""
-        return in_seconds(super().read(robots), self.durations)
+    @property
+    def folder(self) -> Path | None:
+        """The folder of a plan that stands for its scene."""
+        if isinstance(self.scene, Scene) or not (path := Path(self.scene)).is_dir():
+            return None
+        for name in ("scene.json", "plan.csv"):
+            if not (path / name).is_file():
+                raise FileError(f"{path}: it has no {name}; give a folder of seqopt optimize --out")
+        return path
+
+    def read(self, robots: int | Sequence[str] | None = None) -> Scene:
+        """Return the scene; ``robots``: how many there are, or names, which change nothing."""
+        folder, scene = self.folder, self.scene
+        if not isinstance(scene, Scene):
+            scene = load_scene(scene if folder is None else folder / "scene.json")
+        scene = in_order(scene, self.order)
+        for text in self.payload:
+            scene = with_payload(text, scene)
+        if isinstance(robots, int):
+            scene = with_robots(scene, robots)
+        if self.props is not None:
+            scene = scene.with_props(*parse_props(self.props, scene))
+        scene = scene if self.grips is None else with_grips(self.grips, scene)
+        return in_seconds(scene, self.durations)
 
     def parse(self) -> Scene:
-        """Return the scene, as Python takes it."""
+        """Return the scene, as functions of Python take it."""
         return self.read()
 
 
-def listed(values: Any) -> list[Any]:
-    """Return the words of an option that may be repeated."""
-    return [values] if isinstance(values, str) else [*values]
+ARCH25 = Built()
 
 
 def named(text: str) -> tuple[str, ...]:
@@ -201,58 +175,12 @@ def named(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(","))
 
 
-def split_words(
-    words: Mapping[str, Any], kind: Callable[..., _Kind]
-) -> tuple[_Kind, dict[str, Any]]:
-    """Return the value that some words make, and the other words."""
-    own = {each.name for each in fields(kind)}  # type: ignore[arg-type]
-    made = kind(**{name: each for name, each in words.items() if name in own})
-    return made, {name: each for name, each in words.items() if name not in own}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Changed:
-    """What is other than it was planned.
-
-    Parameters
-    ----------
-    payload : float or str
-        What every robot may carry from now on, or as rob1=250 one.
-    grips : float or str
-        How stiff grips are, as of optimize.
-    durations : str or sequence of str
-        As of `optimize`.
-    measured : pathlib.Path or str
-        Where bricks that stand were measured, m: a CSV file (brick, x, y, z), or an assembly of
-        COMPAS.
-    """
-
-    payload: float | Numbers = ()
-    grips: float | str | None = None
-    durations: Words = ()
-    measured: File | None = None
-
-
-def shown(_: object) -> None:
-    """Show the progress, by default, where somebody looks: who calls a command does that."""
-
-
-def in_seconds(scene: Scene, durations: Words) -> Scene:
+def in_seconds(scene: Scene, durations: Sequence[str]) -> Scene:
     """Return a scene with durations, if any."""
     try:
         return scene.with_durations(*durations) if durations else scene
     except SceneError as error:
         raise SceneError(f"--{error}") from None
-
-
-def as_built(scene: BuiltFrom | Built) -> Built:
-    """Return what a command is given in place of a scene."""
-    return scene if isinstance(scene, Built) else Built(scene=scene)
-
-
-def is_folder(path: Path) -> bool:
-    """Return whether a path is the folder of a plan."""
-    return (path / "scene.json").is_file() and (path / "plan.csv").is_file()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -261,28 +189,26 @@ class Stands:
 
     Parameters
     ----------
-    stands : Standing, Mortar or str
+    stands : str
         Every state must be proven to stand, robots within payload: dry, epoxy or bond=STRENGTH
         (Pa).
     friction : float
         With ``stands``: coefficient of friction.
     tilt : float
         With ``stands``: tilt that every state must survive.
-    curing : str or sequence of str
+    curing : sequence of str
         With ``stands``: which share of its bond mortar has at an age: 15min (in proportion, full
         then), 0s=0.005,5min=0.4,15min=1 (what is reached when), never; of one joint with its name
         before, as 5-6:30min. What is let go waits for it (default: full at once).
     """
 
-    stands: Standing | Mortar | str | None = None
+    stands: str | None = None
     friction: float | None = None
     tilt: float | None = None
-    curing: Words = ()
+    curing: Sequence[str] = ()
 
     def parse(self) -> Standing | None:
         """Return the requirement of stability, None if there is none."""
-        if isinstance(self.stands, Standing):  # of Python
-            return self.stands
         said = {"tilt": self.tilt, "friction": self.friction, "curing": self.curing}
         names = [name for name, value in said.items() if value not in (None, ())]
         if self.stands is None:
@@ -299,36 +225,12 @@ class Stands:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ranking:
-    """What a step costs.
-
-    Parameters
-    ----------
-    criterion : Criterion or str
-        What a step costs: equations-2-3 (of Bruun et al.), worst-ratio (over the least worst of
-        fixed methods), or responses to rank with weights, as T_max,M_sup=2,F_move; by default
-        equations-2-3, with --aim, --stands or --schedule free worst-ratio.
-    ranked : str
-        For criteria of ranks: where two open grips meet in a step, rank all pairs of their nodes
-        together, or only the pairs with the node chosen before (default: pairs).
-    """
-
-    criterion: Criterion | str | None = None
-    ranked: str | None = None
-
-    def parse(self) -> Criterion | Ranked | None:
-        """Return the criterion, or how ranks are taken of the usual one."""
-        ranked = None if self.ranked is None else Ranked(self.ranked)
-        return ranked if self.criterion is None else _choose_criterion(ranked, self.criterion)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Sampled:
     """Scenarios that are drawn.
 
     Parameters
     ----------
-    robust : Robust or str
+    robust : str
         What is to be as small as possible over all scenarios, in place of ``formulation``:
         worst-peak (the largest cost of any step), worst-total (the largest total), or cvar=0.9 (the
         mean total of the worst tenth).
@@ -336,22 +238,20 @@ class Sampled:
         With ``robust``: how many samples of the scene (default: 30).
     seed : int
         With ``robust``: which samples are drawn (default: 0).
-    vary : mapping or sequence of str
+    vary : sequence of str
         With ``robust``: how far samples are from the scene: stiffness=3 (of each joint, by a factor
         up to it, up or down), density=0.1 (of each brick, up to this share), position=0.002 (of
         each brick and joint, up to so many m); these are the defaults; grips=2 (of grips that are
         not rigid, by a factor up to it).
     """
 
-    robust: Robust | str | None = None
+    robust: str | None = None
     scenarios: int | None = None
     seed: int = 0
-    vary: Numbers = ()
+    vary: Sequence[str] = ()
 
     def parse(self) -> Robust | None:
         """Return aim and samples, None where there are none."""
-        if isinstance(self.robust, Robust):  # of Python
-            return self.robust
         for name in ("scenarios", "seed", "vary"):
             if self.robust is None and getattr(self, name):
                 raise ProblemError(
@@ -368,9 +268,8 @@ class Sampled:
         return Robust(aim=aim, vary=vary, count=self.scenarios or Robust.count, seed=self.seed)
 
 
-def parse_count(number: int | str, where: str, most: int, least: int = 1) -> int:
+def parse_count(text: str, where: str, most: int, least: int = 1) -> int:
     """Parse an integer within bounds; ``where``: argument, for messages."""
-    text = str(number)
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
         raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
     return int(text)
@@ -388,13 +287,13 @@ def with_payload(text: str, scene: Scene) -> Scene:
     return scene.with_robots(*said)
 
 
-def with_grips(grips: float | str, scene: Scene) -> Scene:
+def with_grips(grips: str, scene: Scene) -> Scene:
     """Return a scene with grip stiffness from a word: ``rigid``, ``1e6`` or ``1e6x1e6x5e5``, N/m.
 
     ``turning=1e4`` after a comma is the rotational stiffness.
     """
-    where = f"--grips {short(str(grips))[1:-1]}"
-    shift, comma, rest = str(grips).partition(",")
+    where = f"--grips {short(grips)[1:-1]}"
+    shift, comma, rest = grips.partition(",")
     turning = rest.removeprefix("turning=")
     if comma and (turning == rest or "," in rest):
         raise SceneError(f"{where}: give a stiffness, and after a comma turning=STIFFNESS")
@@ -434,10 +333,8 @@ def parse_numbers(
     return out
 
 
-def parse_mortar(text: str | Mortar, where: str) -> Mortar:
+def parse_mortar(text: str, where: str) -> Mortar:
     """Parse a mortar; ``where``: argument, for messages."""
-    if isinstance(text, Mortar):  # of Python
-        return text
     try:
         return find_mortar(text)
     except SceneError as error:
@@ -485,15 +382,11 @@ def _placed(word: str, scene: Scene, where: str) -> Sequence[Prop]:
     return [Prop(node=node, stiffness=own) for node in nodes]
 
 
-SPREAD: dict[Any, type] = {
+SPREAD: dict[str, type] = {
     "scene": Built,
-    ("optimize", "scene"): Timed,
-    ("_pose_build", "scene"): Timed,
     "schedule": Part,
     "stands": Stands,
-    "criterion": Ranking,
     "robust": Sampled,
     "search": Search,
-    "changed": Changed,
 }
-"""By parameter, alone or of a function, the class of a value that several words make."""
+"""By parameter, the class of a value that several words make."""

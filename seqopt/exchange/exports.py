@@ -1,16 +1,14 @@
-"""Plans in formats of others, and reading the folder of a plan."""
+"""Plans in formats of others."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from seqopt.errors import FileError, StepError
+from seqopt.errors import StepError
 from seqopt.exchange._formats import formats, writable
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step
 
 
@@ -67,14 +65,3 @@ def export_plan(
     if not isinstance(text, str):
         raise StepError(f"format {form}: it writes {short(text)}; return a text")
     return text
-
-
-def read_folder(folder: Path) -> tuple[Scene, tuple[Step, ...]]:
-    """Return the scene and the steps of a plan's folder, as ``seqopt optimize`` writes it."""
-    picked = (folder / "pick" / "plan.csv").is_file()
-    give = folder / "pick" if picked else "a folder of seqopt optimize --out or pareto --pick"
-    for name in ("scene.json", "plan.csv"):
-        if not (folder / name).is_file():
-            raise FileError(f"{folder}: it has no {name}; give {give}")
-    scene = load_scene(folder / "scene.json")
-    return scene, read_plan(scene, folder / "plan.csv")

@@ -53,7 +53,6 @@ if TYPE_CHECKING:
     from seqopt.graph._decision_search import Windows
 
 CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
-PROOF = "the proof"  # what it is called where there was no time for it
 Result = TypeVar("Result")
 
 
@@ -194,10 +193,8 @@ def proven(
     """Return a solution with its certificate, if one is requested and there is time for it."""
     if not run.proof:
         return selection, None
-    certificate = run.clock.spare(PROOF, judge, None)
-    if certificate is None:
-        selection = replace(selection, stopped=run.clock.left_out[PROOF])
-    return selection, certificate
+    certificate, stopped = run.clock.tried(judge)
+    return replace(selection, stopped=stopped or selection.stopped), certificate
 
 
 def find_path(instance: Instance, formulation: Formulation, run: Run, offset: float = 0.0) -> Found:

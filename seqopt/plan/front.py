@@ -22,10 +22,10 @@ from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import States
 from seqopt.judge._schedules import ordered, plan_values
 from seqopt.judge.certificate import TOLERANCE
-from seqopt.plan._answers import PROOF, called, readable, with_numbers
+from seqopt.plan._answers import called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
 from seqopt.plan.pose import states_of
-from seqopt.plan.solve import RANGE, best_within, leaves
+from seqopt.plan.solve import best_within, leaves
 from seqopt.problem.amounts import REGRIPS, STEPS
 from seqopt.problem.problem import Problem
 from seqopt.responses._grip_sets import Moved, most_moved
@@ -219,11 +219,9 @@ def find_front(
         left = max(0.0, end - time.perf_counter())
         front = _front_of(posed, formulation, left, progress, watch)
 
-        def largest() -> tuple[Moved, ...]:
-            pairs = zip(front.engines, front.steps, strict=True)
-            return tuple(most_moved(engine, steps, {}) for engine, steps in pairs)
-
-        return replace(front, moved=watch.spare(RANGE, largest, ()))
+        pairs = zip(front.engines, front.steps, strict=True)
+        moved = tuple(most_moved(engine, steps, {}) for engine, steps in pairs)
+        return replace(front, moved=moved)
 
     def farthest(front: Front) -> Moved | None:  # all of its plans keep the range, or none can
         return max(front.moved, key=lambda each: each.share, default=None)
@@ -254,17 +252,13 @@ def _front_of(
         if (np.delete(points, i, axis=0) <= point).all(axis=1).any():
             raise SolverError(f"the point {point.tolist()} is dominated by another one")
 
-    def complete() -> bool:
+    def complete() -> None:
         bounds = upper_bounds(points)
         for bound in with_progress("proving that no plan is missing", bounds, progress):
             if not problem.is_empty_below(bound):
                 raise SolverError(f"the set lacks a point below {bound.tolist()}")
-        return True
 
-    stopped = clock.why(chosen[0].stopped)
-    if not stopped:
-        whole = clock.spare(PROOF, complete, otherwise=False)
-        stopped = "" if whole else clock.left_out[PROOF]
+    stopped = clock.why(chosen[0].stopped) or clock.tried(complete)[1]
     spent = {"solve": solved - start, "verify": time.perf_counter() - solved}
     counts = {"steps": [len(steps) for steps in plans]}
     counts["regrips"] = [sum(s.kind is StepKind.REPOSITION for s in steps) for steps in plans]

@@ -42,7 +42,6 @@ from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.steps import Step
 from seqopt.work.progress import INTERRUPT
 
-RANGE = "how far it leaves the linear range"  # what it is called where there was no time for it
 NONE_KEEPS = "no plan keeps it"
 UNKNOWN = "whether any plan keeps it is not known"
 INTERRUPTED = f"{UNKNOWN} (interrupted)"
@@ -105,8 +104,8 @@ def solve(
 def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
     """Solve a problem, or choose from a given graph or instance, within the limits of a run.
 
-    Parts without time are skipped and noted by the clock: without the proof, values and bounds are
-    claimed only. Raises `TimeUpError` if there is no plan in time.
+    A proof without time is left out: values and bounds are claimed only. Raises `TimeUpError` if
+    there is no plan in time.
     """
     if isinstance(problem, Decisions):
         problem = of_decisions(problem)
@@ -133,15 +132,9 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
             plan = from_arms("with_postures")(asked, plan, solved)
         known = {} if plan.search is None or plan.graph.scenarios else plan.search.fields
 
-        def largest() -> Moved | None:
-            engines = plan.graph.scenarios or (plan.engine,)
-            each = (most_moved(engine, plan.steps, known) for engine in engines)
-            return max(each, key=lambda moved: moved.share)
-
-        moved = run.clock.spare(RANGE, largest, None)
-        if moved is None and run.clock.left_out[RANGE] == INTERRUPT:
-            return interrupted(plan)
-        return replace(plan, moved=moved)
+        engines = plan.graph.scenarios or (plan.engine,)
+        each = (most_moved(engine, plan.steps, known) for engine in engines)
+        return replace(plan, moved=max(each, key=lambda moved: moved.share))
 
     def interrupted(plan: Plan) -> Plan:
         return replace(plan, selection=replace(plan.selection, stopped=INTERRUPT))

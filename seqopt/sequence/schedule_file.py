@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from seqopt._files import Row, harmless, parse_json, read_table, read_text
@@ -336,3 +337,53 @@ def _by_robot(scene: Scene, told: object, where: str) -> tuple[int | None, ...] 
     if not isinstance(told, Mapping) or any(name not in names for name in told):
         raise StepError(f"{where}: {short(told)}; give nodes by robot, of {', '.join(names)}")
     return tuple(told.get(name) for name in names)
+
+
+def without(
+    scene: Scene, site: Site, lost: Sequence[str] = (), missing: Sequence[int] = ()
+) -> tuple[Scene, Site]:
+    """Return scene and site without robots that are lost, and without bricks that are missing.
+
+    A lost robot releases its node and is not used again. A missing brick that stood is placed
+    again next; a later one waits for all bricks that are not connected through it. Grips on
+    missing bricks are released.
+    """
+    names = [robot.name for robot in scene.robots]
+    for name in lost:
+        if name not in names:
+            raise StepError(f"robot {name} does not exist; give some of {', '.join(names)}")
+    for brick in missing:
+        if brick not in scene.build_order:
+            raise StepError(f"brick {brick} does not exist; name a brick of scene {scene.name}")
+    stood, later = scene.build_order[: site.bricks], scene.build_order[site.bricks :]
+    stands = tuple(name for name in stood if name not in missing)
+    again = tuple(name for name in stood if name in missing)
+    last = tuple(name for name in later if name in missing)
+    rest = tuple(name for name in later if name not in missing)
+    held = tuple(
+        None if name in lost or (node and scene.brick_of_node[node].name in again) else node
+        for name, node in zip(names, site.holds(scene), strict=True)
+    )
+    before, after = _while_missing(scene, {*stands, *again}, rest)
+    order = (*stands, *again, *before, *last, *after)
+    made = scene if order == scene.build_order else in_order(scene, order)
+    ages = tuple(a for n, a in zip(stood, site.ages, strict=False) if n not in missing)
+    return made, replace(site, bricks=len(stands), grips=held, ages=ages)
+
+
+def _while_missing(
+    scene: Scene, stand: set[int], rest: Sequence[int]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return bricks tied to the standing part or the ground, and those that wait."""
+    beside: dict[int, set[int]] = {name: set() for name in scene.build_order}
+    for first, second in (joint.bricks for joint in scene.joints):
+        beside[first].add(second)
+        beside[second].add(first)
+    grounded = {ground.brick for ground in scene.grounds if ground.closes_with is None}
+    placed, waiting = list[int](), list(rest)
+    while True:
+        tied = next((b for b in waiting if b in grounded or beside[b] & {*stand, *placed}), None)
+        if tied is None:
+            return tuple(placed), tuple(waiting)
+        placed.append(tied)
+        waiting.remove(tied)

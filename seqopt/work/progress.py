@@ -135,19 +135,13 @@ TIME, INTERRUPT = "time", "interrupt"  # why something ended early
 
 
 class Clock:
-    """How much time a piece of work has in all, and what it left out for lack of it.
+    """How much time posing, search and proof have in all.
 
-    Parts of the work that can say what they have by then ask for what is ``left``. Others are ended
-    from outside, `GRACE` after that; an interrupt ends that part alone in which it comes.
-
-    ``left_out``: why, by what was left out: `TIME` or `INTERRUPT`; ``interrupted``: whether anybody
-    asked for an end.
+    Searches ask for what is ``left``. Other work is ended from outside, `GRACE` after that.
     """
 
     def __init__(self, seconds: float = math.inf) -> None:
         self._end = time.perf_counter() + seconds
-        self.left_out: dict[str, str] = {}
-        self.interrupted = False
 
     @property
     def left(self) -> float:
@@ -172,13 +166,12 @@ class Clock:
         except TimeoutError:
             raise TimeUpError(f"{what} takes longer; give more") from None
 
-    def spare(self, what: str, work: Callable[[], _Result], otherwise: _Result) -> _Result:
-        """Return what some work finds that can be left out, or where it ends early what else."""
+    def tried(self, work: Callable[[], _Result]) -> tuple[_Result | None, str]:
+        """Return what some work finds, or None and why it ended early: `TIME` or `INTERRUPT`."""
         try:
             with ending(self._end + GRACE - time.perf_counter()):
-                return work()
+                return work(), ""
         except TimeoutError:
-            self.left_out[what] = TIME
+            return None, TIME
         except KeyboardInterrupt:
-            self.left_out[what], self.interrupted = INTERRUPT, True
-        return otherwise
+            return None, INTERRUPT

@@ -14,10 +14,9 @@ from PIL import Image
 
 from experiments.exchange.four_arms import EXAMPLES, SCENES
 from seqopt.errors import StepError
-from seqopt.exchange.exports import read_folder
 from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.schedule_file import parse_plan
-from tests.builders import ROOT
+from tests.builders import ROOT, read_folder
 
 
 def content(name, file):

@@ -15,10 +15,11 @@ from seqopt._files import csv_text
 from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_json
-from seqopt.exchange.exports import export_plan, read_folder
+from seqopt.exchange.exports import export_plan
 from seqopt.report._pictures import steps_picture
 from seqopt.report._robots import _known_arms
 from tests.arms.scenes import TOOL, beside, two_arms
+from tests.builders import read_folder
 
 pytest.importorskip("pinocchio")
 pytest.importorskip("coal")

@@ -1,4 +1,4 @@
-"""The command ``assess``: rows that are kept, chosen margins, and the map."""
+"""The command ``assess``: mortars, and what enters no verdict."""
 
 from __future__ import annotations
 
@@ -11,46 +11,9 @@ import pytest
 import seqopt
 from seqopt._cli.main import main
 from seqopt.scene.scene_file import load_scene, save_scene
-from seqopt.stability._steps import stability_row
 
 ARCH = "arch:span=1,rise=0.4,pattern=VLR"
 WORDS = ["assess", ARCH, "--method", "sequential", "--mortar", "dry"]
-
-
-def ended_in(row):
-    """What makes rows of verdicts, and is interrupted in one."""
-    made = []
-
-    def until(step, result):
-        if len(made) == row - 1:
-            raise KeyboardInterrupt
-        made.append(step)
-        return stability_row(step, result)
-
-    return until
-
-
-@pytest.mark.parametrize("found", [0, 5])
-def test_what_was_found_before_an_interrupt_is_written(capsys, tmp_path, monkeypatch, found):
-    out = tmp_path / "out.csv"
-    monkeypatch.setattr("seqopt._cli.commands.assess.stability_row", ended_in(found + 1))
-    assert main([*WORDS, "--out", str(out)]) == 130
-    said = f"; {found} of 17 verdicts were found" if found else ""
-    assert capsys.readouterr().err == f"seqopt: interrupted{said}\n"
-    assert out.exists() == bool(found)
-    if found:
-        monkeypatch.undo()
-        own = seqopt.assess(ARCH, method="sequential", mortar="dry").head(found)
-        assert pd.read_csv(out)["verdict"].tolist() == own["verdict"].tolist()
-
-
-@pytest.mark.parametrize(("words", "known"), [("4:6", [4, 5, 6]), ("16:", [16, 17])])
-def test_margins_of_some_steps(capsys, tmp_path, words, known):
-    out = tmp_path / "out.csv"
-    assert main([*WORDS, "--steps", words, "--margins", "bond", "--out", str(out)]) == 1
-    table = pd.read_csv(out)
-    assert table["step"][table["bond_needed_Pa"].notna()].tolist() == known
-    assert table["friction_needed"].isna().all()
 
 
 def test_without_a_mortar_both_answers_are_given(capsys, tmp_path):
@@ -69,8 +32,10 @@ def test_without_a_mortar_both_answers_are_given(capsys, tmp_path):
     assert [*found["verdicts"]] == [*found["mortar"]] == ["epoxy"]
     assert main([*WORDS, "--out", str(out)]) == 1  # what is asked alone decides
     assert set(pd.read_csv(out)["mortar"]) == {"dry"}
-    both = seqopt.assess(ARCH, method="sequential")
-    assert both["verdict"].tolist() == table["verdict"].tolist()
+    network = seqopt.build_network(load_scene(ARCH))
+    steps = seqopt.sequential(network)
+    both = [seqopt.assess_steps(network, steps, mortar) for mortar in ("dry", "epoxy")]
+    assert [e.verdict.value for each in both for e in each] == table["verdict"].tolist()
 
 
 @pytest.mark.parametrize(("fall", "said"), [(-0.005, "leaves their balance"), (-0.5, "not small")])
@@ -88,8 +53,6 @@ def test_a_movement_of_the_ground_is_said_to_enter_no_verdict(capsys, tmp_path, 
     err = capsys.readouterr().err
     assert start in err
     assert said in err
-    notes = seqopt.assess(path, method="sequential", mortar="dry").attrs["notes"]
-    assert [note for note in notes if note.startswith(start)]
     any_range = ["--rule", "payload=ignored", "--limit", "linear_range=any"]
     assert main(["optimize", str(path), "--schedule", "free", *any_range]) == 0
     assert start in capsys.readouterr().err

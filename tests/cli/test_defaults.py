@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 
 import pytest
 
 import seqopt
-from seqopt import doors
 from seqopt._cli.arguments import request
 from seqopt._cli.main import main
 from seqopt._cli.signatures import signature_of
 from seqopt._cli.words import HIDDEN
 from seqopt._registry import COMMANDS
 from seqopt.scene.scene_file import save_scene
-from seqopt.workflow import Part
 from tests.builders import small_arch
 
 UNLIKE = (  # of one run, or added by the command
@@ -53,80 +50,44 @@ def test_python_and_the_command_line_answer_alike(capsys, arch, words, given):
     assert (found["written"], found["exit_status"]) == ([], 0)
 
 
-def test_pareto_in_python_is_the_command(capsys, arch, tmp_path):
+def test_pareto_and_replan_are_what_python_finds(capsys, arch, tmp_path):
     words = ("--aim", "F_largest,steps", "--rule", "least_grips=1")
     found = answered(capsys, "pareto", arch, *words)["points"]
-    same = seqopt.pareto(seqopt.load_scene(arch), aim="F_largest,steps", rules="least_grips=1")
-    assert [row["F_largest"] for row in found] == [*same.table["F_largest"]]
-    seqopt.pareto(
-        arch, aim="F_largest,M_sup", limits=[seqopt.Limit("F_largest", 1e6)], out=tmp_path / "set"
-    )
-    assert (tmp_path / "set" / "pareto.csv").is_file()
-
-
-def test_assess_and_replan_in_python_are_the_commands(capsys, arch, tmp_path):
-    """Of a plan, and of the folder that it is written to."""
+    asked = {"schedule": "free", "aim": "F_largest,steps", "rules": "least_grips=1"}
+    front = seqopt.find_front(seqopt.optimize(arch, **asked).problem)
+    assert [row["F_largest"] for row in found] == [*front.table["F_largest"]]
     plan, folder = seqopt.optimize(arch, "free"), tmp_path / "p"
     assert main(["optimize", str(arch), "--schedule", "free", "--out", str(folder)]) == 0
     capsys.readouterr()
-    found = answered(capsys, "assess", folder, "--mortar", "epoxy", "--margins", "bond")["steps"]
     words = ("--at", "4", "--lost", "rob3", "--rule", "least_grips=1")
     again = answered(capsys, "replan", folder, *words)["plan"]
-    for built in (plan, folder):
-        same = seqopt.assess(built, mortar=seqopt.EPOXY, margins="bond")
-        assert [row["verdict"] for row in found] == [*same["verdict"]]
-        rest = seqopt.replan(built, at=4, lost=["rob3"], rules="least_grips=1")
-        assert [row["step"] for row in again] == [step.number for step in rest.steps]
+    begin = seqopt.Site.after(plan.steps, 4)
+    part = seqopt.Part(schedule="free", begin=begin, lost=["rob3"])
+    rest = seqopt.optimize(arch, part, rules=["least_grips=1"])
+    assert [row["step"] for row in again] == [step.number for step in rest.steps]
+    with pytest.raises(seqopt.SeqoptError, match=r"^missing 2: a build that goes on"):
+        seqopt.optimize(arch, seqopt.Part(schedule="free", missing=[2]))
 
 
-def test_every_command_has_a_function_of_python():
-    """Those that describe a scene, read one or look a move up have values that do the same."""
-    functions = {*doors.__all__} - {"Answer", "Command"}
-    assert functions == COMMANDS.keys() - {"scene", "import"}
-    for name in functions:
-        taken = inspect.signature(getattr(doors, name)).parameters.values()
-        assert all(each.kind is not each.VAR_KEYWORD for each in taken), name
-        assert len(taken) <= 20, name
-
-
-def test_what_functions_take_is_written_once():
-    """Commands are functions of Python: parameters are options, or values that options make."""
-    for name in {*doors.__all__} - {"judge", "optimize", "sweep", "Answer", "Command"}:
-        function = getattr(doors, name)
-        assert COMMANDS[name].load() is function
-        known = signature_of(function)
-        taken = {*inspect.signature(function).parameters} - {"progress"}
-        assert taken <= {*known.options, *known.spread}
+def test_options_are_said_in_docstrings():
+    for name, command in COMMANDS.items():
+        known = signature_of(command.load())
         assert {*known.options} <= {*known.texts(), *HIDDEN}, name
 
 
-def test_words_that_make_a_value_stand_beside_it(arch):
-    """As `grips` of a scene; what nothing is made of is refused."""
-    soft = seqopt.load_scene(arch).with_grips(1e6)
-    own, same = (
-        doors.analyze(scene, method="cantilever", **words)
-        for scene, words in ((soft, {}), (arch, {"grips": 1e6}))
-    )
-    assert own.equals(same)
-    assert not own.equals(doors.analyze(arch, method="cantilever"))
-    with pytest.raises(TypeError, match="unexpected keyword argument 'grip'"):
-        doors.analyze(arch, grip=1e6)
-
-
 def test_a_build_begins_where_python_says(arch):
-    plan = seqopt.optimize(arch, Part(schedule="free", begin=2))
+    plan = seqopt.optimize(arch, seqopt.Part(schedule="free", begin=2))
     assert (plan.steps[0].bricks, plan.problem.moves.begin.bricks) == (2, 2)
     assert seqopt.optimize(arch, "free").steps[0].bricks == 1
     with pytest.raises(seqopt.SeqoptError, match=r"^direction take-down: it goes with schedule="):
-        seqopt.optimize(arch, Part(direction="take-down"))
+        seqopt.optimize(arch, seqopt.Part(direction="take-down"))
 
 
 def test_help_is_what_docstrings_say():
-    compared, chosen = (signature_of(each).texts() for each in (seqopt.compare, seqopt.optimize))
-    assert "reference : str, optional" in inspect.getdoc(seqopt.compare)
-    assert compared["reference"][2].startswith("With ``speed``: the engine that values plans")
-    assert compared["mortar"] == ("Parameters", "optional", chosen["mortar"][2])
-    assert "(default: auto)" in compared["engine"][2]
+    compared, chosen = (signature_of(COMMANDS[n].load()).texts() for n in ("compare", "optimize"))
+    assert compared["reference"][1].startswith("With ``speed``: the engine that values plans")
+    assert compared["mortar"] == ("optional", chosen["mortar"][1])
+    assert "(default: auto)" in chosen["engine"][1]
 
 
 def test_messages_about_parameters_name_options():

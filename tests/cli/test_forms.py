@@ -55,11 +55,11 @@ def test_json_of_optimize_is_its_summary_and_its_plan(capsys, tmp_path):
 
 
 def test_an_answer_that_does_not_hold_is_still_a_document(capsys):
-    status, out, err = run(capsys, "analyze", "--method", "cantilever", "--strict", "--json")
+    status, out, err = run(capsys, "assess", SMALL, "--mortar", "dry", "--json")
     found = strict(out)
-    assert status == found["exit_status"] == 1
-    assert found["failures"] == [err.splitlines()[-1]]
-    assert found["failures"][0].startswith("seqopt: payload exceeded: ")
+    assert (status, err.count("\n")) == (1, len(found["notes"]))
+    assert found["exit_status"] == 1
+    assert found["verdicts"]["dry"]["does not stand"]
 
 
 def test_quiet_prints_the_paths_of_what_is_written(capsys, tmp_path):

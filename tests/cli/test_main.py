@@ -11,11 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from seqopt._cli.arguments import request
 from seqopt._cli.main import main
-from seqopt.responses.table import analyze, step_fields
+from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import save_scene
-from seqopt.sequence.methods import cantilever, sequential
+from seqopt.sequence.methods import sequential
 from seqopt.study.published import printed_steps
 from tests.builders import anywhere, from_both_ends
 from tests.commands import beside_models
@@ -75,61 +74,6 @@ def test_analyze_writes_the_columns_of_table_a1(capsys, tmp_path, engine25):
         assert (table[column] - values[column]).abs().max() <= close
 
 
-def test_full_fields_on_request(capsys, tmp_path, engine25, arch25):
-    path = tmp_path / "fields.npz"
-    assert run(capsys, "analyze", "--method", "cantilever", "--fields", str(path))[0] == 0
-    step = cantilever(engine25.network)[34]
-    want = step_fields(engine25, step)
-    with np.load(path) as archive:
-        for name in ("edge_force", "displacement", "grip_force", "support"):
-            assert (archive[f"step35_{name}"] == getattr(want, name)[0]).all()
-        assert len(archive["edge_nodes"]) == 77
-        assert archive["step49_support"].shape == (2, 6)
-        assert archive["support_brick"].tolist() == [1, 25]
-        assert archive["support_point"].tolist() == [list(g.anchor) for g in arch25.grounds]
-
-
-def ends_in_step(number, how=TimeoutError):
-    """Return what is told of every step, and ends as a time limit does: in the midst of one.
-
-    ``how``: or as somebody does who interrupts.
-    """
-    told = iter(range(1, number))
-
-    def tell(_):
-        if next(told, None) is None:
-            raise how
-
-    return tell
-
-
-def test_a_time_limit_of_analyze_leaves_the_rows_so_far(tmp_path):
-    path, fields = tmp_path / "rows.csv", tmp_path / "fields.npz"
-    words = ["analyze", "--method", "cantilever", "--out", str(path), "--fields", str(fields)]
-    answer = request([*words, "--time-limit", "1e9"]).result(ends_in_step(4))
-    assert answer.status == 4
-    assert answer.failures == (
-        "seqopt: error: --time-limit 1e+09: 3 of 49 steps computed; give more seconds",
-    )
-    assert pd.read_csv(path)["step"].tolist() == [1, 2, 3]
-    with np.load(fields) as archive:
-        assert {name.split("_")[0] for name in archive} > {"step1", "step2", "step3"}
-        assert "step4_support" not in archive
-
-
-def test_an_interrupt_of_analyze_leaves_the_rows_so_far(tmp_path):
-    """Dry steps take discrete elements, and it is said that these take long."""
-    path = tmp_path / "rows.csv"
-    words = ["analyze", "wall:columns=2,courses=2", "--method", "sequential", "--out", str(path)]
-    tell = ends_in_step(3, KeyboardInterrupt)
-    answer = request([*words, "--engine", "auto", "--mortar", "dry"]).result(tell)
-    assert answer.status == 130
-    (said,) = answer.failures
-    assert said.startswith("seqopt: interrupted; 2 of ")
-    assert said.endswith("steps computed, 2 by discrete elements, which are what takes long")
-    assert pd.read_csv(path)["step"].tolist() == [1, 2]
-
-
 def test_robots_by_name_and_those_that_never_grip(capsys, tmp_path):
     words = ("--schedule", "two-robot", "--robots", "rob3,rob1", "--formulation", "overlap_dp")
     status, _, err = run(capsys, "optimize", *words, "--no-stability", "--out", str(tmp_path))
@@ -153,7 +97,7 @@ def test_assess_a_plan_with_a_mortar_of_ones_own(capsys, tmp_path):
     rows += ["3,release,2,1,,"]
     plan.write_text("\n".join(rows) + "\n", encoding="utf-8")
     for strength, verdict in (("600", "does not stand"), ("640", "stands")):
-        mortar = ("--mortar", "dry", "--tensile-strength", strength, "--cohesion", "1e4")
+        mortar = ("--mortar", f"bond={strength}")
         status, out, _ = run(capsys, "assess", "--plan", str(plan), *mortar, "--margins", "bond")
         assert status == (verdict != "stands")
         last = pd.read_csv(io.StringIO(out)).iloc[-1]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import seqopt
-from seqopt._cli.signatures import signature_of
-from seqopt.workflow import _pose_build
+from seqopt._cli.signatures import Call
+from seqopt.workflow import optimize, pose_build
 
 FREE, SCENE = {"schedule": "free"}, "chain:bricks=6"
 QUESTIONS = [
@@ -19,9 +19,14 @@ QUESTIONS = [
 ]
 
 
+def posed(words):
+    """The problem that words of the command line pose."""
+    return pose_build(Call(optimize, {"scene": SCENE, **words}).values())
+
+
 @pytest.mark.parametrize("words", QUESTIONS, ids=str)
 def test_both_pose_the_same_problem(words):
-    asked = signature_of(_pose_build).call({"scene": SCENE, **words})
+    asked = posed(words)
     values = {**words, "robots": words["robots"].split(",")} if "robots" in words else words
     found = seqopt.optimize(SCENE, **values).problem
     assert repr(asked) == repr(found)
@@ -30,6 +35,6 @@ def test_both_pose_the_same_problem(words):
 
 
 def test_another_question_is_another_problem():
-    asked = [signature_of(_pose_build).call({"scene": SCENE, **each}) for each in (FREE, {})]
+    asked = [posed(each) for each in (FREE, {})]
     assert asked[0].criterion != asked[1].criterion
     assert asked[0].goals != asked[1].goals

@@ -35,7 +35,6 @@ def test_an_input_is_not_overwritten(capsys, tmp_path):
     for words in (
         ("scene", scene, "--export", scene),
         ("analyze", "--plan", plan, "--out", plan),
-        ("analyze", "--plan", plan, "--fields", plan),
         ("analyze", scene, "--plan", plan, "--out", scene),
         ("assess", "--plan", plan, "--out", plan),
         ("optimize", scene, "--formulation", "overlap_dp", "--out", tmp_path),

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt import doors
 from seqopt._registry import ADDED, COMMANDS, every_command
 from seqopt.errors import PluginWarning, ProblemError
 from tests.commands import command
@@ -19,9 +18,6 @@ def weigh(
     scene: str = "arch25", *, per: str = "scene", least: float = 0.0, names: tuple[str, ...] = ()
 ):
     """Say what the bricks of a scene weigh.
-
-    Usage
-    [SCENE] [--per brick]
 
     Parameters
     ----------
@@ -46,7 +42,7 @@ def weigh(
     return f"{found.name}: {len(weights)} bricks weigh {sum(weights.values()):.4g} kg"
 
 
-WEIGH = doors.Command("weigh", weigh)
+WEIGH = seqopt.Command("weigh", weigh)
 
 
 @pytest.fixture
@@ -67,7 +63,7 @@ def test_a_package_adds_a_command(package, capsys):
     package(f"{__name__}:WEIGH")
     assert "    weigh     Say what the bricks of a scene weigh." in command(capsys, "--help")[1]
     page = command(capsys, "weigh", "--help")[1]
-    assert "usage: seqopt weigh [SCENE] [--per brick]" in page
+    assert "usage: seqopt weigh [SCENE] [options]" in page
     assert "--least KG" in page
     assert "seqopt weigh arch25 --per brick" in page
     scene = "chain:bricks=7"
@@ -112,7 +108,8 @@ def count(
 ):
     """Count.
 
-    What is counted?
+    Parameters
+    ----------
     folder : DIR
         where
     kind : CHOICE
@@ -122,12 +119,12 @@ def count(
     loud :
         say it louder
     """
-    return doors.Answer({"kind": kind}, f"{folder.name} {kind} {most}{'!' * loud}")
+    return f"{folder.name} {kind} {most}{'!' * loud}"
 
 
 @pytest.mark.usefixtures("alone")
 def test_a_function_is_registered_as_a_command(capsys, tmp_path):
-    seqopt.register(doors.Command("count", count))
+    seqopt.register(seqopt.Command("count", count))
     assert {*every_command()} == {*COMMANDS, "count"}
     assert command(capsys, "count", tmp_path / "a", "--loud")[1] == "a all 3!\n"
     assert command(capsys, "count", tmp_path, "--most", "0", "--kind", "odd")[0] == 0
@@ -135,9 +132,9 @@ def test_a_function_is_registered_as_a_command(capsys, tmp_path):
     assert "did you mean odd?" in command(capsys, "count", tmp_path, "--kind", "od")[2]
     assert "arguments are required: DIR" in command(capsys, "count")[2]
     with pytest.raises(ProblemError, match="this name has a meaning already"):
-        seqopt.register(doors.Command("scene", count))
-    own = doors.Command("say", lambda scene="arch25", *, engine="x": f"{scene} {engine}")
+        seqopt.register(seqopt.Command("scene", count))
+    own = seqopt.Command("say", lambda scene="arch25", *, engine="x": f"{scene} {engine}")
     seqopt.register(own)  # what these words mean elsewhere is not meant
     assert command(capsys, "say", "mine", "--engine", "own")[1] == "mine own\n"
-    seqopt.register(doors.Command("five", lambda: 5))
-    assert "it returns int; return a text, a table or an Answer" in command(capsys, "five")[2]
+    seqopt.register(seqopt.Command("five", lambda: 5))
+    assert "it returns int; return a text or a table" in command(capsys, "five")[2]

@@ -110,7 +110,7 @@ def test_the_rest_is_planned_anew(capsys, folder, tmp_path):
     assert status == 3
     assert "or with one more robot that reaches every node" in err
     for wrong, said in (
-        (("--at", "x"), "give a number"),
+        (("--at", "x"), "--at x: give a whole number from 0"),
         (("--at", "3", "--payload", "rob8=1"), "give ROBOT=NEWTON"),
         (("--at", "3", "--missing", "x"), "give the number of a brick"),
     ):

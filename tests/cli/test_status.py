@@ -140,21 +140,6 @@ def test_statuses():
     assert [row for row in rows if row.isdigit()] == [str(status.value) for status in Status]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("words", "status"),
-    [
-        ((*ANALYZE,), 0),
-        ((*ANALYZE, "--strict"), 1),  # rob2 would hold 406 N of 392 N
-        (("compare", "--strict", "--no-stability"), 1),
-    ],
-)
-def test_strict_asks_for_payloads(capsys, words, status):
-    assert main(list(words)) == status
-    err = capsys.readouterr().err
-    assert ("seqopt: payload exceeded: rob2 holds up to" in err) == (status == 1)
-
-
 def test_a_mechanism_has_no_answer(capsys, tmp_path):
     plan = tmp_path / "plan.csv"
     plan.write_text("step,type,bricks,rob1_node\n1,place,1,1\n", encoding="utf-8")

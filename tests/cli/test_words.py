@@ -38,7 +38,7 @@ def test_without_words_it_shows_three_examples_that_are_commands(capsys):
         ("optimize --formulation beam --criteria t_max --out x", "T_max"),
         ("optimize --formulation beam --candidates nere:3 --out x", "near"),
         ("optimize --robust worst-peak --vary stifness=2 --out x", "stiffness"),
-        ("pareto chain:bricks=7 --aim D_max --pick D_mx --out x", "D_max"),
+        ("pareto chain:bricks=7 --aim D_mx --out x", "D_max"),
         ("import a.obj --unit mmm --out x", "mm"),
     ],
 )

@@ -7,17 +7,15 @@ import json
 import pytest
 
 from seqopt._files import write_text
-from seqopt.errors import FileError, SceneError, StepError
+from seqopt.errors import SceneError, StepError
 from seqopt.exchange._content import Given
-from seqopt.exchange.exports import export_plan, read_folder
+from seqopt.exchange.exports import export_plan
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
-from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind
 from tests.builders import six_bricks
 from tests.documents import DOCUMENTS
-from tests.quality.fuzz_cases import plan_text
 
 SCENE = six_bricks()
 STEPS = METHODS["cantilever"](build_network(SCENE), ())
@@ -50,18 +48,6 @@ def test_an_assembly_keeps_all_and_gains_the_plan(sources):
         grips = tuple(row["holds"].get(name, [None])[0] for name in names)
         told.append(Step(row["step"], StepKind(row["type"]), count, grips))
     assert tuple(told) == steps
-
-
-def test_a_folder_is_read_whole(tmp_path):
-    save_scene(SCENE, tmp_path / "scene.json")
-    with pytest.raises(FileError, match=r"it has no plan\.csv; give a folder of"):
-        read_folder(tmp_path)
-    (tmp_path / "pick").mkdir()
-    (tmp_path / "pick" / "plan.csv").touch()
-    with pytest.raises(FileError, match=r"it has no plan\.csv; give .*pick$"):
-        read_folder(tmp_path)
-    write_text(tmp_path / "plan.csv", plan_text(SCENE, STEPS))
-    assert read_folder(tmp_path) == (SCENE, STEPS)
 
 
 def test_what_does_not_fit_is_refused(sources, tmp_path):

@@ -61,7 +61,7 @@ SLOW = {
 }
 LONG = {
     "order": f"{FREE} --order search {WORST}",
-    "front": "pareto arch25 --pick D_max --under F_largest=250",
+    "front": "pareto arch25",
     "chain of 97": "optimize chain:bricks=97 --schedule free --criteria worst-ratio",
 }
 FILES = ("own.csv", "answers", "front")  # words that stand for files in a folder

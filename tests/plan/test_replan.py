@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError, StepError
 from seqopt.plan.pose import states_of
-from seqopt.plan.replan import compared, goes_on, without
+from seqopt.plan.replan import compared, goes_on
 from seqopt.sequence.rules import FreeRules
+from seqopt.sequence.schedule_file import without
 from seqopt.sequence.steps import Site
 from tests.brute_force import ONES
 from tests.builders import small_arch

@@ -52,10 +52,6 @@ def _out(rng: np.random.Generator, name: str) -> list[str]:
     return ["--out", name] if rng.random() < 0.7 else []
 
 
-def _strict(rng: np.random.Generator) -> list[str]:
-    return ["--strict"] if rng.random() < 0.2 else []
-
-
 def _optimize(rng: np.random.Generator, _: object) -> list[str]:
     schedule = pick(rng, ("three-robot", "modified-sequential"))
     criterion = pick(rng, ("equations-2-3", "worst-ratio", "T_max,M_sup=2", "F_each", "D_max"))
@@ -63,29 +59,26 @@ def _optimize(rng: np.random.Generator, _: object) -> list[str]:
     formulation = pick(rng, formulation_names())
     return [
         *("--formulation", formulation, "--schedule", schedule, "--criteria", criterion),
-        *(*limit, "--out", "out", "--engine", pick(rng, QUICK), *_strict(rng)),
+        *(*limit, "--out", "out", "--engine", pick(rng, QUICK)),
     ]
 
 
 MORE: dict[str, Callable[[np.random.Generator, bool], list[str]]] = {
     "scene": lambda rng, _: ["--export", "out.json"] if rng.random() < 0.5 else [],
-    "analyze": lambda rng, plan: [
-        *(*_steps(rng, plan), *_engine(rng), *_out(rng, "out.csv"), *_strict(rng)),
-        *(["--fields", "out.npz"] if rng.random() < 0.2 else []),
-    ],
+    "analyze": lambda rng, plan: [*(*_steps(rng, plan), *_engine(rng), *_out(rng, "out.csv"))],
     "optimize": _optimize,
     "assess": lambda rng, plan: [
         *(*_steps(rng, plan), *_out(rng, "out.csv")),
         *(["--mortar", "dry"] if rng.random() < 0.5 else []),
     ],
-    "compare": lambda rng, _: _strict(rng),
+    "compare": lambda _, __: [],
 }
 WRONG_WORDS = (
-    *("--out", "--plan", "--limit", "--option", "--criteria", "--export", "--fields", "--no-proof"),
+    *("--out", "--plan", "--limit", "--option", "--criteria", "--export", "--no-proof"),
     *("scene.json", "plan.csv", "out/deep/er", "/dev/null", "/dev/full", "/nowhere/out", ".", ""),
     *("width=0", "width=-3", "width=10000000", "horizon=2", "charge=later", "F_rob1=1", "F_sup=1"),
     *("T_max=nan", "T_max=1e-320", "payload", "1e400", "-1", "\udcff", "\x1b[31m", "x" * 5000),
-    *("--friction", "--cohesion", "--tensile-strength", "1e-300", "1e300", "--strict", "--help"),
+    *("--friction", "1e-300", "1e300", "--help"),
 )
 
 

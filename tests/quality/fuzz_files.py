@@ -20,6 +20,7 @@ import numpy as np
 
 import seqopt
 from seqopt._cli.commands.replan import _told
+from seqopt._files import parse_json, read_text
 from seqopt.arms._postures import PostureTable
 from seqopt.arms._reached import Site as ArmSite
 from seqopt.arms._tables import _read as read_postures
@@ -109,7 +110,10 @@ def _of_scenes() -> Iterator[tuple[str, File]]:
     yield "measured", ("m.csv", measured, lambda path: read_measured(scene, path))
     told = {"schedule": "free", "rules": {"least_grips": 1}, "aims": ["minmax"], "limits": {}}
     told |= {"criterion": "worst-ratio"}
-    yield "summary", ("summary.json", _json(told), lambda path: _told(path.parent))
+    yield (
+        "summary",
+        ("summary.json", _json(told), lambda path: _told(parse_json(read_text(path), "summary"))),
+    )
 
 
 def _of_imports() -> Iterator[tuple[str, File]]:

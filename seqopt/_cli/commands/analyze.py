@@ -5,68 +5,44 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
-from math import inf
-from pathlib import Path
 from typing import Annotated
 
 import pandas as pd
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.inputs import find_engine, find_steps
+from seqopt._cli.inputs import find_engine, read_steps
 from seqopt._cli.outputs import Output
-from seqopt._cli.signatures import door
-from seqopt._cli.words import BuiltFrom, File, Words, as_built, shown
-from seqopt._files import write_bytes
-from seqopt._interrupts import ending
+from seqopt._cli.signatures import Call
+from seqopt._cli.words import File
 from seqopt.arms._kept import arm_faults
-from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import Engine, Fields, OpeningEngine, Want
 from seqopt.engines.registry import AutoEngine, provenance, recipe_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
-from seqopt.network.build import build_network
-from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import _prop_faults, length_word, overloads
 from seqopt.responses._enough import what_was_enough
 from seqopt.responses._tolerance import COLUMN, stiffness_for, tolerances_along
 from seqopt.responses.quantities import _plain, _steps_in_words, length_text
-from seqopt.responses.table import (
-    Departure,
-    LinearRange,
-    _with_faults,
-    archive,
-    response_table,
-    step_fields,
-)
+from seqopt.responses.table import LinearRange, _with_faults, response_table, step_fields
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Verdict
-from seqopt.work.progress import Clock, Tell, with_progress
+from seqopt.work.progress import Tell, with_progress
 
-INTERRUPTED = "seqopt: interrupted; the steps are those that were computed"
-RANGE = "whether they are in the linear range"
 UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 
-@door
-def analyze(  # noqa: PLR0913  # every option is a parameter
-    scene: BuiltFrom = "arch25",
+def analyze(
+    asked: Annotated[Call, ("call", read_steps)],
     *,
-    robots: Words | None = None,
     engine: str | None = None,
-    mortar: Mortar | str | None = None,
-    cache: Path | str | None = None,
-    progress: Tell = shown,
-    method: str | None = None,
-    plan: ShownBuild | Path | str | None = None,
+    mortar: str | None = None,
     tolerance: Annotated[str | None, ("value", "LENGTH"), ("const", "")] = None,
-    fields: File | None = None,
-    time_limit: float = inf,
-    out: File | None = None,
-) -> Answer[pd.DataFrame]:
+    out: File = None,
+    progress: Tell,
+) -> Answer:
     """Compute how the structure responds in every step of one sequence, and write a table.
 
     It has the columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in
@@ -74,31 +50,14 @@ def analyze(  # noqa: PLR0913  # every option is a parameter
 
     Parameters
     ----------
-    scene, robots, engine, mortar, cache, progress : optional
-        As of `optimize`; of a plan its steps are taken too.
-    method : str, optional
-        How it is built: by two robots, or published, the three-robot plan that Bruun et al. print
-        for arch25 (default: the first of sequential, cantilever that fits, or the steps of a plan's
-        folder).
-    plan : ShownBuild, pathlib.Path or str, optional
-        A plan's folder, or a CSV file of steps: step, type, bricks, NAME_node of each robot.
+    engine, mortar : optional
+        As of `optimize`.
     tolerance : str, optional
         Also find how far every grip may be from where it should be before a robot carries more than
         its payload, in the worst direction: a column tolerance_mm; of a length, such as 0.4mm, also
         how soft grips must be to be so far off.
-    fields : pathlib.Path or str, optional
-        Also write every edge force, node displacement and reaction, as a NumPy archive (.npz).
-    time_limit : float, optional
-        Limit of the whole command, with what is said of the steps: those that were computed by then
-        are written, and what there was no time for is named.
-    out : pathlib.Path or str, optional
+    out : pathlib.Path, optional
         CSV file to write (default: standard output).
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per step, units in the names of columns. ``attrs['notes']`` says what is worth
-        knowing, ``attrs['failures']`` which steps are mechanisms, or were not solved.
 
     Examples
     --------
@@ -106,96 +65,52 @@ def analyze(  # noqa: PLR0913  # every option is a parameter
     $ seqopt analyze my.json --plan plan.csv --out responses.csv
     $ seqopt analyze arch25 --method sequential --json
     """
-    output, archived = Output(out, scene, plan), None if fields is None else Path(fields)
-    output.keep_apart(output.path, archived)
-    clock, faults = Clock(time_limit), dict[int, SeqoptError]()
-    with clock.needed("reading scene and steps"):
-        built = as_built(scene).read(robots)
-        find_postures(built, cache, progress)
-        network = build_network(built)
-        computed = find_engine(network, engine, mortar)
-        named = find_steps(network, scene, plan, method, robots, progress, cache)
-    within, steps = LinearRange(computed), named.steps
-    solved = _solved(within, with_progress("steps", steps, progress), clock, faults)
-    answers = solved if archived is None else list(solved)
-    table = response_table(network, answers)
-    reached = len(table) + len(faults)
-    late, ended = _late(time_limit, reached, len(steps), computed, clock)
-    failures, status = (*_describe_faults(faults, reached), *late), _status_of(faults, ended)
-    solved_steps, off = [s for s in steps[:reached] if s.number not in faults], tuple[str, ...]()
-    if solved_steps and tolerance is not None:
-        tolerances = partial(_with_tolerances, tolerance, computed, solved_steps, table)
-        table, off = clock.spare("tolerances", tolerances, (table, off))
-    whole = _with_faults(built, table, steps, faults) if faults or table.empty else table
+    Output(out, asked.words.get("scene"), asked.words.get("plan")).keep_apart(out)
+    given = asked(progress=progress)
+    scene, computed = given.scene, find_engine(given.network, engine, mortar)
+    faults = dict[int, SeqoptError]()
+    within, steps = LinearRange(computed), with_progress("steps", given.steps, progress)
+    table = response_table(given.network, _solved(within, steps, faults))
+    solved = [step for step in given.steps if step.number not in faults]
+    notes = [*given.notes]
+    if solved and tolerance is not None:
+        table, off = _with_tolerances(tolerance, computed, solved, table)
+        notes += off
+    whole = _with_faults(scene, table, given.steps, faults) if faults else table
     mechanisms = sum(isinstance(fault, MechanismError) for fault in faults.values())
     counted = f"{len(whole)} steps" + f", {mechanisms} of them mechanisms," * bool(mechanisms)
-    said = outputs.put_table(output.path, whole, counted) if len(whole) else {}
-    answer = Answer({"steps": whole}, scene=built, value=whole, **said)
-    notes = (*named.notes, *off)
-    answer = replace(answer, notes=notes, failures=failures, status=status)
+    answer = Answer(
+        {"units": UNITS, "steps": whole, **provenance(computed)},
+        scene=scene,
+        failures=_describe_faults(faults, len(given.steps)),
+        status=_status_of(faults),
+        notes=(*notes, *remarks.level_notes(engine, computed)),
+        **outputs.put_table(out, whole, counted),
+    )
     if table.empty:
         return answer
-    if archived is not None:
-        write_bytes(archived, archive(network, answers))
-        answer = replace(answer, written=(*answer.written, archived))
-    return _explained(engine, answer, within, steps, table, clock)
-
-
-def _explained(
-    named: str | None,
-    answer: Answer[pd.DataFrame],
-    within: LinearRange,
-    steps: Sequence[Step],
-    table: pd.DataFrame,
-    clock: Clock,
-) -> Answer[pd.DataFrame]:
-    """Return an answer with what there is time to say of the steps that were computed."""
-    engine, scene = within.engine, answer.scene
-    departures = partial(within.departures, table)
-    outside: tuple[Departure, ...] = clock.spare(RANGE, departures, ())
-    found = partial(what_was_enough, within, {"": table})
-    enough = clock.spare("which model is enough", found, None)
-    facts = {"units": UNITS, **answer.facts, **provenance(engine)}
-    facts |= {"enough": None if enough is None else enough.facts()}
-    notes = (
-        *answer.notes,
-        *remarks.level_notes(named, engine),
-        *within.unchecked,
-        *(() if enough is None else enough.lines),
+    enough = what_was_enough(within, {"": table})
+    notes = [
+        *(*answer.notes, *within.unchecked, *enough.lines),
         *(f"payload exceeded: {excess}" for excess in overloads(scene, table)),
         *(f"props: {fault}" for fault in _prop_faults(scene, table)),
-        *_idle_note(scene, "robots", steps),
-    )
-    answer = remarks.in_time(replace(answer, facts=facts, notes=notes), clock, INTERRUPTED)
-    over = remarks.exceeded(scene, table)
-    cannot = arm_faults(scene, [s for s in steps if s.number in {*table["step"]}])
-    return remarks.held_to(answer, over, outside, unreached=cannot)
+        *_idle_note(scene, "robots", given.steps),
+    ]
+    facts = {**answer.facts, "enough": enough.facts()}
+    answer = replace(answer, facts=facts, notes=(*notes,))
+    over, left = remarks.exceeded(scene, table), within.departures(table)
+    return remarks.marked(answer, left, over, unreached=arm_faults(scene, solved))
 
 
 def _solved(
-    within: LinearRange, steps: Iterator[Step], clock: Clock, faults: dict[int, SeqoptError]
+    within: LinearRange, steps: Iterator[Step], faults: dict[int, SeqoptError]
 ) -> Iterator[tuple[Step, Fields]]:
-    """Yield solved steps with fields until the time limit or an interrupt.
-
-    Errors of the others go to ``faults``, by step number.
-    """
-    while True:
+    """Yield solved steps with fields; errors of the others go to ``faults``, by step number."""
+    for step in steps:
         try:
-            with ending(clock.left):
-                step = next(steps, None)
-                if step is None:
-                    return
-                fields = within.seen(step, step_fields(within.engine, step, Want.ALL))
-        except TimeoutError:
-            return
-        except KeyboardInterrupt:
-            clock.interrupted = True
-            return
+            yield step, within.seen(step, step_fields(within.engine, step, Want.ALL))
         except (MechanismError, SolverError) as error:
-            assert step is not None
             faults[step.number] = _fault(within.engine, step, error)
-        else:
-            yield step, fields
 
 
 def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:
@@ -233,12 +148,11 @@ def _describe_faults(faults: Mapping[int, SeqoptError], steps: int) -> tuple[str
     return tuple(out)
 
 
-def _status_of(faults: Mapping[int, SeqoptError], ended: Status) -> Status:
+def _status_of(faults: Mapping[int, SeqoptError]) -> Status:
     """Return the exit status, given the errors of steps."""
-    if ended is not Status.DONE or not faults:
-        return ended
-    failed = any(isinstance(error, SolverError) for error in faults.values())
-    return Status.FAILED if failed else Status.NO_ANSWER
+    if any(isinstance(error, SolverError) for error in faults.values()):
+        return Status.FAILED
+    return Status.NO_ANSWER if faults else Status.DONE
 
 
 def _with_tolerances(
@@ -259,19 +173,3 @@ def _with_tolerances(
     how = "however soft they are" if found is None else f"unless softer than {_plain(found, 3)} N/m"
     less = f"less than {length_text(wanted)} in {_steps_in_words(short)}"
     return table, (f"{said}, {less}, {how}",)
-
-
-def _late(
-    limit: float, computed: int, steps: int, engine: Engine, clock: Clock
-) -> tuple[tuple[str, ...], Status]:
-    """Return notes and status of an analysis that ended before the last step."""
-    if computed == steps:
-        return (), Status.DONE
-    so_far = f"{computed} of {steps} steps computed" if computed else "no step computed"
-    dear = engine.tally["discrete"] if isinstance(engine, AutoEngine) else 0
-    if dear:
-        so_far += f", {dear} by discrete elements, which are what takes long"
-    if clock.interrupted:
-        return (f"seqopt: interrupted; {so_far}",), Status.INTERRUPTED
-    said = f"seqopt: error: --time-limit {limit:g}: {so_far}; give more seconds"
-    return (said,), Status.FAILED

@@ -3,52 +3,47 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import pandas as pd
 
 from seqopt._cli import outputs, remarks
-from seqopt._cli.answer import Answer, Result
+from seqopt._cli.answer import Answer
 from seqopt._cli.inputs import find_engine, find_prover
 from seqopt._cli.outputs import Output
-from seqopt._cli.signatures import door
 from seqopt._cli.terminal import columns, wrapped
-from seqopt._cli.words import BuiltFrom, Folder, Words, as_built, shown
+from seqopt._cli.words import ARCH25, Built, Folder
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.arms.reach import find_postures
-from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance, simplest
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
-from seqopt.problem.requirements import Criterion
 from seqopt.report._pages import comparison_page
 from seqopt.report._regret._measure import check_reference
 from seqopt.report.comparison import Comparison, _printed_largest, format_comparison
 from seqopt.report.comparison import compare as compare_builds
 from seqopt.responses.table import builds_in_words
-from seqopt.stability._builds import BuildProver
+from seqopt.study.published import find_criterion
 from seqopt.work.progress import Tell
-from seqopt.workflow import DEFAULTS, _choose_criterion
+from seqopt.workflow import DEFAULTS
 
 SPEED = "Speed against regret"
 WHAT = "every build step by step"
 
 
-@door
 def compare(  # noqa: PLR0913  # every option is a parameter
-    scene: BuiltFrom = "arch25",
+    scene: Built = ARCH25,
     *,
-    robots: int | Words | None = None,
-    criterion: Criterion | str | None = None,
+    robots: int | str | None = None,
+    criterion: str | None = None,
     engine: str | None = None,
-    mortar: Mortar | str | None = None,
+    mortar: str | None = None,
     stability: bool = True,
-    cache: Path | str | None = None,
-    progress: Tell = shown,
+    cache: Path | None = None,
+    progress: Tell,
     speed: Annotated[
         float,
         ("value", "SECONDS"),
@@ -56,8 +51,8 @@ def compare(  # noqa: PLR0913  # every option is a parameter
         ("advice", "; give seconds, and the scene before it"),
     ] = 0.0,
     reference: Annotated[str, ("value", "ENGINE")] = "",
-    out: Folder | None = None,
-) -> Result[Comparison]:
+    out: Folder = None,
+) -> Answer:
     """Build a scene in every way that seqopt knows, on paper, and show all side by side.
 
     These are the fixed sequences, a loop of robots whose grips each formulation chooses, and the
@@ -74,20 +69,11 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     reference : str, optional
         With ``speed``: the engine that values plans (compliance; with ``mortar`` every step has to
         stand, too; discrete lets joints open).
-    out : pathlib.Path or str, optional
+    out : pathlib.Path, optional
         Write tables, figures and a page with all builds.
-
-    Returns
-    -------
-    Comparison
-        All ways to build it, side by side.
 
     Examples
     --------
-    >>> found = compare("wall:columns=2,courses=2", criterion="worst-ratio", stability=False)
-    >>> float(found.table.loc["sequential", "F_rob"].round(1))
-    37.3
-
     $ seqopt compare
     $ seqopt compare wall:columns=6,courses=4 --out wall
     $ seqopt compare arch25 --criteria worst-ratio --json
@@ -97,63 +83,54 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     if reference and not speed:
         raise ProblemError("--reference: it values the plans of --speed; give --speed 60 with it")
     check_reference(reference)
-    built, output = as_built(scene).read(robots), Output(out, scene)
+    output, built = Output(out, scene.scene), scene.read(robots)
     find_postures(built, cache, progress)
     computed = find_engine(build_network(built), engine, mortar, verdicts=stability)
-    costs = _choose_criterion(criterion, DEFAULTS["any other"][0])
+    costs = find_criterion(criterion or DEFAULTS["any other"][0])
     output.require()
     prover = find_prover(computed.network, mortar, progress, asks=stability)
     named = robots if isinstance(robots, tuple) else ()
     result = compare_builds(computed, costs, progress, named, prover, speed, reference)
     levels = remarks.level_notes(engine, simplest(computed))
-
-    def answer() -> Answer[Comparison]:
-        return _answer(output, levels, computed, costs, prover, result, progress)
-
-    return Result(result, answer)
-
-
-def _answer(
-    output: Output,
-    levels: Sequence[str],
-    engine: Engine,
-    criterion: Criterion,
-    prover: BuildProver,
-    result: Comparison,
-    tell: Tell,
-) -> Answer[Comparison]:
-    """Write a comparison, and return its answer."""
-    scene = engine.network.scene
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
-    about = {"criteria": criteria, **provenance(engine)}
-    blocks = [format_comparison(result, scene, criterion, columns())]
-    facts = about | {"criterion": criterion.name, **_facts(result)}
-    if (speed := result.speed) is not None:
-        blocks.append("\n".join([SPEED, str(speed)]))
-        facts |= {"speed": speed.facts()}
-    written: tuple[Path, ...] = ()
-    if output.path is not None:
-        tell("drawing figures")
-        charts = outputs.picture("responses", lambda c: c.responses_figure(result.tables))
-        files: dict[str, bytes | str] = {
-            "comparison.csv": result.table.to_csv(float_format="%.6g"),
-            "summary.json": json.dumps({"scene": scene.name, **about}, indent=2) + "\n",
-            **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
-            **charts,
-            PAGE: comparison_page(engine, result),
-        }
-        if speed is not None:
-            files |= {"speed.csv": csv_text(speed.table)}
-            files |= outputs.picture("speed", lambda _: speed.plot())
-        written = output.write(tell, lambda: files)
-    blocks.append(wrapped(outputs.written_to(output.path, tables="tables, figures", what=WHAT)))
-    said = (*levels, *result.enough.lines, *remarks.refused(prover), *outputs.figure_notes(written))
-    answer = Answer(
-        facts, "\n\n".join(blocks), written=written, scene=scene, notes=said, value=result
+    about = {"criteria": criteria, **provenance(computed)}
+    summary = json.dumps({"scene": built.name, **about}, indent=2) + "\n"
+    written = output.write(
+        progress, lambda: {"summary.json": summary, **_files(computed, result, progress)}
     )
-    over = remarks.exceeded(scene, *result.tables.values())
-    left = builds_in_words(result.departures)
-    return remarks.held_to(answer, over, left, result.verdicts)
+    blocks, facts = [format_comparison(result, built, costs, columns())], dict[str, object]()
+    if result.speed is not None:
+        blocks.append("\n".join([SPEED, str(result.speed)]))
+        facts = {"speed": result.speed.facts()}
+    blocks.append(wrapped(outputs.written_to(out, tables="tables, figures", what=WHAT)))
+    answer = Answer(
+        about | {"criterion": costs.name, **_facts(result)} | facts,
+        "\n\n".join(blocks),
+        written=written,
+        scene=built,
+        notes=(
+            *(*levels, *result.enough.lines),
+            *(*remarks.refused(prover), *outputs.figure_notes(written)),
+        ),
+    )
+    over = remarks.exceeded(built, *result.tables.values())
+    return remarks.marked(answer, builds_in_words(result.departures), over, result.verdicts)
+
+
+def _files(engine: Engine, result: Comparison, tell: Tell) -> dict[str, bytes | str]:
+    """Return tables, figures and the page of a comparison by file name."""
+    tell("drawing figures")
+    speed = result.speed
+    files: dict[str, bytes | str] = {
+        "comparison.csv": result.table.to_csv(float_format="%.6g"),
+        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
+        **outputs.picture("responses", lambda c: c.responses_figure(result.tables)),
+        PAGE: comparison_page(engine, result),
+    }
+    if speed is not None:
+        files |= {"speed.csv": csv_text(speed.table)}
+        files |= outputs.picture("speed", lambda _: speed.plot())
+    return files
 
 
 def _facts(result: Comparison) -> dict[str, object]:

@@ -8,7 +8,6 @@ from typing import Annotated
 
 from seqopt._cli import remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.words import shown
 from seqopt._files import require_apart, write_text
 from seqopt.errors import ProblemError
 from seqopt.exchange._content import UNITS, UPS, Given
@@ -37,8 +36,8 @@ def run(  # noqa: PLR0913  # every option is a parameter
     gap: Annotated[float | None, ("value", "M")] = None,
     detect: bool = False,
     accept_overlaps: bool = False,
-    progress: Tell = shown,
-) -> Answer[None]:
+    progress: Tell,
+) -> Answer:
     """Read an assembly of others, say what was assumed, and write it as a scene.
 
     It is an assembly of COMPAS, meshes, or a table of boxes.

@@ -14,7 +14,7 @@ from seqopt.instances.answers import judge_instance
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 
-def run(instance: Path, solution: Path, *, bound: Path | None = None) -> Answer[None]:
+def run(instance: Path, solution: Path, *, bound: Path | None = None) -> Answer:
     """Check a path through an instance, and bounds on all others, with arithmetic alone.
 
     No scene is needed. What is claimed without proof is called claimed. The exit status is 1 if

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pandas as pd
-
 from seqopt._cli.answer import Answer
 from seqopt._cli.outputs import Output
-from seqopt._cli.signatures import door
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.words import BuiltFrom, Folder, as_built, shown
+from seqopt._cli.words import ARCH25, Built, Folder
 from seqopt._files import csv_text
 from seqopt.arms._permits import (
     find_table,
@@ -23,14 +20,9 @@ from seqopt.arms.reach import find_postures
 from seqopt.work.progress import Tell
 
 
-@door
 def reach(
-    scene: BuiltFrom = "arch25",
-    *,
-    cache: Path | str | None = None,
-    progress: Tell = shown,
-    out: Folder | None = None,
-) -> Answer[pd.DataFrame]:
+    scene: Built = ARCH25, *, cache: Path | None = None, progress: Tell, out: Folder = None
+) -> Answer:
     """Say which robots reach which nodes.
 
     Of those with arms, with how many postures, and up to how many bricks. Robots have arms in the
@@ -40,20 +32,15 @@ def reach(
     ----------
     scene, cache, progress : optional
         As of `optimize`.
-    out : pathlib.Path or str, optional
+    out : pathlib.Path, optional
         Folder to write reach.csv, postures.csv and a picture to.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per robot and node.
 
     Examples
     --------
     $ seqopt reach my.json --out reach
     $ seqopt reach my.json --cache postures --json
     """
-    found, output = as_built(scene).read(), Output(out, scene)
+    found, output = scene.read(), Output(out, scene.scene)
     output.require()
     find_postures(found, cache, progress)
     table = reach_table(found) if found.has_arms else reach_without_arms(found)
@@ -70,4 +57,4 @@ def reach(
     else:
         lines.append("--out DIR writes a row for every robot and node, and postures of arms")
     text = "\n".join(map(wrapped, lines))
-    return Answer({"reach": table}, text, scene=found, written=written, value=table)
+    return Answer({"reach": table}, text, scene=found, written=written)

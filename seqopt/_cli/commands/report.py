@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
-from seqopt._cli import inputs, outputs
+from seqopt._cli import outputs
 from seqopt._cli.answer import Answer
-from seqopt._cli.signatures import door
-from seqopt._cli.words import BuiltFrom, File, as_built, shown
+from seqopt._cli.inputs import find_engine, find_prover, posture_trouble, usual_steps
+from seqopt._cli.words import ARCH25, Built, File
 from seqopt._files import write_text
 from seqopt._showing import PAGE
-from seqopt.contact.mortar import Mortar
+from seqopt.arms.reach import find_postures
 from seqopt.network.build import build_network
-from seqopt.report._pages import folder_page
+from seqopt.plan.build import GivenSequence
+from seqopt.report._pages import folder_page, plan_page
 from seqopt.work.progress import Tell
 
 
-@door
-def report(  # every option is a parameter
-    folder: BuiltFrom,
-    scene: BuiltFrom = "arch25",
+def report(
+    folder: str,
+    scene: Built = ARCH25,
     *,
     engine: str | None = None,
-    mortar: Mortar | str | None = None,
+    mortar: str | None = None,
     stability: bool = True,
-    cache: Path | str | None = None,
-    progress: Tell = shown,
-    out: File | None = None,
-) -> Answer[tuple[Path, ...]]:
+    cache: Path | None = None,
+    progress: Tell,
+    out: File = None,
+) -> Answer:
     """Write a page with a step viewer of the plans in a folder.
 
     It shows the structure in three dimensions, who holds what, axial forces, displacements, and
@@ -37,41 +38,37 @@ def report(  # every option is a parameter
 
     Parameters
     ----------
-    folder : pathlib.Path, ShownBuild, Scene or str
+    folder : str
         Folder that holds plans as CSV; in place of it a scene, whose usual steps are shown.
     scene, engine, mortar, stability, cache, progress : optional
         As of `optimize`.
-    out : pathlib.Path or str, optional
+    out : pathlib.Path, optional
         Page to write (default: report.html in the folder, of a scene its name with .html).
-
-    Returns
-    -------
-    tuple of pathlib.Path
-        Paths of what was written.
 
     Examples
     --------
     $ seqopt report best
     $ seqopt report my.json plans --out plans.html
     """
-    place, taken = inputs.plan_folder(folder, cache, progress)
-    built = as_built(scene)
-    if (place / "scene.json").is_file():  # plans go with the scene that stands beside them
-        built = replace(built, scene=place / "scene.json")
-    found = built.read()
-    if out is not None:
-        path = Path(out)
-    elif not isinstance(folder, str | Path):
-        path = inputs.file_name(found.name, ".html")
-    else:
-        own = place == Path(folder)
-        path = place / PAGE if own else inputs.file_name(folder, ".html")
-    outputs.Output(out, built).keep_apart(path)
-    trouble = inputs.posture_trouble(found, cache, progress)
+    place = Path(folder)
+    own = place.is_dir() and (place / "scene.json").is_file()
+    if own or not place.is_dir():  # plans go with the scene that stands beside them
+        scene = replace(scene, scene=place / "scene.json" if own else folder)
+    network = build_network(scene.read())
+    name = re.sub(r"\W+", "-", place.name.removesuffix(".json")).strip("-")
+    path = out or (place / PAGE if place.is_dir() else Path(f"{name}.html"))
+    outputs.Output(out, scene.scene).keep_apart(path)
+    trouble = posture_trouble(network.scene, cache, progress)
+    notes = (f"arms: drawn without postures; {trouble}",) if trouble else ()
     progress("analyzing plans and writing the page")
-    computed = inputs.find_engine(build_network(found), engine, mortar, verdicts=stability)
-    prover = inputs.find_prover(computed.network, mortar, progress, asks=stability)
-    write_text(path, folder_page(computed, place, prover))
-    drawn = (f"arms: drawn without postures; {trouble}",) if trouble else ()
-    text, notes = f"written to {path}", (*taken, *drawn)
-    return Answer({}, text, scene=found, written=(path,), value=(path,), notes=notes)
+    computed = find_engine(network, engine, mortar, verdicts=stability)
+    prover = find_prover(network, mortar, progress, asks=stability)
+    if place.is_dir():
+        page = folder_page(computed, place, prover)
+    else:
+        find_postures(network.scene, cache, progress)
+        steps = usual_steps(network, (), progress)
+        page = plan_page(GivenSequence(computed, steps.steps, steps.name), prover)
+        notes = (*steps.notes, *notes)
+    write_text(path, page)
+    return Answer({}, f"written to {path}", scene=network.scene, written=(path,), notes=notes)

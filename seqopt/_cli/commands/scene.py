@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
 from seqopt._cli import remarks
 from seqopt._cli.answer import Answer, scene_facts
 from seqopt._cli.outputs import Output
-from seqopt._cli.words import BuiltFrom, as_built, shown
+from seqopt._cli.words import ARCH25, Built, File
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.parts import Prop, Robot
@@ -21,12 +20,12 @@ from seqopt.work.progress import Tell, with_progress
 
 
 def run(
-    scene: BuiltFrom = "arch25",
+    scene: Built = ARCH25,
     *,
-    progress: Tell = shown,
+    progress: Tell,
     list: bool = False,  # noqa: A002  # the option's name
-    export: Annotated[Path | None, ("value", "FILE")] = None,
-) -> Answer[None]:
+    export: File = None,
+) -> Answer:
     """Check a scene, say what is in it, and write it as a JSON file if asked.
 
     Or list all built-in scenes and the words that make others.
@@ -48,9 +47,8 @@ def run(
     """
     if list:
         return _list(progress)
-    output = Output(export, scene)
-    output.keep_apart(export)
-    found = as_built(scene).read()
+    Output(export, scene.scene).keep_apart(export)
+    found = scene.read()
     facts = {**scene_facts(found), **_network_facts(build_network(found))}
     lines = [*_described(found, facts)]
     if export is not None:
@@ -79,7 +77,7 @@ def _network_facts(network: Network) -> dict[str, object]:
     }
 
 
-def _list(tell: Tell) -> Answer[None]:
+def _list(tell: Tell) -> Answer:
     told = with_progress("reading built-in scenes", builtin_scenes(), tell)
     found = {name: load_scene(name) for name in told}
     sizes = {n: f"{len(s.bricks)} bricks, {len(s.joints)} joints" for n, s in found.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import product
 from math import prod
@@ -17,7 +17,7 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.commands.optimize import find
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call, names_of, signature_of
-from seqopt._cli.words import Folder, Words, shown
+from seqopt._cli.words import Folder
 from seqopt._files import csv_text, make_folder, read_text, write_folder, write_text
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.sweep import MOST, WORDS, _plan_row, _solve_cases, _spread_values, _spread_words
@@ -30,11 +30,11 @@ ROWS, ASKED, CHART = "sweep.csv", "sweep.json", "sweep"
 def run(
     asked: Annotated[Call, ("call", optimize)],
     *,
-    over: Words = (),
+    over: Sequence[str] = (),
     stability: bool = True,
-    out: Folder | None = None,
-    progress: Tell = shown,
-) -> Answer[pd.DataFrame]:
+    out: Folder = None,
+    progress: Tell,
+) -> Answer:
     """Plan many problems side by side: designs, robots, criteria, payloads.
 
     A row of a table for each: status, objectives, bounds, verdicts, time. All options of optimize
@@ -48,7 +48,7 @@ def run(
         payload=250..400/4, grips=1e5..1e9/5log, criteria=worst-ratio,weighted, scene=a.json,b.json.
     stability : bool
         As of `optimize`.
-    out : pathlib.Path or str
+    out : pathlib.Path
         Folder to write sweep.csv to, row by row, and a chart over one or two of what differs; a
         sweep that was interrupted goes on there.
 
@@ -62,7 +62,9 @@ def run(
     workers = words.pop("workers", 1)
     cases = _cases(over, str(words.get("scene", "arch25")))
     path = None if output.path is None else _begun(words | {"over": over}, output.path, len(cases))
-    solve = partial(_solved, Call(optimize, words), over, stability)  # which other processes take
+    solve = partial(
+        _solved, Call(optimize, words), over, stability=stability
+    )  # which other processes take
     table = _solve_cases(cases, solve, path, workers, None, progress)
     written = () if output.path is None else (output.path,)
     if output.path is not None and (drawn := _chart(table, [*cases[0]])):
@@ -79,11 +81,10 @@ def run(
         written=written,
         notes=outputs.figure_notes(written) if written else (text,),
         status=Status.NO_ANSWER if none else Status.DONE,
-        value=table,
     )
 
 
-def _cases(over: Words, scene: str) -> list[dict[str, Any]]:
+def _cases(over: Sequence[str], scene: str) -> list[dict[str, Any]]:
     """Return every case: words of options by name, and of the scene that they distinguish."""
     flags = names_of(signature_of(optimize).options.values())
     differs = dict[str, list[str]]()
@@ -101,15 +102,17 @@ def _cases(over: Words, scene: str) -> list[dict[str, Any]]:
     return [{**own, **each, WORDS: words} for own, words in scenes for each in chosen]
 
 
-def _solved(asked: Call, over: Words, stability: bool, case: Mapping[str, str]) -> dict[str, Any]:  # noqa: FBT001
+def _solved(
+    asked: Call, over: Sequence[str], case: Mapping[str, str], *, stability: bool
+) -> dict[str, Any]:
     """Return the row of a case: of its plan, and how many steps fall."""
     flags = names_of(signature_of(optimize).options.values())
     names = [each.partition("=")[0] for each in over]  # a word of a scene is no option
     own = {flags[name].name: flags[name].parse(case[name]) for name in names}
     own = {"scene": case[WORDS], **own} if case[WORDS] else own
-    found = find(Call(optimize, {**asked.words, **own}), stability=stability)
-    verdicts = found.verdicts.get(found.plan.title, ())
-    return {**_plan_row(found.plan), **{f"falls_{v.mortar}": v.facts()["falls"] for v in verdicts}}
+    plan, prover = find(Call(optimize, {**asked.words, **own}), None, stability=stability)
+    verdicts = prover.of_builds({plan.title: plan.steps}).get(plan.title, ())
+    return {**_plan_row(plan), **{f"falls_{v.mortar}": v.facts()["falls"] for v in verdicts}}
 
 
 def _begun(words: Mapping[str, Any], folder: Path, count: int) -> Path:

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import Annotated, Any
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.inputs import find_steps, posture_trouble
+from seqopt._cli.inputs import Sequenced, posture_trouble, read_steps
 from seqopt._cli.outputs import Output
-from seqopt._cli.signatures import door
+from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.words import BuiltFrom, Folder, Words, as_built, in_seconds, shown
+from seqopt._cli.words import Folder, in_seconds
 from seqopt._files import csv_text
 from seqopt.arms._kept import arm_faults
 from seqopt.contact.mortar import Mortar
-from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
-from seqopt.network.network import Network
-from seqopt.plan.build import GivenSequence, ShownBuild
+from seqopt.plan.build import GivenSequence
 from seqopt.problem.standing import Standing
-from seqopt.sequence.steps import Step, _idle_note
+from seqopt.sequence.steps import _idle_note
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import has_durations
 from seqopt.times._tables import busy_table, spent_lines, total_lines
@@ -33,20 +27,14 @@ from seqopt.work.progress import Tell
 USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
-@door
-def times(  # noqa: PLR0913  # every option is a parameter
-    scene: BuiltFrom = "arch25",
+def times(
+    asked: Annotated[Call, ("call", read_steps)],
     *,
-    robots: Words | None = None,
-    durations: Words = (),
     stands: Standing | Mortar | str | None = None,
-    cache: Path | str | None = None,
-    progress: Tell = shown,
-    method: str | None = None,
-    plan: ShownBuild | Path | str | None = None,
     reassign: bool = False,
-    out: Folder | None = None,
-) -> Answer[pd.DataFrame]:
+    out: Folder = None,
+    progress: Tell,
+) -> Answer:
     """Say how long a build takes and who does what when.
 
     A robot that holds nothing prepares what it does next while others hold and act; actions come
@@ -55,37 +43,28 @@ def times(  # noqa: PLR0913  # every option is a parameter
 
     Parameters
     ----------
-    scene, robots, durations, stands, cache, progress : optional
-        As of `optimize`; of a plan its steps are taken too.
-    method, plan : optional
-        As of `analyze`.
+    stands : optional
+        As of `optimize`.
     reassign : bool, optional
         Give the same grips, in the same order, to the robots with which the build ends first,
         within their reach and payload.
-    out : pathlib.Path or str, optional
+    out : pathlib.Path, optional
         Folder to write plan.csv, times.csv and a chart to.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per step, s; ``attrs['robots']`` is how long each robot does what.
 
     Examples
     --------
     $ seqopt times timed.json --method cantilever --durations rob3:slower=2.5
     $ seqopt times my.json --plan plan.csv --reassign --out faster
     """
-    output = Output(out, scene, plan)
+    output = Output(out, asked.words.get("scene"), asked.words.get("plan"))
     output.require("plan.csv", "times.csv")
-    built, taken = as_built(scene).read(robots), tuple[str, ...]()
-    if not (durations or has_durations(built)):
-        durations = (USUAL_SECONDS,)
+    named, taken = asked(progress=progress), tuple[str, ...]()
+    if not has_durations(named.scene):
+        built = in_seconds(named.scene, (USUAL_SECONDS,))
+        named = named._replace(network=build_network(built))
         taken = (f"durations: not known, taken as {USUAL_SECONDS}; --durations says others",)
-    built = in_seconds(built, durations)
-    network = build_network(built)
-    named = find_steps(network, scene, plan, method, robots, progress, cache)
-    demanded = stands if isinstance(stands, Standing) else None
-    build, given, least = _build(network, named.steps, demanded, reassign=reassign)
+    demanded, built = stands if isinstance(stands, Standing) else None, named.scene
+    build, given, least = _build(named, demanded, reassign=reassign)
     timed, tables = build.times(), {"plan.csv": build.responses, "times.csv": build.times}
 
     def files() -> dict[str, bytes | str]:
@@ -95,10 +74,10 @@ def times(  # noqa: PLR0913  # every option is a parameter
     where = "--out DIR writes when every step happens, and a chart of it"
     if written := output.write(progress, files):
         where = f"written to {out}: {', '.join(tables)}"
-    timed.attrs["robots"] = busy = busy_table(built, build.steps, build._waits)
+    busy = busy_table(built, build.steps, build._waits)
     lines = [*total_lines(built.name, len(build.steps), given, least)]
     lines += [*remarks.waits_said(build), *spent_lines(busy), where]
-    trouble = posture_trouble(built, cache, progress)
+    trouble = posture_trouble(built, asked.words.get("cache"), progress)
     cannot = (f"not checked; {trouble}",) if trouble else arm_faults(built, build.steps)
     notes = (*taken, *named.notes, *remarks.carrying_notes(built, build.steps))
     notes += (*_idle_note(built, "robots", build.steps), *(f"arms: {each}" for each in cannot))
@@ -107,11 +86,11 @@ def times(  # noqa: PLR0913  # every option is a parameter
     facts |= {"robots": busy, "steps": timed}
     facts |= {"arms_cannot": cannot} if cannot else {}
     text = "\n".join(map(wrapped, lines))
-    return Answer(facts, text, notes=notes, scene=built, written=written, value=timed)
+    return Answer(facts, text, notes=notes, scene=built, written=written)
 
 
 def _build(
-    network: Network, steps: Sequence[Step], standing: Standing | None, *, reassign: bool
+    named: Sequenced, standing: Standing | None, *, reassign: bool
 ) -> tuple[GivenSequence, float, float | None]:
     """Return a build, its makespan, s, and that of the best assignment, if requested."""
     if standing is not None and standing.curing is None:
@@ -119,7 +98,7 @@ def _build(
             "--stands: here it goes with --curing of mortar that has a bond; seqopt assess says "
             "what stands"
         )
-    build = GivenSequence(make_engine(USUAL, network), (*steps,), standing=standing)
+    build = named.build(standing)
     try:
         given = float(build.times()["end_s"].iloc[-1])
     except StepError as error:
@@ -132,5 +111,5 @@ def _build(
         build = GivenSequence(build.engine, build.reassigned(), standing=standing)
         least = build.times()["end_s"].iloc[-1]
     if standing is not None:
-        check_cured(network, build.steps, standing, build.times()["start_s"].tolist())
+        check_cured(named.network, build.steps, standing, build.times()["start_s"].tolist())
     return build, given, least
