@@ -58,7 +58,7 @@ def test_nothing_is_named_where_nothing_is_near(capsys):
 
 
 def test_an_option_that_is_gone_is_told_what_takes_its_place(capsys):
-    assert main(["optimize", "--staged", "3"]) == 2
+    assert main(["optimize", "--load-factor", "3"]) == 2
     err = capsys.readouterr().err
     assert re.search(r"is no more; in Python seqopt(\.\w+)+ has it", err)
     assert err.count("\n") == 1
