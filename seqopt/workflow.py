@@ -65,10 +65,6 @@ class Search:
     proof : bool, optional
         If not, with cascade or rank_search, compute only the responses that the search meets, about
         a fifth; how far the choice is from the optimum stays unknown.
-    lazy : bool, optional
-        With an exact formulation: compute only the responses that the proof needs; stopped before
-        it is done, it leaves its best choice and a bound; with an aim, and of a free schedule it is
-        done at any rate.
     time_limit : float, optional
         Seconds that posing, choosing and proof may take; the best choice by then has a lower bound;
         without proof, where choosing and computing are one, the moves that were chosen by then.
@@ -90,7 +86,6 @@ class Search:
 
     options: Mapping[str, Any] | Sequence[str] = field(default_factory=dict)
     proof: bool = True
-    lazy: bool = False
     time_limit: float = math.inf
     workers: int = 1
     executor: Executor | None = None
@@ -339,7 +334,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         found = as_formulation(formulation or graph_of(problem).default_formulation)
         options = search.parse_options(found)
     tell = within(progress, clock.left) if progress and not found.of_states else progress
-    run = Run(search.time_limit, tell, search.proof, search.lazy, options, clock=clock)
+    run = Run(search.time_limit, tell, search.proof, options, clock=clock)
     assemble = time.perf_counter() - start
     plan = _solve_run(problem, found, run)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})

@@ -2,16 +2,16 @@
 
 Exponents up to 2.1 for memory count as that. Time: up to 2.5 for an analysis, up to 3 for a search
 without proof, which meets as many models as the square of the brick count, each with fields as long
-as that count, and for the lazy proof of the least worst ratio; the proof over all pairs is shown.
+as that count; the proof over all pairs is shown.
 An analysis of barrel vaults of 735 to 3,010 bricks, whose courses are equally long, takes time as
 a power of at most 2 and memory as a power of at most 1.2: every step has responses of every brick.
 Edge forces of the steps of every plan err by at most 1e-9 of the largest of each grip set, and by
 1e-6 where candidates are only compared.
 
 Method: `analyze` of all steps of the sequential method, and the three-robot loop
-without proof (criterion `equations-2-3`, cascade; also with two processes), with proof (overlap_dp)
-and with a lazy proof (`worst-ratio`, minimax), on chains of 25 to 1,000 bricks in the shape of
-`arch25`, on `vault338` and vaults from words. Every run has a process of its own; seconds of the
+without proof (criterion `equations-2-3`, cascade; also with two processes) and with proof
+(overlap_dp), on chains of 25 to 1,000 bricks in the shape of `arch25`, on `vault338` and vaults
+from words. Every run has a process of its own; seconds of the
 core are counted, by the clock where two processes work. Errors are those against the refined mixed
 system at up to forty steps of the plan, and at random sets of three grips as they are screened.
 Exponents are fitted over 100 bricks and more; of memory what the smallest run takes is taken off,
@@ -40,7 +40,7 @@ from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.report._style import GRAY, dress, looks, plain, styled
 from seqopt.responses.resources import Resources
 from seqopt.sequence.steps import Step
-from seqopt.study.published import EQUATIONS, WORST_RATIO
+from seqopt.study.published import EQUATIONS
 
 Done = tuple[Engine, Sequence[Step], int]
 LOOKED_AT, OF_LARGE = 40, 6  # steps of a run, and brick counts, whose errors are looked at
@@ -71,19 +71,11 @@ def proven(network: seqopt.Network) -> Done:
     return engine, plan.steps, plan.models
 
 
-def proven_lazily(network: seqopt.Network) -> Done:
-    """Find the least worst ratio of the three-robot loop, by the pairs that its proof needs."""
-    engine, schedule = seqopt.make_engine("compliance", network), seqopt.three_robot_loop(network)
-    plan = seqopt.solve(seqopt.pose(engine, schedule, WORST_RATIO), "minimax", lazy=True)
-    return engine, plan.steps, plan.models
-
-
 TASKS = {
     "analyze": analyzed,
     "no proof": searched,
     "no proof, two processes": shared,
     "proof": proven,
-    "lazy proof": proven_lazily,
 }
 
 
@@ -142,12 +134,11 @@ SCENES = {
     "no proof": LONG,
     "no proof, two processes": LONG,
     "proof": SHORT,
-    "lazy proof": LONG,
 }
-QUICK = {"analyze": ["chain13"], "lazy proof": ["chain13"]}
+QUICK = {"analyze": ["chain13"], "proof": ["chain13"]}
 FROM = 100  # bricks from which on exponents are fitted
 MOST_MEMORY = 2.1  # exponents that are claimed
-MOST_TIME = {"analyze": 2.5, "no proof": 3.0, "lazy proof": 3.0}
+MOST_TIME = {"analyze": 2.5, "no proof": 3.0}
 MOST_OF_VAULTS = {"seconds": 2.0, "memory_MB": 1.2}
 MOST_ERROR, MOST_SCREEN_ERROR = 1e-9, 1e-6  # of the largest edge force of a set
 STYLES = {
@@ -155,7 +146,6 @@ STYLES = {
     "no proof": "search without proof",
     "no proof, two processes": "search without proof, two processes",
     "proof": "proof over all pairs",
-    "lazy proof": "lazy proof",
 }  # in words
 
 

@@ -60,7 +60,6 @@ GOES = {
     "the mean of the worst scenarios": [*WORTH, "--robust", "cvar=0.5", *SCENARIOS],
     "candidates": [*WORTH, *STATES, "--candidates", "near:2"],
     "a time limit": [*WORTH, *STATES, "--time-limit", "60"],
-    "lazily": [*WORTH, *STATES, "--lazy"],
     "workers": [*WORTH, *STATES, "--workers", "2"],
     "a folder of answers": [*WORTH, *STATES, "--cache", "answers"],
     **{name: [*WORTH, *STATES, "--formulation", name] for name in OVER_STATES},

@@ -45,7 +45,7 @@ QUESTIONS = {
     "What must hold?": "stands friction tilt curing limits budgets",
     "What is asked beside verdicts?": "margins map holds",
     "In which scenarios is it good?": "robust scenarios seed vary",
-    "Who chooses and proves, and how long?": "formulation candidates options proof lazy time_limit "
+    "Who chooses and proves, and how long?": "formulation candidates options proof time_limit "
     "workers max_memory",
     "How are responses computed?": "engine mortar tolerance cache",
     "What does the file not say?": "unit up density supports",

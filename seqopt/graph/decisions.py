@@ -18,7 +18,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from seqopt._showing import Shown
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
 from seqopt.graph.decision_costs import (
@@ -55,35 +55,6 @@ from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step
 
 TIED = 1e-9  # costs this close, relative to the largest, are equal
-
-
-def windows(
-    schedule: Schedule,
-    asked: Sequence[tuple[int, int]],
-    wanted: Sequence[Ints] | None = None,
-    *,
-    alone: bool = False,
-) -> Schedule:
-    """Return the steps that moves share with the ones before, as a schedule with a move for each.
-
-    ``asked`` (sequence of (int, int)): a move, and the candidate of the move before it; ``wanted``
-    (sequence of (c,) int): the candidates of the move that are looked at, by default all;
-    ``alone``: whether the steps in which the move alone is open belong to it too.
-    """
-    moves, steps = [], []
-    for n, (k, before) in enumerate(asked):
-        move = schedule.moves[k]
-        some = range(len(move.candidates)) if wanted is None else wanted[n]
-        moves.append(replace(move, candidates=tuple(move.candidates[i] for i in some)))
-        takes: dict[object, int | OpenGrip] = {OpenGrip(k): OpenGrip(n)}
-        if k:
-            takes[OpenGrip(k - 1)] = schedule.moves[k - 1].candidates[before]
-        own = [*schedule.steps_of.get((k - 1, k), ())]
-        own += schedule.steps_of.get((k,), ()) if alone else ()
-        for step in sorted(own, key=lambda step: step.number):
-            grips = tuple(takes.get(grip, grip) for grip in step.grips)
-            steps.append(replace(step, grips=grips))
-    return replace(schedule, steps=tuple(steps), moves=tuple(moves))
 
 
 @dataclass(frozen=True, repr=False)
@@ -211,22 +182,15 @@ class Decisions(Shown):
         ranked = self._sums[1] if aim is Aim.SUM else self._peaks[1]
         return {"respond": self.evaluation.seconds, "rank": ranked}
 
-    def window_choices(
-        self, move: int, before: int, *, alone: bool = True
-    ) -> tuple[StepChoices, ...]:
-        """Return the steps that a move decides, for its candidates alone.
+    def window_choices(self, move: int, before: int) -> tuple[StepChoices, ...]:
+        """Return the steps that a move decides, in order, for its candidates alone, (C_k,).
 
-        ``move``, ``before``: a move, and the candidate chosen for the move before it; ``alone``:
-        whether those in which it alone is open are among them. Result: in order, with responses
-        (C_k,); those of steps shared with the move before are of that choice. Solved alone where
-        the responses of all choices are not known.
+        ``move``, ``before``: a move, and the candidate chosen for the move before it, of which the
+        responses of those steps are that both share. Solved alone where the responses of all
+        choices are not known.
         """
         if not self.evaluation.is_kept:
-            own = windows(self.schedule, [(move, before)], alone=alone)
-            quiet = self.evaluation.resources.alone()
-            solved = replace(self.evaluation, schedule=own, resources=quiet).steps
-            moves = {step.number: step.moves for step in self.schedule.steps}
-            return tuple(replace(each, moves=moves[each.step.number]) for each in solved)
+            return self.evaluation.window(move, before)
         found = []
         for choices in self._decided.get(move, ()):  # of two open moves the row of the first
             row = before if len(choices.moves) == 2 else slice(None)

@@ -29,16 +29,14 @@ WATCH = "watch"  # the name by which a formulation takes a watch
 class Run:
     """Settings of one solve: time limits, callback of progress, proof and options.
 
-    ``time_limit``: of the formulation alone, s; ``proof``: whether the answer is proven; ``lazy``:
-    whether only models that the proof needs are solved; ``options``: of the formulation;
-    ``explains``: whether an infeasible problem is answered with remedies; ``clock``: of responses,
-    formulation and proof together.
+    ``time_limit``: of the formulation alone, s; ``proof``: whether the answer is proven;
+    ``options``: of the formulation; ``explains``: whether an infeasible problem is answered with
+    remedies; ``clock``: of responses, formulation and proof together.
     """
 
     time_limit: float = math.inf
     progress: Callable[[Any], object] | None = None
     proof: bool = True
-    lazy: bool = False
     options: dict[str, Any] = field(default_factory=dict)
     explains: bool = True
     clock: Clock = field(default_factory=Clock)

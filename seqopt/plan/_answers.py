@@ -59,7 +59,7 @@ Result = TypeVar("Result")
 class Found(NamedTuple):
     """What was chosen: claimed solution, certificate, checked steps, run times by stage, s.
 
-    ``search``, ``looked_at``: as of `Plan`.
+    ``search``: as of `Plan`.
     """
 
     selection: Solution
@@ -67,7 +67,6 @@ class Found(NamedTuple):
     steps: tuple[Step, ...]
     seconds: dict[str, float]
     search: Windows | None = None
-    looked_at: int | None = None
 
 
 def called(name: str, kind: type[Result], solve: Callable[[], object]) -> Result:
@@ -179,12 +178,6 @@ def require_time(formulation: Formulation, time_limit: float) -> None:
     limited = formulation.watched or "seconds" in formulation.options
     if np.isfinite(time_limit) and not limited:
         raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
-
-
-def require_proof(proof: object) -> None:
-    """Raise a `ProblemError` if a lazy search, which solves models for its proof, has none."""
-    if not proof:
-        raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")
 
 
 def proven(

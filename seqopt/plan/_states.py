@@ -15,7 +15,7 @@ from seqopt.graph.states._visits import steps_in_hands
 from seqopt.graph.states.explored import barred
 from seqopt.graph.states.states import States
 from seqopt.judge._schedules import judge_schedule, ordered
-from seqopt.plan._answers import Found, called, proven, require_proof, with_numbers
+from seqopt.plan._answers import Found, called, proven, with_numbers
 from seqopt.plan._infeasible import claimed, confirmed
 from seqopt.work._workers import keep
 
@@ -29,8 +29,6 @@ def find_states(problem: States, formulation: Formulation, run: Run) -> Found:
     `ProblemError` if there is no such option; `SolverError` if the answer fails its check.
     """
     formulation.require_options(run.options)
-    if run.lazy:  # it is at any rate
-        require_proof(run.proof)
     start = time.perf_counter()
     told = {} if run.progress is None else {"progress": run.progress}
     limit = {"seconds": run.left} if isfinite(run.left) else {}

@@ -78,8 +78,6 @@ class Plan(ShownBuild):
         By stage, s: respond, rank, compile (preparing a program for a solver), solve, verify.
     search : Windows or None
         The models solved by a search without proof; None if all were solved.
-    looked_at : int or None
-        How many models a lazy search solved; None if all were solved.
     arms : seqopt.arms._kept.KeptPostures or None
         The postures of arms; None where no robot has one, or a graph was solved.
     moved : Moved or None
@@ -106,7 +104,6 @@ class Plan(ShownBuild):
     steps: tuple[Step, ...]
     seconds: Mapping[str, float] = field(compare=False, hash=False)
     search: Windows | None = None
-    looked_at: int | None = None
     arms: Any = None
     moved: Moved | None = None
     beyond: str = ""
@@ -274,8 +271,6 @@ class Plan(ShownBuild):
     @property
     def models(self) -> int:
         """How many different models were solved."""
-        if self.looked_at is not None:
-            return self.looked_at
         if self.search is None:
             own = self.graph.models
         else:  # the graph would solve them all to count them

@@ -23,13 +23,13 @@ from seqopt.errors import (
     StepError,
     message_of,
 )
-from seqopt.graph._decision_search import Windows, walk_windows
+from seqopt.graph._decision_search import walk_windows
 from seqopt.graph.decisions import Decisions
 from seqopt.graph.formulation import End, Formulation, Run, Solution, Watch, formulations, timed
 from seqopt.graph.instance import Instance
 from seqopt.graph.states.states import States, of_decisions
 from seqopt.judge._step_checks import check_shape
-from seqopt.plan._answers import Found, find_path, judged, require_fit, require_proof, require_time
+from seqopt.plan._answers import Found, find_path, require_fit, require_time
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import AIMS, chooses_moves, graph_of, in_layers
 from seqopt.problem.amounts import Amount
@@ -55,7 +55,6 @@ def solve(
     formulation: Formulation | str | None = None,
     *,
     proof: bool = True,
-    lazy: bool = False,
     time_limit: float = math.inf,
     progress: Callable[[Any], object] | None = None,
     **options: Any,
@@ -71,8 +70,6 @@ def solve(
         Or a name in `seqopt.formulations`; by default the fastest exact one that there is for it.
     proof : bool, optional
         False: no gap is known; ``cascade`` or ``rank_search`` solve only models that they need.
-    lazy : bool, optional
-        Solve only the models that the proof needs, as is always done where states are chosen.
     time_limit : float, optional
         Seconds of choosing after which it returns its best choice and a bound, as at an interrupt;
         without proof of all it does: an error names the moves that were chosen by then. An
@@ -98,7 +95,7 @@ def solve(
     >>> seqopt.solve(problem, "overlap_lp").status
     <Status.OPTIMAL: 'optimal'>
     """
-    return _solve_run(problem, formulation, Run(time_limit, progress, proof, lazy, options))
+    return _solve_run(problem, formulation, Run(time_limit, progress, proof, options))
 
 
 def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
@@ -130,6 +127,7 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
         plan = solved(asked)
         if asked.scene.has_arms:
             plan = from_arms("with_postures")(asked, plan, solved)
+
         known = {} if plan.search is None or plan.graph.scenarios else plan.search.fields
 
         engines = plan.graph.scenarios or (plan.engine,)
@@ -165,8 +163,6 @@ def _chosen(graph: States | Instance, formulation: Formulation, run: Run) -> Pla
     """
     if isinstance(graph, Instance):
         require_time(formulation, run.time_limit)
-        if run.lazy:
-            raise ProblemError("an instance has all its costs; leave out lazy")
         found = find_path(graph, formulation, run)
     elif graph.decisions is not None:
         found = _from_decisions(graph, graph.decisions, formulation, run)
@@ -188,13 +184,8 @@ def _from_decisions(
     own = {name: value for name, value in run.options.items() if name not in EFFORT}
     run = replace(run, options=own, time_limit=limit)
     decisions.require_possible(graph.worlds)
-    if run.lazy:
-        require_proof(run.proof)
-    if graph.scenarios and (run.lazy or not run.proof):
-        instead = "leave out lazy" if run.lazy else "ask for the proof"
-        raise ProblemError(f"the costs of all choices are needed; {instead}")
-    if run.lazy:
-        return _lazily(graph, decisions, formulation, run)
+    if graph.scenarios and not run.proof:
+        raise ProblemError("the costs of all choices are needed; ask for the proof")
     if not run.proof:
         return _by_windows(graph, decisions, formulation, run)
     return _by_all_costs(graph, decisions, formulation, run)
@@ -242,32 +233,6 @@ def _by_windows(graph: States, decisions: Decisions, formulation: Formulation, r
         steps = _checked(decisions.steps(found.choice), graph, decisions)
     chosen = Solution(decisions.rows(found.choice), (np.nan,), (-np.inf,))
     return Found(chosen, None, steps, seconds, found)
-
-
-def _lazily(graph: States, decisions: Decisions, formulation: Formulation, run: Run) -> Found:
-    """Choose by only the models that the optimality proof needs; the answer is certified."""
-    if run.options:
-        raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
-    from seqopt.graph._decision_search import prove_lazily  # noqa: PLC0415  # few ask for it
-
-    seconds, watch = dict[str, float](), Watch(run.left, run.progress)
-    with timed(seconds, "search"):
-        found = prove_lazily(decisions, formulation, watch)
-        solved, nodes = found.bounds.compiled(unknown=False)
-        path = find_path(solved, formulation, Run(proof=False)).selection
-        passed = nodes[[node for (node,) in path.states]]
-        floors, nodes = found.bounds.compiled(unknown=True)
-    with timed(seconds, "verify"):
-        states = tuple((node,) for node in np.searchsorted(nodes, passed).tolist())
-        bound = (min(path.objective[0], watch.bound),)
-        claimed = replace(path, states=states, bound=bound, trace=watch.trace)
-        claimed = replace(claimed, stopped=found.stopped)
-        certificate = judged(floors, formulation, claimed)
-        firsts = np.cumsum([1, *map(len, decisions.candidates[:-1])])
-        along = Windows(decisions, (passed - firsts).tolist())
-        steps = _checked(decisions.steps(along.choice), graph, decisions)
-    chosen = replace(claimed, states=decisions.rows(along.choice))
-    return Found(chosen, certificate, steps, seconds, along, found.models)
 
 
 def _checked(steps: tuple[Step, ...], graph: States, decisions: Decisions) -> tuple[Step, ...]:

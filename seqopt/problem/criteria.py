@@ -159,11 +159,6 @@ class RankSum(Terse):
             "ranked": self.ranked.value,
         }
 
-    @property
-    def least(self) -> float | None:
-        """What a step costs at least; None where that depends on all pairs."""
-        return 1.0 if self.ranked is Ranked.CONDITIONAL else None
-
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs with so many bricks."""
         return tuple(name for name, _ in self._terms(bricks))
@@ -204,7 +199,6 @@ class WeightedSum(Terse):
 
     name: str
     terms: tuple[tuple[str, float, float | None], ...]  # response, weight, scale (N, N m or m)
-    least = 0.0  # that a step costs
 
     @property
     def settings(self) -> Mapping[str, object]:
@@ -240,7 +234,6 @@ class WorstRatio(Terse):
 
     name: str
     limits: tuple[tuple[str, float | None], ...]  # N, N m or m
-    least = 0.0  # that a step costs
 
     @property
     def settings(self) -> Mapping[str, object]:
@@ -298,8 +291,6 @@ class StepCost:
     function : callable
         Of responses by name, each (C,) or (C, D), N, N m or m, and of the bricks that stand in the
         step; returns costs of the same shape, finite or, for what is not allowed, infinite.
-    least : float, optional
-        What a step costs at least, from zero: a lazy search needs it to rule pairs out.
 
     Raises
     ------
@@ -320,7 +311,6 @@ class StepCost:
     name: str
     responses: tuple[str, ...]
     function: StepFunction
-    least: float | None = None
 
     def __post_init__(self) -> None:
         what = f"criterion {self.name}: "
@@ -329,8 +319,6 @@ class StepCost:
                 f"{what}give names of responses, as ('T_max', 'M_sup'), and a function of them"
             )
         object.__setattr__(self, "responses", tuple(self.responses))
-        if not (self.least is None or (isinstance(self.least, Real) and 0 <= self.least < np.inf)):
-            raise ProblemError(f"{what}least is {short(self.least)}; give a number from 0")
 
     @property
     def settings(self) -> Mapping[str, object]:
@@ -367,10 +355,5 @@ class StepCost:
             raise ProblemError(
                 f"{what} returned {found[wrong][0]} for a possible "
                 f"choice at {bricks} bricks; give a number, or inf for what is not allowed"
-            )
-        if self.least is not None and (found[~impossible] < self.least).any():
-            raise ProblemError(
-                f"{what} returned {found[~impossible].min():.6g} at "
-                f"{bricks} bricks, below its least, {self.least:.6g}; state a lower one"
             )
         return np.where(impossible, np.nan, found)

@@ -20,8 +20,7 @@ largest tension. `analyze` returns them as a table for given steps, each compute
 >>> evaluation.steps[0].responses["T_max"].round(1)  # N, by candidate of the first move
 array([17.6, 17.6])
 
-Worker processes, other machines, or stored results do not change a result, not even in the last
-bit:
+Worker processes, other machines, or less memory change no result beyond rounding:
 
 >>> from seqopt.responses import Resources
 >>> shared = Evaluation(engine, schedule, lambda bricks: {"T_max"}, Resources(max_memory=1e9))

@@ -6,11 +6,10 @@ For searches that need few of many sets: the sets of a request are solved in bat
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -88,8 +87,9 @@ class GripSets:
     """The responses of grip sets of one scene.
 
     ``engine``: what solves them; ``names``: responses of `seqopt.responses.quantities.CHOSEN_BY`
-    that are wanted; ``resources``: who solves them, and where answers are kept; ``screen``: whether
-    six digits are enough, to choose by.
+    that are wanted; ``resources``: who solves them; ``screen``: whether six digits are enough, to
+    choose by; ``loose``: whether responses of mechanisms are infinite instead of raising a
+    `MechanismError`; ``work``: that is known to come, as `seqopt.responses._blocks.work` has it.
 
     >>> import numpy as np
     >>> import seqopt
@@ -107,9 +107,11 @@ class GripSets:
         resources: Resources = HERE,
         *,
         screen: bool = False,
+        loose: bool = True,
+        work: float = 0.0,
     ) -> None:
         self._engine, self._resources, self._screen = engine, resources, screen
-        self.names, self._known, self._work = tuple(names), KnownRows(), 0.0
+        self.names, self._known, self._work, self._loose = tuple(names), KnownRows(), work, loose
         scene = engine.network.scene
         nodes = np.array([node for brick in scene.placed for node in brick.nodes])
         kinds = [k * scene.grip_kinds.span for k in range(len(scene.grip_kinds.turns))]
@@ -142,83 +144,70 @@ class GripSets:
         grips = (held > 0).sum(axis=1)
         for count in np.unique(grips).tolist():
             rows = np.flatnonzero(grips == count)
-            found = self._found(bricks, held[rows, held.shape[1] - count :])
+            found = self._found(bricks, self._number[held[rows, held.shape[1] - count :]])
             responses[rows] = found[:, : len(self.names)]
             forces[rows, held.shape[1] - count :] = found[:, len(self.names) :]
         return responses, forces
 
-    def _found(self, bricks: int, nodes: Ints) -> Floats:
-        """Return responses and forces (S, R + r) of sets (S, r); those not cached are solved."""
+    def of_grips(self, bricks: int, grips: Ints) -> tuple[Floats, Floats]:
+        """Return responses (S, R) and forces (S, r) of grips, by number, in any order.
+
+        ``grips`` (S, r): as `seqopt.Scene.grip_numbers` has them.
+        """
+        order, forces = np.argsort(grips, axis=1), np.zeros(grips.shape)
+        found = self._found(bricks, np.take_along_axis(grips, order, axis=1))
+        np.put_along_axis(forces, order, found[:, len(self.names) :], axis=1)
+        return found[:, : len(self.names)], forces
+
+    def _found(self, bricks: int, every: Ints) -> Floats:
+        """Return responses and forces (S, R + r) of grips (S, r); those not cached are solved."""
 
         def solve(new: Ints) -> Floats:
-            grips = self._number[nodes[new]]
-            props = self._engine.network.scene.prop_numbers(bricks, held=bool(nodes.shape[1]))
+            grips = every[new]
+            props = self._engine.network.scene.prop_numbers(bricks, held=bool(every.shape[1]))
             self._work += work(len(grips), bricks)
             compiled = self._work >= COMPILED
             sets = Block(bricks, grips, self.names, self._screen, props, compiled)
-            return solve_sets(self._engine, sets, self._resources)
+            return solve_sets(self._engine, sets, self._resources, loose=self._loose)
 
-        codes = np.zeros(len(nodes), dtype=np.int64)  # a number for every set of its own
-        for column in nodes.T:
-            codes = codes * len(self._number) + column
-        return self._known.of((bricks, nodes.shape[1]), codes, solve)
+        codes = np.zeros(len(every), dtype=np.int64)  # a number for every set of its own
+        for column in every.T:
+            codes = codes * (self._number.max() + 1) + column
+        return self._known.of((bricks, every.shape[1]), codes, solve)
 
 
-def solve_sets(engine: Engine, sets: Block, resources: Resources = HERE) -> Floats:
+def solve_sets(
+    engine: Engine, sets: Block, resources: Resources = HERE, *, loose: bool = True
+) -> Floats:
     """Return responses and grip forces of grip sets; infinite for mechanisms.
 
-    ``sets``: of one brick count; ``resources``: workers. Result (S, R + r): SI units. Raises
-    `SolverError`, `WorkerError`.
+    ``sets``: of one brick count; ``resources``: workers; ``loose``: as of `GripSets`. Result (S, R
+    + r): SI units. Raises `SolverError`, `WorkerError`.
     """
     grips, alone = sets.grips, resources.executor is None and resources.workers == 1
     most = BLOCK if alone else min(BLOCK, max(64, len(grips) // 32))  # sets of a task
     parts = [replace(sets, grips=grips[at : at + most]) for at in range(0, len(grips), most)]
-    quiet = replace(resources, progress=None) if len(parts) > 1 else resources.alone()
+    own = resources if len(parts) > 1 else HERE  # to share one part does not pay
+    tally, progress = tally_of(engine), Progress("responses", sets.work, own.progress)
+
+    def done(part: Block, found: Answers) -> None:
+        if crew is not None:  # else the engine itself has counted
+            for what, count in found.tally:
+                tally[what] = tally.get(what, 0) + count
+        progress.add(part.work)
+
     rows = [np.zeros((0, len(sets.names) + grips.shape[1]))]
-    for found in answer_blocks(engine, parts, sets.work, quiet, loose=True):
-        columns = [found.values[name] for name in sets.names]
-        rows.append(np.column_stack([*columns, found.forces]))
+    with hire(own.executor, own.workers) as crew:
+        task = partial(_answer, engine if crew is None else packed(engine), loose=loose)
+        with closing(map_ordered(task, parts, crew, done)) as answers:
+            for found in answers:
+                columns = [found.values[name] for name in sets.names]
+                rows.append(np.column_stack([*columns, found.forces]))
     return np.concatenate(rows)
 
 
-_SEVERAL = 4  # chunks of work that states of one brick count may be before they are parted
-_CHUNKS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
-
-
-def answer_blocks(
-    engine: Engine,
-    blocks: Iterable[Block],
-    total: float,
-    resources: Resources,
-    *,
-    loose: bool = False,
-) -> Generator[Answers, None, None]:
-    """Return the answers to blocks of states, in their order.
-
-    ``blocks``: consumed lazily; ``total``: their estimated work; ``loose``: whether mechanisms have
-    infinite answers instead of raising a `MechanismError`.
-    """
-    tally = tally_of(engine)
-    progress = Progress("responses", total, resources.progress)
-
-    def done(blocks: Sequence[Block], answers: list[Answers]) -> None:
-        if crew is not None:  # else the engine itself has counted
-            for what, sets in chain.from_iterable(found.tally for found in answers):
-                tally[what] = tally.get(what, 0) + sets
-        progress.add(sum(block.work for block in blocks))
-
-    with hire(resources.executor, resources.workers) as crew:
-        task = partial(_answer_all, engine if crew is None else packed(engine), loose=loose)
-        enough = None if crew is None else total / (_CHUNKS * crew.workers)
-        portions = _split_work(blocks, enough)
-        with closing(map_ordered(task, portions, crew, done)) as results:
-            for answers in results:
-                yield from answers
-
-
-def _answer_all(engine: Engine | bytes, blocks: Sequence[Block], *, loose: bool) -> list[Answers]:
-    solve = _answer_loose if loose else answer
-    return [solve(unpacked(engine), block) for block in blocks]
+def _answer(engine: Engine | bytes, block: Block, *, loose: bool) -> Answers:
+    return (_answer_loose if loose else answer)(unpacked(engine), block)
 
 
 def _answer_loose(engine: Engine, block: Block) -> Answers:
@@ -232,29 +221,6 @@ def _answer_loose(engine: Engine, block: Block) -> Answers:
             return Answers(dict.fromkeys(block.names, infinite), np.full(block.grips.shape, np.inf))
     halves = block.grips[: count // 2], block.grips[count // 2 :]
     return join_answers([_answer_loose(engine, replace(block, grips=half)) for half in halves])
-
-
-def _split_work(blocks: Iterable[Block], enough: float | None) -> Iterator[list[Block]]:
-    """Split blocks into chunks of consecutive ones, of about equal work.
-
-    Engines that grow with the structure are fastest for ascending brick counts, and factorize once
-    for all states of one: chunks keep the order of blocks, and end between brick counts unless one
-    has the work of several chunks.
-
-    ``enough``: work of a chunk; None for a chunk per block.
-    """
-    if enough is None:
-        yield from ([block] for block in blocks)
-        return
-    mine: list[Block] = []
-    for block in blocks:
-        several = 1 if mine and block.bricks != mine[-1].bricks else _SEVERAL
-        if mine and sum(each.work for each in mine) >= several * enough:
-            yield mine
-            mine = []
-        mine.append(block)
-    if mine:
-        yield mine
 
 
 class Moved(NamedTuple):

@@ -1,4 +1,4 @@
-"""One question has one number, whoever is asked: layers of candidates, states, instances, lazily.
+"""One question has one number, whoever is asked: layers of candidates, states, instances.
 
 A sum and a worst value are over every step for which the criterion is defined: responses in all of
 them, ranks where a grip is open. Travel is that of all robots, from every grip to the next.
@@ -74,11 +74,6 @@ def by_states(problem, aim):
     yield "instance", seqopt.solve(compile_instance(asked)).objective[GOALS[aim]]
 
 
-def lazily(problem, aim):
-    name = "overlap_dp" if aim is Aim.SUM else "minimax"
-    yield "lazy", seqopt.solve(problem, name, lazy=True).certificate.objective
-
-
 def of_table(table, name):
     """A response of every step of a table, SI units."""
     return table[RESPONSES[name].column].to_numpy(float) / RESPONSES[name].scale
@@ -107,8 +102,6 @@ def test_sums_and_worst_values_of_responses_are_one_number(schedule, criterion, 
     problem = posed(schedule, criterion)
     found = dict(of_steps(problem, aim))
     kinds = {"layers": by_layers, "states": by_states}
-    if criterion != "by bricks":  # of which no least is said
-        kinds["lazily"] = lazily
     for kind, ask in kinds.items():
         found |= {f"{kind}, {name}": value for name, value in ask(problem, aim)}
     assert len(found) > 10

@@ -93,7 +93,6 @@ BAD = {
     "optimize ARCH --direction take-down": "it goes with --schedule free",
     "optimize ARCH --friction 0.5": "it goes with --stands",
     "optimize ARCH --aim minmax --budget steps_over:F_largest=250:10": "does not exist",
-    "optimize ARCH --lazy --formulation beam": "exact",
     "optimize ARCH --no-proof": "cascade or rank_search",
     # numbers and sizes
     "optimize ARCH --workers 0": "--workers 0: give a whole number from 1",

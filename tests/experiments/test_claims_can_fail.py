@@ -12,14 +12,7 @@ import pytest
 from experiments import figures
 from experiments.calibration import calibration, identify_arch25, vault_loads
 from experiments.discrete import contact_steps
-from experiments.engines import (
-    engine_growth,
-    engine_speed,
-    extremes,
-    fidelity_ladder,
-    parallel,
-    soft_grips,
-)
+from experiments.engines import engine_growth, engine_speed, extremes, fidelity_ladder, soft_grips
 from experiments.exchange import four_arms, outside_assemblies
 from experiments.failing import where_methods_fail
 from experiments.harness.claim import claims
@@ -176,9 +169,6 @@ CHECKS = {
         lambda table: not paper_counterparts.faults(NUMBERED, table),
         ("paper_counterparts",),
         *("error_pct", 50.0, {"id": "table:experimental_data3"}),
-    ),
-    "parallel": Check(
-        parallel.holds, ("parallel",), *("times_as_fast_by_cpu", 1.5, {"way": "two processes"})
     ),
     "peers": Check(
         lambda table: all(peers.holds(table).values()),

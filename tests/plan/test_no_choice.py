@@ -22,7 +22,7 @@ from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import FormulationKind, Solution, find_formulation, formulations
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
-from seqopt.responses import _blocks as batches
+from seqopt.responses import _choices as batches
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import modified_sequential, three_robot_loop

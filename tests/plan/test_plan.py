@@ -52,7 +52,7 @@ def test_posing_computes_nothing(counted):
 def test_a_search_without_proof_computes_only_what_it_meets(counted):
     engine, problem = counted
     plan = seqopt.solve(problem, "cascade", proof=False)
-    assert 0.98 * engine.asked < plan.models < engine.asked  # a few in both kinds of step
+    assert plan.models == engine.asked
     assert plan.certificate is None
     assert np.isnan(plan.selection.objective).all()
     proven = seqopt.solve(problem, "cascade")

@@ -1,9 +1,11 @@
-"""Processes, executors and little memory: the same results to the last bit."""
+"""Processes, executors and little memory: the same results."""
 
 from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 import pytest
@@ -17,13 +19,21 @@ from seqopt.errors import MemoryShortError, ProblemError, SceneError
 from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
-from seqopt.responses import _blocks as batches
+from seqopt.responses import _grip_sets as division
 from seqopt.responses._blocks import Block, answer, packed
-from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
+from seqopt.responses._choices import (
+    CHOICE_RESPONSES,
+    Evaluation,
+    _bytes_of_choices,
+    _bytes_of_costs,
+    _sets_of,
+)
 from seqopt.responses.resources import Resources
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS
+
+NAMES = ("T_max", "M_sup", "D_max", "C_max")
 
 
 def everything(_):
@@ -34,10 +44,33 @@ def evaluation(engine, schedule, **resources):
     return Evaluation(engine, schedule, everything, Resources(**resources))
 
 
+def require_alike(found, expected):
+    """Sets share their work with others: the last digits may differ."""
+    for one, other in zip(found, expected, strict=True):
+        assert one.step == other.step
+        for name, values in other.responses.items():
+            most = 1e-11 * np.nanmax(np.abs(values), initial=0.0)
+            assert one.responses[name] == pytest.approx(values, abs=most, nan_ok=True)
+
+
+def blocks_of(schedule, most):
+    """Return the grip sets of open steps by brick count, in blocks of at most so many."""
+    out = []
+    for step in schedule.steps:
+        for grips in _sets_of(schedule, step, {}).grips if step.moves else ():
+            out.append((step.bricks, len(grips), *np.sort(grips).tolist()))
+    groups = [[*own] for _, own in groupby(sorted({*out}), key=itemgetter(0, 1))]
+    return [
+        Block(own[0][0], np.array([row[2:] for row in own[at : at + most]]), NAMES)
+        for own in groups
+        for at in range(0, len(own), most)
+    ]
+
+
 @pytest.fixture
 def small_blocks(monkeypatch):
     """Many blocks on a small scene."""
-    monkeypatch.setattr(batches, "BLOCK", 50)
+    monkeypatch.setattr(division, "BLOCK", 50)
 
 
 @pytest.mark.slow
@@ -49,7 +82,7 @@ def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, w
     shared = make_engine(name, loop25.scene)
     expected = evaluation(alone, loop25)
     found = evaluation(shared, loop25, workers=workers)
-    assert found.steps == expected.steps
+    require_alike(found.steps, expected.steps)
     assert found.models == expected.models == 8642
     assert getattr(shared, "tally", None) == getattr(alone, "tally", None)
 
@@ -60,9 +93,7 @@ STATES = three_robot_loop(BUILT)
 
 def blocks():
     """Return blocks of all brick counts, in order."""
-    levels = batches.steps_of_batches(STATES)
-    groups = [batches.batch_of(STATES, steps, everything) for level in levels for steps in level]
-    return [block for group in groups for block in group.blocks()]
+    return blocks_of(STATES, 2048)
 
 
 @pytest.mark.slow
@@ -106,7 +137,8 @@ def test_an_engine_that_remembers_is_seen():
 
 def test_the_scene_is_sent_and_no_operators(loop25):
     engine = make_engine("compliance", loop25.scene)
-    engine.solve(1, [[1]])  # what the scene knows of its grips goes along
+    engine.solve(1, [[1]])  # what the scene knows of its grips and props goes along
+    engine.network.scene.prop_numbers(1, held=True)
     before = len(packed(engine))
     assert evaluation(engine, loop25).models == 8642  # operators of all brick counts
     assert len(packed(engine)) == before < 2 * len(pickle.dumps(loop25.scene))
@@ -127,8 +159,9 @@ def test_a_network_that_is_not_its_scenes_is_not_made_anew(loop25):
     heavier = replace(network, weight=2 * network.weight)
     engine = make_engine("compliance", heavier)
     found = evaluation(engine, loop25, workers=2).steps
-    assert found == evaluation(make_engine("compliance", heavier), loop25).steps
-    assert found != evaluation(make_engine("compliance", network), loop25).steps
+    require_alike(found, evaluation(make_engine("compliance", heavier), loop25).steps)
+    with pytest.raises(AssertionError):
+        require_alike(found, evaluation(make_engine("compliance", network), loop25).steps)
 
 
 @pytest.mark.parametrize(
@@ -162,7 +195,7 @@ def test_costs_are_the_same_where_responses_are_not_kept(engine25, loop25, crite
     """Where there is memory for costs alone, responses come and go; nothing else changes."""
     problem = pose_decisions(engine25, loop25, CRITERIA[criterion])
     asked = problem.evaluation.wanted
-    costs, whole = batches._bytes_of_costs(loop25), batches._bytes_of_choices(loop25, asked)
+    costs, whole = _bytes_of_costs(loop25), _bytes_of_choices(loop25, asked)
     assert costs < whole
     few = Resources(max_memory=whole - 1)
     streamed = pose_decisions(engine25, loop25, CRITERIA[criterion], resources=few)

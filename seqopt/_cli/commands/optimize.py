@@ -54,8 +54,7 @@ def run(
     plan, selection, responses, summary and a page for the browser are written.
 
     With --aim, --stands, --order search or --schedule free states of the build are chosen: criteria
-    of ranks do not go with these. --no-proof goes with cascade and rank_search, --lazy with exact
-    formulations.
+    of ranks do not go with these. --no-proof goes with cascade and rank_search.
 
     Parameters
     ----------
