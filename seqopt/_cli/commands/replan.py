@@ -34,7 +34,7 @@ from seqopt.workflow import _Place, optimize
 ASKED = (
     *("criterion", "aim", "limits", "rules", "stands", "friction", "tilt", "curing", "to"),
     *("payload", "grips", "durations", "robots", "lost", "missing", "engine", "mortar"),
-    *("formulation", "options", "proof", "lazy", "time_limit", "workers", "cache", "max_memory"),
+    *("formulation", "options", "proof", "time_limit", "workers", "cache", "max_memory"),
 )
 
 
