@@ -34,7 +34,6 @@ from seqopt.report._style import BLUE, DPI, GRAY, GREEN, VERMILION, plain, style
 from seqopt.report.charts import draw_responses, front_figure
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key
-from seqopt.report.text import in_words
 from seqopt.scene.boxes import boxes
 from seqopt.study.published import WORST_RATIO, as_printed, printed_steps
 
@@ -154,7 +153,7 @@ def tables_as_printed(engine: Engine) -> dict[str, pd.DataFrame]:
 @styled
 def responses_along_the_build(engine: Engine) -> Figure:
     figure, axes = subplots(7.8, len(COLUMNS), 1, sharex=True)
-    tables = {in_words(name): table for name, table in tables_as_printed(engine).items()}
+    tables = tables_as_printed(engine)
     draw_responses(axes, tables, COLUMNS)
     axes[0].get_legend().remove()
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)

@@ -39,7 +39,6 @@ from seqopt.graph.decisions import Decisions, move_costs, pose_decisions, rank_o
 from seqopt.graph.formulation import find_formulation
 from seqopt.problem.requirements import Criterion, SceneFacts
 from seqopt.report._style import dress, looks, styled
-from seqopt.report.text import in_words
 from seqopt.scene.scenarios import _stiffened, shifted, weighed
 from seqopt.study.published import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 
@@ -129,7 +128,7 @@ def chart(table: pd.DataFrame) -> Figure:
             for kind, filled, change in kinds:
                 means = curve(mine, kind, change)
                 style = look.line() | ({} if filled else {"mfc": "white", "lw": 0.8})
-                label = in_words(criterion) if filled else None
+                label = criterion if filled else None
                 for panel, name in zip(line, ROWS, strict=True):
                     panel.plot(means.index, means[name], label=label, **style)
         words, abscissa = title.split("|")

@@ -45,7 +45,6 @@ from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.formulation import exhibits, formulations
 from seqopt.graph.states.states import build_states
 from seqopt.report._style import SMALL, plain, styled
-from seqopt.report.text import in_words
 
 
 class Question(NamedTuple):
@@ -325,7 +324,7 @@ def chart(rows: pd.DataFrame) -> Figure:
         panel.set_xticks(range(len(sizes)), sizes, rotation=90)
         panel.set_title("\n".join(wrap(question, 11)))
         panel.tick_params(length=0)
-    panels[0].set_yticks(range(len(names)), [in_words(each).replace("_", " ") for each in names])
+    panels[0].set_yticks(range(len(names)), [each.replace("_", " ") for each in names])
     figure.supxlabel("bricks")
     bar = figure.colorbar(image, ax=list(panels), location="top", aspect=60, shrink=0.7)
     bar.set_label("times as long as dynamic programming (free, worst step: as the bare cut)")

@@ -22,7 +22,7 @@ from seqopt.report._regret._table import RegretTable
 from seqopt.report._robots import _known_arms
 from seqopt.report.comparison import CLOSED, Comparison, largest, method_tables, shown_table
 from seqopt.report.page import Build, Scatter, _Drawn, report_page
-from seqopt.report.text import IN_UNITS, in_words, spent_said
+from seqopt.report.text import IN_UNITS, spent_said
 from seqopt.responses.table import (
     OUTSIDE,
     REMEDY,
@@ -146,7 +146,7 @@ def plan_page(
     verdicts = prover.of_builds({key: _steps_in_table(scene, t) for key, t in tables.items()})
     left = plan._within.of_builds(tables)  # knows the plan's own steps
     builds = _builds(scene, tables, left, verdicts)
-    found = f"Found by: {in_words(name)} ({plan.result})."
+    found = f"Found by: {name} ({plan.result})."
     found += f" {spent_said(plan, prover)}" if isinstance(plan, Plan) and plan.steps else ""
     shown = [_worst_table(scene, builds)]
     return report_page(engine, builds, builds[0].sentence(scene), shown, found=found)
@@ -163,15 +163,10 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     shown = shown.assign(gap=100 * shown["gap"].astype(float))
     shown = _worded(shown.rename(columns=marks | {"gap": GAP})).join(_falls(builds))
     shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
-    shown["problem"] = shown["problem"].map(in_words)
     shown = shown.rename_axis("method or formulation").reset_index()
     tables: list[tuple[str, pd.DataFrame | _Drawn]] = []
     tables += [] if result.speed is None else _speed_parts(result.speed)
     tables.append(_captioned("Methods and formulations; a click shows the build", shown))
-    if result.printed is not None:
-        printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
-        printed["largest"] = printed["largest"].str.replace("1e-3 mm", "µm")
-        tables.append(("What the paper prints", printed))
     scatter, found = None, result.table.loc[result.table["gap"].notna(), ["seconds", "gap"]]
     if not found.empty:  # how long each formulation took and how far from the best its choice is
         axes = ("seconds to choose, responses being known", GAP)

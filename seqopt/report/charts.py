@@ -28,7 +28,6 @@ from seqopt.report._style import (
     styled,
 )
 from seqopt.report.comparison import _in_shown_unit, _worst_of
-from seqopt.report.text import in_words, typed
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import FailureMap
 
@@ -76,7 +75,9 @@ def responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
         same[twin] = (*same.get(twin, ()), name)
     tables = {}
     for first, names in same.items():
-        called = typed(first) if len(names) == 1 else f"the same plan: {', '.join(names)}"
+        called = (
+            first.replace("_", " ") if len(names) == 1 else f"the same plan: {', '.join(names)}"
+        )
         tables[called] = numbers[first].groupby("bricks").max().reset_index()
     figure = new_figure(6.6 + 0.2 * len(tables))
     figure.suptitle("Worst step at every number of bricks", x=0.01, ha="left")
@@ -142,7 +143,7 @@ def front_figure(
         for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
             if first in worst and name in worst:
                 at = [_in_shown_unit(worst[c], c) for c in (first, name)]
-                axes.plot(*at, marker, label=in_words(method), zorder=3, **mark)
+                axes.plot(*at, marker, label=method.replace("_", " "), zorder=3, **mark)
         axes.set(xlabel=LABELS.get(first, first), ylabel=LABELS.get(name, name))
         _scale(axes, FAR * float(pd.Series(y).max()))
         dress(axes)

@@ -41,7 +41,7 @@ from seqopt.sequence.schedule_file import MOST, find_schedule, parse_plan
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.study.published import PUBLISHED, paper_models, published_about, published_choice
+from seqopt.study.published import PUBLISHED, published_about, published_choice
 from seqopt.work.progress import Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
@@ -49,15 +49,6 @@ MARKS, COST = ["overloaded", "outside"], ["models", "seconds", "solve_seconds"]
 COLUMNS = ["problem", "objective", "gap", *LARGEST, *MARKS, *COST]
 CLOSED = "no choice"  # the problem of a sequence without open grips
 PATIENCE = 10.0  # s, after which the best plan so far is the row
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LoopFacts(Terse):
-    """What the formulations of one loop have in common."""
-
-    method: str
-    seconds: Mapping[str, float]  # to ``respond`` (computing responses) and to ``rank`` (costs)
-    paper_models: tuple[int, int] | None  # of Bruun et al., cascading and with full overlap
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,8 +70,6 @@ class Comparison(Terse):
         looks at, and the ``seconds`` that it took alone, ``solve_seconds`` of them to choose.
     tables : mapping of str to pandas.DataFrame
         Responses of every step, by row of ``table``.
-    loop : LoopFacts or None
-        Of the loop whose open grips the formulations choose, if there is one.
     notes : tuple of str
         Methods that degenerate, robots that never grip, payloads exceeded, and inconsistencies in
         the paper's own numbers.
@@ -105,7 +94,6 @@ class Comparison(Terse):
     printed: pd.DataFrame | None
     table: pd.DataFrame
     tables: Mapping[str, pd.DataFrame]
-    loop: LoopFacts | None
     notes: tuple[str, ...]
     refusal: str
     departures: Mapping[str, tuple[Departure, ...]]
@@ -161,7 +149,8 @@ def compare(
     plans, problem, refusal = _plans(engine, criterion, progress, robots)
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
-    loop = None if problem is None else _facts(problem, rows, robots)
+    if problem is not None and PUBLISHED in rows and not robots:
+        rows[PUBLISHED] |= _published_row(problem)
     free, why = _free_plan(engine, criterion, fixed, robots, progress)
     if not tables and free is None:  # whose refusal says most
         raise type(first := next(iter(refused.values())))(f"{first}; {why[0]}")
@@ -185,7 +174,7 @@ def compare(
     table, faults = _table(scene, rows, tables, left, verdicts)
     notes += faults
     notes += [] if known is None else [f"In the paper: {text}" for text in known.irregularities]
-    found = (maxima, printed, table, tables, loop, tuple(notes), refusal, left)
+    found = (maxima, printed, table, tables, tuple(notes), refusal, left)
     enough = what_was_enough(within, tables)
     return Comparison(*found, criteria, verdicts, enough, measured)
 
@@ -293,18 +282,11 @@ def _row(plan: Plan) -> dict[str, object]:
     return about | {"seconds": seconds, "solve_seconds": plan.seconds["solve"]}
 
 
-def _facts(
-    problem: Decisions, rows: Mapping[str, dict[str, object]], robots: Sequence[str]
-) -> LoopFacts:
-    """Return the facts of a loop, and add the objective to the published plan's row."""
-    method = problem.schedule.method
-    if PUBLISHED in rows and not robots:
-        choice = published_choice(problem)
-        value = problem.sums.cost(choice)
-        gap = (value - problem.sums.least(Aim.SUM)) / max(abs(value), TINY)
-        rows[PUBLISHED] |= {"problem": method, "objective": value, "gap": gap}
-    counted = paper_models(problem.schedule) if method == "three-robot" else None
-    return LoopFacts(method, problem.seconds(Aim.SUM), counted)
+def _published_row(problem: Decisions) -> dict[str, object]:
+    """Return the objective of the published plan."""
+    value = problem.sums.cost(published_choice(problem))
+    gap = (value - problem.sums.least(Aim.SUM)) / max(abs(value), TINY)
+    return {"problem": problem.schedule.method, "objective": value, "gap": gap}
 
 
 def method_tables(
@@ -413,6 +395,12 @@ _STANDING = (
     "Proven as rigid bricks whose joints may open and slide, robots within their payload. First: "
     "the step that falls first, the brick that is fastest in it, and the joint that opens fastest."
 )
+_CHOICES = (
+    "of minimax its largest step, of the free schedule too, or where the criterion has ranks its "
+    "worst response over the least that the fixed sequences reach. Compare objectives only within "
+    "a heading and an aim. Gap: how far the objective is above its optimum. Models: how many "
+    "partial structures with different grips it looks at. Seconds: to choose and to check."
+)
 NAME = 21  # columns of a name
 HEADS = {
     "F_rob": ("grip", "force, N", 15),
@@ -454,12 +442,14 @@ def format_comparison(
         [f"{scene.name}: {len(scene.bricks)} bricks, {len(scene.robots)} robots"],
         ["Largest response of any step", *_responses(comparison), "", _about(comparison)],
     ]
-    if comparison.loop is None:
+    if comparison.refusal:
         blocks.append([f"Loop of robots: not possible here; {comparison.refusal}"])
     if comparison.verdicts:
         blocks.append(["Steps that fall", *_stands(comparison), "", _STANDING])
     if comparison.table["objective"].notna().any():
-        about = _about_choices(comparison, criterion)
+        about = (
+            f"Objective: what the criterion {criterion.name} adds up to over all steps; {_CHOICES}"
+        )
         blocks.append(["How the grips were chosen", *_choices(comparison), "", about])
     for heading, of_paper in (("Notes", False), ("Inconsistencies in the paper", True)):
         said = [text for text in comparison.notes if text.startswith(OF_PAPER) == of_paper]
@@ -476,53 +466,57 @@ def format_comparison(
     return "\n\n".join("\n".join(map(wrapped, block)) for block in blocks)
 
 
+def _grouped(comparison: Comparison, figures: Mapping[str, object]) -> Iterator[tuple[str, str]]:
+    """Yield headings, with an empty name, and below each the label and name of its rows.
+
+    Of rows with the same figures the plainest is named, and how many more there are.
+    """
+    for problem, rows in comparison.table.groupby("problem", sort=False):
+        yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation"), ""
+        same: dict[object, list[str]] = {}
+        for name in sorted(map(str, rows.index), key=_plainness):
+            same.setdefault(figures[name], []).append(name)
+        for name, *more in sorted(same.values(), key=lambda own: rows.index.get_loc(own[0])):
+            yield f"  {name}{f' +{len(more)}' if more else ''}", name
+
+
 def _responses(comparison: Comparison) -> Iterator[str]:
-    """Yield the table of the largest responses; rows with the same figures are one."""
+    """Yield the table of the largest responses."""
     for line in (0, 1):
         heads = (f"{names[line]:>{names[2]}}" for names in HEADS.values())
         yield f"{'':{NAME}}{''.join(heads)}".rstrip()
-    for problem, rows in comparison.table.groupby("problem", sort=False):
-        yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")
-        figures = rows[[*HEADS]].round(3).apply(tuple, axis=1)
-        ranked = figures[sorted(figures.index, key=_plainness)]
-        plainest = {*ranked.index[~ranked.duplicated()]}  # of the rows with the same figures
-        for name in (name for name in figures.index if name in plainest):
-            more = int((figures == figures[name]).sum()) - 1
-            label = f"  {name}{f' +{more}' if more else ''}"
-            row, paper, cells = rows.T[name], _printed_largest(comparison, name), ""
-            marks = {
-                "F_rob": "!" if row["overloaded"] else " ",
-                "D_max": "?" * bool(row["outside"]),
-            }
-            for response, (_, _, width) in HEADS.items():
-                value = float(row[response])
-                said = f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
-                said += f" ({paper[response]:.1f})" if response in paper else ""
-                cells += f"{said + marks.get(response, ''):>{width}}"
-            yield f"{label:{NAME}}{cells}".rstrip()
+    figures = comparison.table[[*HEADS]].astype(float).round(3).apply(tuple, axis=1).to_dict()
+    for label, name in _grouped(comparison, figures):
+        if not name:
+            yield label
+            continue
+        row, paper, cells = comparison.table.T[name], _printed_largest(comparison, name), ""
+        marks = {"F_rob": "!" if row["overloaded"] else " ", "D_max": "?" * bool(row["outside"])}
+        for response, (_, _, width) in HEADS.items():
+            value = float(row[response])
+            said = f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
+            said += f" ({paper[response]:.1f})" if response in paper else ""
+            cells += f"{said + marks.get(response, ''):>{width}}"
+        yield f"{label:{NAME}}{cells}".rstrip()
 
 
 def _stands(comparison: Comparison) -> Iterator[str]:
-    """Yield the table of the steps that fall; rows with the same are one."""
+    """Yield the table of the steps that fall."""
     first, *_ = comparison.verdicts.values()
     heads = "".join(f"{each.mortar:>9}" for each in first)
     yield f"{'':{NAME}}{'steps':>5}{heads}   first, {first[0].mortar}".rstrip()
-    for problem, rows in comparison.table.groupby("problem", sort=False):
-        yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")
-        same: dict[object, list[str]] = {}
-        for name in map(str, rows.index):
-            same.setdefault(comparison.verdicts[name], []).append(name)
-        for name, *more in (sorted(names, key=_plainness) for names in same.values()):
-            label = f"  {name}{f' +{len(more)}' if more else ''}"
-            shown, *_ = found = comparison.verdicts[name]
-            open_ = (each.count(Verdict.UNDECIDED) for each in found)
-            counts = "".join(
-                f"{each.count(Verdict.FALLS)}{f' ({n}?)' if n else ''}".rjust(9)
-                for each, n in zip(found, open_, strict=True)
-            )
-            where = f"step {shown.first}: brick {shown.brick}" if shown.first else ""
-            where += f", joint {shown.joint}" if shown.joint else ""
-            yield f"{label:{NAME}}{len(shown.verdicts):5}{counts}   {where}".rstrip()
+    for label, name in _grouped(comparison, comparison.verdicts):
+        if not name:
+            yield label
+            continue
+        shown, *_ = found = comparison.verdicts[name]
+        counts = ""
+        for each in found:
+            open_ = each.count(Verdict.UNDECIDED)
+            counts += f"{each.count(Verdict.FALLS)}{f' ({open_}?)' if open_ else ''}".rjust(9)
+        where = f"step {shown.first}: brick {shown.brick}" if shown.first else ""
+        where += f", joint {shown.joint}" if shown.joint else ""
+        yield f"{label:{NAME}}{len(shown.verdicts):5}{counts}   {where}".rstrip()
 
 
 def _plainness(name: str) -> tuple[bool, bool, str]:
@@ -579,31 +573,3 @@ def _choices(comparison: Comparison) -> Iterator[str]:
                 f"{f'  {name}':{NAME}}{row['objective']:10.2f}{100 * row['gap']:7.2f} %{steps:7}"
                 f"{models:>9}{seconds:>9}  {kinds.get(str(name), 'in print')}"
             )
-
-
-def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
-    """Return the captions of the columns of the table of choices."""
-    known = "the fixed sequences" + (" and the published plan" * (PUBLISHED in comparison.tables))
-    worst = (
-        "of minimax its largest step, of the free schedule, which has no ranks, its worst response "
-        f"over the least that {known} reach"
-    )
-    if not isinstance(criterion, RankSum):
-        worst = "of minimax and the free schedule its largest step"
-    elif comparison.maxima.empty:
-        worst = "of the free schedule, which has no ranks, its worst response over what it may be"
-    loop, paper, shared = comparison.loop, "", ""
-    if loop is not None:
-        shared = (
-            "; the responses of all choices, which all rows of the loop share, took "
-            f"{loop.seconds['respond']:.2f} s more and their ranks {loop.seconds['rank']:.2f} s"
-        )
-        if loop.paper_models is not None:
-            few, many = loop.paper_models
-            paper = f" (the paper counts {few:,} for its cascade and {many:,} with full overlap)"
-    return (
-        f"Objective: what the criterion {criterion.name} adds up to over all steps; {worst}. "
-        "Compare objectives only within a heading and an aim: others add up other steps. Gap: how "
-        "far the objective is above its optimum. Models: how many partial structures with "
-        f"different grips it looks at{paper}. Seconds: to choose and to check{shared}."
-    )

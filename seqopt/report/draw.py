@@ -50,7 +50,6 @@ GROUND, ARM = "#efece6", 3.2  # color; width of an arm, points
 PALE, THROUGH = 0.55, 0.6  # of the color of an arm's bodies; opacity of those before bricks
 PROP = "#8a8478"
 PROP_MARK: dict[str, Any] = {"marker": "^", "color": PROP, "mec": "white", "ls": "none"}
-_FLAT = 0.9999  # cosine of the angle between faces that count as one
 LINE = 11.0  # points from one line of text to the next
 NEAR = (0.3, 0.08)  # share of a picture within which labels are neighbors, aside and up
 
@@ -213,17 +212,16 @@ def draw_bricks(  # what is drawn, and how, each by its name
     if twist is not None:
         turned = np.cross(twist[:bricks, None, 3:], boxed - boxed.mean(axis=1, keepdims=True))
         boxed = boxed + magnify * (twist[:bricks, None, :3] + turned)
-    polygons, colors, rims = [], [], []
+    polygons, colors = [], []
     rim, toward = (0.25, 0.15, 0.1, alpha), view.axes()
     for b in _drawing_order(boxed, toward):
-        brick, points, faces, inner = network.scene.placed[b], boxed[b], FACES, set()
+        brick, points, faces = network.scene.placed[b], boxed[b], FACES
         if brick.shape is not None:
             points, shape = vertices_of(brick)
             faces = tuple(map(tuple, shape))
             if twist is not None:
                 shift, turn = np.split(magnify * twist[b], 2)
                 points = points + shift + np.cross(turn, points - brick.position)
-            inner = _inner_edges(points, faces)
         seen = points @ toward.T
         for face in sorted(map(list, faces), key=lambda face: float(seen[face, 2].mean())):
             if brick.shape is not None and normal_of(seen[face])[2] <= 0:  # turned away
@@ -232,30 +230,9 @@ def draw_bricks(  # what is drawn, and how, each by its name
             normal = normal_of(points[face])  # whose direction says how bright a face is
             light = 0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal)
             colors.append((*(light * (MARKED if brick.name in marked else CLAY)), alpha))
-            sides = [*zip(face, face[1:] + face[:1], strict=True)]
-            outer = [side for side in sides if frozenset(side) not in inner]
-            rims.append(rim if outer == sides else colors[-1])
-            for side in outer if outer != sides else ():  # each as a polygon of two corners
-                polygons.append(seen[[*side], :2])
-                colors.append(rim)
-                rims.append(rim)
-    drawn: Any = {"facecolors": colors, "edgecolors": rims, "linewidths": 0.4}
+    drawn: Any = {"facecolors": colors, "edgecolors": [rim], "linewidths": 0.4}
     axes.add_collection(PolyCollection(polygons, **drawn))
     _frame(axes)
-
-
-def _inner_edges(points: Floats, faces: Faces) -> set[frozenset[int]]:
-    """Return the edges between faces that lie in one plane: cuts of a face, as into triangles."""
-    met: dict[frozenset[int], Floats] = {}
-    out = set()
-    for face in faces:
-        normal = normal_of(points[list(face)])
-        normal = normal / np.linalg.norm(normal)
-        for side in map(frozenset, zip(face, face[1:] + face[:1], strict=True)):
-            if side in met and met[side] @ normal > _FLAT:
-                out.add(side)
-            met[side] = normal
-    return out
 
 
 def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: View) -> None:

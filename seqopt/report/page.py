@@ -29,7 +29,7 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
-from seqopt.report.text import _deciding_step, _in_a_sentence, _robot_words, in_words
+from seqopt.report.text import _deciding_step, _in_a_sentence, _robot_words
 from seqopt.responses.quantities import _number_text
 from seqopt.responses.table import (
     OUTSIDE,
@@ -223,7 +223,6 @@ def _build_data(
         ],
         "decides": _deciding_step(scene, build.table, build.verdicts),
         "sentence": build.sentence(scene),
-        "words": in_words(build.name),
         "arms": arm_data(scene, build.steps, build.arms),
         "steps": [
             {

@@ -7,7 +7,6 @@ from dataclasses import replace
 import matplotlib as mpl
 import numpy as np
 import pytest
-import trimesh
 
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
@@ -15,7 +14,7 @@ from seqopt.network.build import build_network
 from seqopt.report._style import WIDTH
 from seqopt.report.charts import responses_figure
 from seqopt.report.comparison import LARGEST, compare
-from seqopt.report.draw import View, _inner_edges, draw_bricks, draw_grips, draw_network
+from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network
 from seqopt.study.published import CRITERIA, EQUATIONS
 from tests.blocks import with_shapes
 from tests.builders import six_bricks, small_arch
@@ -66,17 +65,6 @@ def test_names_of_neighbors_stand_in_lines_and_a_name_alone_beside_its_mark(axes
     up = {text.get_text(): text.xyann[1] for text in axes.texts}
     assert up["rob3 at 4"] == 0
     assert abs(up["rob1 at 31"] - up["rob2 at 33"]) >= 11
-
-
-def test_cuts_of_flat_faces_are_no_edges_of_a_block():
-    block = trimesh.creation.box((1.0, 2.0, 3.0))
-    faces = tuple(map(tuple, block.faces.tolist()))
-    inner = _inner_edges(block.vertices, faces)
-    ways = [int((np.ptp(block.vertices[[*edge]], axis=0) > 0).sum()) for edge in inner]
-    assert ways == [2] * 6  # a diagonal of each side
-    bent = block.vertices + np.array([0.0, 0.0, 0.1]) * (block.vertices[:, :1] > 0)
-    bent[0] += 0.2  # the control: a corner out of the plane of three sides
-    assert len(_inner_edges(bent, faces)) < 6
 
 
 def test_a_comparison_is_readable_and_every_plan_has_a_line_of_its_own():

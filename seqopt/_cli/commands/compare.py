@@ -139,16 +139,12 @@ def _facts(result: Comparison) -> dict[str, object]:
         steps=[len(result.tables[name]) for name in result.table.index],
         paper=pd.Series({name: _printed_largest(result, name) for name in result.table.index}),
     )
-    own, printed, loop = result.loop, result.printed, dict[str, object]()
-    if own is not None:
-        loop = {"method": own.method, "seconds": dict(own.seconds)}
-        loop |= {"models_paper_count": own.paper_models}
+    printed = result.printed
     paper = None if printed is None else printed.set_axis(result.maxima.columns, axis=1)
     return {
         "rows": table.rename_axis("name").reset_index(),
         "largest_by_robot": result.maxima.to_dict(),
         "paper_by_robot": None if paper is None else paper.to_dict(),
-        "loop": loop or None,
         "why_no_loop": result.refusal or None,
         "enough": result.enough.facts(),
         "findings": list(result.notes),

@@ -30,7 +30,7 @@ function makeCharts(page) {
   }
   function gantt(build) {
     const steps = build.steps.length, rows = structure.robots.length, width = 1180, height = 40 + 26 * rows, left = 70;
-    const { box, svg, x, cursor } = frame(`${build.words}: which brick each robot holds; darker where it carries more; a white dot where it places the brick${build.marks.some(Boolean) ? "; red below: over payload or outside the linear range" : ""}`, width, height, left, steps);
+    const { box, svg, x, cursor } = frame(`${build.name}: which brick each robot holds; darker where it carries more; a white dot where it places the brick${build.marks.some(Boolean) ? "; red below: over payload or outside the linear range" : ""}`, width, height, left, steps);
     const most = Math.max(1e-30, ...build.steps.flatMap((_, s) => build.forces.map((name) => Math.abs(number(build, s, name) || 0))));
     structure.robots.forEach((robot, r) => {
       const y = 22 + 26 * r;
@@ -100,7 +100,7 @@ function makeCharts(page) {
       svg.setAttribute("width", 34); svg.setAttribute("height", 10);
       draw("line", { x1: 2, x2: 30, y1: 5, y2: 5, stroke: color, "stroke-width": 2, "stroke-dasharray": dash }, svg);
       span.className = "key";
-      span.append(svg, " " + build.words);
+      span.append(svg, " " + build.name);
       out.append(span);
     });
     return out;
@@ -185,7 +185,6 @@ function makeCharts(page) {
   }
 
   // a point for each build, on axes that can be chosen
-  const worded = (name) => (builds.find((build) => build.name === name) || { words: name }).words;
   const NICE = [1, 2, 5];
   function ticks(low, high, log) {
     const out = [];
@@ -250,12 +249,12 @@ function makeCharts(page) {
       data.builds.forEach((name, i) => {
         const [a, b] = [data.values[across][i], data.values[up][i]];
         if (a === null || b === null) return;
-        const point = draw("circle", { cx: x.at(a), cy: y.at(b), r: 6, class: "point", "data-build": name, tabindex: 0, role: "button", "aria-label": `${worded(name)}: ${across} ${plain(a)}, ${up} ${plain(b)}` }, svg);
-        draw("title", {}, point, `${worded(name)}: ${plain(a.toPrecision(4))}, ${plain(b.toPrecision(4))}`);
+        const point = draw("circle", { cx: x.at(a), cy: y.at(b), r: 6, class: "point", "data-build": name, tabindex: 0, role: "button", "aria-label": `${name}: ${across} ${plain(a)}, ${up} ${plain(b)}` }, svg);
+        draw("title", {}, point, `${name}: ${plain(a.toPrecision(4))}, ${plain(b.toPrecision(4))}`);
         const chosen = () => choose(name);
         point.addEventListener("click", chosen);
         point.addEventListener("keydown", (event) => { if (["Enter", " "].includes(event.key)) { event.preventDefault(); event.stopPropagation(); chosen(); } });
-        if (data.builds.length <= FEW) name_point(svg, taken, x.at(a), y.at(b), worded(name), width - 10);
+        if (data.builds.length <= FEW) name_point(svg, taken, x.at(a), y.at(b), name, width - 10);
       });
       place.replaceChildren(box);
       mark();

@@ -272,7 +272,7 @@
     show(build, at, options) {
       const s = Math.min(at, build.steps.length - 1), step = build.steps[s], p = [0, 0, 0];
       this.build = build;
-      this.tag.textContent = `${build.words}: step ${step.number}, ${happens(build, s)}`;
+      this.tag.textContent = `${build.name}: step ${step.number}, ${happens(build, s)}`;
       this.tag.classList.toggle("over", build.marks[s] !== "");
       if (build.marks[s]) this.tag.append(`; ${build.marks[s]}`);
       this.canvas.setAttribute("aria-label", `${structure.name}, ${this.tag.textContent}, ${step.bricks} bricks`);
@@ -432,7 +432,7 @@
   const held = (step, r) => (step.grips[r] === null ? "–" : structure.bricks[structure.nodes[step.grips[r]].brick].name);
   function table(build, at) {
     const s = Math.min(at, build.steps.length - 1), step = build.steps[s], out = document.createElement("div"), what = happens(build, s);
-    out.append(text("h2", `${build.words}, step ${step.number} of ${build.steps.length}`));
+    out.append(text("h2", `${build.name}, step ${step.number} of ${build.steps.length}`));
     if (s === build.decides) out.append(text("p", build.marks[s] ? "The step that decides: the first where something is wrong." : "The step that decides: the worst of all.", "hint"));
     out.append(text("p", `${what[0].toUpperCase()}${what.slice(1)}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "")));
     if (build.marks[s]) out.append(text("p", build.marks[s], "over"));
@@ -531,7 +531,7 @@
   for (const row of document.querySelectorAll("#tables tbody tr")) {
     const cell = row.cells[0], name = cell ? cell.textContent : "";
     if (!builds.some((build) => build.name === name)) continue;
-    const button = text("button", builds.find((build) => build.name === name).words, "link");
+    const button = text("button", name, "link");
     button.type = "button";
     button.addEventListener("click", () => choose(name));
     cell.replaceChildren(button);
@@ -542,8 +542,8 @@
   byId("note").textContent = data.note;
   byId("sentence").classList.toggle("wrong", /^(Not buildable|Outside)/.test(byId("sentence").textContent));
   builds.forEach((build, i) => {
-    byId("first").append(new Option(build.words, i));
-    byId("second").append(new Option(build.words, i));
+    byId("first").append(new Option(build.name, i));
+    byId("second").append(new Option(build.name, i));
   });
   byId("second").prepend(new Option("nothing", "", true, true));
   byId("second").value = "";

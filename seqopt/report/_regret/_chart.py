@@ -38,7 +38,6 @@ from seqopt.report._style import (
     plain,
     styled,
 )
-from seqopt.report.text import in_words
 from seqopt.sequence.rules import FREE
 
 RADII = (7, 12, 20, 30, 42, 56, 72, 90)  # points, from a point to its words
@@ -148,8 +147,7 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
 
 
 def _words(row: pd.Series[float]) -> str:
-    words = in_words(str(row["formulation"])).replace("_", " ")
-    words = words.replace("dynamic programming", "dyn. programming")
+    words = str(row["formulation"]).replace("_", " ")
     return f"{words}, {row['without']}" if row["without"] else words
 
 
