@@ -370,7 +370,7 @@ class Plan(ShownBuild):
         }
 
     @property
-    def spent(self) -> dict[str, dict[str, object]]:
+    def spent(self) -> dict[str, dict[str, Any]]:
         """What was computed to choose and to prove, beside what had to be.
 
         ``models``: ``searched``, ``six_digits`` of them, ``proof`` (None without one), and

@@ -466,7 +466,7 @@ def format_comparison(
     return "\n\n".join("\n".join(map(wrapped, block)) for block in blocks)
 
 
-def _grouped(comparison: Comparison, figures: Mapping[str, object]) -> Iterator[tuple[str, str]]:
+def _grouped(comparison: Comparison, figures: Mapping[Any, object]) -> Iterator[tuple[str, str]]:
     """Yield headings, with an empty name, and below each the label and name of its rows.
 
     Of rows with the same figures the plainest is named, and how many more there are.
@@ -476,7 +476,7 @@ def _grouped(comparison: Comparison, figures: Mapping[str, object]) -> Iterator[
         same: dict[object, list[str]] = {}
         for name in sorted(map(str, rows.index), key=_plainness):
             same.setdefault(figures[name], []).append(name)
-        for name, *more in sorted(same.values(), key=lambda own: rows.index.get_loc(own[0])):
+        for name, *more in sorted(same.values(), key=lambda own: [*rows.index].index(own[0])):
             yield f"  {name}{f' +{len(more)}' if more else ''}", name
 
 
