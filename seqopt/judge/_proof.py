@@ -33,7 +33,7 @@ from seqopt.graph.paths import (
 from seqopt.graph.states.states import States
 from seqopt.judge._bounds import Book, Closed, TwinBook, is_beyond, limit_below
 from seqopt.judge._rule_moves import RuleTables, Transitions
-from seqopt.judge._states import Filter, Reachable, StateEvaluator
+from seqopt.judge._states import Filter, Reachable, StateEvaluator, places
 from seqopt.judge._twin import twin_of
 from seqopt.judge.arithmetic import Stage, budget_bounds, next_stage, only_below, sum_books
 from seqopt.network.build import build_network
@@ -70,7 +70,7 @@ class OneSchedule:
         return part, self.evaluator
 
     def renumbered(self, part: Any, states: Ints, *, back: bool = False) -> Ints:
-        """Return rows of a part as they are passed on from part to part, or back."""
+        """Return rows of a part as they are passed on from part to part, or back, not in order."""
         return states
 
     def onward(self, part: Any, found: Reachable) -> Iterator[tuple[Any, Transitions]]:
@@ -105,8 +105,7 @@ class AllOrders(OneSchedule):
         return len(part[0]), self._known[part]
 
     def renumbered(self, part: Key, states: Ints, *, back: bool = False) -> Ints:
-        rows = self._renumbered(self._order(part), states, back=back)
-        return self._known[part].tables.in_order(rows) if back else rows
+        return self._renumbered(self._order(part), states, back=back)
 
     def onward(self, part: Key, found: Reachable) -> Iterator[tuple[Key, Transitions]]:
         problem, (stand, _) = self._problem, part
@@ -163,8 +162,6 @@ class Rebuilt:
         none = np.zeros(0, dtype=np.int64)
         self._moves = [(none, none, np.zeros((0, len(self._peaks))))]
         self._coming: dict[int, dict[Any, list[tuple[Ints, Transitions]]]] = {}
-        for own in self._hint:
-            self._coming[own] = {own: []}
         onward = [*evaluator.tables.successors(level, start)]
         first = Reachable(none, start, np.zeros(0), onward, self._spent)
         self._go_on(part, level, first, 0)
@@ -185,6 +182,7 @@ class Rebuilt:
         level, evaluator = self._space.at(part)
         none = evaluator.tables.start()[:0]
         rows = (self._space.renumbered(part, move.states, back=True) for _, move in coming)
+        rows = map(evaluator.tables.in_order, rows)
         coming = [(s, m._replace(states=own)) for (s, m), own in zip(coming, rows, strict=True)]
         entries = [none, self._hint.get(level, none), *(move.states for _, move in coming)]
         limited = np.isfinite(self._asked.steps)
@@ -194,13 +192,9 @@ class Rebuilt:
         found = evaluator.reachable(level, *given, self._asked)
         self._spent = np.concatenate([self._spent, found.spent])
         within = [(m.source + self._count, m) for m in found.onward if m.level == level]
-        order = np.argsort(found.codes, kind="stable")
         for source, move in [*coming, *within]:
-            wanted = evaluator.tables.codes(move.states)
-            at = np.searchsorted(found.codes, wanted, sorter=order)
-            kept = at < len(order)
-            kept[kept] = found.codes[order[at[kept]]] == wanted[kept]
-            target, taken = order[at[kept]], move._replace(distance=move.distance[kept])
+            at, kept = places(found.codes, evaluator.tables.codes(move.states))
+            target, taken = at[kept], move._replace(distance=move.distance[kept])
             amounts = evaluator.amounts(found.values[target], taken)
             self._moves.append((source[kept], self._count + target, amounts))
         self._go_on(part, level, found, self._count)
@@ -397,13 +391,18 @@ class Proof:
         return any(room[self.evaluator.margins :])
 
 
+def _own_columns(problem: States, evaluator: StateEvaluator) -> list[int]:
+    """Return the columns that a search has for the robots of the judge's tables."""
+    columns = [robot for kind in problem.space.kinds for robot in kind.robots]
+    return [columns.index(robot) for robot in evaluator.tables.team]
+
+
 def as_rows(problem: States, evaluator: StateEvaluator, hint: Hint) -> dict[int, Ints]:
     """Return states of a search as rows of the tables, by level.
 
     Raises `SolverError` if a row is no state: it has too few numbers, or names no node.
     """
-    tables, columns = evaluator.tables, [r for kind in problem.space.kinds for r in kind.robots]
-    order = [columns.index(r) for r in tables.team]
+    tables, order = evaluator.tables, _own_columns(problem, evaluator)
     width, nodes = tables.start().shape[1], len(node_numbers(problem.network))
     out = {}
     for level, rows in hint.items():
@@ -423,16 +422,10 @@ class _LabelBounds:
     def __init__(
         self, evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: Solution
     ) -> None:
-        problem, team = evaluator.problem, evaluator.tables.team
-        self._evaluator, self._rebuilt, self._values, self._found = (
-            evaluator,
-            rebuilt,
-            values,
-            found,
-        )
-        columns = [r for kind in problem.space.kinds for r in kind.robots]
-        self._columns = [columns.index(r) for r in team]  # of the search
-        clocks = (goal.twin.clocks for goal in problem.goals if goal.in_time)
+        self._evaluator, self._rebuilt = evaluator, rebuilt
+        self._values, self._found = values, found
+        self._columns = _own_columns(evaluator.problem, evaluator)
+        clocks = (goal.twin.clocks for goal in evaluator.problem.goals if goal.in_time)
         self._timed = next((make(evaluator, rebuilt, found.motions) for make in clocks), None)
 
     def bounds(self, graph: Graph) -> tuple[float, ...]:
@@ -522,13 +515,9 @@ class _LabelBounds:
         numbers, labels, first = [none], [none], 0  # where builds begin a state may come twice
         for level, rows in zip(self._rebuilt.levels, self._rebuilt.states, strict=True):
             own = np.flatnonzero(states[:, 0] == level)
-            if len(own) and len(rows):
-                codes, wanted = tables.codes(rows), tables.codes(entries[own])
-                sort = np.argsort(codes)
-                at = sort[np.searchsorted(codes, wanted, sorter=sort).clip(max=len(rows) - 1)]
-                same = codes[at] == wanted
-                numbers.append(first + at[same])
-                labels.append(own[same])
+            at, same = places(tables.codes(rows), tables.codes(entries[own]))
+            numbers.append(first + at[same])
+            labels.append(own[same])
             first += len(rows)
         number, label = np.concatenate(numbers), np.concatenate(labels)
         known = np.isfinite(values[label]).all(axis=1)

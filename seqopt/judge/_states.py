@@ -187,13 +187,8 @@ class StateEvaluator:
             if limited and self._to_go is not None:
                 to_go = self._to_go(self.tables, level, fresh[first])
                 first = first[spent[first] + to_go <= asked.steps]
-            order = np.argsort(codes, kind="stable")
-            at = np.searchsorted(codes, own[first], sorter=order).clip(max=len(codes) - 1)
-            known = np.zeros(len(first), dtype=bool)
-            if len(codes):
-                known = codes[order[at]] == own[first]
-                rows = order[at[known]]
-                steps[rows] = np.minimum(steps[rows], spent[first[known]])
+            at, known = places(codes, own[first])
+            steps[at[known]] = np.minimum(steps[at[known]], spent[first[known]])
             new = first[~known]
             found, passes = self.valued(level, fresh[new], asked)
             codes, states = np.concatenate([codes, own[new]]), np.concatenate([states, fresh[new]])
@@ -304,6 +299,15 @@ class StateEvaluator:
             if goal.moves is not None and (own := own_values(goal)) is not None:
                 out[:, k] = own(moves)
         return out
+
+
+def places(codes: Ints, wanted: Ints) -> tuple[Ints, Bools]:
+    """Return where wanted codes (n,) are among codes (m,), all different, and which are there."""
+    if not len(codes):
+        return np.zeros(len(wanted), dtype=np.int64), np.zeros(len(wanted), dtype=bool)
+    order = np.argsort(codes, kind="stable")
+    at = order[np.searchsorted(codes, wanted, sorter=order).clip(max=len(codes) - 1)]
+    return at, codes[at] == wanted
 
 
 def largest_load(problem: States, robot: int, *, stand: bool) -> float:
