@@ -181,8 +181,8 @@ class Rebuilt:
         """Add the states of a part that are reached, and the moves to them."""
         level, evaluator = self._space.at(part)
         none = evaluator.tables.start()[:0]
-        rows = (self._space.renumbered(part, move.states, back=True) for _, move in coming)
-        rows = map(evaluator.tables.in_order, rows)
+        own = (self._space.renumbered(part, move.states, back=True) for _, move in coming)
+        rows = map(evaluator.tables.in_order, own)
         coming = [(s, m._replace(states=own)) for (s, m), own in zip(coming, rows, strict=True)]
         entries = [none, self._hint.get(level, none), *(move.states for _, move in coming)]
         limited = np.isfinite(self._asked.steps)

@@ -120,13 +120,13 @@ def with_numbers(name: str, found: Solution, goals: int) -> Solution:
         motions = tuple(np.array(each, dtype=float) for each in found.motions)
         if any(each.ndim != 2 or each.shape[1] != 6 or not len(each) for each in motions):
             raise ValueError("motions are none: give rows of six numbers")
-        return Solution(
-            states,
-            objective,
-            bound,
+        return replace(
+            found,
+            states=states,
+            objective=objective,
+            bound=bound,
             visited=tuple(map(_wholes, found.visited)),
             prices=tuple(tuple(map(float, each)) for each in found.prices),
-            stopped=found.stopped,
             grips=tuple(tuple(map(_whole, row)) for row in found.grips),
             proofs=tuple(
                 LabelProof(_wholes(rows), *(np.array(each, dtype=float) for each in numbers))
@@ -135,6 +135,7 @@ def with_numbers(name: str, found: Solution, goals: int) -> Solution:
             starts=tuple(map(float, found.starts)),
             ends=float(found.ends),
             motions=motions,
+            trace=(),
             compile_seconds=seconds,
             order=tuple(map(_whole, found.order)),
             effort=(sets, models),
@@ -312,15 +313,14 @@ def _claims(instance: Instance, found: Solution) -> list[Claim]:
 
 def _of_times(instance: Instance, found: Solution, kinds: list[str]) -> list[Claim]:
     """Return claims of makespan bounds: labels, if any, and shares of robot kinds, by arc."""
-    first = 0 if instance.caps else kinds.index(TIME)
-    own = [Claim() for _ in kinds]
+    assert instance.timed is not None  # multipliers are of robots
+    _, firsts = np.unique(instance.timed.kinds, return_index=True)
+    first, own = 0 if instance.caps else kinds.index(TIME), [Claim() for _ in kinds]
     for k, proof in enumerate(found.proofs[: len(kinds) - first], start=first):
         if kinds[k] == TIME and len(proof.prices):
-            assert instance.timed is not None  # multipliers are of robots
-            _, firsts = np.unique(instance.timed.kinds, return_index=True)
-            shares, labels = np.asarray(proof.prices[:, [0, *(1 + firsts)]]), None
+            claim = Claim(shares=np.asarray(proof.prices[:, [0, *(1 + firsts)]]))
             if len(proof.labels):
                 labels = proof.states[:, 1], proof.labels
-            value = None if labels is None else found.bound[k]
-            own[k] = Claim(value, shares=shares, labels=labels)
+                claim = replace(claim, value=found.bound[k], labels=labels)
+            own[k] = claim
     return own

@@ -19,7 +19,14 @@ from seqopt.problem.standing import Standing
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.quantities import _props_table
-from seqopt.responses.table import Departure, LinearRange, _Columns, analyze, grips_table
+from seqopt.responses.table import (
+    Departure,
+    LinearRange,
+    _analyzed,
+    _Columns,
+    _table_of,
+    grips_table,
+)
 from seqopt.sequence.steps import Site, Step, _check_part
 from seqopt.stability._steps import assess_steps, stability_table, step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
@@ -31,37 +38,18 @@ if TYPE_CHECKING:
 class ShownBuild(Shown):
     """Base class of plans: builds whose grips are all chosen.
 
-    A subclass has an engine, steps, and the responses of these steps.
+    A subclass says which ``engine`` computes its ``steps``, what it is called (``title``), its
+    objective and what is proven of it in words (``result``), run times by stage (``seconds``, s),
+    how every state must stand, if at all (``standing``), and where a part of a build begins.
     """
 
-    if TYPE_CHECKING:
-
-        @property
-        def engine(self) -> Engine:
-            """The engine that computes the responses."""
-
-        @property
-        def steps(self) -> tuple[Step, ...]:
-            """The steps of the build."""
-
-        @property
-        def title(self) -> str:
-            """The name of the plan where it is shown next to others."""
-
-        @property
-        def result(self) -> str:
-            """The objective of the plan, and what is proven about it, in words."""
-
-        @property
-        def seconds(self) -> Mapping[str, float]:
-            """Run times by stage, s."""
-
-        @property
-        def standing(self) -> Standing | None:
-            """The demand that every state stands, if there is one."""
-
-        def responses(self) -> pd.DataFrame:
-            """Return the responses of every step, as `seqopt.analyze` makes them."""
+    engine: Engine
+    steps: tuple[Step, ...]
+    title: str
+    result: str
+    seconds: Mapping[str, float]
+    standing: Standing | None
+    _begin: Site | None
 
     @cached_property
     def departures(self) -> tuple[Departure, ...]:
@@ -70,7 +58,16 @@ class ShownBuild(Shown):
 
     @cached_property
     def _columns(self) -> _Columns:
-        return self.responses()
+        return _analyzed(self.engine, self.steps)
+
+    def responses(self) -> pd.DataFrame:
+        """Return the responses of every step, as of `seqopt.analyze`.
+
+        Result: a row per step; of a schedule the robots whose grips were chosen beside, as
+        ``optimized_robot``. Raises `ProblemError` if a problem is given by its costs alone; so do
+        the tables below.
+        """
+        return _table_of(self._columns)
 
     @cached_property
     def _within(self) -> LinearRange:
@@ -147,11 +144,6 @@ class ShownBuild(Shown):
         scene = self.engine.network.scene
         times = offered("step_times")(scene, self.steps, self._waits, self._begin)
         return float(times[-1].end)
-
-    @property
-    def _begin(self) -> Site | None:
-        """Where a part of a build begins, if that is known."""
-        return None
 
     @cached_property
     def _waits(self) -> Any:
@@ -271,6 +263,8 @@ class GivenSequence(ShownBuild):
     title: str = "sequence"
     seconds: Mapping[str, float] = field(default_factory=dict, compare=False, hash=False)
     standing: Standing | None = None
+    result = "given, not optimized"
+    _begin = None
 
     def __post_init__(self) -> None:
         if not isinstance(getattr(self.engine, "network", None), Network):
@@ -282,15 +276,6 @@ class GivenSequence(ShownBuild):
         name = self.engine.network.scene.name
         return f"<GivenSequence {self.title} of {name}: {len(self.steps)} steps>"
 
-    @property
-    def result(self) -> str:
-        """Its values, in words."""
-        return "given, not optimized"
-
     def table(self) -> pd.DataFrame:
         """Return every grip, as of `grips`."""
         return self.grips()
-
-    def responses(self) -> pd.DataFrame:
-        """Return the responses of every step, as of `seqopt.analyze`."""
-        return analyze(self.engine, self.steps)

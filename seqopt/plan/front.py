@@ -95,18 +95,15 @@ class FrontProblem:
 
         def tell(found: Explorer) -> None:
             if found.nbytes > free_memory():
-                raise ProblemError(
-                    "pareto: the states do not fit the memory; give an order, or rules with fewer "
-                    "states"
-                )
+                less = "give an order, or rules with fewer states"
+                raise ProblemError(f"pareto: the states do not fit the memory; {less}")
 
         found = explore(self._problem, tell=tell)
         if not found.whole:
             raise confirmed(self._problem, "the search")
         found.refine()
         graph, states = found.graph()
-        amounts = graph.amounts.copy()
-        peaks = [k for k, peak in enumerate(graph.peaks) if peak]
+        peaks, amounts = np.array(graph.peaks), graph.amounts.copy()
         amounts[:, peaks] = _rounded_up(amounts[:, peaks], self._round[peaks])
         return Visited(replace(graph, amounts=amounts), states), found.space
 
@@ -321,13 +318,10 @@ def pick(table: pd.DataFrame, least: str, under: Mapping[str, float] | None = No
             known = [*map(str, table.columns)]
             why = f"the set has no such column{did_you_mean(name, known)}"
             raise ProblemError(f"pick {name}: {why}; give one of {', '.join(known)}")
-    rows = np.ones(len(table), dtype=bool)
-    for name, bound in under.items():
-        rows &= table[name].to_numpy(float) < bound
-    if not rows.any():
+    rows = table[(table[[*under]] < pd.Series(under)).all(axis=1)] if under else table
+    if not len(rows):
         closest = ", ".join(f"{name} from {table[name].min():.6g}" for name in under)
         raise ProblemError(
             f"pick {least}: no plan of the set is below all bounds; it has {closest}"
         )
-    values = np.where(rows, table[least].to_numpy(float), np.inf)
-    return int(values.argmin())
+    return int(table.index.get_loc(rows[least].idxmin()))

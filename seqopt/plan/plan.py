@@ -37,7 +37,6 @@ from seqopt.responses.table import (
     _Columns,
     _each_fields,
     _response_columns,
-    _table_of,
 )
 from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
@@ -157,12 +156,12 @@ class Plan(ShownBuild):
         return self.graph.alone_in_scene
 
     @property
-    def engine(self) -> Engine:
+    def engine(self) -> Engine:  # type: ignore[override]
         """The engine of the responses, for the scene in the order of the plan."""
         return self._of_scene.engine
 
     @property
-    def standing(self) -> Standing | None:
+    def standing(self) -> Standing | None:  # type: ignore[override]
         """The demand that every state stands, if there was one."""
         return self.graph.standing
 
@@ -172,7 +171,7 @@ class Plan(ShownBuild):
         return self._of_scene.method
 
     @property
-    def title(self) -> str:
+    def title(self) -> str:  # type: ignore[override]
         """The name of the plan where it is shown next to others."""
         if self.order:
             return "best order"
@@ -240,7 +239,7 @@ class Plan(ShownBuild):
         return Status.FEASIBLE
 
     @property
-    def result(self) -> str:
+    def result(self) -> str:  # type: ignore[override]
         """The objective of the plan, and what is proven about it, in words.
 
         It begins with a warning if steps exceed the linear range.
@@ -265,7 +264,7 @@ class Plan(ShownBuild):
         return self.graph.chosen_nodes(self.selection.states)
 
     @property
-    def _begin(self) -> Site | None:
+    def _begin(self) -> Site | None:  # type: ignore[override]
         return self.graph.begin
 
     @property
@@ -293,14 +292,6 @@ class Plan(ShownBuild):
     def overloads(self) -> tuple[Excess, ...]:
         """The payloads that steps exceed, also without a limit on payloads."""
         return overloads(self.engine.network.scene, self._columns)
-
-    def responses(self) -> pd.DataFrame:
-        """Return the responses of every step; of a schedule with the robots that were chosen for.
-
-        Result: a row per step; the columns of `seqopt.analyze`, of candidates ``optimized_robot``.
-        Raises `ProblemError` if the problem is given by its costs alone; so do the tables below.
-        """
-        return _table_of(self._columns)
 
     @cached_property
     def _columns(self) -> _Columns:
