@@ -174,8 +174,10 @@ class Robust:
                 f"vary grips={grips:g}: they are rigid; say how stiff with --grips or with_grips"
             )
         factors = (1 / factor, factor)
-        drawn = sample(scene, stiffness=factors, count=self.count, seed=self.seed, **spread)
-        return drawn if grips == 1 else drawn.with_grips((1 / grips, grips))
+        held = (1 / grips, grips)
+        return sample(
+            scene, stiffness=factors, grips=held, count=self.count, seed=self.seed, **spread
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -307,7 +309,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         brick on), newest=either|placing|free (where the newest brick is held), regrips=N|any
         (between two bricks), placers=NAME,NAME|any, payload=kept|ignored,
         ending=held|released|one-by-one (how robots leave the finished structure),
-        candidates=near:JOINTS|within:METERS|all.
+        candidates=near:JOINTS|all.
     search : Search, optional
         How it is searched, and what that may use.
     progress : callable, optional

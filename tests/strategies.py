@@ -201,7 +201,7 @@ def free_builds(draw, most_bricks=5, most_robots=4):
         ending=draw(st.sampled_from(["held", "released", "one-by-one"])),
         placers=tuple(names[: draw(st.sampled_from([0, len(names) - 1]))]),
         payload=draw(st.sampled_from(["kept", "ignored"])),
-        candidates=draw(st.sampled_from(["", "near:0", "near:1", "within:0.15"])),
+        candidates=draw(st.sampled_from(["", "near:0", "near:1", "near:2"])),
     )
     return scene, rules
 

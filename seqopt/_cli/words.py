@@ -198,8 +198,8 @@ class Stands:
         With ``stands``: tilt that every state must survive.
     curing : sequence of str
         With ``stands``: which share of its bond mortar has at an age: 15min (in proportion, full
-        then), 0s=0.005,5min=0.4,15min=1 (what is reached when), never; of one joint with its name
-        before, as 5-6:30min. What is let go waits for it (default: full at once).
+        then), 0s=0.005,5min=0.4,15min=1 (what is reached when), never.
+        What is let go waits for it (default: full at once).
     """
 
     stands: str | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 
 from seqopt.arrays import Terse
@@ -127,54 +127,28 @@ Points = tuple[tuple[float, float], ...]
 class Curing(Terse):
     """The share of its full bond that a joint has at an age: what was reached last, never more.
 
-    A joint's age counts from when the brick that closes it is in its place. Tensile strength and
+    Its age counts from when the brick that closes it is in its place. Tensile strength and
     cohesion grow with the share; friction is there from the first.
 
     ``points``: ages, s, and the share that is reached then, both rising; the last share is 1.
-    Before the first point there is no bond. No points at all: it never cures. ``joints``: names of
-    joints, as ``5-6``, and points of their own. Raises `SceneError` if ages or shares do not rise,
-    or the last share is not 1.
+    Before the first point there is no bond. No points at all: it never cures. Raises `SceneError`
+    if ages or shares do not rise, or the last share is not 1.
     """
 
     points: Points = ()
-    joints: tuple[tuple[str, Points], ...] = field(default=())
 
     def __post_init__(self) -> None:
         settle(self, points=_checked("curing", self.points))
-        own = rows("curing: joints", self.joints, "pairs of a joint and its points")
-        named = tuple((str(n), _checked(f"curing: joint {n}", p)) for n, p in own)
-        if bool(self.points) != all(bool(points) for _, points in named) and named:
-            raise SceneError(
-                "curing: a joint that never cures beside others that do is not modeled; give all "
-                "joints points, or none"
-            )
-        settle(self, joints=named)
-
-    def share(self, age: float) -> float:
-        """Return the share of full bond at an age, s, of a joint without points of its own."""
-        return max((share for at, share in self.points if at <= age), default=0.0)
-
-    def points_of(self, joint: str) -> Points:
-        """Return the points of a joint."""
-        return dict(self.joints).get(joint, self.points)
 
     @property
     def is_instant(self) -> bool:
-        """Whether every joint has its full bond from the first."""
-        return all(
-            points[:1] == ((0.0, 1.0),) for points in (self.points, *dict(self.joints).values())
-        )
+        """Whether joints have their full bond from the first."""
+        return self.points[:1] == ((0.0, 1.0),)
 
     def __str__(self) -> str:
-        own = [f"{name}:{_describe(points)}" for name, points in self.joints]
-        return " ".join([_describe(self.points), *own])
-
-
-def _describe(points: Points) -> str:
-    """Return points in the words of `_find_curing`."""
-    if points and points == _linear(points[-1][0]):
-        return f"{points[-1][0]:g}s"
-    return ",".join(f"{age:g}s={share:g}" for age, share in points) or "never"
+        if self.points and self.points == _linear(self.points[-1][0]):
+            return f"{self.points[-1][0]:g}s"
+        return ",".join(f"{age:g}s={share:g}" for age, share in self.points) or "never"
 
 
 def _checked(where: str, given: Iterable[Sequence[float]]) -> Points:
@@ -208,50 +182,33 @@ def _find_curing(given: Curing | str | Iterable[str]) -> Curing:
     """Return how mortar cures: itself, or by words.
 
     ``15min`` (or ``s``, ``h``) has full bond after that and before a share in proportion, counted
-    from below at `SHARES`; ``5min=0.4,15min=1`` what is reached when; ``never``; before any of
-    these the name of a joint and a colon, as ``5-6:30min``.
+    from below at `SHARES`; ``5min=0.4,15min=1`` what is reached when; ``never``. An age without a
+    unit is in s.
     """
     if isinstance(given, Curing):
         return given
-    words = given.split() if isinstance(given, str) else list(given)
-    common, own = list[Points](), list[tuple[str, Points]]()
-    for word in words:
-        name, colon, text = word.rpartition(":")
-        points = _in_words(word, text)
-        if colon:
-            own.append((name, points))
-        else:
-            common.append(points)
-    if len(common) != 1:
-        raise SceneError(
-            f"curing {' '.join(words)}: give one law for all joints, as {EXAMPLE}, and others with "
-            "the name of a joint, as 5-6:30min"
-        )
-    return Curing(common[0], tuple(own))
-
-
-def _in_words(word: str, text: str) -> Points:
-    """Return the points of a law in words; an age without a unit is in s."""
-    if text == "never":
-        return ()
-    out = []
-    for part in text.split(","):
-        age, _, share = part.partition("=")
+    words, out = given.split() if isinstance(given, str) else [*given], []
+    if len(words) != 1:
+        raise SceneError(f"curing {' '.join(words)}: give one law for all joints, as {EXAMPLE}")
+    if words[0] == "never":
+        return Curing()
+    for part in words[0].split(","):
+        age, equals, share = part.partition("=")
         number = age.rstrip("minhs")
         try:
             seconds = float(number) * _UNITS[age[len(number) :] or "s"]
         except (KeyError, ValueError):
             wrong = f"{short(age)} is no age"
-            raise SceneError(f"curing {word}: {wrong}; give {EXAMPLE}, or never") from None
+            raise SceneError(f"curing {words[0]}: {wrong}; give {EXAMPLE}, or never") from None
         if not 0 <= seconds < math.inf:
-            raise SceneError(f"curing {word}: {short(age)} is no age; give zero or more")
-        if text == age:
-            return _linear(seconds)
+            raise SceneError(f"curing {words[0]}: {short(age)} is no age; give zero or more")
+        if not equals and len(words[0]) == len(age):
+            return Curing(_linear(seconds))
         try:
             out.append((seconds, float(share)))
         except ValueError:
-            raise SceneError(f"curing {word}: share {short(share)}; give {EXAMPLE}") from None
-    return _checked(f"curing {word}", out)
+            raise SceneError(f"curing {words[0]}: share {short(share)}; give {EXAMPLE}") from None
+    return Curing(tuple(out))
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import ProblemError, SceneError
 from seqopt.scene._checks import short, whole_between
 from seqopt.scene.boxes import as_vector
-from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
+from seqopt.scene.parts import Brick, Ground, Joint, Load
 from seqopt.scene.scene import Scene
 
 _Part = TypeVar("_Part", Brick, Joint, Ground, Load)
@@ -42,6 +42,17 @@ def _stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene
     ]
     joints = len(scene.joints)
     return replace(scene, joints=tuple(out[:joints]), grounds=tuple(out[joints:]))
+
+
+def _regripped(scene: Scene, factors: Floats) -> Scene:
+    """Return a scene whose grips are stiffer by factors (K,), by kind, with the joints of arms."""
+    robots = []
+    for robot, kind in zip(scene.robots, scene.grip_kinds.of_robot, strict=False):  # props follow
+        factor = float(factors[kind])
+        arm = robot.arm and _stiffer(robot.arm, joint_stiffness=factor)
+        grip = _stiffer(robot, stiffness=factor, rotational_stiffness=factor)
+        robots.append(replace(grip, arm=arm))
+    return scene.with_robots(*robots)
 
 
 def weighed(scene: Scene, factors: Floats) -> Scene:
@@ -149,28 +160,6 @@ class Scenarios:
             "seed": self.seed,
         } | ({"grips": list(self.grips)} if self.grips != _ALIKE else {})
 
-    def with_grips(self, factors: tuple[float, float]) -> Scenarios:
-        """Return the same scenarios with grips that vary as well.
-
-        ``factors``: the least and the largest by which the stiffness of grips is multiplied, the
-        same for all robots of one compliance, with the joints of arms; log-uniform. Rigid grips
-        stay rigid.
-        """
-        held = _factors("grips", factors)
-        if self.grips != _ALIKE:
-            raise SceneError("grips of these scenarios vary already; give factors once")
-        scenes, (low, high) = [], map(math.log, held)
-        for i, scene in enumerate(self.scenes):  # with random numbers of their own
-            kinds = len(scene.grip_kinds.turns)
-            logs = np.random.default_rng([self.seed, i, 3]).uniform(low, high, kinds)
-            own, robots = np.exp(logs)[scene.grip_kinds.of_robot].tolist(), list[Robot]()
-            for robot, factor in zip(scene.robots, own, strict=True):
-                arm = robot.arm and _stiffer(robot.arm, joint_stiffness=factor)
-                grip = _stiffer(robot, stiffness=factor, rotational_stiffness=factor)
-                robots.append(replace(grip, arm=arm))
-            scenes.append(scene.with_robots(*robots))
-        return replace(self, scenes=tuple(scenes), grips=held)
-
 
 def scenarios(
     scene: Scene,
@@ -178,6 +167,7 @@ def scenarios(
     stiffness: tuple[float, float] = (1 / 3, 3.0),
     density: float = 0.1,
     position: float = 0.002,
+    grips: tuple[float, float] = _ALIKE,
     count: int = 30,
     seed: int = 0,
 ) -> Scenarios:
@@ -197,6 +187,9 @@ def scenarios(
         Largest relative change of every brick's density, from 0 to below 1; uniform.
     position : float, optional
         Largest shift of bricks, joints and ground ends along every axis, m; uniform.
+    grips : (float, float), optional
+        Least and largest factor of the stiffness of grips, the same for all robots of one
+        compliance, with the joints of arms; log-uniform. Rigid grips stay rigid.
     count, seed : int, optional
         How many, and which.
 
@@ -210,26 +203,29 @@ def scenarios(
     >>> scenarios(load_scene("arch25"), count=5, seed=1)  # doctest: +ELLIPSIS
     <5 scenarios of arch25: stiffness times 0.333 to 3, density within 10 %, ... seed 1>
     """
-    low, high = _factors("stiffness", stiffness)
+    factors, held = _factors("stiffness", stiffness), _factors("grips", grips)
     for name, given, most in (("density", density, 1.0), ("position", position, math.inf)):
         if isinstance(given, bool) or not isinstance(given, Real) or not 0 <= given < most:
             limit = f" to below {most:g}" if math.isfinite(most) else ""
             raise SceneError(f"{name} is {short(given)}; give a number from 0{limit}")
     number = whole_between("count", count, 1, MOST)
     seed = whole_between("seed", seed, 0, 2**63)
-    drawn = Scenarios(scene, (low, high), float(density), float(position), seed, ())
+    drawn = Scenarios(scene, factors, float(density), float(position), seed, (), held)
     return replace(drawn, scenes=tuple(_sample(drawn, i) for i in range(number)))
 
 
 def _sample(of: Scenarios, number: int) -> Scene:
     """Return one scenario, by number; each kind of change has random numbers of its own."""
     scene = of.nominal
-    stiff, heavy, moved = (np.random.default_rng([of.seed, number, kind]) for kind in range(3))
-    low, high = map(math.log, of.stiffness)
-    logs = stiff.uniform(low, high, (2, len(scene.joints) + len(scene.grounds)))
+    stiff, heavy, moved, held = (np.random.default_rng([of.seed, number, k]) for k in range(4))
+    logs = stiff.uniform(*map(math.log, of.stiffness), (2, len(scene.joints) + len(scene.grounds)))
     shares = heavy.uniform(-1.0, 1.0, len(scene.bricks))
     try:
         out = weighed(_stiffened(scene, *np.exp(logs)), 1.0 + of.density * shares)
+        if of.grips != _ALIKE:
+            out = _regripped(
+                out, np.exp(held.uniform(*map(math.log, of.grips), len(scene.grip_kinds.turns)))
+            )
         return shifted(out, of.position, moved) if of.position else out
     except SceneError as error:
         raise SceneError(

@@ -75,7 +75,7 @@ class FreeRules:
         How the build ends. One by one: with all bricks robots may release against the rules,
         and once a state violates them, only release; also if a build begins in such a state.
     candidates : str
-        At which nodes placed bricks may be gripped: ``near:6`` or ``within:1.5``, as of
+        At which nodes placed bricks may be gripped: ``near:6``, as of
         `seqopt.sequence.schedule.Near`; by default wherever robots reach.
     begin : Site or None
         Where the build begins; by default with the empty site. This state need not keep rules or

@@ -20,7 +20,7 @@ import numpy as np
 
 from seqopt._showing import Shown, display
 from seqopt.arrays import Bools, Floats, Ints, Terse
-from seqopt.errors import ProblemError, StepError, did_you_mean
+from seqopt.errors import ProblemError, StepError
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
@@ -29,7 +29,7 @@ from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_RULE = re.compile(r"(near|within):([0-9]+\.?[0-9]*|\.[0-9]+)")
+_RULE = re.compile(r"near:([0-9]+)")
 _NEWEST = 2  # bricks that make the working end: a build from both ends has two of them
 
 
@@ -38,7 +38,7 @@ class Near:
     """A restriction of candidates to nodes near the working end of a build.
 
     ``rule``: ``near:12`` keeps the nodes of bricks that at most 12 joints part from the bricks
-    placed last, ``within:1.5`` the nodes at most 1.5 m from these bricks' centroids.
+    placed last.
     """
 
     rule: str
@@ -46,33 +46,21 @@ class Near:
     def __post_init__(self) -> None:
         text = self.rule.strip() if isinstance(self.rule, str) else ""
         if _RULE.fullmatch(text) is None:
-            hint = did_you_mean(str(self.rule).partition(":")[0], ("near", "within"))
-            raise StepError(
-                f"candidates {self.rule!r}{hint}: give near:JOINTS or within:METERS, as near:12"
-            )
+            raise StepError(f"candidates {self.rule!r}: give near:JOINTS, as near:12")
         object.__setattr__(self, "rule", text)
 
     def nodes(self, scene: Scene, bricks: int, nodes: Sequence[int]) -> tuple[int, ...]:
         """Select the nodes that are near at a brick count, or else the nearest ones."""
-        if not nodes:
-            return ()
-        name, _, most = self.rule.partition(":")
-        placed = scene.placed[:bricks]
-        if name == "near":  # counted in joints
-            import networkx as nx  # noqa: PLC0415  # slow to import, for this only
+        import networkx as nx  # noqa: PLC0415  # slow to import, for this only
 
-            names = [brick.name for brick in placed]
-            graph: nx.Graph[int] = nx.Graph(joint.bricks for joint in scene.joints)
-            graph = graph.subgraph(names).copy()
-            graph.add_nodes_from(names)
-            joints = nx.multi_source_dijkstra_path_length(graph, {*names[-_NEWEST:]})
-            away = {n: float(joints.get(b.name, math.inf)) for b in placed for n in b.nodes}
-        else:
-            ends = [brick.position for brick in placed[-_NEWEST:]]
-            points = {n: b.node_position(n) for b in placed for n in b.nodes}
-            away = {n: min(math.dist(at, end) for end in ends) for n, at in points.items()}
-        limit = max(float(most), min(away.get(n, math.inf) for n in nodes))
-        return tuple(node for node in nodes if away.get(node, math.inf) <= limit)
+        placed = scene.build_order[:bricks]
+        graph: nx.Graph[int] = nx.Graph(joint.bricks for joint in scene.joints).subgraph(placed)
+        graph = nx.Graph(graph)
+        graph.add_nodes_from(placed)
+        joints = nx.multi_source_dijkstra_path_length(graph, {*placed[-_NEWEST:]})
+        away = {n: joints.get(scene.brick_of_node[n].name, math.inf) for n in nodes}
+        limit = max(int(self.rule.partition(":")[2]), min(away.values(), default=0))
+        return tuple(node for node in nodes if away[node] <= limit)
 
 
 @dataclass(frozen=True)

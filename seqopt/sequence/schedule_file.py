@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.methods import SCHEDULES, open_schedule, robot_loop
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrips
-from seqopt.sequence.steps import Site, Step, StepKind, _check_part, _check_step, check_sequence
+from seqopt.sequence.steps import Site, Step, StepKind, _check_state, _check_step
 
 
 def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
@@ -67,42 +67,35 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     ``NAME_node`` and, if present, ``NAME_brick``; an empty cell means that the robot does not grip.
     Other columns are ignored. A take-down may begin with any bricks.
     """
-    steps: list[Step] = []
-    for line, _, read in _read_steps(scene, text, f"plan {source}"):
-        if read.moves:
+    what, out = f"plan {source}", list[Step]()
+    rows = _read_steps(scene, text, what)
+    _check_rows(scene, rows, part=True)
+    for where, step in rows:
+        if step.moves:
             raise StepError(
-                f"plan {source}, line {line}: a grip is ?, open; give its node, or optimize the "
-                "file as a schedule"
+                f"{where}: a grip is ?, open; give its node, or optimize the file as a schedule"
             )
-        nodes = (grip if isinstance(grip, int) else None for grip in read.grips)
-        steps.append(Step(read.number, read.kind, read.bricks, tuple(nodes)))
-    first = 1
-    if steps and (steps[0].kind, steps[0].bricks) != (StepKind.PLACE, 1):  # a part of a plan
-        first = max(1, steps[0].number)
-    for expected, step in enumerate(steps, start=first):
-        if step.number != expected:
-            where = f"plan {source}: step {step.number}"
-            raise StepError(f"{where} should be {expected}; number steps from 1")
-    if first > 1 or any(step.kind is StepKind.REMOVE for step in steps):
-        return _check_part(scene, steps)
-    return check_sequence(scene, steps)
+        nodes = (grip if isinstance(grip, int) else None for grip in step.grips)
+        out.append(Step(step.number, step.kind, step.bricks, tuple(nodes)))
+    return tuple(out)
 
 
-def _read_steps(scene: Scene, text: str, what: str) -> Iterator[tuple[int, Row, OpenStep]]:
-    """Yield the number of each line of a table of steps, its cells by column, and its step."""
+def _read_steps(scene: Scene, text: str, what: str) -> list[tuple[str, OpenStep]]:
+    """Return the steps of a table, each with the line that it is in."""
     wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
     columns, rows = read_table(text, what, StepError)
     if lacking := [column for column in wanted if column not in columns]:
         raise StepError(f"{what}: column {lacking[0]} is missing; give {', '.join(wanted)}")
     if twice := [column for column in wanted if columns.count(column) > 1]:
         raise StepError(f"{what}: column {twice[0]} occurs twice; keep one")
-    kinds = {kind.value: kind for kind in StepKind}
+    if not rows:
+        raise StepError(f"{what}: it has no steps; give at least one")
+    kinds, out = {kind.value: kind for kind in StepKind}, list[tuple[str, OpenStep]]()
     grips: ScheduledGrips = (None,) * len(scene.robots)
     opened = 0
     for line, row in rows:
         where = f"{what}, line {line}"
-        kind = row["type"]
-        if kind not in kinds:
+        if (kind := row["type"]) not in kinds:
             raise StepError(f"{where}: type is {short(kind)}; give one of {', '.join(kinds)}")
         number, bricks = (_integer(row[name], f"{where}: {name}") for name in ("step", "bricks"))
         now: list[int | OpenGrip | None] = []
@@ -110,7 +103,32 @@ def _read_steps(scene: Scene, text: str, what: str) -> Iterator[tuple[int, Row, 
             now.append(_read_grip(scene, robot, row, where, held, opened))
             opened += isinstance(now[-1], OpenGrip) and now[-1] != held
         grips = tuple(now)
-        yield line, row, OpenStep(number, kinds[kind], bricks, grips)
+        out.append((where, OpenStep(number, kinds[kind], bricks, grips)))
+    return out
+
+
+def _check_rows(scene: Scene, rows: Sequence[tuple[str, OpenStep]], *, part: bool = False) -> None:
+    """Require steps that are numbered, and feasible one after the other.
+
+    ``part``: whether the first may go on from any state: a build does so where it is numbered on,
+    a take-down always.
+    """
+    first, before = rows[0][1], None
+    begins = (first.kind, first.bricks) == (StepKind.PLACE, 1)
+    goes_on = part and not begins
+    goes_on &= first.number > 1 or any(step.kind is StepKind.REMOVE for _, step in rows)
+    for number, (where, step) in enumerate(rows, start=max(first.number, 1) if goes_on else 1):
+        if step.number != number:
+            wanted = f"should be {number}; number steps from 1"
+            raise StepError(f"{where}: step {step.number} {wanted}")
+        try:
+            if before is None and goes_on:
+                _check_state(scene, step, f"step {number}")
+            else:
+                _check_step(scene, before, step)
+        except StepError as error:
+            raise StepError(f"{where}: {error}") from error
+        before = step
 
 
 def _read_grip(
@@ -206,28 +224,21 @@ def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
     """
     network = network_of(where)
     scene, what = network.scene, f"schedule {source}"
-    known = [f"{robot.name}_node" for robot in scene.robots]
-    steps: list[OpenStep] = []
-    for line, row, step in _read_steps(scene, text, what):
-        at = f"{what}, line {line}"
-        for column in filter(None, row):  # None stands for cells without a column
-            if column.endswith("_node") and column not in known:
-                raise StepError(
-                    f"{what}: column {column}: no robot of scene {scene.name} is called so; "
-                    f"give {', '.join(known)}"
-                )
-        if step.number != len(steps) + 1:
-            wanted = f"should be {len(steps) + 1}; number steps from 1"
-            raise StepError(f"{at}: step {step.number} {wanted}")
-        if None in row:
-            raise StepError(f"{at}: it has more cells than there are columns; leave out the rest")
-        try:
-            _check_step(scene, steps[-1] if steps else None, step)
-        except StepError as error:
-            raise StepError(f"{at}: {error}") from error
-        steps.append(step)
-    if not steps:
-        raise StepError(f"{what}: it has no steps; give at least one")
+    known, (columns, rows) = (
+        [f"{r.name}_node" for r in scene.robots],
+        read_table(text, what, StepError),
+    )
+    if unknown := [name for name in columns if name.endswith("_node") and name not in known]:
+        raise StepError(
+            f"{what}: column {unknown[0]}: no robot of scene {scene.name} is called so; "
+            f"give {', '.join(known)}"
+        )
+    if more := [line for line, row in rows if None in row]:
+        wrong = "it has more cells than there are columns; leave out the rest"
+        raise StepError(f"{what}, line {more[0]}: {wrong}")
+    read = _read_steps(scene, text, what)
+    _check_rows(scene, read)
+    steps = [step for _, step in read]
     try:
         return open_schedule(Path(source).stem, network, steps)
     except StepError as error:

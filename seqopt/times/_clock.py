@@ -138,7 +138,7 @@ class Floors:
         for motion in motions:
             if len(motion) <= len(network.inner):
                 self._cuts.add(motion)
-        self._brick, self._points = joints.closing, [curing.points_of(n) for n in joints.names]
+        self._brick, self._points = joints.closing, [curing.points] * len(joints.names)
         ages = np.array([points[-1][0] if points else 0.0 for points in self._points])
         self.full = np.zeros(len(network.inner))  # age at which all joints of a brick are cured, s
         np.maximum.at(self.full, self._brick, ages)

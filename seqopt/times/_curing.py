@@ -14,7 +14,7 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.contact.faces import PartialAssemblies, _contact_at
 from seqopt.contact.mortar import Curing, Mortar
-from seqopt.errors import SceneError, StepError
+from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
@@ -28,8 +28,7 @@ class JointsInTime:
     """The joints of a scene, and which share of its bond each has when.
 
     ``names`` (J,): in the order of contacts; ``closing`` (J,): index, in build order, of the brick
-    that closes it; ``ages``, ``shares`` (J, k): what is reached when; infinite, and 1, where a
-    joint has fewer points.
+    that closes it; ``ages``, ``shares`` (J, k): what is reached when.
     """
 
     def __init__(self, network: Network, curing: Curing) -> None:
@@ -37,19 +36,9 @@ class JointsInTime:
         self.names = tuple(
             _contact_at(network, i)[0] for i in springs.acting(len(network.inner)).tolist()
         )
-        unknown = [name for name, _ in curing.joints if name not in self.names]
-        if unknown:
-            raise SceneError(
-                f"curing: scene {network.scene.name} has no joint {unknown[0]}; its joints are "
-                f"named as {', '.join(self.names[:3])}"
-            )
         self.closing = np.asarray(springs.since[springs.acting(len(network.inner))] - 1)
-        points = [curing.points_of(name) for name in self.names]
-        most = max(map(len, points), default=0)
-        self.ages, self.shares = np.full((len(points), most), np.inf), np.ones((len(points), most))
-        for row, own in enumerate(points):
-            for k, (age, share) in enumerate(own):
-                self.ages[row, k], self.shares[row, k] = age, share
+        reached = np.array(curing.points).reshape(-1, 2).T
+        self.ages, self.shares = (np.tile(row, (len(self.names), 1)) for row in reached)
 
     @cached_property
     def full(self) -> Floats:

@@ -97,10 +97,10 @@ def check_cured(
     for step, start, end in zip(steps, starts, ends, strict=True):
         whole = step_assembly(network, step.bricks, step.grips)
         bond = []
-        for joint, bodies in zip(whole.contact_name, whole.bodies.tolist(), strict=True):
+        for bodies in whole.bodies.tolist():
             since = max(placed.get(body, start) for body in bodies if body >= 0)
             age = start - since + CLOSE * abs(start)
-            bond.append(max((s for at, s in curing.points_of(joint) if at <= age), default=0.0))
+            bond.append(max((s for at, s in curing.points if at <= age), default=0.0))
         key = step.bricks, step.grips, tuple(bond)
         if key not in found:
             found[key] = verdict(whole.with_bond(np.array(bond)), standing.mortar)

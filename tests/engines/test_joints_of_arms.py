@@ -151,7 +151,7 @@ def test_scenarios_hold_in_the_same_postures(arch25):
     jacobians = drawn_jacobians(np.random.default_rng(1), arch25, 2)
     scene = with_joints(arch25, np.full((2, 6), 1e6), jacobians)
     engine = make_engine("compliance", scene)
-    (drawn,) = seqopt.scenarios(scene, count=1).with_grips((0.1, 0.2)).scenes
+    (drawn,) = seqopt.scenarios(scene, count=1, grips=(0.1, 0.2)).scenes
     factor = drawn.robots[1].arm.joint_stiffness[0] / 1e6
     assert 0.1 <= factor <= 0.2
     found = engine_for(engine, drawn).network.scene.held_postures

@@ -83,7 +83,7 @@ def test_scenarios_keep_who_is_like_whom(unlike):
     )
     with pytest.raises(ProblemError, match="or other robots share a compliance"):
         require_alike(unlike, unlike.with_grips(1e6), 1)
-    drawn = seqopt.scenarios(unlike, count=3).with_grips((0.3, 3.0))
+    drawn = seqopt.scenarios(unlike, count=3, grips=(0.3, 3.0))
     plan = seqopt.optimize(unlike, "free", "worst-ratio", robust=Robust(scenes=drawn.scenes))
     assert plan.status == "optimal"
 

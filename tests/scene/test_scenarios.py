@@ -111,7 +111,7 @@ def test_grips_vary_by_kind_and_leave_all_else():
     soft = [replace(robot, stiffness=1e6, rotational_stiffness=1e4) for robot in others]
     scene = scene.with_robots(first, *soft)
     plain = scenarios(scene, count=20, seed=1)
-    drawn = plain.with_grips((0.5, 4.0))
+    drawn = scenarios(scene, grips=(0.5, 4.0), count=20, seed=1)
     ratios = []
     for before, after in zip(plain.scenes, drawn.scenes, strict=True):
         assert replace(after, robots=scene.robots) == before
@@ -126,9 +126,7 @@ def test_grips_vary_by_kind_and_leave_all_else():
     assert drawn.settings["grips"] == [0.5, 4.0]
     assert "grips times 0.5 to 4, seed 1" in repr(drawn)
     with pytest.raises(SceneError, match="grips is 3; give the least and the largest"):
-        plain.with_grips(3)
-    with pytest.raises(SceneError, match="vary already"):
-        drawn.with_grips((0.5, 2.0))
+        scenarios(scene, grips=3)
 
 
 # bricks that stand where they were measured

@@ -127,5 +127,5 @@ def test_on_a_chain_joints_are_counted(arch25, method):
 
 @pytest.mark.parametrize("rule", ["near:", "near:-1", "far:3", 3])
 def test_what_is_no_rule_is_refused(loop25, rule):
-    with pytest.raises(StepError, match="give near:JOINTS or within:METERS"):
+    with pytest.raises(StepError, match="give near:JOINTS, as near:12"):
         thin(loop25, rule)

@@ -135,7 +135,7 @@ def bonds(network, curing, bricks, placed, now):
     for name in names:
         ends = [which[part] for part in name.split("-") if part != "ground"]
         age = now - max(placed[i] if i < len(placed) else now for i in ends)
-        points = curing.points_of(name)
+        points = curing.points
         out.append(max((share for at, share in points if at <= age + 1e-9), default=0.0))
     return tuple(out)
 
@@ -178,8 +178,7 @@ def at_all_times(network, curing, step, label):
     """What follows from a label by a step, started at its earliest time or when joints change."""
     (kind, grips, after), (end, since, placed) = step, label
     begin, acts, gone = started(network.scene, kind, (grips, after), (end, since))
-    points = [curing.points, *dict(curing.joints).values()]
-    ages = {age for each in points for age, _ in each}
+    ages = {age for age, _ in curing.points}
     for now in sorted({begin, *(t + age for t in placed for age in ages if t + age > begin)}):
         then = now + acts
         free = tuple(

@@ -38,10 +38,7 @@ def plan():
 
 CASES = [
     (3, 2, (), ALONE, "0s=0.002,10min=1"),
-    pytest.param(
-        *(3, 2, ("rob2:slower=2.5",), ALONE, "0s=0.002,10min=1 2-3:0s=0.002,1h=1"),
-        marks=pytest.mark.slow,
-    ),
+    pytest.param(*(3, 2, ("rob2:slower=2.5",), ALONE, "0s=0.002,10min=1"), marks=pytest.mark.slow),
     pytest.param(4, 2, (), ALONE, "5min=1", marks=LONG),
     pytest.param(4, 2, (), ALONE, "1min=0.001,10min=1", marks=LONG),
 ]
@@ -158,7 +155,7 @@ def test_bonds_only_grow(shares, last, times):
     assert (np.diff(found, axis=0) >= 0).all()
     assert (found[-1] == 1.0).all()
     again = _find_curing(str(curing))
-    assert [again.share(age) for age in ages] == pytest.approx([*shares, 1.0], rel=1e-5)
+    assert np.allclose(again.points, curing.points, rtol=1e-5)
 
 
 def test_with_full_bond_verdicts_are_those_without_age():
@@ -180,8 +177,7 @@ def test_with_full_bond_verdicts_are_those_without_age():
         ("5min=0.4", "the last share is 0.4; give 1 last"),
         ("5min=0.4,3min=1", "ages and shares must rise"),
         ("15min 30min", "give one law for all joints"),
-        ("never 1-2:15min", "never cures beside others"),
-        ("15min 8-9:1h", "no joint 8-9; its joints are named as ground-1"),
+        ("5-6:30min", "'5-6:30min' is no age"),
     ],
 )
 def test_words_of_curing(words, said):
