@@ -218,14 +218,13 @@ def _sample(of: Scenarios, number: int) -> Scene:
     """Return one scenario, by number; each kind of change has random numbers of its own."""
     scene = of.nominal
     stiff, heavy, moved, held = (np.random.default_rng([of.seed, number, k]) for k in range(4))
-    logs = stiff.uniform(*map(math.log, of.stiffness), (2, len(scene.joints) + len(scene.grounds)))
+    (low, high), (least, most) = (map(math.log, ends) for ends in (of.stiffness, of.grips))
+    logs = stiff.uniform(low, high, (2, len(scene.joints) + len(scene.grounds)))
+    grips = held.uniform(least, most, len(scene.grip_kinds.turns))
     shares = heavy.uniform(-1.0, 1.0, len(scene.bricks))
     try:
         out = weighed(_stiffened(scene, *np.exp(logs)), 1.0 + of.density * shares)
-        if of.grips != _ALIKE:
-            out = _regripped(
-                out, np.exp(held.uniform(*map(math.log, of.grips), len(scene.grip_kinds.turns)))
-            )
+        out = _regripped(out, np.exp(grips)) if least < most else out
         return shifted(out, of.position, moved) if of.position else out
     except SceneError as error:
         raise SceneError(

@@ -68,9 +68,7 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     Other columns are ignored. A take-down may begin with any bricks.
     """
     what, out = f"plan {source}", list[Step]()
-    rows = _read_steps(scene, text, what)
-    _check_rows(scene, rows, part=True)
-    for where, step in rows:
+    for where, step in _read_steps(scene, text, what, part=True):
         if step.moves:
             raise StepError(
                 f"{where}: a grip is ?, open; give its node, or optimize the file as a schedule"
@@ -80,14 +78,21 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     return tuple(out)
 
 
-def _read_steps(scene: Scene, text: str, what: str) -> list[tuple[str, OpenStep]]:
-    """Return the steps of a table, each with the line that it is in."""
+def _read_steps(
+    scene: Scene, text: str, what: str, *, part: bool = False
+) -> list[tuple[str, OpenStep]]:
+    """Return the steps of a table, each with the line that it is in, after `_check_rows`."""
     wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
     columns, rows = read_table(text, what, StepError)
     if lacking := [column for column in wanted if column not in columns]:
         raise StepError(f"{what}: column {lacking[0]} is missing; give {', '.join(wanted)}")
     if twice := [column for column in wanted if columns.count(column) > 1]:
         raise StepError(f"{what}: column {twice[0]} occurs twice; keep one")
+    if unknown := [name for name in columns if name.endswith("_node") and name not in wanted]:
+        raise StepError(
+            f"{what}: column {unknown[0]}: no robot of scene {scene.name} is called so; "
+            f"give {', '.join(wanted[3:])}"
+        )
     if not rows:
         raise StepError(f"{what}: it has no steps; give at least one")
     kinds, out = {kind.value: kind for kind in StepKind}, list[tuple[str, OpenStep]]()
@@ -95,6 +100,10 @@ def _read_steps(scene: Scene, text: str, what: str) -> list[tuple[str, OpenStep]
     opened = 0
     for line, row in rows:
         where = f"{what}, line {line}"
+        if None in row:
+            raise StepError(
+                f"{where}: it has more cells than there are columns; leave out the rest"
+            )
         if (kind := row["type"]) not in kinds:
             raise StepError(f"{where}: type is {short(kind)}; give one of {', '.join(kinds)}")
         number, bricks = (_integer(row[name], f"{where}: {name}") for name in ("step", "bricks"))
@@ -104,10 +113,11 @@ def _read_steps(scene: Scene, text: str, what: str) -> list[tuple[str, OpenStep]
             opened += isinstance(now[-1], OpenGrip) and now[-1] != held
         grips = tuple(now)
         out.append((where, OpenStep(number, kinds[kind], bricks, grips)))
+    _check_rows(scene, out, part=part)
     return out
 
 
-def _check_rows(scene: Scene, rows: Sequence[tuple[str, OpenStep]], *, part: bool = False) -> None:
+def _check_rows(scene: Scene, rows: Sequence[tuple[str, OpenStep]], *, part: bool) -> None:
     """Require steps that are numbered, and feasible one after the other.
 
     ``part``: whether the first may go on from any state: a build does so where it is numbered on,
@@ -224,21 +234,7 @@ def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
     """
     network = network_of(where)
     scene, what = network.scene, f"schedule {source}"
-    known, (columns, rows) = (
-        [f"{r.name}_node" for r in scene.robots],
-        read_table(text, what, StepError),
-    )
-    if unknown := [name for name in columns if name.endswith("_node") and name not in known]:
-        raise StepError(
-            f"{what}: column {unknown[0]}: no robot of scene {scene.name} is called so; "
-            f"give {', '.join(known)}"
-        )
-    if more := [line for line, row in rows if None in row]:
-        wrong = "it has more cells than there are columns; leave out the rest"
-        raise StepError(f"{what}, line {more[0]}: {wrong}")
-    read = _read_steps(scene, text, what)
-    _check_rows(scene, read)
-    steps = [step for _, step in read]
+    steps = [step for _, step in _read_steps(scene, text, what)]
     try:
         return open_schedule(Path(source).stem, network, steps)
     except StepError as error:
