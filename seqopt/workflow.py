@@ -301,9 +301,9 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         names of those that take part where the steps leave that open; in the order in which they
         place their first bricks (default: the first of the scene whose reach allows the build).
     candidates : str, optional
-        Look at fewer nodes per move: near:12 for those at most 12 joints from the newest bricks,
-        within:1.5 for those at most 1.5 m from them; makes any formulation a heuristic (free: of
-        grips on bricks that stand; what is proven holds among these).
+        Look at fewer nodes per move: near:12 for those at most 12 joints from the newest bricks;
+        makes any formulation a heuristic (free: of grips on bricks that stand; what is proven holds
+        among these).
     rules : FreeRules, str or sequence of str, optional
         What robots of a free schedule may do: least_grips=N (2, or 1 of two robots, from the second
         brick on), newest=either|placing|free (where the newest brick is held), regrips=N|any
