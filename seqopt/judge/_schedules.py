@@ -313,7 +313,7 @@ def _responses(problem: States, steps: Sequence[Step], table: _Columns) -> dict[
         elif name == PROP_EXCESS:
             out[name] = np.asarray(table[EXCESS_COLUMN], dtype=float)
         elif is_tolerance(name):
-            out[name] = misfits_along({COLUMN: tolerances_along(problem.engine, steps, name)})
+            out[name] = misfits_along({COLUMN: tolerances_along(problem.engine, steps)})
         elif name != LARGEST:
             chosen = CHOSEN_BY[name]
             out[name] = np.asarray(table[chosen.column], dtype=float) / chosen.scale

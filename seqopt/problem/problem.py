@@ -21,7 +21,7 @@ from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
-from seqopt.problem.amounts import BUILT_IN, STATE_RESPONSES, Amount, parse_goals, worst
+from seqopt.problem.amounts import BUILT_IN, STATE_RESPONSES, Amount, parse_goals
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.filters import Filter, parse_limits
 from seqopt.problem.requirements import (
@@ -31,7 +31,6 @@ from seqopt.problem.requirements import (
     SceneFacts,
     _prop_limits,
     _step_limits,
-    _tolerance_beside,
     as_limits,
 )
 from seqopt.problem.resources import Resource
@@ -323,15 +322,12 @@ class Problem(Shown):
     paths: tuple[Resource, ...] = ()
 
     def __post_init__(self) -> None:
-        """Let a tolerance keep to other limits, and props to their capacities."""
+        """Let props keep to their capacities."""
         network, limits = getattr(self.engine, "network", None), self.limits
         if isinstance(network, Network):  # another engine is refused later
             kept = (each for each in limits if each.response != PROP_EXCESS)
             limits = (*kept, *_prop_limits(network.scene))
-        whole = _tolerance_beside(limits)
-        named = (replace(e, response=whole) if is_tolerance(e.response) else e for e in limits)
-        goals = (worst(whole) if is_tolerance(goal.name) else goal for goal in self.goals)
-        settle(self, limits=tuple(named), goals=tuple(goals))
+        settle(self, limits=tuple(limits), goals=tuple(self.goals))
 
     def __repr__(self) -> str:
         parts = [f"{self.scene.name!r}, {self.method!r}, criterion {self.criterion.name!r}"]

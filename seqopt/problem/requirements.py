@@ -18,7 +18,7 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
 from seqopt.responses._choices import CHOICE_RESPONSES
-from seqopt.responses._tolerance import Allowed, is_tolerance, misfits_along
+from seqopt.responses._tolerance import is_tolerance, misfits_along
 from seqopt.responses.quantities import (
     EXCESS_COLUMN,
     NO_TOLERANCE,
@@ -328,15 +328,6 @@ def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
             "seqopt.problem.requirements.payload_limits(scene) has those of all payloads"
         )
     return tuple(limits)
-
-
-def _tolerance_beside(limits: Sequence[Limit]) -> str:
-    """Return the name of the tolerance that keeps to other limits wherever grips are."""
-    least = {
-        name: min((each.bound for each in limits if each.response == name), default=math.inf)
-        for name in ("T_max", "D_max")
-    }
-    return Allowed(least["T_max"], least["D_max"]).name
 
 
 def payload_limits(scene: Scene) -> tuple[Limit, ...]:

@@ -23,11 +23,12 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
-from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits
+from seqopt.responses._tolerance import misfits
 from seqopt.responses.quantities import (
     CHOSEN_BY,
     EXTREMES,
     PROP_EXCESS,
+    TOLERANCE,
     _excess_of,
     lengths,
     require_finite,
@@ -100,9 +101,9 @@ def answer(engine: Engine, block: Block) -> Answers:
     forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)[:, :robots]
     network, bricks = engine.network, block.bricks
     values = {r.name: require_finite(r.name, r.of(network, fields), bricks) for r in asked}
-    for name in filter(is_tolerance, block.names):
+    if TOLERANCE in block.names:
         with one_thread():
-            values[name] = misfits(engine, bricks, grips, allowed_by(name))
+            values[TOLERANCE] = misfits(engine, bricks, grips)
     if PROP_EXCESS in block.names:
         props = [network.scene.prop_of_number[number] for number in block.props]
         values[PROP_EXCESS] = _excess_of(props, fields.grip_force[:, robots:])

@@ -28,7 +28,7 @@ from seqopt.errors import MemoryShortError
 from seqopt.responses._blocks import work
 from seqopt.responses._grip_sets import GripSets
 from seqopt.responses._tolerance import COLUMN, is_tolerance, tolerances_along
-from seqopt.responses.quantities import CHOSEN_BY, OFFERED, PROP_EXCESS, robot_response
+from seqopt.responses.quantities import CHOSEN_BY, OFFERED, PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
 from seqopt.scene._armed import go_together
@@ -107,11 +107,9 @@ class Evaluation(Terse):
 
     def table_of_given(self, names: Iterable[str]) -> pd.DataFrame:
         """Return the table of `seqopt.analyze` of given steps, with the tolerances in ``names``."""
-        table = self._given_table
-        for name in {*filter(is_tolerance, names)}:
-            distances = tolerances_along(self.engine, self.given, name)
-            table = table.assign(**{COLUMN: distances})
-        return table
+        if not any(map(is_tolerance, names)):
+            return self._given_table
+        return self._given_table.assign(**{COLUMN: tolerances_along(self.engine, self.given)})
 
     @cached_property
     def streams(self) -> bool:
@@ -221,8 +219,7 @@ class Evaluation(Terse):
         """Return grip sets with the responses that steps with so many bricks ask for."""
         moves = self.schedule.moves
         asked = {n for s in self._by_bricks[bricks] for n in self.wanted(moves[s.moves[-1]].bricks)}
-        known = (*CHOSEN_BY, PROP_EXCESS)
-        names = sorted(name for name in asked if name in known or is_tolerance(name))
+        names = sorted(asked & {*CHOSEN_BY, PROP_EXCESS, TOLERANCE})
         quiet = replace(self.resources, progress=None)  # each call would begin anew
         return GripSets(self.engine, names, quiet, screen=True, loose=False, work=work)
 

@@ -20,8 +20,8 @@ from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepErr
 from seqopt.exchange.imports import read_measured
 from seqopt.plan.plan import Plan
 from seqopt.plan.replan import compared
-from seqopt.responses._tolerance import is_tolerance, values_text
-from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
+from seqopt.responses._tolerance import values_text
+from seqopt.responses.quantities import PROP_EXCESS, length_text
 from seqopt.scene.scenarios import SAME, as_built
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, _usual_grips, with_robots
@@ -168,7 +168,7 @@ def _told(summary: Any, *, lost: bool = False) -> dict[str, Any]:
         "criterion": criterion if isinstance(criterion, str) and criterion in CRITERIA else None,
         "rules": tuple(f"{name}={rules[name]}" for name in names if name in rules),
         "limits": tuple(
-            f"{TOLERANCE if is_tolerance(name) else name}={value}"  # beside which limits follows
+            f"{name}={value}"
             for name, value in limits.items()
             if name != PROP_EXCESS  # which the scene says
         ),

@@ -45,8 +45,7 @@ from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.resources import Resource
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets, _near
-from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, robot_response
+from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scenarios import require_alike
@@ -340,8 +339,7 @@ class States(Shown):
         if any(goal.of_criterion for goal in self.goals):
             names += self.criterion.wanted(1)
         names += [limit.response for limit in self.limits]
-        own = sorted({name for name in names if is_tolerance(name)} - {TOLERANCE})
-        return tuple(name for name in (*STATE_RESPONSES, PROP_EXCESS, *own) if name in names)
+        return tuple(name for name in (*STATE_RESPONSES, PROP_EXCESS) if name in names)
 
     @property
     def aims(self) -> tuple[Amount, ...]:
