@@ -21,7 +21,7 @@ from seqopt.problem.requirements import overloads
 from seqopt.report._regret._table import RegretTable
 from seqopt.report._robots import _known_arms
 from seqopt.report.comparison import CLOSED, Comparison, largest, method_tables, shown_table
-from seqopt.report.page import Build, Scatter, _Drawn, report_page
+from seqopt.report.page import Build, _Drawn, report_page
 from seqopt.report.text import IN_UNITS, spent_said
 from seqopt.responses.table import (
     OUTSIDE,
@@ -73,7 +73,7 @@ def _page(
     builds: Sequence[Build],
     sentence: str,
     tables: Sequence[tuple[str, pd.DataFrame | _Drawn]],
-    scatter: Scatter | None = None,
+    scatter: tuple[str, pd.DataFrame] | None = None,
 ) -> str:
     """Return a page of several builds, whose sentence also names their faults."""
     said = builds_in_words({build.name: build.departures for build in builds})
@@ -167,13 +167,8 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     tables: list[tuple[str, pd.DataFrame | _Drawn]] = []
     tables += [] if result.speed is None else _speed_parts(result.speed)
     tables.append(_captioned("Methods and formulations; a click shows the build", shown))
-    scatter, found = None, result.table.loc[result.table["gap"].notna(), ["seconds", "gap"]]
-    if not found.empty:  # how long each formulation took and how far from the best its choice is
-        axes = ("seconds to choose, responses being known", GAP)
-        points = found.assign(gap=100 * found["gap"]).set_axis(axes, axis=1)
-        scatter = Scatter("Speed against accuracy: a click shows the plan", points, axes[:1])
     sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side"
-    return _page(engine, builds, sentence, tables, scatter)
+    return _page(engine, builds, sentence, tables)
 
 
 def _speed_parts(speed: RegretTable) -> Iterator[tuple[str, pd.DataFrame | _Drawn]]:
@@ -235,7 +230,7 @@ def front_page(
     sentence = f"1 plan for {scene.name} is best in everything"
     if len(plans) > 1:
         sentence = f"{len(plans):,} plans for {scene.name}, of which none beats another everywhere"
-    scatter = Scatter("The Pareto set: every point is a plan; a click shows it", points)
+    scatter = "The Pareto set: every point is a plan; a click shows it", points
     table = _captioned("The Pareto set; a click shows a plan", shown)
     return _page(engine, builds, sentence, [table], scatter)
 

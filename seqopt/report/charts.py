@@ -36,7 +36,6 @@ COLUMNS = {
     "F_max_N": "largest tension\nT_max [N]",
     "D_max_1e-3mm": "largest displacement\nD_max [µm]",
 }
-MOST_LINES = 6  # of a sweep, beyond which it is a map
 BOUND = "_bound"
 CASE = 0.27  # inches: of a row of a map of failure
 MARKS = 12  # along a line, so that lines are told apart without their color
@@ -232,8 +231,8 @@ def _draw_along(axes: Axes, steps: pd.DataFrame, rows: list[tuple[str, str]]) ->
 def draw_sweep(table: pd.DataFrame, names: Sequence[str]) -> Figure:
     """Draw the first goal over the first name, a line for every value of a second one.
 
-    Where these are more than six, a map of both. Problems without a plan are crosses. ``table``: of
-    `seqopt.sweep.sweep`; ``names``: its columns of what differs.
+    Problems without a plan are crosses. ``table``: of `seqopt.sweep.sweep`; ``names``: its columns
+    of what differs.
     """
     several = [name for name in names if len(table[name].unique()) > 1] or [*names[:1]]
     first, second = several[0], several[1] if len(several) > 1 else ""
@@ -241,15 +240,6 @@ def draw_sweep(table: pd.DataFrame, names: Sequence[str]) -> Figure:
     figure = new_figure(3.4)
     axes = figure.subplots()
     axes.set_xlabel(first)
-    if second and table[second].nunique() > MOST_LINES:
-        grid = table.pivot_table(index=second, columns=first, values=goal, sort=False)
-        image = axes.imshow(grid.to_numpy(float), origin="lower", aspect="auto", cmap="cividis")
-        figure.colorbar(image, label=LABELS.get(goal, goal))
-        axes.set_facecolor(GRAY)
-        axes.set_xticks(range(grid.shape[1]), grid.columns)
-        axes.set_yticks(range(grid.shape[0]), grid.index)
-        axes.set_ylabel(second)
-        return figure
     numbers = pd.to_numeric(table[first], errors="coerce")
     named = numbers.isna().any()  # then values stand one beside the other
     place = pd.Series(pd.factorize(table[first])[0] if named else numbers, table.index, float)

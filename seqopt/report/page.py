@@ -93,32 +93,6 @@ class Build:
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
-    """A chart with a point for each of some builds.
-
-    Its points have a row per build, with its name as index, and a column for every quantity that an
-    axis may show, in words and with its unit; the first two are shown first. Values of logarithmic
-    ones are positive.
-    """
-
-    title: str
-    points: pd.DataFrame
-    logarithmic: Sequence[str] = ()
-
-    def data(self) -> dict[str, object]:
-        """Return it as lists, ready for JSON; None where unknown."""
-        known = self.points.astype(float)
-        known = known.astype(object).where(np.isfinite(known), None)
-        return {
-            "title": self.title,
-            "builds": [str(name) for name in self.points.index],
-            "axes": [*self.points],
-            "logarithmic": [*self.logarithmic],
-            "values": {name: known[name].tolist() for name in known},
-        }
-
-
-@dataclass(frozen=True, eq=False)
 class _Drawn:
     """A picture on a page: PNG, and what it shows."""
 
@@ -290,7 +264,7 @@ def report_page(
     builds: Sequence[Build],
     sentence: str,
     tables: Sequence[tuple[str, pd.DataFrame | _Drawn]] = (),
-    scatter: Scatter | None = None,
+    scatter: tuple[str, pd.DataFrame] | None = None,
     *,
     found: str = "",
 ) -> str:
@@ -298,6 +272,8 @@ def report_page(
 
     The first build is shown first; a row of a table whose first cell names a build shows it. Fields
     of some builds are left out, and the page says so, where there are more than `MOST` numbers.
+    ``scatter``: title and points of a chart, a row per build and a column for every quantity that
+    an axis may show, in words and with its unit; the first two are shown first.
 
     Examples
     --------
@@ -309,7 +285,7 @@ def report_page(
     >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
     True
     """
-    data = _data(engine, builds) | {"scatter": None if scatter is None else scatter.data()}
+    data = _data(engine, builds) | {"scatter": scatter and _scatter(*scatter)}
     scene = engine.network.scene
     loading = f" Counted, and not drawn: {scene.loading}." if scene.loading else ""
     loading += "".join(f" Of {note}." for note in shape_notes(scene))
@@ -320,6 +296,14 @@ def report_page(
         tables="".join(_part(caption, part) for caption, part in tables),
         data=data,
     )
+
+
+def _scatter(title: str, points: pd.DataFrame) -> dict[str, object]:
+    """Return a chart of builds as lists, ready for JSON; None where unknown."""
+    known = points.astype(float)
+    known = known.astype(object).where(np.isfinite(known), None)
+    builds, values = [*map(str, points.index)], {name: known[name].tolist() for name in known}
+    return {"title": title, "builds": builds, "axes": [*points], "values": values}
 
 
 def _filled(data: Mapping[str, object], **parts: str) -> str:

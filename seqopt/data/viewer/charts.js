@@ -185,27 +185,19 @@ function makeCharts(page) {
   }
 
   // a point for each build, on axes that can be chosen
-  const NICE = [1, 2, 5];
-  function ticks(low, high, log) {
+  function ticks(low, high) {
     const out = [];
-    if (log) {
-      for (let e = Math.floor(Math.log10(low)); e <= Math.ceil(Math.log10(high)); e += 1) {
-        NICE.forEach((n) => { const v = n * 10 ** e; if (v >= low && v <= high) out.push(v); });
-      }
-      return out.length > 7 ? out.filter((v) => Math.log10(v) % 1 === 0) : out;
-    }
     const rough = (high - low) / 4 || 1, power = 10 ** Math.floor(Math.log10(rough));
     const step = [1, 2, 5, 10].map((n) => n * power).find((v) => v >= rough);
     for (let v = Math.ceil(low / step) * step; v <= high + 1e-9 * step; v += step) out.push(Number(v.toPrecision(12)));
     return out;
   }
   function axis(data, name, other, from, to) {
-    const known = data.values[name].filter((v, i) => v !== null && data.values[other][i] !== null), log = data.logarithmic.includes(name);
+    const known = data.values[name].filter((v, i) => v !== null && data.values[other][i] !== null);
     let low = Math.min(...known), high = Math.max(...known);
-    if (log) [low, high] = [low / 1.5, high * 1.5];
-    else { const room = 0.08 * (high - low) || 0.08 * Math.abs(high) || 1; [low, high] = [low - room, high + room]; }
-    const share = log ? (v) => Math.log(v / low) / Math.log(high / low) : (v) => (v - low) / (high - low);
-    return { at: (v) => from + share(v) * (to - from), ticks: ticks(low, high, log) };
+    const room = 0.08 * (high - low) || 0.08 * Math.abs(high) || 1;
+    [low, high] = [low - room, high + room];
+    return { at: (v) => from + ((v - low) / (high - low)) * (to - from), ticks: ticks(low, high) };
   }
   // the name stands above its point, higher where another name is in the way
   const FEW = 16, LINE = 14;

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 
-from seqopt.arrays import Floats
 from seqopt.report._regret._table import (
     CUT,
     DONE,
@@ -40,80 +38,14 @@ from seqopt.report._style import (
 )
 from seqopt.sequence.rules import FREE
 
-RADII = (7, 12, 20, 30, 42, 56, 72, 90)  # points, from a point to its words
-DEGREES = (0, 45, 90, 315, 135, 270, 180, 225, 20, 70, 340, 290, 110, 160, 250, 200)
-SPOTS = np.array(
-    [(r * np.cos(angle), r * np.sin(angle)) for r in RADII for angle in np.radians(DEGREES)]
-)  # the nearest and those beside first
-FAR = 16  # from where on a line leads to them
-ROOM = 4.0  # half of the size of a point, in points
-AIR = 1.5  # points between two texts
-SIDES: tuple[Any, ...] = (("left", "center", "right"), ("bottom", "center", "top"))
-
-
-@dataclass(frozen=True)
-class Label:
-    """Words for a point; those that are not ``needed`` are left out where there is no room."""
-
-    axes: Axes
-    at: tuple[float, float]
-    words: str
-    needed: bool
-
-
-def place(
-    figure: Figure, labels: Sequence[Label], taken: Sequence[tuple[Axes, float, float]]
-) -> None:
-    """Write labels around points that are taken, the needed ones first.
-
-    Each stands at the first spot that is free; where none is, needed words go where they cover
-    least, others nowhere.
-    """
-    FigureCanvasAgg(figure).draw()  # type: ignore[no-untyped-call]  # which settles where everything is
-    scale = figure.dpi / 72
-    points = np.array([axes.transData.transform((x, y)) for axes, x, y in taken]).reshape(-1, 2)
-    texts = [text.get_window_extent().extents for axes in figure.axes for text in axes.texts]
-    boxes = np.vstack([np.hstack([points - ROOM * scale, points + ROOM * scale]), *texts])
-    for label in sorted(labels, key=lambda each: not each.needed):
-        beside: Any = {"textcoords": "offset points", "fontsize": SMALL, "linespacing": 1.0}
-        color = INK if label.needed else GRAY
-        text = label.axes.annotate(label.words, label.at, (0, 0), color=color, **beside)
-        text.set_in_layout(False)
-        size = np.array(text.get_window_extent().size)
-        before = np.select([SPOTS > 1, SPOTS < -1], [0.0, 1.0], 0.5)  # share before the anchor
-        low = label.axes.transData.transform(label.at) + SPOTS * scale - size * before
-        spots, air = np.hstack([low, low + size]), AIR * scale * np.array([-1, -1, 1, 1])
-        inside = np.array([label.axes.get_window_extent().extents])
-        outside = (spots[:, 2:] - spots[:, :2]).prod(axis=1) - _shared(spots, inside)
-        covered = outside + _shared(spots + air, boxes)
-        best = int(covered.argmin())
-        if covered[best] > 0 and not label.needed:
-            text.remove()
-            continue
-        dx, dy = SPOTS[best].tolist()
-        text.set_position((dx, dy))
-        ha, va = (names[int(2 * share)] for names, share in zip(SIDES, before[best], strict=True))
-        text.set(ha=ha, va=va)
-        if float(np.hypot(dx, dy)) > FAR:
-            line = {"arrowstyle": "-", "lw": 0.5, "color": GRAY, "shrinkA": 0, "shrinkB": 4}
-            how: Any = {"textcoords": "offset points", "arrowprops": line}
-            label.axes.annotate("", label.at, (dx, dy), **how).set_in_layout(False)
-        boxes = np.vstack([boxes, spots[best]])
-
-
-def _shared(boxes: Floats, others: Floats) -> Floats:
-    """Return how much of boxes (n, 4) others (m, 4) cover, each by itself, pixels squared, (n,)."""
-    low = np.maximum(boxes[:, None, :2], others[:, :2])
-    high = np.minimum(boxes[:, None, 2:], others[:, 2:])
-    return np.asarray((high - low).clip(min=0.0).prod(axis=2).sum(axis=1))
-
-
 ENGINES = ("compliance", "rigid grips", "frame", "discrete")  # in the order of their looks
 MARKS = {"loop": "o", FREE: "s"}
 PALE = 0.28
 LEAST = 1e-6  # regret from which on the axis is logarithmic; less is drawn in the band of none
 NONE = LEAST / 6
 LINE = 24  # letters of a line beside a point
+SPOT = (-12, 9)  # points, from a point to its words
+HALO = (withStroke(linewidth=2.5, foreground="white"),)
 LETTER = 0.072  # inches of a letter of a title
 LOST = {CUT: "stopped", FAILED: "without a plan", FALLS: "fall", DONE: "not allowed"}
 
@@ -127,8 +59,8 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
     panels = figure.subplots(rows, across, squeeze=False).ravel()
     for axes in panels[len(tables) :]:
         axes.set_visible(False)
-    marks = [_regrets(axes, each) for axes, each in zip(panels, tables, strict=False)]
     for axes, each in zip(panels, tables, strict=False):
+        _regrets(axes, each)
         took = each.take
         words = f"take {took['engine']}, {_words(took)}: {seconds_text(took['seconds'])}"
         valued = f", valued by {each.valued}" if len(tables) == 1 else ""
@@ -141,8 +73,6 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
     if len(tables) > 1:
         name_panels(*shown)
     _legend(figure, tables, 2 if width < WIDTH else 4)
-    for labels, taken in marks:
-        place(figure, labels, taken)
     return figure
 
 
@@ -160,46 +90,38 @@ def _height(regret: float) -> float:
     return regret if regret >= LEAST else NONE
 
 
-def _regrets(axes: Axes, table: RegretTable) -> tuple[list[Label], list[tuple[Axes, float, float]]]:
-    """Draw regret over time; return words for points, and where these are."""
+def _regrets(axes: Axes, table: RegretTable) -> None:
+    """Draw regret over time, with words for each way that is not dominated."""
     seen = table.table.assign(kept=table.kept)
     seen = seen[np.isfinite(seen["regret"].to_numpy(float))].sort_values(
         ["kept", "seconds"], ascending=[True, False]
-    )
-    taken, labels, named = (
-        list[tuple[Axes, float, float]](),
-        list[Label](),
-        set[tuple[float, str]](),
     )
     for name, row in seen.iterrows():
         kept, at = bool(row["kept"]), (float(row["seconds"]), _height(float(row["regret"])))
         mark = _look(str(row["engine"]), str(row["schedule"]), filled=bool(row["exact"]))
         how: dict[str, Any] = {"ms": 6.5, "zorder": 3} if kept else {"ms": 5.0, "alpha": PALE}
         axes.plot(*at, clip_on=False, **mark, **how)
-        taken.append((axes, *at))
         if name == table.take.name:
             ring: dict[str, Any] = {"ms": 14, "mfc": "none", "mec": INK, "mew": 1.1, "zorder": 4}
             axes.plot(*at, "o", clip_on=False, **ring)
-    for _, row in seen[::-1].iterrows():
-        key = round(float(row["regret"]), 4), str(row["engine"])
-        if key not in named:
-            named.add(key)
-            at = float(row["seconds"]), _height(float(row["regret"]))
-            engine = f"{row['engine']}: " * (row["engine"] != table.reference)
-            words = textwrap.fill(engine + _words(row), LINE)
-            labels.append(Label(axes, at, words, bool(row["kept"])))
     kept = seen[seen["kept"]][::-1]  # no way lies below these steps
     steps: dict[str, Any] = {"color": INK, "lw": 0.8, "drawstyle": "steps-post", "zorder": 1}
     axes.plot(kept["seconds"], kept["regret"].cummin().map(_height), **steps)
     _scales(axes, table, seen)
-    return labels, taken
+    beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALL, "linespacing": 1.0}
+    for _, row in kept.assign(same=kept["regret"].round(4)).drop_duplicates("same").iterrows():
+        engine = f"{row['engine']}: " * (row["engine"] != table.reference)
+        words = textwrap.fill(engine + _words(row), LINE)
+        at = float(row["seconds"]), _height(float(row["regret"]))
+        text = axes.annotate(words, at, SPOT, path_effects=HALO, zorder=5, **beside)
+        text.set_in_layout(False)
 
 
 def _scales(axes: Axes, table: RegretTable, seen: pd.DataFrame) -> None:
     """Give axes their limits, a band of no regret, and the number of ways without a point."""
     times, most = seen["seconds"], max(float(seen["regret"].max()), 100 * LEAST)
     axes.set(xscale="log", yscale="log", xlim=(float(times.min()) / 2.2, 3.0 * float(times.max())))
-    axes.set(ylim=(NONE / 3, 4 * most), xlabel="time from scene to plan [s]", ylabel="regret")
+    axes.set(ylim=(NONE / 3, 12 * most), xlabel="time from scene to plan [s]", ylabel="regret")
     plain(axes.xaxis)
     ticks = [10.0**power for power in range(-6, int(np.ceil(np.log10(most))) + 1)]
     axes.set_yticks([NONE, *ticks], ["proven 0" if table.is_proven else "0", *map(percent, ticks)])
