@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seqopt.engines.interface import Fields, Want
+from seqopt.engines.interface import _NAMES, Fields, Want
 from seqopt.engines.rigid.compliance import ACCURACY, _solve_fast
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -262,6 +262,14 @@ def rescaled(scene, length, force, softness):
 
 def solve(engine_type, scene, bricks, grips, want):
     return engine_type(build_network(scene)).solve(bricks, grips, want)
+
+
+def apart(fields, others, names=_NAMES):
+    """The largest difference of each field, relative to its largest entry."""
+    pairs = [(getattr(fields, name), getattr(others, name)) for name in names]
+    return max(
+        np.abs(a - b).max(initial=0.0) / max(np.abs(b).max(initial=0.0), 1e-300) for a, b in pairs
+    )
 
 
 def largest_difference(first, second, net):

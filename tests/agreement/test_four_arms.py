@@ -73,27 +73,6 @@ def test_scenes_are_those_that_are_generated(build, tmp_path):
     assert load_scene(tmp_path / "again.json") == scene
 
 
-def test_compas_opens_tasks_with_frames_shapes_and_postures(build):
-    compas = pytest.importorskip("compas")
-    from compas.geometry import Frame, Transformation  # noqa: PLC0415
-
-    name, scene, _ = build
-    found = compas.json_load(EXAMPLES / name / "tasks.json")
-    assert {robot["robot"] for robot in found["robots"]} == {robot.name for robot in scene.robots}
-    for block, brick in zip(found["blocks"], scene.placed, strict=True):
-        assert block["shape"].volume() * brick.density == pytest.approx(brick.mass, rel=1e-6)
-    for task in (task for task in found["tasks"] if task["action"] != "pick"):
-        assert len(task["posture"]) == 6
-        assert list(task["grip"].point) == pytest.approx(
-            scene.node_position(task["node"]), abs=1e-5
-        )
-        there = Transformation.from_frame(task["block_frame"])
-        grip = Frame.from_transformation(there * Transformation.from_frame(task["grip_in_block"]))
-        assert list(grip.point) == pytest.approx(list(task["grip"].point), abs=1e-6)
-    plain = json.loads(content(name, "tasks.json"))["tasks"][1]["grip"]
-    assert not isinstance(plain, Frame)  # the control: it is compas that makes frames
-
-
 def test_compas_fab_takes_the_arms_of_the_tasks_there():
     """A cell of compas_fab puts the flange where the task has it, by its own kinematics."""
     kinematics = pytest.importorskip("compas_fab.backends.kinematics.solvers")

@@ -10,14 +10,14 @@ import pytest
 
 import seqopt
 from seqopt.engines._grip_compliance import read_compliance
-from seqopt.engines.interface import _NAMES, grip_columns
+from seqopt.engines.interface import grip_columns
 from seqopt.engines.rigid._frontal import FrontalFactor, FrontalSystem
 from seqopt.engines.rigid._mixed import LAST_CORRECTION, solve_mixed
 from seqopt.engines.rigid.compliance import _LARGE, ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Load
-from tests.builders import hinged
+from tests.builders import apart, hinged
 
 
 def loaded(scene):
@@ -36,15 +36,6 @@ SCENES = {
     "soft": lambda: seqopt.load_scene("chain:bricks=16").with_grips(1e6, 1e4),
 }
 AT_ONCE = 3  # bricks of a block, so that small structures have several
-
-
-def apart(fields, others):
-    out = 0.0
-    for name in _NAMES:
-        a, b = getattr(fields, name), getattr(others, name)
-        if np.abs(b).max(initial=0.0) > 0:
-            out = max(out, np.abs(a - b).max() / np.abs(b).max())
-    return out
 
 
 def asked(network, bricks, seed, moved=None):

@@ -11,19 +11,10 @@ from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import GripError
 from seqopt.network.build import build_network
-from tests.builders import six_bricks
+from tests.builders import apart, six_bricks
 from tests.direct_solve import solve_dense
 
 SETS = [[3, 8, 11], [4, 5, 9]]  # two hold one brick in the second
-
-
-def apart(fields, others):
-    """The largest difference of each field, relative to its largest entry."""
-    out = 0.0
-    for name in _NAMES:
-        a, b = getattr(fields, name), getattr(others, name)
-        out = max(out, np.abs(a - b).max(initial=0.0) / max(np.abs(b).max(initial=0.0), 1e-300))
-    return out
 
 
 def drawn(sets, size, seed=0):

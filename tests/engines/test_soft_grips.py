@@ -16,21 +16,12 @@ from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, MechanismError, SceneError
 from seqopt.network.build import build_network
-from tests.builders import six_bricks
+from tests.builders import apart, six_bricks
 from tests.limit_scenes import softened
 from tests.soft_bodies import SoftBodies
 
 STATES = 200  # random ones, one in two with hands that are moved
 NAMES = ("edge_force", "displacement", "grip_force", "grip_moment", "support", "joint_wrench")
-
-
-def apart(fields, others):
-    """The largest difference of each field, relative to its largest entry."""
-    out = 0.0
-    for name in NAMES:
-        a, b = getattr(fields, name), getattr(others, name)
-        out = max(out, np.abs(a - b).max(initial=0.0) / max(np.abs(b).max(initial=0.0), 1e-300))
-    return out
 
 
 def far(found, wanted):

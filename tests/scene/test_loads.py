@@ -75,6 +75,16 @@ def test_a_load_far_from_its_brick_is_doubted(tmp_path):
         load_scene(tmp_path / "own.json")
 
 
+def test_scenarios_take_loads_along():
+    scene = loaded()
+    for each in seqopt.scenarios(scene, count=3).scenes:
+        step = np.subtract(each.bricks[2].position, scene.bricks[2].position)
+        assert np.abs(step).max() > 1e-5
+        assert each.loads[1].position == pytest.approx(step + scene.loads[1].position)
+        assert each.loads[0] == scene.loads[0]
+        assert each.grounds[1].movement == scene.grounds[1].movement
+
+
 def test_what_acts_depends_on_what_stands():
     scene = loaded()
     network = seqopt.build_network(replace(scene, wind=(0.0, 0.0, 0.0)))

@@ -12,7 +12,14 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from seqopt.errors import SceneError
-from seqopt.scene.boxes import _find_overlaps, _separations, as_vectors, require_apart
+from seqopt.scene.boxes import (
+    _find_overlaps,
+    _separations,
+    as_vectors,
+    block_brick,
+    overlapping,
+    require_apart,
+)
 from seqopt.scene.parts import Brick
 from tests.blocks import C_SHAPE, box, prism
 
@@ -179,3 +186,13 @@ def test_a_moved_brick_is_found(arch25):
             "arch", [first, replace(second, position=tuple(nearer.tolist())), *rest], "move it"
         )
     require_apart("one brick", [first], "none")
+
+
+def test_bricks_of_a_scene_as_boxes_and_as_shapes():
+    halves = [block_brick(i, box(BRICK, at=(0.1 * i, 0.0, 0.0)), 2000.0) for i in (1, 2, 4)]
+    boxes = [replace(brick, shape=None, node_offsets=None) for brick in halves]
+    for bricks in (halves, boxes, [boxes[0], *halves[1:]]):
+        ((a, b, depth),) = overlapping(bricks)
+        assert (a, b) == (1, 2)
+        assert depth == pytest.approx(0.06, rel=1e-3)
+        assert overlapping(bricks[1:]) == []

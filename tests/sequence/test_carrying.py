@@ -16,7 +16,7 @@ from seqopt.plan.front import find_front
 from seqopt.plan.pose import states_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.scene.arm import Arm
-from seqopt.sequence._rule_check import too_heavy
+from seqopt.sequence._rule_check import check_carried, too_heavy
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import can_carry, loads
 from seqopt.sequence.steps import StepKind
@@ -77,6 +77,16 @@ def test_every_formulation_of_states_refuses_what_nobody_carries(name):
     assert seqopt.solve(posed(wall(212.0, 212.0)), name).steps
 
 
+@pytest.mark.parametrize("goals", ["steps", "regrips,minmax"])
+@pytest.mark.parametrize("rules", [ANYHOW, DOWN])
+def test_whatever_is_aimed_at(goals, rules):
+    done = "removed" if rules is DOWN else "placed"
+    with pytest.raises(InfeasibleError, match=f"is never {done}: {TOO_HEAVY}") as caught:
+        seqopt.solve(posed(wall(150.0, 150.0), rules, goals))
+    assert newtons(caught.value) == 212
+    assert seqopt.solve(posed(wall(212.0, 212.0), rules, goals)).steps
+
+
 def test_an_advice_is_no_less_than_the_heaviest_brick_and_no_more_than_is_needed():
     with pytest.raises(InfeasibleError) as caught:
         seqopt.solve(posed(wall(30.0, 30.0), goals="steps"))
@@ -130,6 +140,24 @@ def loop(*payloads):
         "compliance", scene.with_robots(*(replace(r, payload=p) for r, p in pairs))
     )
     return engine, seqopt.three_robot_loop(engine.network)
+
+
+def test_states_of_a_loop_are_refused_and_judged_too():
+    engine, schedule = loop(141.0, 22.0, 141.0)
+    said = r"in step 2 brick \d weighs 23\.5 N, more than the payload of rob2 \(22 N\)"
+    weak = seqopt.pose(engine, schedule, WORST, "minmax")
+    with pytest.raises(InfeasibleError, match=said) as caught:
+        seqopt.solve(weak)
+    assert newtons(caught.value) == 24
+    strong = seqopt.pose(*loop(141.0, 24.0, 141.0), WORST, "minmax")
+    plan = seqopt.solve(strong)
+    assert Proof(states_of(weak)).is_impossible()
+    assert not Proof(states_of(strong)).is_impossible()
+    with pytest.raises(StepError, match=r"step 2: brick \d weighs"):
+        judge_schedule(states_of(weak), plan.selection, plan.steps)
+    assert judge_schedule(states_of(strong), plan.selection, plan.steps).gap == 0
+    with pytest.raises(StepError, match=r"step 2: brick \d weighs"):
+        check_carried(engine.network.scene, plan.steps)
 
 
 @pytest.mark.parametrize("rules", [ANYHOW, DOWN])
