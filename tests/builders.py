@@ -14,8 +14,6 @@ from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step, StepKind, _check_part
 from seqopt.stability._held_states import HeldStates
 from seqopt.stability.assessment import bonded
@@ -332,9 +330,3 @@ def lacking(assembly, mortar, compiled):
     """The brackets of the least bond that a structure lacks; it stands at zero."""
     case = bonded(assembly, mortar)
     return HeldStates(assembly, case, compiled, case.fixed())
-
-
-def read_folder(folder):
-    """Return the scene and the steps of a plan's folder."""
-    scene = load_scene(folder / "scene.json")
-    return scene, read_plan(scene, folder / "plan.csv")

@@ -29,10 +29,10 @@ import seqopt
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, Options
 from experiments.harness.results import FIGURES
+from experiments.harness.scenes import read_folder
 from seqopt._cli.main import main
 from seqopt.arms._model import PosedArm, idle_arm
 from seqopt.errors import ExtraError, SceneError
-from seqopt.exchange.exports import read_folder
 from seqopt.report._pictures import VIEW, _build_box, _mark_grips, steps_picture
 from seqopt.report._robots import Arms, Cell
 from seqopt.report._style import styled

@@ -39,6 +39,7 @@ from matplotlib.figure import Figure
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
 from experiments.harness.results import stored
+from experiments.harness.scenes import read_folder
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt import EPOXY, Scene, Step, build_network, load_scene
 from seqopt._cli.main import main
@@ -46,7 +47,6 @@ from seqopt.contact.faces import step_assembly
 from seqopt.errors import SceneWarning
 from seqopt.exchange._content import Given
 from seqopt.exchange._formats import sniffed, writable
-from seqopt.exchange.exports import read_folder
 from seqopt.exchange.imports import import_scene, read_content
 from seqopt.report._style import styled
 from seqopt.report.draw import View, draw_bricks

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from seqopt.scene.library.arch_form import chain
 from seqopt.scene.library.common import MASONRY
 from seqopt.scene.library.wall import WallShape, wall
 from seqopt.sequence.methods import METHODS, modified_sequential, three_robot_loop
+from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step
 from seqopt.study.published import EQUATIONS, ROBOTS, SOURCE, printed, published_plan
 
@@ -136,3 +138,9 @@ def grip_sets(net: Network, bricks: int, count: int) -> Ints:
     free = [n for b in net.scene.placed[:bricks] for n in b.nodes if n not in blocked]
     rng = np.random.default_rng(0)
     return np.array([rng.choice(free, 3, replace=False) for _ in range(count)])
+
+
+def read_folder(folder: Path) -> tuple[Scene, tuple[Step, ...]]:
+    """Return the scene and the steps of a plan's folder."""
+    scene = load_scene(folder / "scene.json")
+    return scene, read_plan(scene, folder / "plan.csv")

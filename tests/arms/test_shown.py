@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import seqopt
+from experiments.harness.scenes import read_folder
 from seqopt._cli.main import main
 from seqopt._cli.outputs import task_files
 from seqopt._files import csv_text
@@ -19,7 +20,6 @@ from seqopt.exchange.exports import export_plan
 from seqopt.report._pictures import steps_picture
 from seqopt.report._robots import _known_arms
 from tests.arms.scenes import TOOL, beside, two_arms
-from tests.builders import read_folder
 
 pytest.importorskip("pinocchio")
 pytest.importorskip("coal")
