@@ -16,7 +16,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph._orders import order_rules, upward
+from seqopt.graph._orders import order_rules
 from seqopt.graph.formulation import Solution
 from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.instance import PEAK, SUM, TIME, _Target
@@ -79,13 +79,13 @@ class OneSchedule:
 
 
 class AllOrders(OneSchedule):
-    """The states of all feasible orders; of a take-down those of the build that it reverses.
+    """The states of all feasible orders.
 
     ``evaluator``: of the scene's own order: what all orders have in common.
     """
 
     def __init__(self, problem: States) -> None:
-        self._problem = replace(upward(problem), resources=problem.resources.alone())
+        self._problem = replace(problem, resources=problem.resources.alone())
         self._rules, scene = order_rules(problem), problem.network.scene
         super().__init__(replace(self._problem, orders=None))
         self._known = dict[Key, StateEvaluator]()

@@ -83,8 +83,6 @@ def _ask_engine(problem: States, bricks: int, grips: Ints) -> Answers:
     own = [own_values(goal) if goal.states is not None else None for goal in problem.goals]
     zeros = np.zeros(len(grips))  # of what is not about states
     values = np.column_stack([zeros if value is None else value(seen) for value in own])
-    if problem.spares and bricks == len(problem.network.inner) and not grips.shape[1]:
-        values[:] = 0.0  # the whole that nobody holds, where a take-down begins
     return Answers(values, forces, fit & np.isfinite(values).all(axis=1), len(grips))
 
 

@@ -210,8 +210,6 @@ def find_front(
     def measured(asked: Problem) -> Front:
         with watch.needed("posing the problem"):
             states = states_of(asked)
-            if states.orders is not None and states.free_rules.takes_down:
-                raise ProblemError("a Pareto set of take-downs is of one order; give an order")
             posed = FrontProblem(states, rounding)
         left = max(0.0, end - time.perf_counter())
         front = _front_of(posed, formulation, left, progress, watch)

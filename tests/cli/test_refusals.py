@@ -74,7 +74,7 @@ BAD = {
     f"{FREE} --direction takedown": "did you mean take-down?",
     f"{FREE} --direction take-down --keep 1..2": "--keep is no more; --to 12 leaves the first",
     f"{FREE} --direction take-down --to 5": "cannot end with 5; give fewer",
-    f"{FREE} --direction take-down --order search --aim steps": "put minmax first",
+    f"{FREE} --direction take-down --order search": "give an order",
     f"{FREE} --props evry": "'evry' is no node (did you mean every?); give nodes, as 13,27",
     f"{FREE} --props 99": "prop at node 99: there is no free node 99",
     f"{FREE} --props 3,3": "a prop at node 3 occurs twice",

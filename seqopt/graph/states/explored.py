@@ -16,7 +16,7 @@ from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
-from seqopt.graph._orders import MOST_PARTS, OrderSpace, order_rules, whole_bound
+from seqopt.graph._orders import MOST_PARTS, OrderSpace, order_rules
 from seqopt.graph.paths import FAILS, PASSES, _lazy_path
 from seqopt.graph.states._visits import StateSpace
 from seqopt.graph.states.states import States
@@ -64,8 +64,6 @@ def floors_of_goals(problem: States) -> tuple[float, ...]:
             out[k] = float(values[0, k])
         if goal.least is not None:
             out[k] = goal.least(space)
-    if problem.orders is not None:  # every order passes the finished structure
-        out[0] = max(out[0], whole_bound(problem))
     return tuple(out)
 
 

@@ -76,12 +76,12 @@ class States(Shown):
     engines of the same scene in other states of the world: the largest value over them counts, and
     limits and stability hold in all; by default that of ``engine`` alone. ``over``: aggregation of
     their totals, if the goal is a sum; ``weights``: of the scenarios in it, in place of the
-    largest. ``resources``: workers of grip sets and the cache of responses, which the proof does
-    not use; ``spares``: whether the finished structure without grips costs nothing; ``filters``:
-    further requirements of states; ``orders``: which orders of the bricks are searched, by default
-    the scene's own alone: values keep its scales; ``paths``: resources that plans must keep;
-    ``decisions``: of a schedule, what candidates of its moves cost, where these are chosen: then
-    there are no goals, and the formulation says whether the sum or the largest counts.
+    largest. ``resources``: workers of grip sets, which the proof does
+    not use; ``filters``: further requirements of states; ``orders``: which orders of the bricks are
+    searched, by default the scene's own alone: values keep its scales; ``paths``: resources that
+    plans must keep; ``decisions``: of a schedule, what candidates of its moves cost, where these
+    are chosen: then there are no goals, and the formulation says whether the sum or the largest
+    counts.
     """
 
     engine: Engine
@@ -96,7 +96,6 @@ class States(Shown):
     over: RobustAim = WORST_PEAK
     weights: tuple[float, ...] = ()
     resources: Resources = HERE
-    spares: bool = False
     filters: tuple[Filter, ...] = ()
     orders: Orders | None = None
     paths: tuple[Resource, ...] = ()
@@ -457,8 +456,6 @@ class States(Shown):
         for column, goal in enumerate(self.goals):
             if goal.states is not None:
                 out[:, column] = goal.value(found)
-        if self.spares and bricks == len(self.network.inner):
-            out[(states[:, : self.space.robots] <= 0).all(axis=1)] = 0.0
         within &= np.isfinite(out).all(axis=1)
         out[~within] = np.inf
         return out, within
