@@ -50,9 +50,7 @@ def picture(name: str, draw: Callable[[Any], Any]) -> dict[str, bytes]:
 def plan_files(plan: Plan) -> dict[str, bytes | str]:
     """Return tables and tasks of a plan by file name."""
     tables = {"plan": plan.responses()}
-    if plan.graph.candidates:
-        tables["selection"] = plan.table()
-    elif plan.graph.standing is not None:
+    if plan.graph.standing is not None and not plan.graph.candidates:
         tables["stability"] = plan.stability()
     if plan.engine.network.scene.props:
         tables["props"] = plan.props()

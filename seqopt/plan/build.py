@@ -78,7 +78,7 @@ class ShownBuild(Shown):
         """The sufficient model of the steps, what others would change, what is not modeled."""
         return what_was_enough(self._within, {"": self._columns})
 
-    def grips(self) -> pd.DataFrame:
+    def table(self) -> pd.DataFrame:
         """Return every grip of the build, for as long as it lasts.
 
         Result: a row per grip, by first step: ``robot``, ``from_step``, ``to_step``, ``brick``,
@@ -153,9 +153,9 @@ class ShownBuild(Shown):
     def reassigned(self) -> tuple[Step, ...]:
         """Return the same grips in the same order, assigned to robots with the least makespan.
 
-        A robot may have a grip that it reaches, that is within its payload, and at which it gives
-        way as the one who had it. Raises `StepError` if it is not known how long robots take, or
-        some have arms, whose postures count.
+        A robot may have a grip that it reaches, that is within its payload, and of which it has the
+        same compliance. Raises `StepError` if it is not known how long robots take, or some have
+        arms, whose postures count.
         """
         scene = self.engine.network.scene
         own: tuple[Step, ...] = offered("reassign")(
@@ -254,7 +254,7 @@ class GivenSequence(ShownBuild):
     >>> build = seqopt.GivenSequence(engine, seqopt.sequential(engine.network), "sequential")
     >>> build
     <GivenSequence sequential of arch25: 49 steps>
-    >>> float(build.grips()["largest_force_N"].max().round(1))
+    >>> float(build.table()["largest_force_N"].max().round(1))
     406.1
     """
 
@@ -275,7 +275,3 @@ class GivenSequence(ShownBuild):
     def __repr__(self) -> str:
         name = self.engine.network.scene.name
         return f"<GivenSequence {self.title} of {name}: {len(self.steps)} steps>"
-
-    def table(self) -> pd.DataFrame:
-        """Return every grip, as of `grips`."""
-        return self.grips()

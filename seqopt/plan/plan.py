@@ -454,30 +454,3 @@ class Plan(ShownBuild):
         if is_tolerance(goal.name):  # of which more is better
             return f"no order above {length_text(goal.shown(bound))}{claimed}"
         return f"no order below {bound:.6g}{claimed}"
-
-    def table(self) -> pd.DataFrame:
-        """Return the choice: the candidate of every move, or grips if states were chosen.
-
-        Result: a row per move: ``move``, ``step``, ``to_step`` (the last in which the node is
-        held), ``bricks``, ``robot``, ``brick``, ``node``, ``largest_force_N``, ``candidates`` (how
-        many there were); then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or without
-        proof ``cost`` and the ``margin`` to the next candidate. Of states as of `grips`.
-        """
-        if not self.graph.candidates:
-            return self.grips()
-        schedule, nodes = self.decisions.schedule, self.decisions.nodes(self.choice)
-        moves, brick_of = schedule.moves, schedule.scene.brick_of_node
-        held = {(row["robot"], row["from_step"]): row for row in self.grips().to_dict("records")}
-        own = [held[move.robot, move.step] for move in moves]
-        columns = {
-            "move": range(1, len(moves) + 1),
-            "step": [move.step for move in moves],
-            "to_step": [row["to_step"] for row in own],
-            "bricks": [move.bricks for move in moves],
-            "robot": [move.robot for move in moves],
-            "brick": [brick_of[node].name for node in nodes],
-            "node": nodes,
-            "largest_force_N": [row["largest_force_N"] for row in own],
-            "candidates": [len(move.candidates) for move in moves],
-        }
-        return pd.DataFrame(columns)

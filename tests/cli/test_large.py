@@ -156,7 +156,7 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
     assert err == "seqopt: interrupted; the plan is the best that was met\n"
     assert "written to" in out
     written = contents(tmp_path / "out")
-    assert set(written) >= {"plan.csv", "selection.csv"}
+    assert set(written) >= {"plan.csv", "tasks.csv"}
     assert (tmp_path / "out" / "trace.csv").exists()
     summary = written["summary.json"]
     assert summary["ended"] == "interrupted"

@@ -207,7 +207,7 @@ def test_a_plan_over_scenarios_shows_its_choice(aim):
     problem = posed()
     drawn = scenarios(problem.schedule.scene, count=6, seed=1)
     plan = seqopt.solve(robust(problem, drawn, aim))
-    assert len(plan.table()) == len(plan.choice) == len(plan.nodes)
+    assert len(plan.table()) > len(plan.choice) == len(plan.nodes)
     assert plan.title == str(aim)
 
 

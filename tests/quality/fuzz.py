@@ -55,7 +55,7 @@ STARTS = (  # of lines on standard error
     "Do not rely on numbers outside the linear range. ",
 )
 ARCHIVE, IMAGE = b"PK", b"\x89PNG"  # how files of fields and of pictures begin
-SET = {"plan.csv", "selection.csv", "summary.json"}
+SET = {"plan.csv", "tasks.csv", "summary.json"}
 
 
 def judge(case: Case) -> tuple[int, str]:

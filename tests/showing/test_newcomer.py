@@ -24,7 +24,7 @@ def test_one_line_makes_a_plan_that_shows_itself():
     assert "optimal" in plan._repr_html_()
     assert len(plan.table()) > 0
     assert plan.gantt().axes
-    assert len(set(plan.grips()["robot"])) == 2
+    assert len(set(plan.table()["robot"])) == 2
     with pytest.raises(seqopt.SeqoptError, match="robots"):
         plan.engine.network.scene.with_robots("left")
 
@@ -54,7 +54,6 @@ def test_a_given_sequence_shows_itself_as_a_plan_does():
     steps = seqopt.sequential(engine.network)
     build = seqopt.GivenSequence(engine, steps, "sequential")
     pd.testing.assert_frame_equal(build.responses(), seqopt.analyze(engine, steps), rtol=1e-9)
-    pd.testing.assert_frame_equal(build.table(), build.grips(), rtol=1e-9)
     assert "GivenSequence sequential of wall 2 x 2: 7 steps" in build._repr_html_()
     verdicts = build.stability("epoxy")["verdict"]
     assert len(verdicts) == len(steps)
