@@ -73,9 +73,7 @@ def _of_instances() -> Iterator[tuple[str, File]]:
         {"value": 1.0, "shares": [[0.5, 0.25, 0.25]], "prices": {"regrips": 0.0}},
         {
             "shares": [[1.0, 0.0, 0.0]],
-            "potentials": [0.0] * one.nodes,
             "weights": [1.0],
-            "cut": [0],
         },
         {"labels": {"nodes": [0], "values": [[0.0, 0.0, 0.0, 0.0]]}},
     ]
