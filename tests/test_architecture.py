@@ -415,7 +415,7 @@ def test_claims_stand_apart_from_their_parts():
 
 
 def test_an_experiment_that_reaches_across_is_seen():
-    a, b = "experiments.harness.scenes", "experiments.peers.parts.models"
+    a, b = "experiments.harness.scenes", "experiments.calibration.parts.barrel_vaults"
     modules, makers = graph("experiments"), {module for module, _ in claims().values()}
     modules.add_edge(a, b)
     assert crossed(modules, makers) == [f"{a} imports {b}"]

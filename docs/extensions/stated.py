@@ -25,7 +25,6 @@ def stated() -> dict[str, str]:
         | _taken(stored("regret"))
         | _heuristics(stored("heuristic_gaps"))
         | _outside(stored("outside_assemblies"))
-        | _composing(stored("composing"))
         | {"vault_loads_table": _vault_loads(stored("vault_loads"))}
         | {"classical_table": _classical(stored("classical"))}
         | {"makespan_table": _makespans(stored("makespan"), stored("makespan_large"))}
@@ -84,13 +83,6 @@ def _vault_loads(table: pd.DataFrame) -> str:
         for row in table.to_dict("records")
     ]
     return markdown(head, rows)
-
-
-def _composing(table: pd.DataFrame) -> dict[str, str]:
-    """Return how many pairs of schedules and other words there are, and which."""
-    schedules, words = (", ".join(table[name].unique()) for name in ("schedule", "with"))
-    told = {"composing_schedules": schedules, "composing_words": words}
-    return {**told, "composing_cells": str(len(table))}
 
 
 def _makespans(*tables: pd.DataFrame) -> str:

@@ -123,7 +123,7 @@ def test_the_last_line_and_the_exit_status_are_the_verdict(capsys, finding, word
 def test_tables_and_verdicts_are_stored_when_asked(tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.harness.results.RESULTS", tmp_path)
     monkeypatch.setattr(harness, "VERDICTS", tmp_path / "verdicts.csv")
-    known = pd.DataFrame({"verdict": ["holds", "holds"], "seconds": 2.0}, ["gone", "peers"])
+    known = pd.DataFrame({"verdict": ["holds", "holds"], "seconds": 2.0}, ["gone", "makespan"])
     known.rename_axis("experiment").to_csv(tmp_path / "verdicts.csv")
     claim = stand_in(Finding(holds=False, tables={"rows": pd.DataFrame({"x": [1 / 3]})}), digits=2)
     for arguments in ([], ["--quick"], ["--quick", "--store"]):
@@ -132,7 +132,7 @@ def test_tables_and_verdicts_are_stored_when_asked(tmp_path, monkeypatch):
     claim.main(["--store"])
     assert (tmp_path / "rows.csv").read_text() == "x\n0.33\n"
     after = pd.read_csv(tmp_path / "verdicts.csv")
-    assert after["experiment"].tolist() == ["figures", "peers"]
+    assert after["experiment"].tolist() == ["figures", "makespan"]
     assert after["verdict"].tolist() == ["does not hold", "holds"]
 
 

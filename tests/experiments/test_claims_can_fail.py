@@ -11,32 +11,28 @@ import pytest
 
 from experiments import figures
 from experiments.calibration import calibration, identify_arch25, vault_loads
-from experiments.discrete import contact_steps
 from experiments.engines import engine_growth, engine_speed, extremes, fidelity_ladder, soft_grips
 from experiments.exchange import four_arms, outside_assemblies
 from experiments.failing import where_methods_fail
 from experiments.harness.claim import claims
 from experiments.harness.results import stored
 from experiments.instances import instance_contest
-from experiments.peers import peers
 from experiments.placement import (
-    composing,
     decision_sensitivity,
     formulations,
     free_growth,
     heuristic_gaps,
+    makespan,
     robust_placement,
     speed_accuracy,
     staged_construction,
 )
-from experiments.stability import classical, dry_map, dry_methods, witnesses
+from experiments.stability import classical, contact_steps, dry_map, dry_methods, witnesses
 from experiments.study import criteria_variants, paper_counterparts
-from experiments.study.parts.counterpart_items import ITEMS
-from experiments.times import makespan
 
 pytestmark = pytest.mark.slow
 
-NUMBERED = [item for item in ITEMS if item.has_numbers]
+NUMBERED = [item for item in paper_counterparts.ITEMS if item.numbers]
 
 
 class Check(NamedTuple):
@@ -160,20 +156,10 @@ CHECKS = {
         ("four_arms",),
         *("status", "feasible", {"build": "vault"}),
     ),
-    "composing": Check(
-        composing.holds,
-        ("composing",),
-        *("value", np.nan, {"schedule": "free", "with": "overlap_dp"}),
-    ),
     "paper_counterparts": Check(
         lambda table: not paper_counterparts.faults(NUMBERED, table),
         ("paper_counterparts",),
         *("error_pct", 50.0, {"id": "table:experimental_data3"}),
-    ),
-    "peers": Check(
-        lambda table: all(peers.holds(table).values()),
-        ("peers",),
-        *("ratio_lowest", 15.0, {"tool": "SciPy bars, banded"}),
     ),
     "robust_placement": Check(
         robust_placement.holds,

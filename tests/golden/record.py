@@ -15,7 +15,6 @@ from tempfile import TemporaryDirectory
 
 import pandas as pd
 
-from experiments.placement.composing import GOES, OPEN, SCHEDULES
 from seqopt._cli.main import main
 
 VALUES = Path(__file__).parent / "values.csv"
@@ -64,11 +63,58 @@ LONG = {
     "front": "pareto arch25",
     "chain of 97": "optimize chain:bricks=97 --schedule free --criteria worst-ratio",
 }
+OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node
+1,place,1,?,,
+2,place,2,?,?,
+3,place,3,?,?,?
+4,release,3,,?,?
+5,place,4,?,?,?
+6,release,4,?,,?
+7,place,5,?,?,?
+8,release,5,?,?,
+9,place,6,?,?,?
+10,release,6,,?,?
+11,place,7,?,?,?
+"""
+SCHEDULES = {
+    "three-robot": ["--schedule", "three-robot"],
+    "modified-sequential": ["--schedule", "modified-sequential"],
+    "own, up to three grips open": ["--schedule", "own.csv"],
+    "free": ["--schedule", "free"],
+    "free, order sought": ["--schedule", "free", "--order", "search"],
+}
+WORTH = ["--criteria", "worst-ratio-published"]
+STATES = ["--aim", "minmax"]
+SCENARIOS = ["--scenarios", "2"]
+OVER_STATES = ("path_dp", "path_labels", "path_beam", "best_first", "flow_lp", "flow_mip")
+GOES = {
+    "as it is": [],
+    "sum": [*WORTH, "--aim", "sum"],
+    "minmax": [*WORTH, "--aim", "minmax"],
+    "minmax, then steps": [*WORTH, "--aim", "minmax,steps"],
+    "a response": ["--aim", "T_max"],
+    **{aim: ["--aim", aim] for aim in ("steps", "regrips", "travel")},
+    "friction": ["--stands", "bond=3e4", "--aim", "friction"],
+    "a limit": [*WORTH, *STATES, "--limit", "F_largest=500"],
+    "a budget": [*WORTH, *STATES, "--budget", "travel=20m"],
+    "standing": [*WORTH, *STATES, "--stands", "bond=3e4"],
+    "the worst step of scenarios": [*WORTH, *STATES, "--robust", "worst-peak", *SCENARIOS],
+    "the worst total of scenarios": [*WORTH, "--robust", "worst-total", *SCENARIOS],
+    "the mean of the worst scenarios": [*WORTH, "--robust", "cvar=0.5", *SCENARIOS],
+    "candidates": [*WORTH, *STATES, "--candidates", "near:2"],
+    "a time limit": [*WORTH, *STATES, "--time-limit", "60"],
+    "workers": [*WORTH, *STATES, "--workers", "2"],
+    "a folder of answers": [*WORTH, *STATES, "--cache", "answers"],
+    **{name: [*WORTH, *STATES, "--formulation", name] for name in OVER_STATES},
+    "overlap_dp": [*WORTH, "--formulation", "overlap_dp"],
+    "rank_search": ["--formulation", "rank_search"],
+    "Pareto": ["pareto", "--aim", "T_max,F_largest"],
+}
 FILES = ("own.csv", "answers", "front")  # words that stand for files in a folder
 
 
 def composed() -> dict[str, str]:
-    """Return the questions of `experiments.placement.composing`, every schedule with everything."""
+    """Return every schedule with everything that goes with it, on an arch of seven bricks."""
     out = {}
     for schedule, place in SCHEDULES.items():
         for word, words in GOES.items():

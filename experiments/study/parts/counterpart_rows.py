@@ -1,6 +1,6 @@
 """Printed and computed values, side by side, of every figure and table of the paper.
 
-Every function yields the rows of one item of `counterpart_items`, named by its label in
+Every function yields the rows of one item of the claim, named by its label in
 `COUNTERPARTS`.
 """
 
@@ -19,7 +19,6 @@ from experiments.harness.yardstick import ROUNDING, STEPS, VALUES, error, inner_
 from experiments.study.parts.ranks import rank_choice
 from seqopt.arrays import Floats
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.network.build import build_network
@@ -158,17 +157,6 @@ def discrete_elements(own: Ours) -> Rows:
     for step in arches(own):
         mean = error(moved(own.engine, step), moved(discrete, step))
         yield Row("mean error [%]", f"{step.bricks} bricks", study[step.bricks], mean)
-
-
-def node_displacements(own: Ours, step: Step) -> dict[str, pd.Series]:
-    """Return displacements of the inner nodes that no robot holds, 1e-3 mm, by model."""
-    net = own.engine.network
-    names = [int(str(net.node_name[i])) for i in inner_nodes(net, step)]
-    models: dict[str, Engine] = {"double cross": own.engine, "discrete elements": _discrete(net)}
-    return {
-        model: pd.Series(1e6 * moved(engine, step), names).sort_index()
-        for model, engine in models.items()
-    }
 
 
 TWISTING = (9, 11, 21, 23, 33, 35, 45, 47)

@@ -94,7 +94,7 @@ def experiment(options: Options) -> Finding:
         for bricks in counts:
             for robots in ("equal", "unequal"):
                 case = bricks, robots, name, LONGER.get(bricks, SECONDS[name])
-                module = "experiments.times.makespan"
+                module = "experiments.placement.makespan"
                 rows.append(run(*case) if options.quick else apart(module, *case))
                 print(*rows[-1].values(), flush=True)
     table = pd.DataFrame(rows)

@@ -1,1 +1,0 @@
-"""Claims about discrete elements: joints as beds of springs, and bricks laid dry."""

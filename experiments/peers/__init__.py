@@ -1,1 +1,0 @@
-"""Claims about the tools that one would take instead."""

@@ -1,1 +1,0 @@
-"""What the claims about peers rest on: scenes, models, charts. None is run on its own."""

@@ -1,1 +1,0 @@
-"""Claims about builds in time: how long they take, and what proves it."""
