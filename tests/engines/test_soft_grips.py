@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 
 import seqopt
+from seqopt.arms import _permits
 from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.registry import make_engine
+from seqopt.engines.registry import engine_for, make_engine
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, MechanismError, SceneError
 from seqopt.network.build import build_network
-from tests.builders import apart, six_bricks
+from seqopt.scene._armed import can_hold
+from tests.arms.scenes import compliances, with_joints
+from tests.builders import apart, block, six_bricks
 from tests.limit_scenes import softened
 from tests.soft_bodies import SoftBodies
 
@@ -51,7 +54,10 @@ def inner_nodes(net, bricks):
 
 
 def drawn_state(arch, i):
-    """A random state: scene, brick count, nodes, stiffness of hands, and how far they are moved."""
+    """A random state: scene, brick count, grips, stiffness of hands, and how far they are moved.
+
+    Grips are nodes, and the numbers by which engines know them.
+    """
     rng = np.random.default_rng([i, 7])
     scene = softened(arch, i)
     size = 10 ** rng.uniform(3, 9)
@@ -64,45 +70,81 @@ def drawn_state(arch, i):
         pair = scene.placed[int(rng.integers(1, bricks))].nodes
         nodes = [*pair, *(n for n in nodes if n not in pair)][:4]
     moved = 4e-4 * rng.normal(size=(len(nodes), 3)) * (i % 2)
-    return (
-        scene.with_grips(shift, turn),
-        bricks,
-        nodes,
-        hands_of([(shift, turn)] * len(nodes)),
-        moved,
-    )
+    hands = hands_of([(shift, turn)] * len(nodes))
+    return scene.with_grips(shift, turn), bricks, (nodes, nodes), hands, moved
 
 
-def agree_with_dense(arch, i):
-    """The largest relative difference of a random state's forces, moments and displacements."""
-    scene, bricks, nodes, hands, moved = drawn_state(arch, i)
+def drawn_jacobians(rng, scene, robots, joints=6):
+    """How nodes move with joints about axes through random points a meter or so away."""
+    nodes = len(scene.brick_of_node)
+    axes = rng.normal(size=(robots, nodes, 3, joints))
+    axes /= np.linalg.norm(axes, axis=2, keepdims=True)
+    away = rng.normal(size=(robots, nodes, 3, joints))
+    return np.concatenate([np.cross(axes, away, axis=2), axes], axis=2)
+
+
+def drawn_joints(arch, i):
+    """The same of arms whose joints give way, and hands beside them; compliances for stiffness."""
+    rng = np.random.default_rng([i, 11])
+    scene = softened(arch, i)
+    robots = int(rng.integers(1, 5))
+    stiffness = 10 ** rng.uniform(4, 8, (robots, 1)) * 10 ** rng.uniform(-1, 1, (robots, 6))
+    hands = [
+        (
+            None if rng.random() < 0.6 else 10 ** rng.uniform(4, 8),
+            None if rng.random() < 0.6 else 10 ** rng.uniform(2, 7),
+        )
+        for _ in range(robots)
+    ]
+    bricks = int(rng.integers(2, 26))
+    free = [n for b in scene.placed[:bricks] for n in b.nodes if n not in scene.blocked_nodes]
+    nodes = rng.permutation(free)[:robots].tolist()
+    if robots > 1 and rng.random() < 0.4:  # two on one brick
+        pair = scene.placed[int(rng.integers(1, bricks))].nodes
+        nodes = [*pair, *(n for n in nodes if n not in pair)][:robots]
+    robots = len(nodes)
+    moved = 4e-4 * rng.normal(size=(robots, 3)) * (i % 2)
+    jacobians = drawn_jacobians(rng, scene, robots)
+    scene = with_joints(scene, stiffness[:robots], jacobians, hands[:robots])
+    return scene, bricks, (nodes, scene.grip_numbers(nodes)), compliances(scene, nodes), moved
+
+
+def agree_with_dense(state):
+    """The largest relative difference of a state's forces, moments and displacements."""
+    scene, bricks, (nodes, numbers), hands, moved = state
     borne, shifts = SoftBodies(scene, bricks).solve(nodes, hands, moved)
-    net = build_network(scene)
-    given = moved[None] if moved.any() else None
-    found = ComplianceEngine(net).solve(bricks, [nodes], Want.ALL, given)
+    net, given = build_network(scene), moved[None] if moved.any() else None
+    found = ComplianceEngine(net).solve(bricks, [numbers], Want.ALL, given)
     own = found.displacement[0, inner_nodes(net, bricks)]
-    out = [far(found.grip_force[0], borne[:, :3]), far(own, shifts)]
-    return max([*out, far(found.grip_moment[0], borne[:, 3:])] if hands[:, 3:].any() else out)
+    moment = found.grip_moment[0] if found.grip_moment.size else np.zeros((len(nodes), 3))
+    pairs = ((found.grip_force[0], borne[:, :3]), (moment, borne[:, 3:]), (own, shifts))
+    return max(far(*pair) for pair in pairs)
 
 
-@pytest.mark.parametrize("i", range(0, STATES, 40))
-def test_a_dense_solver_agrees(arch25, i):
-    assert agree_with_dense(arch25, i) <= 1e-9
+@pytest.mark.parametrize("draw", [drawn_state, drawn_joints])
+@pytest.mark.parametrize("i", range(0, STATES, 45))
+def test_a_dense_solver_agrees(arch25, draw, i):
+    assert agree_with_dense(draw(arch25, i)) <= 1e-9
 
 
 @pytest.mark.long
 @pytest.mark.slow
-def test_a_dense_solver_agrees_on_all_states(arch25):
-    assert max(agree_with_dense(arch25, i) for i in range(STATES)) <= 1e-9
+@pytest.mark.parametrize("draw", [drawn_state, drawn_joints])
+def test_a_dense_solver_agrees_on_all_states(arch25, draw):
+    assert max(agree_with_dense(draw(arch25, i)) for i in range(STATES)) <= 1e-9
 
 
 def test_the_dense_solver_would_notice(arch25):
-    """Negative control: a tenth softer, or moved a tenth less, is another answer."""
-    scene, bricks, nodes, hands, moved = drawn_state(arch25, 1)
-    solver = SoftBodies(scene, bricks)
-    right = solver.solve(nodes, hands, moved)[0]
-    assert far(solver.solve(nodes, 0.9 * hands, moved)[0], right) > 1e-3
-    assert far(solver.solve(nodes, hands, 0.9 * moved)[0], right) > 1e-3
+    """Negative control: a tenth softer, moved a tenth less, or no give across the axes of hands."""
+    for (scene, bricks, (nodes, _), hands, moved), across in (
+        (drawn_state(arch25, 1), False),
+        (drawn_joints(arch25, 1), True),
+    ):
+        solver, others = SoftBodies(scene, bricks), [[0.9 * np.array(each) for each in hands]]
+        right = solver.solve(nodes, hands, moved)[0]
+        others += [[np.diag(np.diag(each)) for each in hands]] if across else []
+        assert all(far(solver.solve(nodes, own, moved)[0], right) > 1e-3 for own in others)
+        assert far(solver.solve(nodes, hands, 0.9 * moved)[0], right) > 1e-3
 
 
 WAYS = {
@@ -256,3 +298,73 @@ def test_numbers_of_grips_that_there_are_not(arch25):
 def test_wrong_stiffness_is_a_line(given, named):
     with pytest.raises(SceneError, match=named):
         seqopt.Robot(name="a", payload=1.0, **given)
+
+
+# grips that give way as the joints of an arm do: full compliances against a dense solver
+
+
+@pytest.mark.parametrize("turn", [None, 1e5])
+@pytest.mark.parametrize("grips", [(3, 8, 11), (4, 5, 9)])
+def test_engines_agree_with_joints(grips, turn):
+    rng, scene = np.random.default_rng(3), six_bricks("V")
+    stiffness = 10 ** rng.uniform(5, 7, (3, 6))
+    hands = [(1e7, turn)]
+    scene = with_joints(scene, stiffness, drawn_jacobians(rng, scene, 3), hands)
+    net, numbers = build_network(scene), [scene.grip_numbers(grips)]
+    borne, shifts = SoftBodies(scene, 6).solve(grips, compliances(scene, grips), np.zeros((3, 3)))
+    most = {"compliance": 1e-10, "auto": 1e-9, "discrete": 1e-7, "frame": 1e-4}
+    for name, close in most.items():
+        found = make_engine(name, net).solve(6, numbers, Want.ALL)
+        assert far(found.grip_force[0], borne[:, :3]) <= close
+        assert far(found.displacement[0, inner_nodes(net, 6)], shifts) <= close
+
+
+@pytest.mark.parametrize("size", [1e3, 1e5])
+def test_one_joint_bears_what_a_lever_on_a_spring_does(size):
+    """A hinge whose axis is level, 1.5 m from the node, beside ground that sinks and does not turn.
+
+    Where node and ground sink by the same u, W = u (g + k / L²), with g of the ground.
+    """
+    ground, length = 1e6, 1.5
+    hinge = np.zeros((1, 2, 6, 1))
+    hinge[..., 2, 0], hinge[..., 4, 0] = length, 1.0  # it turns about y, and lifts
+    lever, ways = size / length**2, (("compliance", 1e13), ("frame", 1e8), ("discrete", 1e8))
+    for name, turning in ways:
+        scene = block(translational_stiffness=(ground,) * 3, rotational_stiffness=(turning,) * 3)
+        arm, weight = with_joints(scene, [[size]], hinge), scene.bricks[0].mass * 9.81
+        node, close = scene.bricks[0].nodes[0], 1e-7 if name == "compliance" else 1e-3
+        found = make_engine(name, arm).solve(1, [[node]], Want.ALL).grip_force[0, 0]
+        assert found[2] == pytest.approx(weight * lever / (ground + lever), abs=close * weight)
+
+
+def test_a_posture_that_there_is_not_is_a_line(arch25):
+    jacobians = drawn_jacobians(np.random.default_rng(1), arch25, 2)
+    scene = with_joints(arch25, np.full((2, 6), 1e6), jacobians, without=[(1, 4)])
+    node = sorted(arch25.brick_of_node)[4]
+    engine = make_engine("compliance", scene)
+    said = f"robot r1 has no posture at node {node}, so the compliance of its grip is not known"
+    with pytest.raises(GripError, match=said):
+        engine.solve(20, [scene.grip_numbers((3, node))])
+    assert engine.solve(20, [scene.grip_numbers((node, 3))]).grip_force.all()
+    assert [can_hold(scene, kind, node) for kind in (0, 1)] == [True, False]
+    assert can_hold(arch25, 0, node)
+
+
+def test_scenarios_hold_in_the_same_postures(arch25):
+    """In which joints may have other stiffnesses; a scene with arms elsewhere has its own."""
+    jacobians = drawn_jacobians(np.random.default_rng(1), arch25, 2)
+    scene = with_joints(arch25, np.full((2, 6), 1e6), jacobians)
+    engine = make_engine("compliance", scene)
+    (drawn,) = seqopt.scenarios(scene, count=1, grips=(0.1, 0.2)).scenes
+    factor = drawn.robots[1].arm.joint_stiffness[0] / 1e6
+    assert 0.1 <= factor <= 0.2
+    found = engine_for(engine, drawn).network.scene.held_postures
+    assert found == scene.held_postures
+    own = [found.compliance(each.arms)[1] for each in (drawn, scene)]
+    assert np.allclose(factor * own[0], own[1], rtol=1e-12)
+    first, second = drawn.robots
+    away = replace(second, arm=replace(second.arm, position=(9.0, 0.0, 0.0)))
+    other = drawn.with_robots(first, away)
+    assert _permits.hold_alike(scene, other) is other
+    assert "held_postures" not in vars(other)
+    assert "held_postures" not in vars(drawn)  # by itself it has postures of its own
