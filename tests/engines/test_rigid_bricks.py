@@ -3,35 +3,44 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import sparse
 
 from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid import _mixed as mixed
 from seqopt.engines.rigid import _refinement as refinement
 from seqopt.engines.rigid import compliance as trial
 from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._mixed import add_products, solve_mixed
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid.compliance import _EVEN, ComplianceEngine, _cancels
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
-from tests.builders import from_both_sides, hinged, six_bricks, solve_batch
+from tests.builders import apart, from_both_sides, hinged, six_bricks, solve_batch
 from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened
 from tests.reference_chain import solve_exactly
 
+EPS = np.finfo(float).eps
+KINDS = ("translational_stiffness", "rotational_stiffness")
+FIELDS = ("edge_force", "displacement", "grip_force", "support")
+BEYOND = [(43,), (31,), (13, 45)]  # the loose joint, which is between bricks 12 and 13
 
-def error(net, fields, row, grips):
-    """The largest relative error of displacements, joint forces and joint moments."""
-    bricks = len(net.inner)
-    columns = grip_columns(net, bricks, np.array([grips], dtype=int))[0]
-    exact = solve_exactly(net, bricks, columns)
-    wrench = fields.joint_wrench[row]
+
+def off(net, columns, fields, row=0):
+    """The largest difference from sixty digits, relative to the largest of each field."""
+    exact = solve_exactly(net, len(net.inner), columns)
+    wrench, nodes = fields.joint_wrench[row], net.inner.ravel()
     pairs = (
-        (fields.displacement[row, net.inner.ravel()], exact.displacement),
+        (fields.displacement[row, nodes], exact.displacement),
         (wrench[:, :3], exact.joint_wrench[:, :3]),
         (wrench[:, 3:], exact.joint_wrench[:, 3:]),
     )
-    return max(np.abs(got - want).max() / np.abs(want).max() for got, want in pairs)
+    return max(np.abs(a - b).max() / np.abs(b).max() for a, b in pairs)
 
 
 @pytest.mark.parametrize("only_turning", [True, False])
@@ -41,16 +50,15 @@ def test_grips_beyond_a_loose_joint(factor, only_turning):
     net = build_network(loosened(chain(25), factor, only_turning=only_turning))
     sets = [HELD, (30, 37, 49), (3, 8, 10)]
     fields = ComplianceEngine(net).solve(25, sets, Want.ALL)
-    for row, grips in enumerate(sets):
-        assert error(net, fields, row, grips) <= 1e-9
-    operator = OperatorBuilder(net, grow_tree(net)).operator(25)
     columns = grip_columns(net, 25, np.array(sets))
+    assert max(off(net, own, fields, row) for row, own in enumerate(columns)) <= 1e-9
+    operator = OperatorBuilder(net, grow_tree(net)).operator(25)
     for accuracy in (1e-9, 1e-6):
         fields, trusted = solve_batch(operator, columns, Want.ALL, accuracy=accuracy)
         assert trusted[2]
-        assert not trusted[:2].any() or factor >= 1e3 * np.finfo(float).eps / accuracy
+        assert not trusted[:2].any() or factor >= 1e3 * EPS / accuracy
         for row in np.flatnonzero(trusted):
-            assert error(net, fields, row, sets[row]) <= accuracy
+            assert off(net, columns[row], fields, row) <= accuracy
 
 
 def test_a_batch_of_many_passes(monkeypatch):
@@ -58,25 +66,21 @@ def test_a_batch_of_many_passes(monkeypatch):
     sets = [(1, 9, 14), (14, 15, 3), (4, 5, 2), (12, 10, 7), (8, 9, 15)]
     whole = ComplianceEngine(net).solve(8, sets, Want.ALL)
     monkeypatch.setattr(trial, "_CHUNK", 2)
-    parts = ComplianceEngine(net).solve(8, sets, Want.ALL)
-    for name in ("edge_force", "displacement", "grip_force", "support"):
-        gap = np.abs(getattr(parts, name) - getattr(whole, name)).max()
-        assert gap <= 1e-12 * np.abs(getattr(whole, name)).max()
+    assert apart(ComplianceEngine(net).solve(8, sets, Want.ALL), whole, FIELDS) <= 1e-12
 
 
-def test_grips_close_together_on_a_long_chain():
-    net = build_network(chain(150))
-    sets = [(296, 297, 299), (297, 298, 299), (297, 299, 295)]
-    fields = ComplianceEngine(net).solve(150, sets, Want.ALL)
-    for row, grips in enumerate(sets):
-        assert error(net, fields, row, grips) <= 1e-12
-
-
-def test_a_hundred_bricks_with_a_hinge():
-    """A spring without stiffness leaves no operator."""
-    net = build_network(hinged(chain(100), 50))
-    fields = ComplianceEngine(net).solve(100, [(150, 199)], Want.ALL)
-    assert error(net, fields, 0, (150, 199)) <= 1e-12
+@pytest.mark.parametrize(
+    ("scene", "sets"),
+    [
+        (chain(150), [(296, 297, 299), (297, 298, 299), (297, 299, 295)]),  # close together
+        (hinged(chain(100), 50), [(150, 199)]),  # a spring without stiffness leaves no operator
+    ],
+)
+def test_long_chains_keep_their_digits(scene, sets):
+    net, count = build_network(scene), len(scene.bricks)
+    fields = ComplianceEngine(net).solve(count, sets, Want.ALL)
+    for row, columns in enumerate(grip_columns(net, count, np.array(sets))):
+        assert off(net, columns, fields, row) <= 1e-12
 
 
 def test_what_double_precision_cannot_tell_from_a_mechanism_is_refused():
@@ -89,9 +93,6 @@ def test_what_double_precision_cannot_tell_from_a_mechanism_is_refused():
 
 
 # when the fast engine's own answers stand, and when they are corrected
-
-
-KINDS = ("translational_stiffness", "rotational_stiffness")
 
 
 def test_nothing_is_corrected_where_joints_are_even(monkeypatch):
@@ -130,3 +131,86 @@ def test_who_looks_for_what_cancels(monkeypatch, scene, kind, share, uneven):
         engine.solve(bricks, [[scene.placed[bricks - 1].placing_node]])
     acts = 1 + max(scene.build_order.index(brick) for brick in joint.bricks)
     assert looked == ([*range(acts, len(scene.bricks) + 1)] if uneven else [])
+
+
+# residuals in twice the digits, and what is answered or refused by them on every processor
+
+
+def exactly(start, matrix, factors):
+    """The sums of products as fractions."""
+    rows = matrix.toarray()
+    return [
+        Fraction(a) + sum((Fraction(m) * Fraction(x) for m, x in zip(row, factors, strict=True)))
+        for a, row in zip(start.tolist(), rows.tolist(), strict=True)
+    ]
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 7), st.integers(1, 9))
+def test_sums_of_products_are_those_of_fractions(seed, width, rows):
+    """Though all but sixteen digits cancel."""
+    rng = np.random.default_rng(seed)
+    dense = rng.normal(size=(rows, width)) * (rng.random((rows, width)) < 0.6)
+    matrix, factors = sparse.csr_array(dense), rng.normal(size=width) * 10.0 ** rng.integers(-9, 9)
+    start = -(dense @ factors)
+    found, wanted = add_products(start, matrix, factors), exactly(start, matrix, factors)
+    size = np.abs(dense) @ np.abs(factors) + np.abs(start)
+    for one, true, scale in zip(found, wanted, size, strict=True):
+        allowed = EPS * abs(true) + Fraction((width + 1) ** 2 * (EPS * EPS) * scale)
+        assert abs(Fraction(float(one)) - true) <= allowed
+
+
+def test_plain_sums_of_products_are_not():
+    """The control: a third times three, less one."""
+    matrix, third = sparse.csr_array([[3.0, 1e-3]]), np.array([1 / 3, 0.0])
+    start = np.array([-1.0])
+    (true,) = exactly(start, matrix, third)
+    assert abs(true) == Fraction(1, 2**54)
+    assert add_products(start, matrix, third)[0] == float(true)
+    assert (start + matrix @ third)[0] == 0.0
+
+
+@pytest.fixture(scope="module")
+def hinge():
+    """A chain of which one joint has 1e-8 of the others' stiffness in turning."""
+    return build_network(loosened(chain(25), 1e-8, only_turning=True))
+
+
+@pytest.mark.parametrize("held", BEYOND)
+def test_loose_sets_are_answered_as_sixty_digits_do(hinge, held):
+    """By residuals in doubles, half of them were refused, others on other processors."""
+    columns = np.array(held)
+    assert off(hinge, columns, solve_mixed(hinge, 25, columns[None])) <= 1e-9
+    numbers = [[hinge.node_name[i] for i in hinge.inner.ravel()[columns]]]
+    fields = ComplianceEngine(hinge).solve(25, numbers, Want.ALL)
+    assert off(hinge, columns, fields) <= 1e-9
+
+
+def spoiled():
+    """Sums without the last digit of doubles, another way in each."""
+    rng = np.random.default_rng(0)
+
+    def add(start, matrix, factors):
+        size = np.abs(start) + abs(matrix) @ np.abs(factors)
+        lost = 10 * EPS * size * rng.choice([-1, 1], len(size))
+        return add_products(start, matrix, factors) + lost
+
+    return add
+
+
+def test_corrections_that_stall_refuse(hinge, monkeypatch):
+    """The control of the test before."""
+    monkeypatch.setattr(mixed, "add_products", spoiled())
+    with pytest.raises(SolverError, match="too close to a mechanism"):
+        solve_mixed(hinge, 25, np.array([(43,)]))
+
+
+@pytest.mark.parametrize(("power", "refused"), [(7, False), (13, True)])
+def test_what_last_digits_decide_is_refused(power, refused):
+    """How far the part beyond turns about its grips: by moments that are nothing but rounding."""
+    net = build_network(loosened(chain(25), 10.0**-power, only_turning=True))
+    for held in BEYOND:
+        if refused:
+            with pytest.raises(SolverError, match="too close to a mechanism"):
+                solve_mixed(net, 25, np.array([held]))
+        else:
+            assert off(net, np.array(held), solve_mixed(net, 25, np.array([held]))) <= 1e-10
