@@ -21,12 +21,14 @@ formulation solves the problem, and the plan is the checked answer.
 from __future__ import annotations
 
 import re
-from importlib import import_module
 from pathlib import Path
+
+from seqopt._later import later
 
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")  # also of type checkers
 _HOME_OF = {name: home for home, name in re.findall(r"from seqopt\.(\S+) import (\w+)", _STUB)}
 __all__ = [*_HOME_OF, "__version__"]  # noqa: PLE0604  # they are strings
+_find, _ = later("seqopt", _HOME_OF)
 
 
 def __getattr__(name: str) -> object:
@@ -35,11 +37,7 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version  # noqa: PLC0415  # 30 ms that few ask for
 
         return version("seqopt")
-    if name not in _HOME_OF:
-        raise AttributeError(f"module 'seqopt' has no attribute {name!r}")
-    found: object = getattr(import_module(f"seqopt.{_HOME_OF[name]}"), name)
-    globals()[name] = found
-    return found
+    return _find(name)
 
 
 def __dir__() -> list[str]:

@@ -17,7 +17,6 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt._interrupts import undisturbed
 from seqopt.errors import FileError, SeqoptError
 
 _FORMULA = ("=", "+", "-", "@")
@@ -176,7 +175,7 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
             _put_all([(target / name, content) for name, content in files.items()])
             return
         make_folder(target.parent)
-        with undisturbed(), tempfile.TemporaryDirectory(dir=target.parent, prefix=HIDDEN) as hidden:
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=HIDDEN) as hidden:
             whole = Path(hidden) / "whole"
             whole.mkdir()  # as open as any new folder; the one around it is private
             _put_all([(whole / name, content) for name, content in files.items()])
@@ -257,15 +256,14 @@ def _stage(path: Path, content: bytes | str) -> tuple[Path, Path]:
 def _put_all(files: Sequence[tuple[Path, bytes | str]]) -> None:
     """Write temporary files; then rename all to their targets."""
     staged: list[tuple[Path, Path]] = []
-    with undisturbed():
-        try:
-            for path, content in files:
-                staged.append(_stage(path, content))
-            for hidden, target in staged:
-                hidden.replace(target)
-        finally:
-            for hidden, _ in staged:
-                hidden.unlink(missing_ok=True)
+    try:
+        for path, content in files:
+            staged.append(_stage(path, content))
+        for hidden, target in staged:
+            hidden.replace(target)
+    finally:
+        for hidden, _ in staged:
+            hidden.unlink(missing_ok=True)
 
 
 def _is_same(path: Path, other: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Interrupts: deferred in critical sections, answered by callbacks, and raised by time limits."""
+"""Interrupts: answered by callbacks, and raised by time limits."""
 
 from __future__ import annotations
 
@@ -13,33 +13,6 @@ from types import FrameType
 _ENDS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-
-
-@contextmanager
-def undisturbed() -> Iterator[None]:
-    """Defer termination signals until the end of the block."""
-    if threading.current_thread() is not threading.main_thread():  # signals are not answered here
-        yield
-        return
-    came: list[int] = []
-
-    def note(number: int, _: FrameType | None) -> None:
-        came.append(number)
-
-    masks = hasattr(signal, "pthread_sigmask")  # other threads may still take them: see note
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS) if masks else set()
-    answers = {n: answer for n in _ENDS if callable(answer := signal.getsignal(n))}
-    try:
-        for number in answers:
-            signal.signal(number, note)
-        yield
-    finally:
-        for number, answer in answers.items():
-            signal.signal(number, answer)
-        if masks:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        for number in came[:1]:
-            signal.raise_signal(number)
 
 
 @contextmanager

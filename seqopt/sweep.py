@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from seqopt._files import csv_text, read_table, read_text, write_text
+from seqopt._files import csv_text, write_text
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SeqoptError, SolverError
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene import Scene
@@ -209,26 +209,21 @@ def _row(solve: Callable[[Case], dict[str, Any]], case: Case) -> dict[str, Any]:
 
 def _read_rows(path: Path, names: list[str]) -> dict[tuple[str, ...], dict[str, Any]]:
     """Return the rows of a file by what tells them apart."""
-    columns, rows = read_table(read_text(path), str(path))
-    if columns[: len(names)] != names:
+    try:
+        table = pd.read_csv(path, dtype=dict.fromkeys(names, str))
+    except (OSError, ValueError) as error:
+        raise ProblemError(f"{path}: no table of a sweep: {error}; name another file") from None
+    if (columns := [*table][: len(names)]) != names:
         raise ProblemError(
-            f"{path}: it has columns {', '.join(columns[: len(names)])}, not {', '.join(names)}; "
+            f"{path}: it has columns {', '.join(columns)}, not {', '.join(names)}; "
             "it is of another sweep, name another file"
         )
-    kept = {}
-    for _, row in rows:
-        own = {name: _number(cell) for name, cell in row.items() if name not in names and cell}
-        kept[tuple(row[name] for name in names)] = own
-    return kept
-
-
-def _number(cell: str) -> object:
-    for kind in (int, float):
-        try:
-            return kind(cell)
-        except ValueError:
-            continue
-    return {"True": True, "False": False}.get(cell, cell)
+    return {
+        tuple(row[name] for name in names): {
+            str(name): cell for name, cell in row.items() if name not in names and pd.notna(cell)
+        }
+        for row in table.to_dict("records")
+    }
 
 
 def _table(

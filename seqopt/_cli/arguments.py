@@ -42,21 +42,6 @@ LEADS = {"limit": "limits", "option": "options"}  # first words of messages, and
 LEADS |= {n: n for n in ("begin", "criterion", "direction", "engine", "lost", "missing", "rules")}
 LEADS["to"] = "to"
 GIVEN = re.compile(r"\b(\w+)='([\w-]+)'")
-GONE = {
-    "--cohesion": "give --mortar bond=STRENGTH, or in Python a Mortar",
-    "--crown": "in Python dataclasses.replace(seqopt.CRITERIA[...], crown=...) has it",
-    "--fields": "in Python seqopt.responses.step_fields has them",
-    "--keep": "--to 12 leaves the first 12 bricks of --order",
-    "--load-factor": "in Python seqopt.stability.load_factors has it",
-    "--pick": "seqopt optimize --schedule free --aim D_max --limit F_largest=250 plans it",
-    "--ranked": "in Python RankSum(..., ranked=Ranked.CONDITIONAL) has it",
-    "--seconds": "it is --time-limit, as of any command",
-    "--steps": "give --margins without it, or in Python seqopt.assess_steps some steps",
-    "--stiffens": "give a scene whose joints are softer, as seqopt scene --export writes it",
-    "--strict": "--json lists payloads_exceeded, outside_linear_range and arms_cannot",
-    "--tensile-strength": "give --mortar bond=STRENGTH, or in Python a Mortar",
-    "--under": "seqopt optimize --schedule free --aim D_max --limit F_largest=250 plans it",
-}  # options that there were, and what to do in their place
 
 
 def _nearest(message: str, options: Iterable[str]) -> str:
@@ -72,8 +57,6 @@ def _nearest(message: str, options: Iterable[str]) -> str:
     found = UNKNOWN.search(message)
     if found is None:
         return ""
-    if found[1] in GONE:
-        return f" ({found[1]} is no more; {GONE[found[1]]})"
     known = {option.lstrip("-"): option for option in options}
     if found[1] in known.values():
         return " (options stand after the command)"

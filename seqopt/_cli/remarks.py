@@ -68,17 +68,14 @@ def rule_notes(rules: FreeRules | Schedule, scene: Scene) -> tuple[str, ...]:
 
 
 def waits_said(build: ShownBuild) -> Iterator[str]:
-    """Yield the total wait for mortar of a judged build, and the joints with the longest waits."""
+    """Yield the total wait for mortar of a judged build."""
     if build.standing is None or build.standing.curing is None:
         return
     table = build.times()
     waits = table[table["cures_s"] > 0]
     steps, total = f"{len(waits)} step{'s' * (len(waits) > 1)}", waits["cures_s"].sum()
-    said = f"{total:.6g} s are waits for mortar, in {steps}; the longest:"
+    said = f"{total:.6g} s are waits for mortar, in {steps}"
     yield said if len(waits) else "no step waits for mortar"
-    for row in waits.nlargest(3, "cures_s").to_dict("records"):
-        step = f"step {row['step']} ({row['type']})"
-        yield f"  {step} waits {row['cures_s']:.6g} s for joint {row['joint']}"
     yield "every state is proven to stand with the bond that its joints have when it begins"
 
 

@@ -31,7 +31,6 @@ from seqopt._cli.words import (
     parse_count,
 )
 from seqopt._registry import COMMANDS
-from seqopt.errors import ProblemError
 from seqopt.problem.requirements import number_word
 
 OWN = "What is it about?"  # of options under no question
@@ -51,7 +50,7 @@ class Option:
     """An option: the types that it takes, its default, and what a parser knows of it.
 
     ``more``: ``choices``, ``const`` (what it is where no value follows), ``zero`` (whether a number
-    may be zero), ``least`` and ``most`` (of a whole number), ``advice``, ``parse``.
+    may be zero), ``least`` and ``most`` (of a whole number), ``parse``.
     """
 
     name: str
@@ -107,10 +106,7 @@ class Option:
         if not isinstance(value, str):
             return value
         if self.kinds <= {float, type(None)}:
-            try:
-                return number_word(value, self.flag, zero=self.more.get("zero", False))
-            except ProblemError as error:
-                raise ProblemError(f"{error}{self.more.get('advice', '')}") from None
+            return number_word(value, self.flag, zero=self.more.get("zero", False))
         if self.kinds <= {int, type(None)}:
             least, most = self.more.get("least", 1), self.more.get("most", MOST_WORKERS)
             return parse_count(value, self.flag, most, least)

@@ -346,8 +346,7 @@ def parse_mortar(text: str, where: str) -> Mortar:
 def parse_props(text: str, scene: Scene) -> tuple[Prop, ...]:
     """Parse props, as ``13,27:1e6,push,capacity=300`` or ``every:1e6``.
 
-    ``every`` is a node of each brick, ``all`` are all nodes, ``none`` are none; ``push`` and
-    ``capacity`` are of all that are named.
+    ``every`` is a node of each brick; ``push`` and ``capacity`` are of all that are named.
     """
     props, common = list[Prop](), dict[str, object]()
     where = f"--props {short(text)[1:-1]}"
@@ -357,7 +356,7 @@ def parse_props(text: str, scene: Scene) -> tuple[Prop, ...]:
             common["capacity"] = number_word(value, where)
         elif word.strip() == "push":
             common["direction"] = scene.up
-        elif word.strip() != "none":
+        else:
             props += _placed(word.strip(), scene, where)
     try:
         scene.with_props(*props)
@@ -371,15 +370,10 @@ def _placed(word: str, scene: Scene, where: str) -> Sequence[Prop]:
     own = number_word(stiffness, where) if colon else None
     if place == "every":
         return scene.with_centering(own).props
-    if place == "all":
-        free = (node for brick in scene.placed for node in brick.nodes)
-        nodes = tuple(node for node in free if node not in scene.blocked_nodes)
-    elif place.isascii() and place.isdecimal():
-        nodes = (int(place),)
-    else:
-        hint = did_you_mean(place, ("every", "all", "push", "none"))
+    if not (place.isascii() and place.isdecimal()):
+        hint = did_you_mean(place, ("every", "push"))
         raise SceneError(f"{where}: {place!r} is no node{hint}; {PROPS}")
-    return [Prop(node=node, stiffness=own) for node in nodes]
+    return [Prop(node=int(place), stiffness=own)]
 
 
 SPREAD: dict[str, type] = {

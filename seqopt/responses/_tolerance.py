@@ -31,7 +31,7 @@ import pandas as pd
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine, OpeningEngine, Want, grip_columns
-from seqopt.engines.registry import USUAL, AutoEngine, Recipe, recipe_of
+from seqopt.engines.registry import AutoEngine
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
@@ -198,35 +198,6 @@ def each_tolerance(
             off = np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
             known[bricks, held] = off
     return np.array([known[bricks, held] for _, bricks, held in steps], dtype=float)
-
-
-_SOFTEST, _STIFFEST = 1e2, 1e12  # N/m, between which a stiffness is sought
-_ALIKE = 1.01  # ratio of stiffnesses that are not told apart
-
-
-def stiffness_for(engine: Engine, steps: Sequence[Step], distance: float) -> float | None:
-    """Return the largest stiffness of all grips, N/m, at which the tolerance is met.
-
-    Found by bisection, so that not all stiffer grips are checked. Infinite if rigid grips meet it,
-    None if no stiffness from `_SOFTEST` on does.
-    """
-    recipe, scene = recipe_of(engine) or Recipe(USUAL, engine.network.scene), engine.network.scene
-
-    def enough(stiffness: float | None) -> bool:
-        soft = scene.with_grips(stiffness)
-        held = [(s.number, s.bricks, soft.grip_numbers(s.grips, s.bricks)) for s in steps]
-        found = each_tolerance(recipe.make(soft), held)
-        return bool(found.min(initial=np.inf) >= distance)
-
-    if enough(None):
-        return np.inf
-    low, high = _SOFTEST, _STIFFEST
-    if not enough(low):
-        return None
-    while high > _ALIKE * low:
-        middle = (low * high) ** 0.5
-        low, high = (middle, high) if enough(middle) else (low, middle)
-    return low
 
 
 def tolerances_along(engine: Engine, steps: Sequence[Step]) -> list[float]:

@@ -57,13 +57,6 @@ def test_nothing_is_named_where_nothing_is_near(capsys):
     assert "did you mean" not in capsys.readouterr().err
 
 
-def test_an_option_that_is_gone_is_told_what_takes_its_place(capsys):
-    assert main(["optimize", "--load-factor", "3"]) == 2
-    err = capsys.readouterr().err
-    assert re.search(r"is no more; in Python seqopt(\.\w+)+ has it", err)
-    assert err.count("\n") == 1
-
-
 def test_every_example_of_help_can_be_parsed():
     for name, command in COMMANDS.items():
         examples = signature_of(command.load()).examples

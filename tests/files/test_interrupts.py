@@ -1,55 +1,13 @@
-"""Interrupts wait until files are whole, and are answered then."""
+"""Interrupts are answered by calls, and raised by limits of time."""
 
 from __future__ import annotations
 
-import os
 import signal
-import threading
 import time
 
 import pytest
 
-from seqopt._interrupts import answered, ending, undisturbed
-
-
-def meanwhile(number):
-    """Send a signal from another thread, which may take it too."""
-    sender = threading.Thread(target=lambda: os.kill(os.getpid(), number))
-    sender.start()
-    sender.join()
-    time.sleep(0.01)
-
-
-def twice(depth, done):
-    with undisturbed():
-        if depth > 1:
-            twice(depth - 1, done)
-        else:
-            meanwhile(signal.SIGINT)
-        done.append(depth)
-    done.append("late")
-
-
-@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-@pytest.mark.parametrize("depth", [1, 2])
-def test_an_interrupt_waits_for_the_end(depth):
-    done = []
-    with pytest.raises(KeyboardInterrupt):
-        twice(depth, done)
-    assert done[-1] == depth
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-def test_an_interrupt_is_answered_at_once_elsewhere():
-    """The negative control."""
-    with pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGINT)
-
-
-def test_an_error_inside_comes_out_and_signals_are_as_before():
-    with pytest.raises(ValueError, match="own"), undisturbed():
-        raise ValueError("its own")
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+from seqopt._interrupts import answered, ending
 
 
 def test_a_first_interrupt_is_a_call_and_a_second_one_ends():

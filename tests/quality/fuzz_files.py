@@ -71,10 +71,7 @@ def _of_instances() -> Iterator[tuple[str, File]]:
     names = dict(zip(plan.goals, values, strict=False))
     bounds = [
         {"value": 1.0, "shares": [[0.5, 0.25, 0.25]], "prices": {"regrips": 0.0}},
-        {
-            "shares": [[1.0, 0.0, 0.0]],
-            "weights": [1.0],
-        },
+        {"shares": [[1.0, 0.0, 0.0]], "weights": [1.0]},
         {"labels": {"nodes": [0], "values": [[0.0, 0.0, 0.0, 0.0]]}},
     ]
     answer = {"nodes": [*plan.nodes], "values": names, "bounds": bounds[:1]}

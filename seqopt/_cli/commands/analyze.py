@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import Annotated
-
-import pandas as pd
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
@@ -21,10 +19,9 @@ from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import Engine, Fields, OpeningEngine, Want
 from seqopt.engines.registry import AutoEngine, provenance, recipe_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
-from seqopt.problem.requirements import _prop_faults, length_word, overloads
+from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.responses._enough import what_was_enough
-from seqopt.responses._tolerance import COLUMN, stiffness_for, tolerances_along
-from seqopt.responses.quantities import _plain, _steps_in_words, length_text
+from seqopt.responses.quantities import _steps_in_words
 from seqopt.responses.table import LinearRange, _with_faults, response_table, step_fields
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability._steps import assess_steps
@@ -39,7 +36,6 @@ def analyze(
     *,
     engine: str | None = None,
     mortar: str | None = None,
-    tolerance: Annotated[str | None, ("value", "LENGTH"), ("const", "")] = None,
     out: File = None,
     progress: Tell,
 ) -> Answer:
@@ -52,10 +48,6 @@ def analyze(
     ----------
     engine, mortar : optional
         As of `optimize`.
-    tolerance : str, optional
-        Also find how far every grip may be from where it should be before a robot carries more than
-        its payload, in the worst direction: a column tolerance_mm; of a length, such as 0.4mm, also
-        how soft grips must be to be so far off.
     out : pathlib.Path, optional
         CSV file to write (default: standard output).
 
@@ -72,10 +64,6 @@ def analyze(
     within, steps = LinearRange(computed), with_progress("steps", given.steps, progress)
     table = response_table(given.network, _solved(within, steps, faults))
     solved = [step for step in given.steps if step.number not in faults]
-    notes = [*given.notes]
-    if solved and tolerance is not None:
-        table, off = _with_tolerances(tolerance, computed, solved, table)
-        notes += off
     whole = _with_faults(scene, table, given.steps, faults) if faults else table
     mechanisms = sum(isinstance(fault, MechanismError) for fault in faults.values())
     counted = f"{len(whole)} steps" + f", {mechanisms} of them mechanisms," * bool(mechanisms)
@@ -84,7 +72,7 @@ def analyze(
         scene=scene,
         failures=_describe_faults(faults, len(given.steps)),
         status=_status_of(faults),
-        notes=(*notes, *remarks.level_notes(engine, computed)),
+        notes=(*given.notes, *remarks.level_notes(engine, computed)),
         **outputs.put_table(out, whole, counted),
     )
     if table.empty:
@@ -153,23 +141,3 @@ def _status_of(faults: Mapping[int, SeqoptError]) -> Status:
     if any(isinstance(error, SolverError) for error in faults.values()):
         return Status.FAILED
     return Status.NO_ANSWER if faults else Status.DONE
-
-
-def _with_tolerances(
-    length: str, engine: Engine, steps: Sequence[Step], table: pd.DataFrame
-) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Return a table with tolerances of grips, and a note; ``length``: how far off they may be."""
-    table = table.assign(**{COLUMN: tolerances_along(engine, steps)})
-    off, numbers = 1e-3 * table[COLUMN].to_numpy(float), table["step"].astype(int)
-    at = int(off.argmin())
-    said = f"tolerance: grips may be {length_text(float(off[at]))} off (step {numbers.iloc[at]})"
-    if not length:
-        return table, (said,)
-    wanted = length_word(length, f"--tolerance {length}")
-    short = numbers[off < wanted].tolist()
-    if not short:
-        return table, (f"{said}, no less than {length_text(wanted)}",)
-    found = stiffness_for(engine, steps, wanted)
-    how = "however soft they are" if found is None else f"unless softer than {_plain(found, 3)} N/m"
-    less = f"less than {length_text(wanted)} in {_steps_in_words(short)}"
-    return table, (f"{said}, {less}, {how}",)

@@ -44,12 +44,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     stability: bool = True,
     cache: Path | None = None,
     progress: Tell,
-    speed: Annotated[
-        float,
-        ("value", "SECONDS"),
-        ("const", "60"),
-        ("advice", "; give seconds, and the scene before it"),
-    ] = 0.0,
+    speed: Annotated[float, ("value", "SECONDS"), ("const", "60")] = 0.0,
     reference: Annotated[str, ("value", "ENGINE")] = "",
     out: Folder = None,
 ) -> Answer:
@@ -139,12 +134,8 @@ def _facts(result: Comparison) -> dict[str, object]:
         steps=[len(result.tables[name]) for name in result.table.index],
         paper=pd.Series({name: _printed_largest(result, name) for name in result.table.index}),
     )
-    printed = result.printed
-    paper = None if printed is None else printed.set_axis(result.maxima.columns, axis=1)
     return {
         "rows": table.rename_axis("name").reset_index(),
-        "largest_by_robot": result.maxima.to_dict(),
-        "paper_by_robot": None if paper is None else paper.to_dict(),
         "why_no_loop": result.refusal or None,
         "enough": result.enough.facts(),
         "findings": list(result.notes),
