@@ -88,7 +88,8 @@ def _read_steps(
         raise StepError(f"{what}: column {lacking[0]} is missing; give {', '.join(wanted)}")
     if twice := [column for column in wanted if columns.count(column) > 1]:
         raise StepError(f"{what}: column {twice[0]} occurs twice; keep one")
-    if unknown := [name for name in columns if name.endswith("_node") and name not in wanted]:
+    known = (*wanted, "prop_node")  # of a plan with props
+    if unknown := [name for name in columns if name.endswith("_node") and name not in known]:
         raise StepError(
             f"{what}: column {unknown[0]}: no robot of scene {scene.name} is called so; "
             f"give {', '.join(wanted[3:])}"
