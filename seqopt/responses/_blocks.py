@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import pickle
 import threading
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -34,8 +33,6 @@ from seqopt.responses.quantities import (
     require_finite,
 )
 from seqopt.work._threads import one_thread
-
-_Tally = tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,30 +62,22 @@ def work(states: int, bricks: int) -> float:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Answers(FrozenValue):
-    """The responses of a block.
-
-    ``values`` (S,): the requested responses, SI units; ``forces`` (S, r): sizes of the forces of
-    the grips, N; ``tally`` (str, int): what the engine counted meanwhile, if it counts:
-    `seqopt.engines.registry.AutoEngine`.
-    """
+    """The requested responses of a block (S,), SI units, and sizes of grip forces (S, r), N."""
 
     values: Mapping[str, Floats]
     forces: Floats
-    tally: _Tally = ()
 
 
 def join_answers(parts: Sequence[Answers]) -> Answers:
     """Concatenate the answers to blocks, at least one."""
     values = {name: np.concatenate([a.values[name] for a in parts]) for name in parts[0].values}
-    tally = sum((Counter(dict(part.tally)) for part in parts), Counter[str]())
-    return Answers(values, np.concatenate([part.forces for part in parts]), tuple(tally.items()))
+    return Answers(values, np.concatenate([part.forces for part in parts]))
 
 
 def answer(engine: Engine, block: Block) -> Answers:
     """Return the responses of a block of states. Raises what the engine does."""
     asked = [CHOSEN_BY[name] for name in block.names if name in CHOSEN_BY]
     want = reduce(or_, (r.needs for r in asked), Want.SCREEN if block.screen else Want(0))
-    before = Counter(tally_of(engine))
     sets, robots = block.grips.shape
     grips = np.hstack([block.grips, np.tile(np.array(block.props, dtype=np.int64), (sets, 1))])
     if isinstance(engine, ComplianceEngine) and set(block.names) <= EXTREMES.keys():
@@ -107,13 +96,7 @@ def answer(engine: Engine, block: Block) -> Answers:
     if PROP_EXCESS in block.names:
         props = [network.scene.prop_of_number[number] for number in block.props]
         values[PROP_EXCESS] = _excess_of(props, fields.grip_force[:, robots:])
-    return Answers(values, forces, tuple((Counter(tally_of(engine)) - before).items()))
-
-
-def tally_of(engine: Engine) -> dict[str, int]:
-    """Return the counts of an engine, to update in place; an empty mapping if it has none."""
-    found = getattr(engine, "tally", None)
-    return found if isinstance(found, dict) else {}
+    return Answers(values, forces)
 
 
 def packed(engine: Engine) -> bytes:

@@ -25,7 +25,6 @@ from seqopt.responses._blocks import (
     answer,
     join_answers,
     packed,
-    tally_of,
     unpacked,
     work,
 )
@@ -188,12 +187,9 @@ def solve_sets(
     most = BLOCK if alone else min(BLOCK, max(64, len(grips) // 32))  # sets of a task
     parts = [replace(sets, grips=grips[at : at + most]) for at in range(0, len(grips), most)]
     own = resources if len(parts) > 1 else HERE  # to share one part does not pay
-    tally, progress = tally_of(engine), Progress("responses", sets.work, own.progress)
+    progress = Progress("responses", sets.work, own.progress)
 
-    def done(part: Block, found: Answers) -> None:
-        if crew is not None:  # else the engine itself has counted
-            for what, count in found.tally:
-                tally[what] = tally.get(what, 0) + count
+    def done(part: Block, _: Answers) -> None:
         progress.add(part.work)
 
     rows = [np.zeros((0, len(sets.names) + grips.shape[1]))]

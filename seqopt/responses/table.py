@@ -5,7 +5,6 @@ Also its grips: robot, node, first and last step, and force.
 
 from __future__ import annotations
 
-import io
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -266,20 +265,6 @@ def _analyzed(engine: Engine, steps: Sequence[Step]) -> dict[str, list[object]]:
     return _response_columns(engine.network, zip(steps, _each_fields(engine, steps), strict=True))
 
 
-def _analyze_builds(engine: Engine, builds: Sequence[Sequence[Step]]) -> list[pd.DataFrame]:
-    """Return the table of `analyze` of every build; states that builds share are computed once."""
-    states = _distinct(builds)
-    pairs = zip(states.items(), _each_fields(engine, states.values()), strict=True)
-    rows = {state: _row(engine.network, step, fields) for (state, step), fields in pairs}
-    tables = []
-    for steps in builds:
-        own = [rows[step.bricks, step.grips] for step in steps]
-        table = _table_of({name: [row[name] for row in own] for name in (own[0] if own else ())})
-        kinds = [step.kind.value for step in steps]
-        tables.append(table.assign(step=[step.number for step in steps], type=kinds))
-    return tables
-
-
 def _distinct(builds: Iterable[Sequence[Step]]) -> dict[tuple[int, Grips], Step]:
     """Return a step for every distinct state of builds, by ascending bricks, as engines grow."""
     states = {(step.bricks, step.grips): step for steps in builds for step in steps}
@@ -411,29 +396,6 @@ def step_named(step: Step) -> Iterator[None]:
         raise MechanismError(f"step {step.number}: {error}", error.mode) from error
     except SolverError as error:
         raise SolverError(f"step {step.number}: {error}") from error
-
-
-def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
-    """Return the full fields of steps as a NumPy archive (``.npz``).
-
-    Arrays are named ``step1_edge_force``, ``step1_displacement``, ``step1_grip_force``,
-    ``step1_support`` and so on, as in `Fields` without its first axis; ``edge_nodes`` (E, 2),
-    ``node_position`` (N, 3), ``node_name`` (N,), and of the ground ends ``support_brick`` (G,) and
-    ``support_point`` (G, 3), the fixed points, say what they run over.
-    """
-    arrays: dict[str, np.ndarray] = {
-        "edge_nodes": network.edge_nodes,
-        "node_position": network.node_position,
-        "node_name": np.array([str(name) for name in network.node_name]),
-        "support_brick": np.array([ground.brick for ground in network.scene.grounds]),
-        "support_point": network.springs.anchor[network.springs.support],
-    }
-    for step, fields in answers:
-        for name in ("edge_force", "displacement", "grip_force", "support"):
-            arrays[f"step{step.number}_{name}"] = getattr(fields, name)[0]
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    return buffer.getvalue()
 
 
 def _with_faults(

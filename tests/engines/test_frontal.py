@@ -12,7 +12,8 @@ import seqopt
 from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines.interface import grip_columns
 from seqopt.engines.rigid._frontal import FrontalFactor, FrontalSystem
-from seqopt.engines.rigid._mixed import LAST_CORRECTION, solve_mixed
+from seqopt.engines.rigid._mechanism import LAST_CORRECTION
+from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import _LARGE, ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network

@@ -84,7 +84,6 @@ def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, w
     found = evaluation(shared, loop25, workers=workers)
     require_alike(found.steps, expected.steps)
     assert found.models == expected.models == 8642
-    assert getattr(shared, "tally", None) == getattr(alone, "tally", None)
 
 
 BUILT = arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, 7).tolist(), pattern="V"))  # in a plane
@@ -107,7 +106,7 @@ def test_an_answer_does_not_depend_on_what_was_asked_before(name, order):
     found = {i: answer(engine, few[i]) for i in order}
     for i, block in enumerate(few):
         expected = answer(make_engine(name, BUILT), block)
-        assert replace(found[i], tally=()) == replace(expected, tally=())
+        assert found[i] == expected
 
 
 class Dependent:

@@ -28,7 +28,7 @@ from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import _said_limits
 from seqopt.report._pages import front_page
 from seqopt.report.comparison import method_tables, shown_table
-from seqopt.responses.table import Departure, LinearRange, _analyze_builds, builds_in_words
+from seqopt.responses.table import Departure, LinearRange, analyze, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
@@ -152,7 +152,7 @@ def _responses(front: Front) -> tuple[dict[str, pd.DataFrame], Departures]:
     """Return the responses of the steps of every plan, and where they leave the linear range."""
     each, left = dict[str, pd.DataFrame](), dict[str, Sequence[Departure]]()
     for own, builds in _by_engine(front).items():
-        found = dict(zip(builds, _analyze_builds(own, [*builds.values()]), strict=True))
+        found = {name: analyze(own, steps) for name, steps in builds.items()}
         each |= found
         left |= LinearRange(own).of_builds(found)
     names = [f"point {number}" for number in range(1, len(front.steps) + 1)]

@@ -259,9 +259,9 @@ def _solve_one(
         share, before = min(1.0, _MARGIN * np.max(size / np.maximum(before, TINY))), size
         if not count:
             continue
-        whole = sizes(parts, state[None])
-        small = are_small(parts, whole, size[None], _SHRINKING)[0]  # not shrunk by chance
-        if small and are_small(parts, whole, share * size[None], largest)[0]:
+        reached = sizes(parts, state[None])
+        small = are_small(parts, reached, size[None], _SHRINKING)[0]  # not shrunk by chance
+        if small and are_small(parts, reached, share * size[None], largest)[0]:
             wrench, twist = unscaled(parts, state[None])
             force = held.force @ (forces * parts.unit)
             return Solution(twist, wrench, *borne(force[None], len(columns), compliance))

@@ -118,37 +118,25 @@ class Growth:
         self.loss = np.ones(len(tree.spring))
         self.twist = np.empty((1 + most, most))
         self.wrench = np.zeros((1 + most, 6 * self._acting[-1]))
-        self.bricks = self._closed = 0
-        self._weighed: list[list[Floats]] = []
-        self._before: _Before | None = None
         self._start()
 
     def reach(self, bricks: int) -> None:
         """Let a number of bricks stand, at most as many as the tree has.
 
-        More than stand are added. Fewer: if no loop was closed since, rows and columns of the
-        others are left out; else all begins anew.
+        More than stand are added; fewer are begun anew.
         """
-        if bricks < self._closed:
-            self._start()
         if bricks < self.bricks:
-            self.bricks = bricks
-            self._tie(np.arange(self._acting[bricks]))
-            del self._weighed[bricks - self._closed + 1 :]
-            self._before = None
-            for array, row in zip((self.twist, self.wrench), self._weighed[-1], strict=True):
-                array[0, : len(row)] = row
+            self._start()
         while self.bricks < bricks:
-            weighed, loss = self._weighed[-1], self.loss[: self.bricks].copy()
+            weighed = [each.copy() for each in self._answers(0)]
+            loss = self.loss[: self.bricks].copy()
             self._add()
             closing, changes = np.empty((1 + self._moves, 0)), [np.empty((0, 1))] * 2
             mine = np.arange(*self._acting[self.bricks - 1 : self.bricks + 1])
             others = mine[mine != self._tree.spring[self.bricks - 1]]
             if others.size:
                 closing, changes = self._close(others)
-                self._closed, self._weighed = self.bricks, []
             self._before = _Before(weighed, loss, closing, changes)
-            self._weighed.append([each.copy() for each in self._answers(0)])
 
     def recalls(self, bricks: int) -> bool:
         """Return whether `answers` of a brick count are there, or nearly so."""
@@ -191,14 +179,11 @@ class Growth:
         return self.twist[:, : self._moves][rows], self.wrench[:, :acting][rows]
 
     def _start(self) -> None:
-        if self._closed:
-            self.wrench[:] = 0.0  # springs not of the tree act on all rows
-        self.bricks = self._closed = 0
-        self._left = 1.0  # rounding when the twists were summed anew
-        self._weighed = [[np.empty(0)] * 2]
-        self._before = None
+        self.wrench[:] = 0.0  # springs not of the tree act on all rows
+        self.bricks, self._left = 0, 1.0  # rounding when the twists were summed anew
+        self._before: _Before | None = None
         self._tie(np.arange(0))
-        self.twist[0] = self.wrench[0] = 0.0
+        self.twist[0] = 0.0
 
     def _add(self) -> None:
         """Hang the next brick on its spring."""

@@ -22,6 +22,8 @@ from seqopt.network._mechanics import (
 from seqopt.network.network import Network
 from seqopt.work._threads import one_thread
 
+LAST_CORRECTION = 1e-10  # of exact answers: of forces, moments, shifts, turns, relative to each
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shared(FrozenValue):

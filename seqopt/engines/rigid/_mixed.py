@@ -25,7 +25,12 @@ from scipy.sparse.linalg import SuperLU, splu
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import Fields, _join_sets, no_sets
-from seqopt.engines.rigid._mechanism import Ungripped, require_resistance, ungripped_system
+from seqopt.engines.rigid._mechanism import (
+    LAST_CORRECTION,
+    Ungripped,
+    require_resistance,
+    ungripped_system,
+)
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import Statics, point_motion
 from seqopt.network.network import Network
@@ -254,7 +259,6 @@ def rescaled(parts: Ungripped, wrench: Floats, twist: Floats) -> Floats:
 
 
 _CORRECTIONS = 6  # most of an answer; rounding in what is left does not spoil them
-LAST_CORRECTION = 1e-10  # the largest of forces, moments, shifts and turns, relative to each
 _SENSITIVE = 1e-6  # largest change by last digits of the system; errors are a tenth of it or less
 _TRIES = 4  # ways in which last digits are changed
 _EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
@@ -380,7 +384,7 @@ def sizes(parts: Ungripped, states: Floats) -> Floats:
     """Return the largest force, moment, shift and turn of each state, (S, 4)."""
     both = np.split(states, [len(parts.wrench_unit)], axis=1)
     ways = [np.abs(part[:, way::6]).max(axis=1, initial=0.0) for part in both for way in range(6)]
-    return np.stack(ways, axis=1).reshape(len(states), 4, 3).max(axis=2)
+    return np.asarray(np.stack(ways, axis=1).reshape(len(states), 4, 3).max(axis=2))
 
 
 _SPLIT = 2.0**27 + 1.0  # halves the 53 digits of a double

@@ -34,14 +34,13 @@ from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import Fields, _join_sets, _merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import grip_forces, nearly_rigid, pairs_of, still_forces
 from seqopt.engines.rigid._mechanism import (
+    LAST_CORRECTION,
     Shared,
     Ungripped,
     require_resistance,
-    share,
     ungripped_system,
 )
 from seqopt.engines.rigid._mixed import (
-    LAST_CORRECTION,
     Solution,
     bordered,
     borne,
@@ -257,22 +256,6 @@ class Refinement:
         own = [compliance.select(part) for part in every]
         parts = (corrector.together(columns[p], h) for p, h in zip(every, own, strict=True))
         return _join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
-
-
-class Refinements:
-    """Makes the refinements of a network, and keeps that of the brick count asked last."""
-
-    largest = LAST_CORRECTION  # after which an answer needs no other
-
-    def __init__(self, network: Network) -> None:
-        self._network, self._shared = network, share(network)
-        self._last: Refinement | None = None
-
-    def of(self, bricks: int, *, tied: bool) -> Refinement:
-        """Return that of a brick count."""
-        if self._last is None or self._last.bricks != bricks:
-            self._last = Refinement(self._network, bricks, self._shared, tied=tied)
-        return self._last
 
 
 class _Asked(NamedTuple):

@@ -44,6 +44,7 @@ from seqopt.engines.rigid._grip_equations import (
     well_conditioned,
 )
 from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._mechanism import LAST_CORRECTION, Shared, share
 from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
@@ -52,7 +53,7 @@ from seqopt.work._threads import one_thread
 
 if TYPE_CHECKING:
     from seqopt.engines.rigid._frontal import FrontalSystem
-    from seqopt.engines.rigid._refinement import Refinements
+    from seqopt.engines.rigid._refinement import Refinement
 
 _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
 ACCURACY = 1e-9  # largest error of fields over the largest of each
@@ -159,6 +160,7 @@ class ComplianceEngine(NamedEngine):
         self._accuracy = accuracy
         self._tree, self._uniform = grow_tree(self.network), _count_uniform(self.network)
         self._kept: dict[int, ComplianceOperator] = {}  # the one that was asked last comes last
+        self._refinement: Refinement | None = None  # of the brick count that was corrected last
         self._grown: GrownExtremes | None = None  # what answers few grip sets of large structures
 
     @_failing_in_a_line()
@@ -179,8 +181,7 @@ class ComplianceEngine(NamedEngine):
         """Return the fields of grip sets, corrected where the operator is not accurate enough."""
         if self._is_frontal(len(columns)):
             with suppress(SolverError):  # of what blocks of the stiffness do not answer
-                largest = _SCREEN if Want.SCREEN in want else self._refinements.largest
-                answer = self._frontal.solve(bricks, columns, compliance, largest)
+                answer = self._frontal.solve(bricks, columns, compliance, _last_correction(want))
                 return keep_wanted(answer, want)
         fast: _FastSolution | None = None
         if bricks <= len(self._tree.spring):
@@ -257,11 +258,9 @@ class ComplianceEngine(NamedEngine):
         return known
 
     @cached_property
-    def _refinements(self) -> Refinements:
-        """What corrects answers."""
-        from seqopt.engines.rigid._refinement import Refinements  # noqa: PLC0415  # few need any
-
-        return Refinements(self._network)
+    def _shared(self) -> Shared:
+        """What the systems that correct answers are cut from."""
+        return share(self._network)
 
     @cached_property
     def _builder(self) -> OperatorBuilder:
@@ -283,13 +282,21 @@ class ComplianceEngine(NamedEngine):
         self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want
     ) -> Fields:
         """Return the fields of grip sets for which the operator is not accurate enough."""
-        operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
+        from seqopt.engines.rigid._refinement import Refinement  # noqa: PLC0415  # few need any
+
+        tied = bricks <= len(self._tree.spring)  # the tree that operators grow on reaches them all
+        operator = self._operator(bricks, columns) if tied else None
         with one_thread():
-            tied = operator is not None  # the tree that it grew on reaches them all
-            refinement = self._refinements.of(bricks, tied=tied)
-            largest = _SCREEN if want & Want.SCREEN else self._refinements.largest
-            answer = refinement.solve(columns, operator, largest, compliance)
+            if self._refinement is None or self._refinement.bricks != bricks:
+                self._refinement = Refinement(self._network, bricks, self._shared, tied=tied)
+            last = _last_correction(want)
+            answer = self._refinement.solve(columns, operator, last, compliance)
         return keep_wanted(answer, want)
+
+
+def _last_correction(want: Want) -> float:
+    """Return how large a correction may be after which an answer needs no other."""
+    return _SCREEN if Want.SCREEN in want else LAST_CORRECTION
 
 
 def _count_uniform(network: Network) -> int:
