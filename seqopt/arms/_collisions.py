@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from seqopt._later import Later
 from seqopt.arms._model import ArmModel, Placed
 from seqopt.arrays import Bools, Floats, Ints
+
+coal = Later("coal")  # an extra
 
 _SAMPLES = 200  # postures from which it is known which links always touch
 _ALWAYS = 0.95  # share of them
@@ -31,8 +34,6 @@ class Obstacles:
 
 def turned(rotation: Floats, shift: Floats) -> Any:
     """Return where a body is, as coal has it."""
-    import coal  # noqa: PLC0415  # an extra
-
     return coal.Transform3s(rotation, shift)
 
 
@@ -40,8 +41,6 @@ class _Collider:
     """Asks coal, with one request for all questions."""
 
     def __init__(self) -> None:
-        import coal  # noqa: PLC0415  # an extra
-
         self._collide: Callable[..., int] = coal.collide
         self._request, self._result = coal.CollisionRequest(), coal.CollisionResult()
 
@@ -59,8 +58,6 @@ class _Bodies:
         self._tools: dict[float, Any] = {}
 
     def __call__(self, posture: int, link: int) -> _Turned:
-        import coal  # noqa: PLC0415  # an extra
-
         key, moving, long = (posture, link), self._model.moving, float(self._placed.tools[posture])
         if key not in self._made:
             at = turned(self._placed.rotation[key], self._placed.shift[key])
@@ -170,8 +167,6 @@ def _collide(
 
 def convex(points: Floats) -> Any:
     """Return the convex hull of points (m, 3) as coal has it."""
-    import coal  # noqa: PLC0415  # an extra
-
     cloud = coal.StdVec_Vec3s()
     for point in points:
         cloud.append(point)

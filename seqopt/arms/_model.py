@@ -17,10 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from seqopt._later import Later
 from seqopt.arms._urdf import model_path, read_urdf
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ExtraError, SceneError
 from seqopt.scene.arm import Arm
+
+coal, pin = Later("coal"), Later("pinocchio")  # an extra
 
 UP = 4  # folders above a URDF in which packages that it names are looked for
 _SAME = 1e-6  # m; points that are closer are one
@@ -79,10 +82,8 @@ class ArmModel:
 
     def __init__(self, arm: Arm) -> None:
         needs_extra()
-        import pinocchio as pin  # noqa: PLC0415  # an extra
-
         self.arm, path = arm, model_path(arm)
-        self.model, geometry = _read(pin, path, arm)
+        self.model, geometry = _read(path, arm)
         self.data = self.model.createData()
         self.flange = self.model.getFrameId(flange_of(self.model, arm))
         x, y = np.array(arm.x_axis), np.array(arm.y_axis)
@@ -168,8 +169,6 @@ class ArmModel:
 
     def flange_pose(self, posture: Floats) -> tuple[Floats, Floats]:
         """Return the axes (3, 3), as columns, and the place (3,) of the flange in the scene."""
-        import pinocchio as pin  # noqa: PLC0415  # an extra
-
         pin.forwardKinematics(self.model, self.data, posture)
         found = self.base * pin.updateFramePlacement(self.model, self.data, self.flange)
         return found.rotation, found.translation
@@ -179,8 +178,6 @@ class ArmModel:
 
         Translation first, then rotation, in the axes of the scene.
         """
-        import pinocchio as pin  # noqa: PLC0415  # an extra
-
         axes, _ = self.flange_pose(posture)
         pin.computeJointJacobians(self.model, self.data, posture)
         frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -209,8 +206,6 @@ class ArmModel:
 
         ``tools`` (P,): how long the body of the tool is in each, m.
         """
-        import pinocchio as pin  # noqa: PLC0415  # an extra
-
         count, links = len(postures), len(self.moving) + 1
         rotation, shift = np.zeros((count, links, 3, 3)), np.zeros((count, links, 3))
         for i, posture in enumerate(postures):
@@ -244,7 +239,7 @@ def flange_of(model: Any, arm: Arm) -> str:
     return name
 
 
-def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
+def _read(path: Path, arm: Arm) -> tuple[Any, Any]:
     """Return the model of a URDF, joints locked that do not move the flange, and its bodies."""
     folders = [str(folder) for folder in [*path.resolve().parents][:UP]]
     text = read_urdf(path).text
@@ -276,8 +271,6 @@ def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
 
 
 def _bodies(model: Any, geometry: Any) -> Iterator[Body]:
-    import coal  # noqa: PLC0415  # an extra
-
     for each in geometry.geometryObjects:
         shape = each.geometry
         if isinstance(shape, coal.BVHModelBase):
@@ -316,8 +309,6 @@ class PosedArm:
 
         Of the foot the last point is there twice: there is no tool.
         """
-        import pinocchio as pin  # noqa: PLC0415  # an extra
-
         model = _model(self.arm)
         axes, flange = model.flange_pose(self._own)
         data, root = model.data, model.base.translation

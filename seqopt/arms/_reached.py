@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from seqopt._later import Later
 from seqopt.arms._collisions import (
     apart_pairs,
     convex,
@@ -24,6 +25,8 @@ from seqopt.errors import SceneError
 from seqopt.scene.arm import MOST
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
+
+pin = Later("pinocchio")  # an extra
 
 
 def diverse(node: Ints, joints: Floats, struck: Bools, most: int) -> Ints:
@@ -98,14 +101,12 @@ def targets(model: ArmModel, brick: Brick, node: int) -> Iterator[Target]:
 
 def solve(model: ArmModel, target: Target, draws: np.random.Generator) -> list[Floats]:
     """Return the postures that were found for a target, each once."""
-    import pinocchio as pin  # noqa: PLC0415  # an extra
-
     wanted = model.base.actInv(pin.SE3(target.axes, target.place))
     found: list[Floats] = []
     if np.linalg.norm(target.place - model.base.translation) > model.span:
         return found
     for first in model.draw(draws, _TRIES):
-        posture = _descend(pin, model, wanted, first)
+        posture = _descend(model, wanted, first)
         if posture is None:
             continue
         wrapped = (posture + np.pi) % (2 * np.pi) - np.pi
@@ -121,12 +122,10 @@ def way(model: ArmModel, target: Target, posture: Floats) -> Floats | None:
 
     None if it cannot be gone without a jump: where a joint ends, or the arm does.
     """
-    import pinocchio as pin  # noqa: PLC0415  # an extra
-
     out, last = [], posture
     for share in np.linspace(0.0, 1.0, WAY + 1)[1:]:
         place = target.place - share * model.arm.approach * target.axes[:, 2]
-        found = _descend(pin, model, model.base.actInv(pin.SE3(target.axes, place)), last)
+        found = _descend(model, model.base.actInv(pin.SE3(target.axes, place)), last)
         if found is None or np.abs(found - last).max() > _JUMP:
             return None
         if (found < model.low).any() or (found > model.high).any():
@@ -136,18 +135,18 @@ def way(model: ArmModel, target: Target, posture: Floats) -> Floats | None:
     return np.array(out)
 
 
-def _descend(pin: object, model: ArmModel, wanted: object, posture: Floats) -> Floats | None:
+def _descend(model: ArmModel, wanted: object, posture: Floats) -> Floats | None:
     """Return the posture that Newton's method, damped, ends in; None if it does not arrive."""
     inner, data, flange = model.model, model.data, model.flange
-    local = pin.ReferenceFrame.LOCAL  # type: ignore[attr-defined]
+    local = pin.ReferenceFrame.LOCAL
     damping = _DAMPING * np.eye(6)
     for _ in range(_STEPS):
-        pin.forwardKinematics(inner, data, posture)  # type: ignore[attr-defined]
-        at = pin.updateFramePlacement(inner, data, flange)  # type: ignore[attr-defined]
-        error = pin.log6(at.actInv(wanted)).vector  # type: ignore[attr-defined]
+        pin.forwardKinematics(inner, data, posture)
+        at = pin.updateFramePlacement(inner, data, flange)
+        error = pin.log6(at.actInv(wanted)).vector
         if np.abs(error).max() < _CLOSE:
             return posture
-        jacobian = pin.computeFrameJacobian(inner, data, posture, flange, local)  # type: ignore[attr-defined]
+        jacobian = pin.computeFrameJacobian(inner, data, posture, flange, local)
         step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping, error)
         posture = posture + np.clip(step, -_LONGEST, _LONGEST)
     return None

@@ -7,10 +7,13 @@ import math
 import numpy as np
 
 from seqopt._files import read_table
+from seqopt._later import Later
 from seqopt.errors import SceneError
 from seqopt.exchange._content import LARGEST, MOST_BLOCKS, Content, FileBlock
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
+
+transform = Later("scipy.spatial.transform")  # slow to import
 
 _NEEDED = ("x", "y", "z", "length", "width", "height")
 _TURNS = ("roll", "pitch", "yaw")
@@ -46,9 +49,7 @@ def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
     if not size.min() > 0:
         raise SceneError(f"{where}: its sizes are {size.tolist()}; give positive ones")
     angles = [_number(where, row, name, "0") for name in _TURNS]
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to import
-
-    frame = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
+    frame = transform.Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
     optional = (_number(where, row, name, "nan") for name in ("density", "mass", "course"))
     density, mass, course = (None if math.isnan(value) else value for value in optional)
     if mass is not None and not mass > 0:

@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text
+from seqopt._later import Later
 from seqopt.arms._plan_postures import plan_postures
 from seqopt.errors import ExtraError, SceneError
 from seqopt.exchange._compas_shapes import compas_frame, mesh_data, typed
@@ -27,6 +28,8 @@ from seqopt.scene.boxes import as_vector, vertices_of
 from seqopt.scene.parts import Robot, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step, StepKind
+
+transform = Later("scipy.spatial.transform")  # slow to import
 
 
 class Action(Enum):
@@ -257,10 +260,8 @@ def _places(name: str, frames: Sequence[Frame | None]) -> pd.DataFrame:
     known = [i for i, frame in enumerate(frames) if frame is not None]
     held = [frame for frame in frames if frame is not None]
     if held:
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to import
-
         axes = np.array([frame.axes for frame in held])
-        turned = Rotation.from_matrix(axes.transpose(0, 2, 1)).as_quat(canonical=True)
+        turned = transform.Rotation.from_matrix(axes.transpose(0, 2, 1)).as_quat(canonical=True)
         out[known, :3] = [frame.point for frame in held]
         out[known, 3:] = turned[:, [3, 0, 1, 2]]
     ends = ("x", "y", "z", "qw", "qx", "qy", "qz")

@@ -46,12 +46,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
+from seqopt._later import Later
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
 from seqopt.graph._labels import CappedSums, LabelSearch, widening
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import ROUNDING, least_sum, tied
+
+optimize = Later("scipy.optimize")  # slow to import
 
 ROUNDS = 60  # of cutting planes
 CLOSED = 1e-9  # share of a bound to which multipliers are the best
@@ -299,8 +302,6 @@ class Polyhedron(NamedTuple):
 
     def highest(self, planes: Sequence[Plane]) -> Highest | None:
         """Return the highest point under all planes; None where the program has no solution."""
-        from scipy.optimize import linprog  # noqa: PLC0415  # slow to import, few ask for it
-
         constant, slope = (
             np.array([p.constant for p in planes]),
             np.array([p.slope for p in planes]),
@@ -312,7 +313,7 @@ class Polyhedron(NamedTuple):
         else:
             size = np.maximum(size, self.units)
             size[size == 0] = 1.0
-        found = linprog(
+        found = optimize.linprog(
             [*[0.0] * len(size), -1.0],
             A_ub=np.column_stack([-slope / size, np.ones(len(planes))]),
             b_ub=constant / scale,

@@ -14,11 +14,14 @@ import numpy as np
 
 from seqopt._archives import Archive
 from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
+from seqopt._later import Later
 from seqopt.errors import FileError, ProblemError
 from seqopt.graph.graph import NOW, Graph, TimedGraph
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _by_goal, _Cap, _Target
 from seqopt.instances._program import as_mps
 from seqopt.scene._checks import short
+
+jsonschema = Later("jsonschema")  # slow to import, and of files alone
 
 FORMAT, VERSION = "seqopt-instance", 1
 TEXT = "instance.json"  # the name of the text in the archive
@@ -83,8 +86,6 @@ def _narrow(values: np.ndarray) -> np.ndarray:
 
 def read(path: Path) -> Instance:
     """Read the instance of a file; raise a `FileError` that names the fault."""
-    import jsonschema  # noqa: PLC0415  # slow to import, and needed for files only
-
     if path.suffix in WRITERS and path.suffix != ".npz":
         raise FileError(f"{path}: {path.suffix} is written for solvers, not read; give the .npz")
     content = read_bytes(path)

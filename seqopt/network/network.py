@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from seqopt._later import Later
 from seqopt._showing import Shown, display
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
@@ -24,6 +25,8 @@ from seqopt.scene.scene import Scene
 if TYPE_CHECKING:
     import networkx as nx
     from matplotlib.figure import Figure
+
+nx = Later("networkx")  # 120 ms, where connectivity is asked
 
 _OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zero, over the brick
 
@@ -309,8 +312,6 @@ class Network(Shown, FrozenValue):
         Nodes have a ``kind`` (`PartKind`), ``since``, the brick count that brings them, and a
         ``position``, m; edges a ``kind``, ``since``, their ``number`` and ``length``, m.
         """
-        import networkx as nx  # noqa: PLC0415  # 0.12 s, and only connectivity asks for it
-
         out: nx.Graph[object] = nx.Graph(name=self.scene.name)
         for i, name in enumerate(self.node_name[: self.count_nodes(bricks)]):
             own = {"kind": PartKind(self.node_kind[i]), "since": int(self.node_since[i])}
@@ -328,9 +329,7 @@ class Network(Shown, FrozenValue):
         Bricks are indices in build order, the ground is `GROUND`. A spring without stiffness is no
         edge.
         """
-        from networkx import Graph  # noqa: PLC0415  # as above
-
-        graph: nx.Graph[int] = Graph()
+        graph: nx.Graph[int] = nx.Graph()
         springs = self.springs
         graph.add_nodes_from([*range(bricks), GROUND])
         ties = (springs.since <= bricks) & springs.stiffness.any(axis=1)

@@ -23,6 +23,7 @@ from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 
+from seqopt._later import Later
 from seqopt.arms._model import PosedArm
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
@@ -31,6 +32,8 @@ from seqopt.report._style import BLUE, SMALL, VERMILION
 from seqopt.scene.boxes import boxes, vertices_of
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import normal_of
+
+spatial = Later("scipy.spatial")  # slow to import
 
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
 POINTS = 9.0  # from a mark up to the middle of its number
@@ -283,12 +286,10 @@ def _draw_robots(
 
 def _draw_bodies(axes: Axes, arm: PosedArm, view: View, *, color: str, order: float) -> None:
     """Draw an arm as the outlines of its bodies, the farthest first, its tool dark."""
-    from scipy.spatial import ConvexHull  # noqa: PLC0415  # slow to import, for this only
-
     seen = [points @ view.axes().T for points in arm.bodies]
     last = len(seen) - 1 if arm.holds else None
     for k in sorted(range(len(seen)), key=lambda k: float(seen[k][:, 2].mean())):
-        around = seen[k][ConvexHull(seen[k][:, :2]).vertices, :2]
+        around = seen[k][spatial.ConvexHull(seen[k][:, :2]).vertices, :2]
         face = to_rgb(INK) if k == last else tuple(1 - PALE * (1 - np.array(to_rgb(color))))
         fill = (*face, THROUGH if order > 1 else 1.0)
         axes.add_patch(Polygon(around, fc=fill, ec=color, lw=0.7, joinstyle="round", zorder=order))

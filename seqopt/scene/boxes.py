@@ -15,12 +15,15 @@ from typing import Any
 
 import numpy as np
 
+from seqopt._later import Later
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import frames, short, units, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron, normal_of, plane_axes
 from seqopt.work.progress import Progress, Tell
+
+optimize, spatial = Later("scipy.optimize"), Later("scipy.spatial")  # slow to import
 
 
 def block_brick(
@@ -116,11 +119,9 @@ def _separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
     Along the direction in which they are farthest apart: at most their distance, negative where
     they interpenetrate.
     """
-    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and not always needed
-
     shapes = boxes(bricks)
     longest = 2 * float(np.linalg.norm(shapes.half, axis=1).max(initial=0.0))
-    near = KDTree(shapes.place).query_pairs(longest, output_type="ndarray")
+    near = spatial.KDTree(shapes.place).query_pairs(longest, output_type="ndarray")
     pairs = near[np.lexsort(near.T[::-1])].astype(np.int64)
     a, b = pairs.T
     first, second = shapes.frame[a], shapes.frame[b]
@@ -338,8 +339,6 @@ def _grown(pair: Sequence[Sequence[_Face]], center: Floats) -> float:
 
     Each program grows it between planes through its nearest points of all faces.
     """
-    from scipy.optimize import linprog  # noqa: PLC0415  # for solids that overlap only
-
     radius = 0.0
     while True:
         feet = np.array([_foot(face, center) for faces in pair for face in faces])
@@ -349,7 +348,7 @@ def _grown(pair: Sequence[Sequence[_Face]], center: Floats) -> float:
             return radius
         radius = float(away.min())
         rows = np.column_stack([(feet - center) / away[:, None], np.ones(len(away))])
-        found = linprog([0, 0, 0, -1], rows, away, bounds=[(None, None)] * 3 + [(0, None)])
+        found = optimize.linprog([0, 0, 0, -1], rows, away, bounds=[(None, None)] * 3 + [(0, None)])
         if found.status:
             return radius
         center = center + np.asarray(found.x)[:3]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from seqopt._later import Later
 from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, did_you_mean
@@ -21,6 +22,8 @@ from seqopt.scene.parts import Brick, Ground, Joint, Load, Prop, Reach, Robot, _
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+nx = Later("networkx")  # 120 ms, where connectivity is asked
 
 _Part = TypeVar("_Part")
 _AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
@@ -442,9 +445,7 @@ _PART = re.compile(r"(-?\d+)(?:\.\.(-?\d+))?")
 
 def _from_all_ends(scene: Scene) -> Order:
     """Return the order that builds from all ground ends at once, one brick each in turn."""
-    import networkx as nx  # noqa: PLC0415  # slow to import, for this only
-
-    graph: nx.Graph[int] = nx.Graph([joint.bricks for joint in scene.joints])
+    graph = nx.Graph([joint.bricks for joint in scene.joints])
     graph.add_nodes_from(scene.build_order)
     far: dict[int, tuple[int, int]] = {}
     for end, ground in enumerate(scene.grounds):

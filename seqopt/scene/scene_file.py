@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from seqopt._files import parse_json, read_text, write_text
+from seqopt._later import Later
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import Reader, cut, in_words, short
@@ -29,6 +30,8 @@ from seqopt.scene.boxes import overlapping
 from seqopt.scene.parts import Anywhere, Ground, Joint, Reach, Side, Sphere
 from seqopt.scene.scene import _KINDS, Scene, in_order
 from seqopt.scene.shape import Polyhedron
+
+jsonschema = Later("jsonschema")  # slow to import, and of files alone
 
 _SHOWN = 3  # pairs of bricks that interpenetrate; more are counted
 _FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
@@ -236,7 +239,6 @@ def _with_models(scene: Scene, found: Callable[[str], Path]) -> Scene:
 
 def _parse_scene(text: str, source: str = "text") -> Scene:
     """Return the scene that a JSON document describes, if it obeys the schema."""
-    import jsonschema  # noqa: PLC0415  # slow to import, and needed for files only
 
     def entries(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         keys = [key for key, _ in pairs]

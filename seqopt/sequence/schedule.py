@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
 
+from seqopt._later import Later
 from seqopt._showing import Shown, display
 from seqopt.arrays import Bools, Floats, Ints, Terse
 from seqopt.errors import ProblemError, StepError
@@ -28,6 +29,8 @@ from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+nx = Later("networkx")  # 120 ms, where connectivity is asked
 
 _RULE = re.compile(r"near:([0-9]+)")
 _NEWEST = 2  # bricks that make the working end: a build from both ends has two of them
@@ -51,10 +54,8 @@ class Near:
 
     def nodes(self, scene: Scene, bricks: int, nodes: Sequence[int]) -> tuple[int, ...]:
         """Select the nodes that are near at a brick count, or else the nearest ones."""
-        import networkx as nx  # noqa: PLC0415  # slow to import, for this only
-
         placed = scene.build_order[:bricks]
-        graph: nx.Graph[int] = nx.Graph(joint.bricks for joint in scene.joints).subgraph(placed)
+        graph = nx.Graph(joint.bricks for joint in scene.joints).subgraph(placed)
         graph = nx.Graph(graph)
         graph.add_nodes_from(placed)
         joints = nx.multi_source_dijkstra_path_length(graph, {*placed[-_NEWEST:]})
@@ -278,10 +279,8 @@ def islands(network: Network, bricks: int) -> tuple[frozenset[int], ...]:
     at_once = springs.stiffness.any(axis=1) & (springs.since == springs.bodies[:, 1] + 1)
     if len(np.unique(springs.bodies[at_once, 1])) == len(placed):  # each to what stood before
         return ()
-    from networkx import connected_components  # noqa: PLC0415  # 0.12 s, for this only
-
     names = [brick.name for brick in placed]
-    parts = connected_components(network.bodies(bricks))
+    parts = nx.connected_components(network.bodies(bricks))
     return tuple(frozenset(names[i] for i in part) for part in parts if GROUND not in part)
 
 

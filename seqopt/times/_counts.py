@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 from scipy import sparse
 
+from seqopt._later import Later
 from seqopt.arrays import Floats
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import least_sum
@@ -24,6 +24,8 @@ from seqopt.scene.arm import Durations
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.times._steps import require_durations
+
+optimize = Later("scipy.optimize")  # slow to import
 
 _Counts = tuple[int, tuple[int, ...]]  # bricks that stand, and grips by kind
 
@@ -100,8 +102,6 @@ def least_by_counts(network: Network, rules: FreeRules | Schedule) -> float:
 
 def _multipliers(graph: Graph, sizes: Floats) -> Iterator[Floats]:
     """Yield multipliers of the time of all and of robots of kinds, at most one together."""
-    from scipy.optimize import linprog  # noqa: PLC0415  # it takes long to load
-
     yield np.eye(1, len(sizes))[0]
     ends, moves = np.flatnonzero(graph.ends), np.arange(len(graph.source))
     rows = np.concatenate([graph.source, ends, graph.target])
@@ -111,7 +111,7 @@ def _multipliers(graph: Graph, sizes: Floats) -> Iterator[Floats]:
     shares = np.column_stack([graph.amounts.T, np.zeros((len(sizes), len(ends))), -sizes])
     cost = np.eye(1, flow.shape[1], flow.shape[1] - 1)[0]
     begin = np.eye(1, graph.states)[0]
-    solve: Any = linprog  # its stubs know no sparse rows
+    solve = optimize.linprog
     found = solve(cost, shares, np.zeros(len(sizes)), flow, begin, method="highs")
     if found.x is not None:
         multipliers = np.maximum(-found.ineqlin.marginals, 0.0)

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from seqopt._later import Later
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
@@ -26,6 +27,8 @@ from seqopt.scene.boxes import require_apart
 from seqopt.scene.library.common import MASONRY, JointLaw, _few_enough, _joint_width, a_law
 from seqopt.scene.parts import THICKEST
 from seqopt.scene.scene import Scene
+
+optimize = Later("scipy.optimize")  # slow to import
 
 _Line = Callable[[float], Floats]
 """Takes a number from 0 at the first springing to 1 at the second; returns (x, z), m."""
@@ -85,9 +88,7 @@ _CURVES = {"circular": _circular, "catenary": _catenary, "pointed": _pointed}
 
 
 def _root(of: Callable[[float], float], low: float, high: float, tolerance: float = 1e-15) -> float:
-    from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
-
-    return float(brentq(of, low, high, xtol=tolerance))
+    return float(optimize.brentq(of, low, high, xtol=tolerance))
 
 
 def _chords(line: _Line, lengths: Floats) -> Floats | None:
