@@ -54,8 +54,8 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         sunk, lines = _interpenetrating(content, given, blocks, bricks)
         touching, found = _find_contacts(content, given, blocks, bricks)
         said = [*lines, *said, *found]
-        law = a_law("law", given.law or content.law or MASONRY)
-        origin = "as given" if given.law else "of the file" if content.law else "by default"
+        law = a_law("law", given.law or MASONRY)
+        origin = "as given" if given.law else "by default"
         along, across, _ = law.translational
         said.append(f"joints are {along:g} and {across:g} N/m³ stiff along and across, {origin}")
         springs = _springs(touching, bricks, law)

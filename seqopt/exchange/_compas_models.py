@@ -17,14 +17,7 @@ from seqopt._files import read_text
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError, StepError
 from seqopt.exchange._building import block_numbers
-from seqopt.exchange._compas_shapes import (
-    held_by,
-    kind,
-    payload,
-    solid_of,
-    solid_of_element,
-    transformation_of,
-)
+from seqopt.exchange._compas_shapes import held_by, kind, payload, solid_of, transformation_of
 from seqopt.exchange._content import (
     Content,
     Entry,
@@ -40,7 +33,6 @@ from seqopt.exchange._content import (
 )
 from seqopt.exchange._meshes import object_content
 from seqopt.scene._checks import short
-from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind
 
@@ -150,10 +142,9 @@ def _edges(source: str, found: Entry) -> Iterator[tuple[str, str, str, Any]]:
 def read_model(document: Any, source: str) -> Content:
     """Return the content of a block model, or of a problem about one."""
     held = held_by(source, document)
-    law, said = None, list[str]()
+    said = list[str]()
     if kind(document) == "problem":
-        law = _law(source, held.get("contact_properties"))
-        said.append("loads of the problem are left out; blocks carry their weight")
+        said.append("loads and joints of the problem are left out; blocks carry their weight")
         if "model" not in held:  # some versions keep its identifier alone
             raise SceneError(
                 f"{source}: the problem does not hold its model; give the model itself"
@@ -173,14 +164,14 @@ def read_model(document: Any, source: str) -> Content:
         place[guid] = None if kind(item) == "group" else len(blocks)
         if place[guid] is not None:
             at, own = elements[guid]
-            vertices, faces = solid_of_element(at, own)
+            vertices, faces = solid_of(at, entry(at, own, "geometry", "shape"))
             density = densities.get(str(own.get("material")))
             about: Any = {"support": own.get("is_support") is True, "density": density}
             blocks.append(FileBlock(str(i), moved(vertices, placed[guid]), faces, **about))
     if len(blocks) < len(rows):
         said.append(f"{len(rows) - len(blocks)} groups only place what is in them")
     contacts = tuple(_contacts(source, held, place))
-    return Content(tuple(blocks), contacts, law=law, said=tuple(said))
+    return Content(tuple(blocks), contacts, said=tuple(said))
 
 
 def _contacts(source: str, held: Entry, known: dict[str, int | None]) -> Iterator[FileFace]:
@@ -197,21 +188,6 @@ def _contacts(source: str, held: Entry, known: dict[str, int | None]) -> Iterato
             corners = points(where, held_by(where, face).get("points") or [])
             if len(corners) > 2:  # of points and edges nothing is carried over a face
                 yield FileFace((entry(source, place, a), entry(source, place, b)), corners)
-
-
-def _law(source: str, held: Any) -> JointLaw | None:
-    """Return the stiffness of joints by area, if the model has one."""
-    if held is None:
-        return None
-    properties = held_by(source, held)
-    found = properties.get("joint_model") or properties.get("contact_model") or {}
-    model = held_by(f"{source}: joint model", found)
-    normal = model.get("kn", model.get("k_n"))
-    side = model.get("kt", model.get("k_t"))
-    if normal is None or side is None:
-        return None
-    across = number(f"{source}: kt", side)
-    return JointLaw(translational=(number(f"{source}: kn", normal), across, across))
 
 
 _SOLIDS = ("mesh", "box", "polyhedron")

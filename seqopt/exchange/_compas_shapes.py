@@ -9,11 +9,10 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.exchange._content import Entry, entry, listing, mapping, number, point, points
+from seqopt.exchange._content import Entry, entry, listing, mapping, number, point
 from seqopt.exchange._grip_frames import Frame
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
-from seqopt.scene.shape import normal_of
 
 _PLAIN = 1e-9  # by how much rounding may change the last row of a transformation
 _DIGITS = 9  # of lengths, m, and of axes that are written: a nanometer
@@ -110,32 +109,6 @@ def transformation_of(where: str, value: Any) -> Floats:
     if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=_PLAIN):
         raise SceneError(f"{where} ends in {matrix[3]}; give a matrix that ends in 0, 0, 0, 1")
     return np.array(matrix)
-
-
-def solid_of_element(where: str, held: Entry) -> _Solid:
-    """Return the shape of an element: its mesh, or a beam, column or plate of compas_model."""
-    if "polygon" in held:
-        return _plate(where, held)
-    if {"width", "depth"} <= held.keys() and not {"geometry", "shape"} & held.keys():
-        tall = entry(where, held, "length", "height")
-        size = [number(where, x) for x in (held["width"], held["depth"], tall)]
-        local = 0.5 * (BOX_CORNERS + np.array([0.0, 0.0, 1.0])) * size
-        return np.asarray(local), [list(face) for face in BOX_FACES]
-    return solid_of(where, entry(where, held, "geometry", "shape"))
-
-
-def _plate(where: str, held: Entry) -> _Solid:
-    """Return a plate, which lies behind its polygon."""
-    front = points(f"{where}: polygon", entry(where, payload(held["polygon"]), "points"))
-    normal = normal_of(front) if len(front) else np.zeros(3)
-    if not (size := float(np.linalg.norm(normal))) > 0:
-        raise SceneError(f"{where}: its polygon has no area")
-    thickness = number(f"{where}: thickness", entry(where, held, "thickness"))
-    first = [*range(len(front))]
-    behind = [len(front) + i for i in first]
-    around = zip(first, first[1:] + first[:1], behind, behind[1:] + behind[:1], strict=True)
-    sides = [[b, a, c, d] for a, b, c, d in around]
-    return np.vstack([front, front - thickness * normal / size]), [first, behind[::-1], *sides]
 
 
 def typed(kind: str, data: object) -> Document:

@@ -75,8 +75,6 @@ class Content:
         What is built, and where blocks touch; no faces where the file has none.
     unit
         Unit of length, one of `UNITS`, if the file says it.
-    law
-        Stiffnesses of joints, if the file has them.
     said
         What was read, left out or assumed.
     """
@@ -84,7 +82,6 @@ class Content:
     blocks: tuple[FileBlock, ...]
     faces: tuple[FileFace, ...] = ()
     unit: str | None = None
-    law: JointLaw | None = None
     said: tuple[str, ...] = ()
 
     def placed(self, unit: float, up: str) -> Content:
@@ -110,7 +107,7 @@ class Given:
     supports
         Keys of blocks that are fixed, or of layers and groups of blocks; by default the file's.
     law
-        Stiffness of joints by area; by default the file's.
+        Stiffness of joints by area; by default `seqopt.scene.library.common.MASONRY`.
     gap
         Most that may lie between faces that touch, m.
     detect

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from seqopt._files import parse_json, read_text
-from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.instance import Instance
 from seqopt.judge.arithmetic import Answer, Claim, judge_path
 from seqopt.judge.certificate import Certificate
-from seqopt.scene._checks import as_float, short
+from seqopt.scene._checks import short
 
 WHAT = ("nodes", "arcs", "acts")
 KEYS = ("value", "prices", "weights", "shares", "labels")
@@ -65,30 +64,29 @@ def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certi
 def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
     """Parse a solution with its bounds; raise a `ProblemError` that names an invalid entry."""
     found, where = _loaded(solution)
-    if isinstance(found, Mapping):
-        if unknown := {*found} - {*WHAT, "values", "bounds", "instance"}:
-            known = f"{', '.join(WHAT)}, values and bounds"
-            raise ProblemError(f"{where}: {min(map(str, unknown))} is none of {known}")
-        named = [what for what in WHAT if what in found]
-        if len(named) != 1:
-            raise ProblemError(f"{where}: give one of {', '.join(WHAT)}")
-        what, numbers = named[0], found[named[0]]
-        own = found.get("bounds", ())
-        values = found.get("values", ())
-    else:
-        what, numbers, own, values = "nodes", found, (), ()
-    none = isinstance(bounds, Sequence) and not len(bounds)
-    claims, said = (own, where) if none else _loaded(bounds)
+    held = found if isinstance(found, Mapping) else {"nodes": found}
+    _require_known(where, held, (*WHAT, "values", "bounds", "instance"))
+    named = [what for what in WHAT if what in held]
+    if len(named) != 1:
+        raise ProblemError(f"{where}: give one of {', '.join(WHAT)}")
+    own = isinstance(bounds, Sequence) and not len(bounds)
+    claims, said = (held.get("bounds", ()), where) if own else _loaded(bounds)
     if isinstance(claims, Mapping):
-        claims = claims.get("bounds", claims)
-    claims = [claims] if isinstance(claims, Mapping | Claim) else claims
+        claims = claims.get("bounds", [claims])
     if isinstance(claims, str) or not isinstance(claims, Sequence):
         raise ProblemError(f"{said}: bounds are {short(claims)}; give a list, one for every goal")
+    names, values = [goal.name for goal in instance.goals], held.get("values", ())
+    if isinstance(values, Mapping):
+        _require_known(f"{where}, values", values, names)
+        values = [values.get(name, np.inf) for name in names]
+    known = _numbers(f"{where}, values", values).tolist()
+    if len(known) > len(names):
+        raise ProblemError(f"{where}: {len(known)} values for {len(names)} goals; leave some out")
     return Answer(
-        what,
-        _whole(numbers, f"{where}, {what}"),
-        _values(instance, values, where),
-        tuple(_claim(each, f"{said}, bound {k}") for k, each in enumerate(claims, start=1)),
+        named[0],
+        _numbers(f"{where}, {named[0]}", held[named[0]], whole=True),
+        tuple(value if np.isfinite(value) else None for value in known),
+        tuple(_claim(f"{said}, bound {k}", each) for k, each in enumerate(claims, start=1)),
     )
 
 
@@ -112,86 +110,55 @@ def _loaded(given: Any) -> tuple[Any, str]:
     return {what if what in WHAT else "nodes": [int(word) for word in numbers]}, where
 
 
-def _whole(given: Any, where: str) -> Ints:
-    """Return an integer array (n,), not empty; raise a `ProblemError` for other values."""
-    found = _array(given)
-    if found is None or found.ndim != 1 or not len(found) or (found % 1).any():
-        raise ProblemError(f"{where}: give a list of whole numbers")
-    return found.astype(np.int64)
+def _require_known(where: str, given: Mapping[Any, Any], known: Sequence[str]) -> None:
+    if unknown := {*map(str, given)} - {*known}:
+        raise ProblemError(f"{where}: {min(unknown)} is none of {', '.join(known)}")
 
 
-def _array(given: Any) -> np.ndarray | None:
-    """Return an array of numbers below 2**63 in size; None for other values.
+def _numbers(where: str, given: Any, *, whole: bool = False, rows: bool = False) -> Any:
+    """Return numbers (n,), infinite for missing ones, not empty if ``whole``; or ``rows`` (m, n).
 
-    Booleans, strings and ragged lists are no numbers.
+    Booleans, texts and ragged lists are no numbers, and neither is NaN.
     """
+    lists = isinstance(given, Sequence) and not isinstance(given, str) and not rows and not whole
     try:
-        found = np.asarray(given)
+        found = np.asarray([np.inf if v is None else v for v in given] if lists else given)
     except (TypeError, ValueError, OverflowError, RecursionError):
-        return None
-    if found.dtype.kind not in "iuf" or not (np.abs(found) < 2.0**63).all():  # NaN is none
-        return None
-    return found
-
-
-def _values(instance: Instance, given: Any, where: str) -> tuple[float | None, ...]:
-    """Return claimed values by goal, None without a claim."""
-    names = [goal.name for goal in instance.goals]
-    if isinstance(given, Mapping):
-        if unknown := {*given} - {*names}:
-            first = min(map(str, unknown))
-            raise ProblemError(f"{where}: {first} is no goal; give {', '.join(names)}")
-        return tuple(
-            float(_floats([given[n]], f"{where}, values, {n}")[0]) if n in given else None
-            for n in names
-        )
-    found = _floats(given, f"{where}, values")
-    if len(found) > len(names):
-        raise ProblemError(f"{where}: {len(found)} values for {len(names)} goals; leave some out")
-    return tuple(found.tolist())
-
-
-def _floats(given: Any, where: str) -> Floats:
-    """Return numbers (n,), infinite for missing ones."""
-    if isinstance(given, str | bytes | Mapping) or not isinstance(given, Iterable):
-        raise ProblemError(f"{where}: give a list of numbers")
-    found = np.array([np.inf if v is None else as_float(v) for v in given], dtype=float)
-    if np.isnan(found).any():
+        found = np.array("")
+    flat = found.ndim == 1 or (rows and found.ndim == 2)
+    if found.size and (not flat or found.dtype.kind not in "iuf" or np.isnan(found).any()):
         raise ProblemError(f"{where}: give a list of numbers; NaN and text are none")
-    return found
+    if whole:
+        if not len(found) or not (np.abs(found) < 2.0**63).all() or (found % 1).any():
+            raise ProblemError(f"{where}: give a list of whole numbers")
+        return found.astype(np.int64)
+    return np.atleast_2d(found.astype(float)) if rows else found.astype(float)
 
 
-def _claim(given: Any, where: str) -> Claim:
+def _claim(where: str, given: Any) -> Claim:
     """Parse a claim from a mapping or a number."""
-    if isinstance(given, Real):
-        given = {"value": given}
-    if isinstance(given, Claim):
-        return given
+    given = {"value": given} if isinstance(given, Real) else given
     if not isinstance(given, Mapping):
         raise ProblemError(f"{where}: {short(given)} is no bound; give {', '.join(KEYS)}")
-    if unknown := {*given} - {*KEYS}:
-        raise ProblemError(f"{where}: {min(map(str, unknown))} is none of {', '.join(KEYS)}")
-    value, prices = given.get("value"), given.get("prices", {})
+    _require_known(where, given, KEYS)
+    held = {name: value for name, value in given.items() if value is not None}
+    prices, labels = held.get("prices", {}), held.get("labels")
     if not isinstance(prices, Mapping):
         raise ProblemError(f"{where}, prices: give them by name of a cap, or of a sum before")
-    weights = given.get("weights")
-    weights = None if weights is None else _floats(weights, f"{where}, weights")
-    shares = None if given.get("shares") is None else _table(given["shares"], f"{where}, shares")
-    labels = None
-    if (found := given.get("labels")) is not None:
-        said = f"{where}, labels"
-        if not isinstance(found, Mapping) or {*found} != {"nodes", "values"}:
-            raise ProblemError(f"{said}: give nodes and values")
-        nodes, rows = _whole(found["nodes"], f"{said}, nodes"), found["values"]
-        labels = nodes, _table(rows, f"{said}, values")
-    number = None if value is None else float(_floats([value], where)[0])
-    named = {str(n): float(_floats([p], f"{where}, prices")[0]) for n, p in prices.items()}
-    return Claim(number, prices=named, weights=weights, shares=shares, labels=labels)
-
-
-def _table(given: Any, where: str) -> Floats:
-    """Return rows of numbers (m, n); a single row may be one-dimensional."""
-    found = _array(given)
-    if found is None or not 1 <= found.ndim <= 2:
-        raise ProblemError(f"{where}: give rows of as many numbers each")
-    return np.atleast_2d(found.astype(float))
+    if labels is not None:
+        if not isinstance(labels, Mapping) or {*labels} != {"nodes", "values"}:
+            raise ProblemError(f"{where}, labels: give nodes and values")
+        nodes = _numbers(f"{where}, labels, nodes", labels["nodes"], whole=True)
+        labels = nodes, _numbers(f"{where}, labels, values", labels["values"], rows=True)
+    arrays = {
+        name: _numbers(f"{where}, {name}", held[name], rows=name == "shares")
+        for name in ("weights", "shares")
+        if name in held
+    }
+    values = _numbers(where, [*prices.values(), *([held["value"]] if "value" in held else [])])
+    return Claim(
+        value=float(values[-1]) if "value" in held else None,
+        prices=dict(zip(map(str, prices), values.tolist(), strict=False)),
+        labels=labels,
+        **arrays,
+    )

@@ -11,7 +11,6 @@ import trimesh
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene
-from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import _parse_scene, dump_scene
 from tests.blocks import box
 from tests.documents import BOXES, DOCUMENTS, HIGH, LOW, TOP, obj
@@ -58,13 +57,6 @@ def test_blocks_faces_and_supports(read, name, masses, areas, ends):
     assert _parse_scene(dump_scene(scene)) == scene
     heights = [brick.position[2] for brick in scene.placed]
     assert heights == sorted(heights)
-
-
-def test_a_problem_brings_the_stiffness_of_its_joints(read):
-    scene = read("p.json", DOCUMENTS["problem"])
-    assert scene.joints[0].translational_stiffness == pytest.approx((1e11, 1e8, 1e8))
-    own = Given(unit="m", density=1.0, law=JointLaw(translational=(2e9, 1e9, 1e9)))
-    assert read("p.json", DOCUMENTS["problem"], own).joints[0].translational_stiffness[0] == 2e9
 
 
 def test_meshes_of_every_kind(read):

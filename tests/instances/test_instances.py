@@ -239,7 +239,7 @@ def test_labels_prove_a_time_and_missing_ones_do_not(compiled):
         ('{"path": [1]}', "none of nodes"),
         ('{"nodes": [1.5]}', "whole numbers"),
         ('{"nodes": [1], "bounds": [{"proof": 1}]}', "none of value"),
-        ('{"nodes": [1], "values": {"least": 1}}', "is no goal"),
+        ('{"nodes": [1], "values": {"least": 1}}', "least is none of"),
     ],
 )
 def test_what_cannot_be_read_is_named(compiled, text, said):

@@ -64,7 +64,7 @@ def run(  # noqa: PLR0913  # every option is a parameter
     robots : int, optional
         How many there are, mobile ones that reach all (default: those of the file, else 3).
     stiffness : str, optional
-        Of joints by area, N/m³, in place of that of the file (default: 1.5e9,1.5e8).
+        Of joints by area, N/m³ (default: 1.5e9,1.5e8).
     gap : float, optional
         Most that may lie between faces that touch (default: a twentieth of the thinnest block).
     detect : bool, optional
