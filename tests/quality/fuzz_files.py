@@ -98,7 +98,7 @@ def _of_scenes() -> Iterator[tuple[str, File]]:
     yield "schedule", ("l.csv", loop.encode(), lambda path: seqopt.read_schedule(scene, path))
     node = scene.placed[0].nodes[0]
     state = {"bricks": [1, 2], "grips": {"rob1": node}, "last": {}, "regrips": 0, "step": 3}
-    state |= {"ages": {"1": 5.0, "2": 1.0}, "measured": {"1": [*scene.placed[0].position]}}
+    state |= {"ages": {"1": 5.0, "2": 1.0}}
     yield "state", ("state.json", _json(state), lambda path: read_site(scene, path))
     rows = "".join(f"{b.name},{','.join(map(str, b.position))}\n" for b in scene.bricks)
     measured = f"brick,x,y,z\n{rows}".encode()
