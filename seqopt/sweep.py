@@ -139,13 +139,11 @@ def _plan_scene(plan: Callable[[Any], Plan], mortars: Sequence[str], case: Case)
 
 def _plan_row(plan: Plan, mortars: Sequence[str] = ()) -> dict[str, Any]:
     """Return what a table says of a plan; with mortars how many steps fall."""
-    bounds = plan.brief()["bound"]
-    assert isinstance(bounds, Mapping)
     falls = {name: int((plan.stability(name)["verdict"] == "falls").sum()) for name in mortars}
     return {
         "status": str(plan.status),
         **plan.objective,
-        **{f"{name}_bound": bound for name, bound in bounds.items()},
+        **{f"{name}_bound": bound for name, bound in plan.bound.items()},
         "gap": plan.gap,
         "steps": len(plan.steps),
         "models": plan.models,

@@ -200,6 +200,21 @@ class Plan(ShownBuild):
         return self.graph.in_display_units(self.formulation.aim, values)
 
     @property
+    def bound(self) -> dict[str, float | None]:
+        """The lower bound of every goal by its name, None where there is none.
+
+        Of a search that stopped early it is the one that it claims.
+        """
+        proof, claimed = self.certificate, self.selection.bound
+        bounds: tuple[float, ...] = () if proof is None else proof.bounds
+        if proof is None and self.objective:  # of a search without models nothing is known
+            bounds = claimed
+        elif proof is not None and self.stopped and not isfinite(proof.gap):
+            bounds = tuple(map(max, claimed, bounds))
+        found = self.in_display_units(self.graph.bounded(bounds))
+        return {name: bound if isfinite(bound) else None for name, bound in found.items()}
+
+    @property
     def gap(self) -> float | None:
         """Relative optimality gap that is proven; None without proof."""
         if self.certificate is None or not isfinite(self.certificate.gap):
@@ -327,8 +342,8 @@ class Plan(ShownBuild):
         (s, if it is known how long robots take), ``idle_robots``, which never grip; limits of the
         linear range that are left, which model was ``enough``, what is known of ``arms``, and
         payloads that are exceeded; what was ``spent``, ``seconds``; of an order that was sought
-        ``order``, ``orders`` (among which), whether the bound is proven of any order
-        (``order_bound_proven``) and ``order_evaluated``; the ``engine`` and ``versions``.
+        ``order``, ``orders`` (among which) and ``order_evaluated``; the ``engine`` and
+        ``versions``.
         """
         if not self.steps:  # a path through an instance, or given costs
             known: dict[str, object] = getattr(self.problem, "facts_of", dict)()
@@ -393,26 +408,12 @@ class Plan(ShownBuild):
             },
         }
 
-    def brief(self) -> dict[str, object]:
-        """Return the entries of the summary that need no responses."""
-        own = {"scene": self.engine.network.scene.name, "schedule": self.method, **self._named()}
-        return {**own, **self._answer(), "steps": len(self.steps)}
-
     def _named(self) -> dict[str, object]:
         return {"formulation": self.formulation.name, "kind": self.formulation.kind.value}
 
     def _answer(self) -> dict[str, object]:
-        """Return the entries of a summary about values and what is proven of them.
-
-        The bound of a search that stopped early is the one that it claims.
-        """
-        proof, names, claimed = self.certificate, self.goals, self.selection.bound
-        bounds: tuple[float, ...] = () if proof is None else proof.bounds
-        if proof is None and self.objective:  # of a search without models nothing is known
-            bounds = claimed
-        elif proof is not None and self.stopped and not isfinite(proof.gap):
-            bounds = tuple(map(max, claimed, bounds))
-        found = self.in_display_units(self.graph.bounded(bounds))
+        """Return the entries of a summary about values and what is proven of them."""
+        proof = self.certificate
         rests_on = () if proof is None else self.graph.bounded(proof.rests_on)
         narrowed = self.graph.among and "optimal" in self.status
         left = None if proof is None or self.gap is None else _known_gap(proof.claimed_gap)
@@ -421,8 +422,8 @@ class Plan(ShownBuild):
             "ended": self.ended.value,
             "stopped": self.stopped,
             "objective": self.objective,
-            "bound": {name: bound if isfinite(bound) else None for name, bound in found.items()},
-            "bound_rests_on": dict(zip(names, map(str, rests_on), strict=False)),
+            "bound": self.bound,
+            "bound_rests_on": dict(zip(self.goals, map(str, rests_on), strict=False)),
             "gap": self.gap,
             "claimed_gap": left,
         }
@@ -431,23 +432,16 @@ class Plan(ShownBuild):
         """Return the entries of a summary about the optimized order, if one was sought."""
         if not self.order:
             return {}
-        return {
-            "order": [*self.order],
-            "orders": self.problem.orders.value,  # type: ignore[union-attr]  # one was sought
-            "order_bound_proven": self._order_is_bounded,
-            "order_evaluated": self.selection.effort[0],
-        }
-
-    @property
-    def _order_is_bounded(self) -> bool:
-        return self.certificate is not None and isfinite(self.certificate.bounds[0])
+        sought = self.problem.orders.value  # type: ignore[union-attr]  # one was
+        evaluated = self.selection.effort[0]
+        return {"order": [*self.order], "orders": sought, "order_evaluated": evaluated}
 
     @property
     def order_bound_said(self) -> str:
         """The lower bound over all orders in words, and whether it is proven."""
         proof, goal, claimed = self.certificate, self.states.goals[0], " (claimed, not proven)"
         bound = self.selection.bound[0]
-        if proof is not None and self._order_is_bounded:
+        if proof is not None and isfinite(proof.bounds[0]):
             bound, claimed = proof.bounds[0], ""
         if not isfinite(bound):
             return "others are not looked at yet"

@@ -110,7 +110,7 @@ def test_every_plan_has_one_summary():
     keys = [{k for k in p.summary() if k not in own and not k.startswith("order")} for p in plans]
     assert keys == [keys[0]] * len(plans)
     assert [type(plan.summary()["objective"]) for plan in plans] == [dict] * len(plans)
-    assert {"order", "orders", "order_bound_proven"} <= set(plans[-1].summary())
+    assert {"order", "orders", "order_evaluated"} <= set(plans[-1].summary())
     for plan in plans:
         assert len(plan.responses()) == len(plan.steps)
         assert len(plan.table()) > 0
