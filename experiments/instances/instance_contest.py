@@ -50,7 +50,8 @@ MOST_ARCS = 20_000  # of what outside solvers are given
 
 def solvers(one: Instance) -> tuple[str, ...]:
     """Return the ways to solve an instance: formulations that fit, then outside solvers."""
-    return (*one.fitting, *(OUTSIDE if one.arcs <= MOST_ARCS else ()))
+    fits = one.arcs <= MOST_ARCS and not one.asks_time
+    return (*one.fitting, *(OUTSIDE if fits else ()))
 
 
 def run(name: str, solver: str, seconds: float) -> dict[str, object]:
@@ -104,8 +105,6 @@ def _outside(one: Instance, solver: str, seconds: float) -> dict[str, object]:
     if taken is None:
         return {"end": end, "bound": bound}
     arcs = np.asarray(taken) > 0.5
-    if one.asks_time:
-        arcs = np.isin(np.arange(one.arcs), one.timed.move[arcs])
     part = one.graph.only(arcs)
     if not part.ends[reached(part)].any():
         return {"end": f"{end}, no path", "bound": bound}
@@ -119,9 +118,8 @@ def _outside(one: Instance, solver: str, seconds: float) -> dict[str, object]:
 def _highs(one: Instance, folder: Path, seconds: float):
     save_instance(one, folder / "x.mps")
     end, value, bound, found = _solve_file(str(folder / "x.mps"), seconds)
-    count = one.arcs if not one.asks_time else len(one.timed.move)
     known = math.isfinite(value) and len(found) > 0 and abs(value) < 1e30
-    return end.removeprefix("k"), bound, found[:count] if known else None
+    return end.removeprefix("k"), bound, found[: one.arcs] if known else None
 
 
 def _cp_sat(one: Instance, _: Path, seconds: float):
@@ -134,8 +132,7 @@ def _cp_sat(one: Instance, _: Path, seconds: float):
     solver.parameters.num_workers = 1
     status = solver.solve(model)
     known = status in (cp_model.OPTIMAL, cp_model.FEASIBLE)
-    count = one.arcs if not one.asks_time else len(one.timed.move)
-    found = [*solver.response_proto.solution][:count] if known else None
+    found = [*solver.response_proto.solution][: one.arcs] if known else None
     return solver.status_name(status).capitalize(), solver.best_objective_bound, found
 
 

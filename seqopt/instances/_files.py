@@ -270,8 +270,8 @@ def save_instance(instance: Instance, path: Path | str) -> None:
     if path.suffix == "":
         archive = stored(instance)
         text = Archive(archive, str(path)).text(TEXT)
-        programs = {"instance.mps": as_mps(instance), TEXT: text}
-        write_folder(path, {"instance.npz": archive, **programs})
+        programs = {} if instance.asks_time else {"instance.mps": as_mps(instance)}
+        write_folder(path, {"instance.npz": archive, TEXT: text, **programs})
         return
     if path.suffix not in WRITERS:
         known = ", ".join(WRITERS)

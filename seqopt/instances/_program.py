@@ -1,12 +1,10 @@
 r"""An instance as a mixed-integer program, the content of its files for solvers.
 
-With :math:`x_a \in \{0, 1\}` for every arc (of times: for every act), one unit flows from node 0 to
-an end. A sum is :math:`\sum c_a x_a`. A peak is :math:`t` with :math:`t \ge \sum c_a x_a` over the
-arcs of every level where all paths have one arc on each, else over the arcs to every node. A tail
-is :math:`\eta + m \sum_s u_s` with :math:`u_s \ge \sum_a c_{s a} x_a - \eta`, where :math:`m` is
-the largest weight. Of times, :math:`T_v` is the end of the act that leads to a node, and
-:math:`\rho_{v r}` the time from which robot :math:`r` is free there; the constraints of an act on
-these are relaxed by the horizon (big-M) unless it is taken.
+With :math:`x_a \in \{0, 1\}` for every arc, one unit flows from node 0 to an end. A sum is
+:math:`\sum c_a x_a`. A peak is :math:`t` with :math:`t \ge \sum c_a x_a` over the arcs of every
+level where all paths have one arc on each, else over the arcs to every node. A tail is
+:math:`\eta + m \sum_s u_s` with :math:`u_s \ge \sum_a c_{s a} x_a - \eta`, where :math:`m` is the
+largest weight. When acts end is no part of it.
 """
 
 from __future__ import annotations
@@ -19,9 +17,8 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph.graph import HELD, NOW, TimedGraph
-from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
-from seqopt.graph.paths import distances
+from seqopt.errors import ProblemError
+from seqopt.graph.instance import PEAK, SUM, TAIL, Instance
 
 
 class Program(NamedTuple):
@@ -110,65 +107,39 @@ class _Draft:
 
 def program(instance: Instance) -> Program:
     """Return the program of the first goal; further goals are unbounded rows."""
-    timed = instance.timed if instance.asks_time else None
-    arc = np.arange(instance.arcs) if timed is None else timed.move
-    every, more, draft = np.arange(len(arc)), _more(instance, timed), _Draft()
-    names = [*(f"{'x' if timed is None else 'y'}{k}" for k in every), *more.names]
-    _flow(draft, instance, arc)
-    goals = [_goal(draft, instance, k, arc, more) for k in range(len(instance.goals))]
+    if instance.asks_time:
+        raise ProblemError(f"instance {instance.name}: no program has times; give the .npz")
+    arcs, draft, names, at = instance.arcs, _Draft(), list[str](), list[int]()
+    for k, goal in enumerate(instance.goals):  # variables besides arcs, and the first of each goal
+        at.append(arcs + len(names))
+        names += [f"t{k}"] if goal.kind == PEAK else []
+        if goal.kind == TAIL:
+            names += [f"eta{k}", *(f"u{k}_{s}" for s in range(len(goal.columns)))]
+    every = np.arange(arcs)
+    _flow(draft, instance)
+    goals = [_goal(draft, instance, k, at[k], len(names)) for k in range(len(instance.goals))]
     for k, cap in enumerate(instance.caps):
-        if cap.column is None:
-            draft.add(f"cap_{k}", 0, more.at["end"], 1.0, -np.inf, cap.most)
-        else:
-            own = instance.amounts[arc, cap.column]
-            draft.add(f"cap_{k}", 0, every, own, -np.inf, cap.most)
-    if timed is not None:
-        _times(draft, instance, timed, more)
+        assert cap.column is not None  # as of times alone
+        draft.add(f"cap_{k}", 0, every, instance.amounts[:, cap.column], -np.inf, cap.most)
     for k, own in enumerate(goals[1:], start=1):
-        at = np.flatnonzero(own)
-        draft.add(f"goal_{k}", 0, at, own[at], -np.inf)
+        used = np.flatnonzero(own)
+        draft.add(f"goal_{k}", 0, used, own[used], -np.inf)
     rows, columns, values = (np.concatenate(each) for each in zip(*draft.at, strict=True))
-    shape = len(draft.names), len(names)
+    shape = len(draft.names), arcs + len(names)
     matrix = sparse.csr_array((values, (rows, columns)), shape=shape)
     matrix.sum_duplicates()
     matrix.eliminate_zeros()
-    whole = np.arange(len(names)) < len(arc)
-    upper = np.where(whole, 1.0, more.most)
+    whole = np.arange(shape[1]) < arcs
     limits = np.concatenate(draft.low), np.concatenate(draft.high)
-    return Program(names, goals[0], upper, whole, matrix, *limits, draft.names)
+    named = [*(f"x{k}" for k in every), *names]
+    return Program(
+        named, goals[0], np.where(whole, 1.0, np.inf), whole, matrix, *limits, draft.names
+    )
 
 
-class _More(NamedTuple):
-    """Variables besides arcs: first index by purpose."""
-
-    names: list[str]
-    at: dict[str, int]
-    most: float  # of each: with times an upper bound of the makespan, s
-
-
-def _more(instance: Instance, timed: TimedGraph | None) -> _More:
-    first = instance.arcs if timed is None else len(timed.move)
-    names, at = list[str](), dict[str, int]()
-    for k, goal in enumerate(instance.goals):
-        if goal.kind == PEAK:
-            at[f"peak {k}"] = first + len(names)
-            names.append(f"t{k}")
-        elif goal.kind == TAIL:
-            at[f"tail {k}"] = first + len(names)
-            names += [f"eta{k}", *(f"u{k}_{s}" for s in range(len(goal.columns)))]
-    if timed is None:
-        return _More(names, at, np.inf)
-    at["end"], at["node"] = first + len(names), first + len(names) + 1
-    at["since"] = at["node"] + instance.nodes
-    names += ["makespan", *(f"T{v}" for v in range(instance.nodes))]
-    names += [f"r{v}_{c}" for v in range(instance.nodes) for c in range(len(timed.kinds))]
-    one_by_one = distances(timed.graph, timed.prepares + timed.acts)
-    return _More(names, at, float(one_by_one[timed.graph.ends].min()))
-
-
-def _flow(draft: _Draft, instance: Instance, arc: Ints) -> None:
+def _flow(draft: _Draft, instance: Instance) -> None:
     """Add flow conservation of one unit from node 0 to an end."""
-    source, target, inner = instance.source[arc], instance.target[arc], ~instance.ends
+    source, target, inner = instance.source, instance.target, ~instance.ends
     number = np.cumsum(inner) - 1
     leaves, comes = np.flatnonzero(inner[source]), np.flatnonzero(inner[target])
     rows = np.concatenate([number[source[leaves]], number[target[comes]]])
@@ -181,73 +152,23 @@ def _flow(draft: _Draft, instance: Instance, arc: Ints) -> None:
     draft.add("ends", 0, np.concatenate([last, went]), signs, 1.0, 1.0)
 
 
-def _goal(draft: _Draft, instance: Instance, k: int, arc: Ints, more: _More) -> Floats:
-    """Add the rows of a goal, and return its cost vector."""
-    goal, every, to = instance.goals[k], np.arange(len(arc)), instance.target[arc]
-    out = np.zeros(len(arc) + len(more.names))
+def _goal(draft: _Draft, instance: Instance, k: int, first: int, more: int) -> Floats:
+    """Add the rows of a goal, and return its costs; ``first``: its own variable, of so many."""
+    goal, every = instance.goals[k], np.arange(instance.arcs)
+    out = np.zeros(instance.arcs + more)
     if goal.kind == SUM:
-        out[every] = instance.amounts[arc, goal.columns[0]]
-    elif goal.kind == TIME:
-        out[more.at["end"]] = 1.0
+        out[every] = instance.amounts[:, goal.columns[0]]
     elif goal.kind == PEAK:  # what arcs to a level take, or to a node
-        variable = more.at[f"peak {k}"]
-        out[variable] = 1.0
-        groups = instance.levels[to] if instance.is_layered else to
+        out[first] = 1.0
+        groups = instance.levels[instance.target] if instance.is_layered else instance.target
         own, rows = np.unique(groups, return_inverse=True)
         ones = np.ones(len(own))
-        columns = np.concatenate([every, np.full(len(own), variable)])
-        values = np.concatenate([-instance.amounts[arc, goal.columns[0]], ones])
+        columns = np.concatenate([every, np.full(len(own), first)])
+        values = np.concatenate([-instance.amounts[:, goal.columns[0]], ones])
         draft.add("peak", np.append(rows, np.arange(len(own))), columns, values, 0 * ones)
     else:
-        first, count = more.at[f"tail {k}"], len(goal.columns)
-        out[first], out[first + 1 : first + 1 + count] = 1.0, goal.most
+        out[first], out[first + 1 : first + 1 + len(goal.columns)] = 1.0, goal.most
         for s, column in enumerate(goal.columns):  # u_s: what a total is above the threshold
-            values = np.append(-instance.amounts[arc, column], [1.0, 1.0])
+            values = np.append(-instance.amounts[:, column], [1.0, 1.0])
             draft.add(f"total_{s}", 0, np.append(every, [first, first + 1 + s]), values, 0.0)
     return out
-
-
-def _times(draft: _Draft, instance: Instance, timed: TimedGraph, more: _More) -> None:
-    """Add rows of end times of acts, and of the availability of robots."""
-    move, column, big = timed.move, timed.column, more.most
-    node, since, robots = more.at["node"], more.at["since"], len(timed.kinds)
-    before, after = instance.source[move].astype(int), instance.target[move].astype(int)
-    every = np.arange(len(move))
-    acts, prepares = timed.acts[move], timed.prepares[move]
-    _after(draft, "act", (node + after, node + before), acts, every, big)
-    own = column >= 0
-    free = since + robots * before + column
-    _after(draft, "own", ((node + after)[own], free[own]), (acts + prepares)[own], every[own], big)
-    for c in range(robots):
-        origin = timed.origin[:, c]
-        rows = np.flatnonzero(origin != HELD)
-        from_node = origin[rows] == NOW
-        was = np.where(from_node, node + after[rows], since + robots * before[rows] + origin[rows])
-        is_ = since + robots * after[rows] + c
-        _after(draft, f"ready{c}", (is_, was), np.zeros(len(rows)), rows, big)
-    ends = np.flatnonzero(instance.ends)
-    last = np.full(len(ends), more.at["end"])
-    _after(draft, "last", (last, node + ends), np.zeros(len(ends)))
-    for k, size in enumerate(timed.sizes.tolist()):
-        values = np.append(-timed.work[move, k], float(size))
-        draft.add(f"share_{k}", 0, np.append(every, more.at["end"]), values, 0.0)
-
-
-def _after(
-    draft: _Draft,
-    name: str,
-    variables: tuple[Ints, Ints],
-    least: Floats,
-    taken: Ints | None = None,
-    big: float = 0.0,
-) -> None:
-    r"""Add precedence rows: one variable is at least another plus a duration.
-
-    Of acts, :math:`t - t' - (M + d) y \ge -M`: only of those that are ``taken``.
-    """
-    ones = np.ones(len(least))
-    columns, values, low = [*variables], [ones, -ones], least
-    if taken is not None:
-        columns, values, low = [*columns, taken], [*values, -(big + least)], -big * ones
-    rows = np.tile(np.arange(len(least)), len(columns))
-    draft.add(name, rows, np.concatenate(columns), np.concatenate(values), low)
