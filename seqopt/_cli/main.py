@@ -50,8 +50,7 @@ def load(words: Sequence[str]) -> None:
         for part in ("ctypeslib", "f2py", "fft", "polynomial", "testing"):
             if part not in vars(np):
                 vars(np)[part] = sys.modules.setdefault(f"numpy.{part}", Later(f"numpy.{part}"))
-        needed = ["seqopt._cli.signatures", "seqopt._cli.watcher"]
-        for name in [*needed, *["jsonschema"] * any(map(os.path.exists, words))]:  # of scene files
+        for name in ("seqopt._cli.signatures", "seqopt._cli.watcher"):
             import_module(name)
         COMMANDS[asked].load()
     gc.freeze()

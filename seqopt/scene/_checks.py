@@ -178,12 +178,13 @@ def cut(text: str, most: int) -> str:
 def vector(where: str, values: Iterable[float], at_least: float = -math.inf) -> Vector:
     """Return three finite floats, none below ``at_least``."""
     try:
-        x, y, z = (float(value) for value in values)
-    except (TypeError, ValueError, OverflowError) as error:
+        given = [*values]
+        x, y, z = map(as_float, given)
+    except (TypeError, ValueError) as error:
         raise SceneError(f"{where} is {short(values)}; give three numbers") from error
     if not all(math.isfinite(c) and c >= at_least for c in (x, y, z)):
         bound = "" if at_least == -math.inf else f", each at least {at_least:g}"
-        raise SceneError(f"{where} is {[x, y, z]}; give three finite numbers{bound}")
+        raise SceneError(f"{where} is {short(given)}; give three finite numbers{bound}")
     return x, y, z
 
 
@@ -196,7 +197,8 @@ def sizes(where: str, values: Iterable[float]) -> Vector:
 def as_float(value: object) -> float:
     """Return a number as a float: NaN if it is none, infinity if it is too large."""
     try:
-        return float(value) if isinstance(value, Real) else math.nan
+        real = isinstance(value, Real) and not isinstance(value, bool)
+        return float(value) if real else math.nan  # type: ignore[arg-type]
     except OverflowError:
         return math.inf
 

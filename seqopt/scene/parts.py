@@ -18,6 +18,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
+    as_float,
     check,
     density,
     frames,
@@ -402,8 +403,8 @@ def _each_way(where: str, value: float | Iterable[float], unit: str) -> Vector:
     """Return three stiffnesses of a grip, of one number or three."""
     one = isinstance(value, Real) and not isinstance(value, bool)
     try:
-        x, y, z = [float(value)] * 3 if one else map(float, value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
+        x, y, z = [as_float(value)] * 3 if one else map(as_float, value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
         x = y = z = math.nan
     if not all(_GIVES[0] <= each <= _GIVES[1] for each in (x, y, z)):
         low, high = _GIVES

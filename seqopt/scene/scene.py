@@ -16,7 +16,16 @@ from seqopt._later import Later
 from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, did_you_mean
-from seqopt.scene._checks import check, not_negative, printable, settle, short, vector, wholes
+from seqopt.scene._checks import (
+    check,
+    kind_of,
+    not_negative,
+    printable,
+    settle,
+    short,
+    vector,
+    wholes,
+)
 from seqopt.scene.arm import Arm, HeldPostures, _durations_in_words, from_arms
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Prop, Reach, Robot, _GripKinds
 
@@ -147,6 +156,7 @@ class Scene(Shown):
         where = f"scene {printable('scene', self.name)}"
         check(self, where, build_order=wholes, blocked_nodes=wholes, gravity=vector)
         check(self, where, wind=vector, weight_factor=not_negative)
+        check(self, where, provenance=partial(kind_of, kind=str))
         if not self.bricks:
             raise SceneError(f"{where}: it has no bricks; give at least one")
         if not self.grounds:

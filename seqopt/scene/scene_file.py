@@ -1,7 +1,7 @@
 """Scenes by name, in words, ``wall:columns=6,courses=4``, or as versioned JSON.
 
-A file is checked against the published schema ``data/scene.schema.json``; values that are possible
-but probably wrong, such as mixed-up units, are warned of.
+A file has the fields of `Scene` and of its parts, which check their values themselves; values that
+are possible but probably wrong, such as mixed-up units, are warned of.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import os
 import shlex
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import MISSING, fields, is_dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from seqopt._files import parse_json, read_text, write_text
 from seqopt._later import Later
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
-from seqopt.scene._checks import Reader, cut, in_words, short
+from seqopt.scene._checks import Reader, in_words, one_of, rows, short
 from seqopt.scene.arm import Arm, Durations
 from seqopt.scene.boxes import overlapping
 from seqopt.scene.parts import Anywhere, Ground, Joint, Reach, Side, Sphere
@@ -92,17 +92,11 @@ def _find_overlapping(scene: Scene) -> Iterator[str]:
         yield f"{len(lines) - _SHOWN} more pairs of bricks interpenetrate"
 
 
-_VERSION = 1
+_HEADER = {"format": "seqopt-scene", "version": 1}
 _SAID = ("blocked_nodes", "gravity", "provenance", "closes_with")  # in files by default as well
 _REACHES: dict[str, type[Reach]] = {"anywhere": Anywhere, "side": Side, "sphere": Sphere}
 _WITHIN: dict[str, type] = {"shape": Polyhedron, "arm": Arm, "durations": Durations}
 _DATA = resources.files("seqopt").joinpath("data")
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of a scene file."""
-    document: dict[str, Any] = json.loads(_DATA.joinpath("scene.schema.json").read_text("utf-8"))
-    return document
 
 
 ABOUT = {
@@ -205,7 +199,7 @@ def load_scene(name: str | Path) -> Scene:
     name = str(name)
     if name in builtin_scenes():
         text = _DATA.joinpath("scenes", f"{name}.json").read_text("utf-8")
-        return _scene_from_dict(json.loads(text))  # ours obey the schema: a test asks
+        return _scene_from_dict(json.loads(text))
     kind, colon, _ = name.partition(":")
     if colon and kind in KINDS:
         return _scene_by_words(name)
@@ -238,7 +232,7 @@ def _with_models(scene: Scene, found: Callable[[str], Path]) -> Scene:
 
 
 def _parse_scene(text: str, source: str = "text") -> Scene:
-    """Return the scene that a JSON document describes, if it obeys the schema."""
+    """Return the scene that a JSON document describes."""
 
     def entries(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         keys = [key for key, _ in pairs]
@@ -248,39 +242,48 @@ def _parse_scene(text: str, source: str = "text") -> Scene:
         return dict(pairs)
 
     document = parse_json(text, f"scene {source}", SceneError, object_pairs_hook=entries)
-    validator = jsonschema.Draft202012Validator(schema())
-    error = jsonschema.exceptions.best_match(validator.iter_errors(document))
-    if error is not None:
-        entry = error.json_path.removeprefix("$").removeprefix(".") or "document"
-        raise SceneError(f"scene {source}: {entry}: {cut(error.message, 160)}")
-    return _scene_from_dict(document)
+    return _scene_from_dict(document, f"scene {source}")
 
 
-def _scene_from_dict(document: dict[str, Any]) -> Scene:
-    """Return the scene of a document that obeys the schema."""
+def _scene_from_dict(document: Any, where: str = "scene") -> Scene:
+    """Return the scene of a document; ``where``: named in messages."""
+    content = dict(document) if isinstance(document, dict) else document
+    for key, wanted in _HEADER.items() if isinstance(content, dict) else ():
+        if (given := content.pop(key, None)) != wanted:
+            raise SceneError(f"{where}: {key} is {short(given)}; give {wanted!r}")
+    scene: Scene = _read(Scene, content, where)
+    return scene
 
-    def part(make: type, entry: dict[str, Any]) -> Any:
-        own = dict(entry)
-        if "reach" in own:
-            reach = dict(own["reach"])
-            own["reach"] = _REACHES[reach.pop("kind")](**reach)
-        for name, kind in _WITHIN.items():
-            if own.get(name):
-                try:
-                    own[name] = kind(**own[name])
-                except SceneError as error:
-                    where = f"brick {short(own['name'])}: " if name == "shape" else ""
-                    raise SceneError(f"{where}{error}") from error
-        return make(**own)
 
-    content = {key: value for key, value in document.items() if key not in ("format", "version")}
-    for kind, make in _KINDS.items():
-        content[kind] = [part(make, entry) for entry in content.get(kind, ())]
-    return Scene(**content)
+def _read(kind: type, given: Any, where: str) -> Any:
+    """Return a scene or a part of one, of a class, from its entry in a document."""
+    if not isinstance(given, dict):
+        raise SceneError(f"{where} is {short(given)}; give an object")
+    known, own = {field.name: field for field in fields(kind)}, dict(given)
+    if unknown := [key for key in given if key not in known]:
+        hint = f"is not known{did_you_mean(unknown[0], known)}"
+        raise SceneError(f"{where}: {short(unknown[0])} {hint}; give {', '.join(known)}")
+    for name, field in known.items():
+        if name not in given and field.default is field.default_factory is MISSING:
+            raise SceneError(f"{where}: {name} is missing; give it")
+    for name, value in given.items():
+        inner = f"{where}: {name}"
+        if kind is Scene and name in _KINDS:
+            each = enumerate(rows(inner, value))
+            own[name] = [_read(_KINDS[name], part, f"{inner}[{i}]") for i, part in each]
+        elif name == "reach" and isinstance(value, dict):
+            reach = _REACHES[one_of(f"{inner}: kind", value.get("kind"), _REACHES)]
+            own[name] = _read(reach, {k: v for k, v in value.items() if k != "kind"}, inner)
+        elif name in _WITHIN and value is not None:
+            try:
+                own[name] = _read(_WITHIN[name], value, name)
+            except SceneError as error:
+                raise SceneError(f"{where}: {error}") from error
+    return kind(**own)
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """Return a scene as a document that obeys the schema, without defaults."""
+    """Return a scene as the document of a file, without defaults."""
     kinds = {cls: {"kind": kind} for kind, cls in _REACHES.items()}
 
     def entry(part: Any) -> dict[str, Any]:
@@ -294,7 +297,7 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
                     out[each.name] = entry(value)
         return out
 
-    return {"format": "seqopt-scene", "version": _VERSION, **entry(scene)}
+    return {**_HEADER, **entry(scene)}
 
 
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:

@@ -59,8 +59,7 @@ def test_every_built_in_scene_is_named_drawn_from_text_and_not_odd(name):
 @pytest.mark.parametrize(
     "path", sorted(DATA.joinpath("scenes").glob("*.json")), ids=lambda p: p.stem
 )
-def test_scenes_that_ship_as_files_obey_the_schema(path):
-    """So that loading them need not ask."""
+def test_scenes_that_ship_as_files_are_scene_files(path):
     assert _parse_scene(path.read_text("utf-8")) == load_scene(path.stem)
 
 
