@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 
 from seqopt._files import parse_json, read_text, write_text
-from seqopt._later import Later
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import Reader, in_words, one_of, rows, short
@@ -30,8 +29,6 @@ from seqopt.scene.boxes import overlapping
 from seqopt.scene.parts import Anywhere, Ground, Joint, Reach, Side, Sphere
 from seqopt.scene.scene import _KINDS, Scene, in_order
 from seqopt.scene.shape import Polyhedron
-
-jsonschema = Later("jsonschema")  # slow to import, and of files alone
 
 _SHOWN = 3  # pairs of bricks that interpenetrate; more are counted
 _FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension

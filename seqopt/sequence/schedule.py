@@ -21,7 +21,7 @@ import numpy as np
 from seqopt._later import Later
 from seqopt._showing import Shown, display
 from seqopt.arrays import Bools, Floats, Ints, Terse
-from seqopt.errors import ProblemError, StepError
+from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
@@ -49,7 +49,8 @@ class Near:
     def __post_init__(self) -> None:
         text = self.rule.strip() if isinstance(self.rule, str) else ""
         if _RULE.fullmatch(text) is None:
-            raise StepError(f"candidates {self.rule!r}: give near:JOINTS, as near:12")
+            hint = did_you_mean(str(self.rule).partition(":")[0], ("near",))
+            raise StepError(f"candidates {self.rule!r}{hint}: give near:JOINTS, as near:12")
         object.__setattr__(self, "rule", text)
 
     def nodes(self, scene: Scene, bricks: int, nodes: Sequence[int]) -> tuple[int, ...]:

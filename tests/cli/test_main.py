@@ -130,7 +130,7 @@ def test_a_bad_scene_gets_one_line(capsys, tmp_path):
     words = ("analyze", str(path), "--method", "sequential", "--out", str(target))
     status, _, err = run(capsys, *words)
     assert (status, err.count("\n"), target.exists()) == (2, 1, False)
-    assert "bricks[4].density" in err
+    assert "brick 5: density is 'heavy'; give a positive number" in err
 
 
 def test_a_joint_that_is_missing_gets_one_line_beside_the_table(capsys, tmp_path):
