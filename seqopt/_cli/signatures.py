@@ -12,7 +12,7 @@ import argparse
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -101,8 +101,8 @@ class Option:
 
     def parse(self, value: Any) -> Any:
         """Return the value of words of the command line; other values stay unchanged."""
-        if isinstance(self.default, tuple) and isinstance(value, str | list):
-            return (value,) if isinstance(value, str) else tuple(value)
+        if isinstance(self.default, tuple) and isinstance(value, list):
+            return tuple(value)
         if not isinstance(value, str):
             return value
         if self.kinds <= {float, type(None)}:
@@ -313,8 +313,3 @@ def _read(page: str | None) -> tuple[dict[str, list[str]], dict[str, tuple[str, 
         else:
             lines.setdefault(title, []).append(line)
     return lines, texts
-
-
-def names_of(options: Iterable[Option]) -> dict[str, Option]:
-    """Return options that have a value, by their words without dashes."""
-    return {option.flag.removeprefix("--"): option for option in options if option.value}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -98,39 +98,39 @@ class Given:
 
     Parameters
     ----------
-    unit
-        Unit of length of the file: m, cm, mm, in or ft.
-    up
+    unit : str, optional
+        Unit of length, where the file has none.
+    up : str, optional
         Axis of the file that points up, ``z`` or ``y``; by default ``z``.
-    density
+    density : float, optional
         Of blocks for which the file has none, kg/m³.
-    supports
+    supports : sequence of str, optional
         Keys of blocks that are fixed, or of layers and groups of blocks; by default the file's.
-    law
+    law : JointLaw, optional
         Stiffness of joints by area; by default `seqopt.scene.library.common.MASONRY`.
-    gap
-        Most that may lie between faces that touch, m.
-    detect
-        Whether to look for faces although the file has some.
-    accept_overlaps
-        Whether blocks may interpenetrate by more than faces tolerate.
-    robots
-        Number of mobile robots that the scene gets, three if the file has none.
-    name
-        Of the scene.
-    progress
+    gap : float, optional
+        Most that may lie between faces that touch, m (default: a twentieth of the thinnest block).
+    detect : bool, optional
+        Look for faces although the file has some.
+    accept_overlaps : bool, optional
+        Import blocks that interpenetrate by more than faces tolerate.
+    robots : int, optional
+        How many there are, mobile ones that reach all (default: those of the file, else 3).
+    name : str, optional
+        Of the scene (default: that of the file).
+    progress : callable, optional
         Called with how far the search for faces is, which takes long of many blocks.
     """
 
-    unit: str | None = None
-    up: str | None = None
-    density: float | None = None
+    unit: Annotated[str | None, ("choices", UNITS)] = None
+    up: Annotated[str | None, ("choices", UPS)] = None
+    density: Annotated[float | None, ("value", "KG/M3")] = None
     supports: Sequence[str] | None = None
     law: JointLaw | None = None
-    gap: float | None = None
+    gap: Annotated[float | None, ("value", "M")] = None
     detect: bool = False
     accept_overlaps: bool = False
-    robots: int | None = None
+    robots: Annotated[int | None, ("value", "N"), ("most", 100)] = None
     name: str | None = None
     progress: Tell | None = None
 

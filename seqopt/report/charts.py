@@ -21,7 +21,6 @@ from seqopt.report._style import (
     SMALL,
     VERMILION,
     dress,
-    look,
     looks,
     new_figure,
     plain,
@@ -225,38 +224,3 @@ def _draw_along(axes: Axes, steps: pd.DataFrame, rows: list[tuple[str, str]]) ->
         words["some step is undecided"] = Verdict.UNDECIDED
     marks = [Patch(color=VERDICTS[verdict.value], label=word) for word, verdict in words.items()]
     axes.legend(handles=marks, loc="upper right", bbox_to_anchor=(1.0, 1.25), ncols=len(marks))
-
-
-@styled
-def draw_sweep(table: pd.DataFrame, names: Sequence[str]) -> Figure:
-    """Draw the first goal over the first name, a line for every value of a second one.
-
-    Problems without a plan are crosses. ``table``: of `seqopt.sweep.sweep`; ``names``: its columns
-    of what differs.
-    """
-    several = [name for name in names if len(table[name].unique()) > 1] or [*names[:1]]
-    first, second = several[0], several[1] if len(several) > 1 else ""
-    goal = next(c.removesuffix(BOUND) for c in table.columns if c.endswith(BOUND))
-    figure = new_figure(3.4)
-    axes = figure.subplots()
-    axes.set_xlabel(first)
-    numbers = pd.to_numeric(table[first], errors="coerce")
-    named = numbers.isna().any()  # then values stand one beside the other
-    place = pd.Series(pd.factorize(table[first])[0] if named else numbers, table.index, float)
-    for number, value in enumerate(table[second].unique() if second else [""]):
-        own = table[table[second] == value] if second else table
-        about = look(number).line()
-        axes.plot(place[own.index], own[goal].astype(float), label=f"{second} {value}", **about)
-    lacking = table[table[goal].isna()]
-    if len(lacking):
-        foot, low = axes.get_xaxis_transform(), np.full(len(lacking), 0.03)
-        axes.plot(place[lacking.index], low, "x", color=GRAY, transform=foot, label="no plan")
-    if named:
-        axes.set_xticks(range(table[first].nunique()), table[first].unique())
-    elif numbers.min() > 0 and numbers.max() >= 100 * numbers.min():
-        axes.set_xscale("log")
-    axes.set_ylabel(LABELS.get(goal, goal))
-    if second or len(lacking):
-        axes.legend()
-    dress(axes)
-    return figure
