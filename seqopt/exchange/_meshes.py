@@ -15,7 +15,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.exchange._content import MOST_BLOCKS, MOST_CORNERS, Content, FileBlock
 from seqopt.scene._checks import short
-from seqopt.scene.boxes import _bounds_of, as_vectors
+from seqopt.scene.boxes import as_vectors
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
 
 NX, SPATIAL = Later("networkx"), Later("scipy.spatial")  # 0.3 and 0.2 s, for imports alone
@@ -163,39 +163,6 @@ def _compact(points: Floats, faces: _Polygons) -> tuple[Floats, tuple[tuple[int,
     used = sorted({v for face in faces for v in face})
     place = {v: i for i, v in enumerate(used)}
     return points[used], tuple(tuple(place[v] for v in face) for face in faces)
-
-
-def without_repeats(content: Content) -> Content:
-    """Return a content without blocks that repeat earlier ones, which are named.
-
-    Blocks all stay where faces of the file refer to them.
-    """
-    blocks = [block for block in content.blocks if len(block.vertices)]
-    if content.faces or len(blocks) < 2:
-        return content
-    bounds = np.array([_bounds_of(block.vertices).reshape(6) for block in blocks])
-    near = _WELD * float(np.ptp(bounds))
-    first = dict[str, str]()
-    for i, j in sorted(SPATIAL.KDTree(bounds).query_pairs(near)):
-        one, other = blocks[i], blocks[j]
-        alike = one.support == other.support and same_points(one.vertices, other.vertices, _WELD)
-        if alike and one.key not in first:
-            first.setdefault(other.key, one.key)
-    return replace(
-        content,
-        blocks=tuple(block for block in content.blocks if block.key not in first),
-        said=(*content.said, *(f"block {a} repeats {b} and is left out" for a, b in first.items())),
-    )
-
-
-def same_points(some: Floats, others: Floats, share: float) -> bool:
-    """Return whether two sets of points (n, 3) are the same but for their order and rounding.
-
-    ``share``: by which rounding moves a point, over the size of the set and its distance.
-    """
-    near = share * float(np.abs(others).max() + np.ptp(others, axis=0).max())
-    pairs = ((some, others), (others, some))
-    return all(bool(np.max(SPATIAL.KDTree(a).query(b)[0]) <= near) for a, b in pairs)
 
 
 _CUT = "faces that are not flat are cut into triangles"

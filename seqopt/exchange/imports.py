@@ -11,7 +11,6 @@ from seqopt.errors import FileError, SceneError, SceneWarning, StepError
 from seqopt.exchange._building import build_scene
 from seqopt.exchange._content import Content, Given
 from seqopt.exchange._formats import read_file
-from seqopt.exchange._meshes import without_repeats
 from seqopt.scene._checks import LARGEST_NUMBER, printable, short
 from seqopt.scene.scenarios import SAME
 from seqopt.scene.scene import Scene
@@ -82,7 +81,7 @@ def read_content(path: Path, form: str | None = None) -> Content:
     """Return what a file says, in the format of a name; by default in that which it looks like."""
     if path.is_dir():
         raise FileError(f"{path} is a folder; give a file with all blocks, as .obj")
-    return without_repeats(read_file(path, form))
+    return read_file(path, form)
 
 
 def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:

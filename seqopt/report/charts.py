@@ -26,7 +26,7 @@ from seqopt.report._style import (
     plain,
     styled,
 )
-from seqopt.report.comparison import _in_shown_unit, _worst_of
+from seqopt.report.comparison import _in_shown_unit, largest
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import FailureMap
 
@@ -130,7 +130,10 @@ def front_figure(
     down = -(-len(others) // across)
     figure = new_figure(0.8 + 2.5 * down)
     panels = figure.subplots(down, across, squeeze=False).ravel()
-    marks = {name: _worst_of(rows) | {"steps": len(rows)} for name, rows in methods.items()}
+    scene, marks = front.engines[0].network.scene, dict[str, dict[str, float]]()
+    for name, rows in methods.items():
+        worst = largest(scene, rows)
+        marks[name] = {**worst, "F_largest": worst["F_rob"], "steps": len(rows)}
     for axes, name in zip(panels, others, strict=False):
         for label, other in (beside or {}).items():
             ways = (_in_shown_unit(other[c], c) for c in (first, name))
@@ -140,8 +143,14 @@ def front_figure(
         mark: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none", "mew": 2}
         for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
             if first in worst and name in worst:
-                at = [_in_shown_unit(worst[c], c) for c in (first, name)]
-                axes.plot(*at, marker, label=method.replace("_", " "), zorder=3, **mark)
+                axes.plot(
+                    worst[first],
+                    worst[name],
+                    marker,
+                    label=method.replace("_", " "),
+                    zorder=3,
+                    **mark,
+                )
         axes.set(xlabel=LABELS.get(first, first), ylabel=LABELS.get(name, name))
         _scale(axes, FAR * float(pd.Series(y).max()))
         dress(axes)

@@ -360,16 +360,6 @@ def _free_plan(
     return on_the_way(plan), []
 
 
-def _worst_of(table: pd.DataFrame) -> dict[str, float]:
-    """Return the worst responses of any step of a table from `seqopt.analyze`, SI units."""
-    nodes = [str(c).removesuffix("_node") for c in table.columns if str(c).endswith("_node")]
-    columns = [c for c in table.columns if any(c in (f"F_{n}_N", f"F_[{n}]_N") for n in nodes)]
-    out = {"F_largest": float(table[columns].abs().max().max())}
-    for name in ("M_sup", "T_max", "D_max"):
-        out[name] = float(table[CHOSEN_BY[name].column].max()) / CHOSEN_BY[name].scale
-    return out
-
-
 def _in_shown_unit(value: pd.Series[float] | float, name: str) -> pd.Series[float] | float:
     """Return a number of a Pareto set, SI units, in the unit in which it is shown."""
     if name == "tilt":

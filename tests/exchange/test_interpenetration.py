@@ -71,19 +71,7 @@ def test_accepted_overlaps_are_said_first_and_warned_of(read):
     assert "gap" not in str(caught.value)
 
 
-def test_a_block_that_is_there_twice_is_named_and_left_out(read, tmp_path):
+def test_a_block_that_is_there_twice_is_refused(read):
     """It weighed twice as much: both were one block of twelve faces."""
-    scene = read([*GOOD, GOOD[2]])
-    assert "block block_3 repeats block_2 and is left out" in scene.provenance
-    assert [round(brick.mass, 6) for brick in scene.bricks] == [2.4, 2.4, 2.4]
-    assert "repeats" not in read(GOOD).provenance
-    rows = ["0,0,0.03", "0,0,0.09", "0,0,0.09"]
-    table = [
-        "name,x,y,z,length,width,height",
-        *(f"{i},{row},0.2,0.1,0.06" for i, row in enumerate(rows)),
-    ]
-    path = tmp_path / "twice.csv"
-    path.write_text("\n".join(table), encoding="utf-8")
-    found = import_scene(path, given=Given(unit="m", density=2000.0))
-    assert "block 2 repeats 1 and is left out" in found.provenance
-    assert len(found.bricks) == 2
+    with pytest.raises(SceneError, match="blocks block_2 and block_3 interpenetrate by 60 mm"):
+        read([*GOOD, GOOD[2]])

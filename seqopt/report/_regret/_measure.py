@@ -190,7 +190,8 @@ class _Course:
         last, bare = steps[-1], (None,) * len(steps[-1].grips)
         end = [replace(last, grips=bare, kind=StepKind.RELEASE)] if last.held else []
         try:
-            along, *after = self._worst(steps, end)
+            problem = states_of(self.reference)
+            along, *after = (plan_values(problem, part)[0] for part in (steps, end) if part)
         except MechanismError as error:
             return np.inf, np.nan, FALLS, str(error)
         except SeqoptError as error:  # a limit is exceeded
@@ -202,11 +203,6 @@ class _Course:
                     status = FALLS if verdict is Verdict.FALLS else FAILED
                     return np.inf, along, status, f"step {step.number} {verdict.value}"
         return max([along, *after]), along, DONE, ""
-
-    def _worst(self, steps: Sequence[Step], end: Sequence[Step]) -> list[float]:
-        """Return the worst step of a plan, and of its bare end, if there is one after it."""
-        problem = states_of(self.reference)
-        return [plan_values(problem, part)[0] for part in (steps, end) if part]
 
 
 def measure_regret(
