@@ -86,13 +86,12 @@ def _vault_loads(table: pd.DataFrame) -> str:
 
 
 def _makespans(*tables: pd.DataFrame) -> str:
-    """Return a row per arch, robots and formulation: the plan, its proven bound, and seconds."""
-    every = pd.concat(tables).sort_values(["bricks", "robots", "formulation"], kind="stable")
+    """Return a row per arch and robots: the plan, its proven bound, and seconds."""
+    every = pd.concat(tables).sort_values(["bricks", "robots"], kind="stable")
     rows = [
         [
             str(row["bricks"]),
             row["robots"],
-            f"`{row['formulation']}`",
             f"{row['planned']:.0f} s",
             f"{row['makespan']:.0f} s",
             f"{row['proven']:.0f} s",
@@ -103,7 +102,7 @@ def _makespans(*tables: pd.DataFrame) -> str:
         ]
         for row in every.to_dict("records")
     ]
-    head = ["bricks", "robots", "formulation", "fewest steps", "makespan", "proven bound"]
+    head = ["bricks", "robots", "fewest steps", "makespan", "proven bound"]
     return markdown([*head, "status", "took"], rows)
 
 

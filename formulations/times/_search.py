@@ -1,4 +1,4 @@
-"""Plans of formulations of time: states that stand, goals in turn, and waits for mortar.
+"""Plans in time: states that stand, goals in turn, and waits for mortar.
 
 Labels wait no longer than motions prove that they must. The plan that they find is looked at as it
 is, with proven verdicts; where it has to wait longer, motions in which its states fall say why, and
@@ -8,7 +8,7 @@ labels are set again.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,11 +24,10 @@ from formulations.states._search import (
     watched,
 )
 from formulations.times._labels import Carrying
-from formulations.times._stages import ALMOST, Choose, Goals, StageFound, Stages
-from seqopt.arrays import Terse
+from formulations.times._stages import ALMOST, Goals, Least, StageFound, Stages, by_labels
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
+from seqopt.graph.formulation import Solution, Watch
 from seqopt.graph.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
 from seqopt.graph.states._visits import seen_steps
@@ -102,7 +101,7 @@ class Waits:
         return Soonest(grips, times[-1].end, starts)
 
 
-def of_instance(instance: Instance, choose: Choose, watch: Watch) -> Solution:
+def of_instance(instance: Instance, least: Least, watch: Watch) -> Solution:
     """Return the best path through an instance, its states the numbers of nodes."""
     timed = instance.timed if instance.asks_time else None
     if timed is None and not instance.resources:
@@ -115,7 +114,7 @@ def of_instance(instance: Instance, choose: Choose, watch: Watch) -> Solution:
     visited = Visited(graph, ((0, 0, np.arange(instance.nodes)[:, None]),))
     levels = instance.levels if timed is None else timed.levels
     carrying = Carrying(graph, levels, timed, instance.resources, instance.steps)
-    stages = Stages(asked, visited, choose, watch, carrying)
+    stages = Stages(asked, visited, least, watch, carrying)
     try:
         found = stages.run()
     except StopError as stop:
@@ -140,38 +139,26 @@ def _no_higher(bounds: Sequence[float], values: tuple[float, ...]) -> tuple[floa
     return (*map(min, bounds, values), *values[len(bounds) :])
 
 
-@dataclass(frozen=True, repr=False)
-class _InTime(Terse):
-    """The ``solve`` of a formulation of time."""
-
-    choose: Choose = field(repr=False)
-    name: str
-    exact: bool
-
-    def __call__(
-        self,
-        problem: States | Instance,
-        *,
-        seconds: float = np.inf,
-        max_memory: float = np.inf,
-        progress: Tell = lambda _: None,
-    ) -> Solution:
-        """Return the plan of the chosen path, or the incumbent at the limit of time or memory."""
-        watch = Watch(seconds, memory=max_memory)
-        if isinstance(problem, Instance):
-            return of_instance(problem, self.choose, watch)
-        if problem.standing is not None and problem.standing.curing and not self.exact:
-            raise ProblemError(
-                f"{self.name}: it does not know mortar that cures; take makespan_labels"
-            )
-        tell = watched(problem, watch, progress)
-        return after_margins(
-            problem, lambda rest: _searched(rest, self.choose, watch, tell, progress), tell
-        )
+def plan_in_time(
+    problem: States | Instance,
+    *,
+    seconds: float = np.inf,
+    max_memory: float = np.inf,
+    progress: Tell = lambda _: None,
+    least: Least = by_labels,
+) -> Solution:
+    """Return the plan of least makespan, or the incumbent at the limit of time or memory."""
+    watch = Watch(seconds, memory=max_memory)
+    if isinstance(problem, Instance):
+        return of_instance(problem, least, watch)
+    if least is not by_labels and problem.standing is not None and problem.standing.curing:
+        raise ProblemError("it does not know mortar that cures; take makespan_labels")
+    tell = watched(problem, watch, progress)
+    return after_margins(problem, lambda rest: _searched(rest, least, watch, tell, progress), tell)
 
 
 def _searched(
-    problem: States, choose: Choose, watch: Watch, tell: Watching, progress: Tell
+    problem: States, least: Least, watch: Watch, tell: Watching, progress: Tell
 ) -> Solution:
     """Return the best plan of states that are proven to stand, where that is demanded."""
     first, waits, best = None, Waits(problem), list[Solution]()
@@ -186,7 +173,7 @@ def _searched(
         while wide.whole:
             wide.refine()
             progress("makespan")
-            visited, stages, found = _staged(problem, wide, choose, watch, waits)
+            visited, stages, found = _staged(problem, wide, least, watch, waits)
             if close_fallen(wide, visited, found.path):
                 continue
             plan = _plan(problem, visited, stages, found, waits)
@@ -210,7 +197,7 @@ def _searched(
 
 
 def _staged(
-    problem: States, wide: Explorer, choose: Choose, watch: Watch, waits: Waits
+    problem: States, wide: Explorer, least: Least, watch: Watch, waits: Waits
 ) -> tuple[Visited, Stages, StageFound]:
     """Return the visited states in time, and the best path through them, goal after goal."""
     visited = wide.graph()
@@ -221,7 +208,7 @@ def _staged(
     levels = np.repeat([key for key, *_ in visited.states], [len(s) for *_, s in visited.states])
     seen = seen_steps(problem, visited) if problem.paths else None
     carrying = Carrying(graph, levels, timed, problem.paths, seen)
-    stages = Stages(asked, visited, choose, watch, carrying)
+    stages = Stages(asked, visited, least, watch, carrying)
     try:
         return visited, stages, stages.run()
     except InfeasibleError as error:
@@ -281,15 +268,3 @@ def _by_then(
     return replace(
         found, objective=values, grips=soonest.grips, starts=soonest.starts, ends=soonest.makespan
     )
-
-
-def in_time(
-    name: str, summary: str, kind: FormulationKind, choose: Choose, *, exact: bool = False
-) -> Formulation:
-    """Return the formulation of time that chooses a path by a function of an `Asked`.
-
-    ``exact``: whether it knows mortar that cures, and further resources.
-    """
-    solve = _InTime(choose, name, exact)
-    answers = ("time", *("resource",) * exact, "instance")
-    return Formulation(name, summary, kind, None, solve, answers=answers, takes_budgets=True)

@@ -1,8 +1,7 @@
-"""What formulations of time share: states, goals one after the other, and plans from paths.
+"""Goals one after the other, on a graph in time: paths, with lower bounds that labels prove.
 
-A formulation of time is a function from a build in time to a `Chosen`: a path, its makespan and
-a lower bound. Goals before the makespan leave moves out, as without time; where there
-are budgets, and after the makespan, they are sought by labels that keep all caps at once.
+Goals before the makespan leave moves out, as without time; where there are budgets, and after the
+makespan, they are sought by labels that keep all caps at once.
 """
 
 from __future__ import annotations
@@ -24,6 +23,8 @@ from seqopt.graph.graph import LabelProof
 from seqopt.graph.paths import _best_moves, _on_paths, moves_along, tied
 from seqopt.problem.amounts import Amount
 
+SHARES = (0.25, 0.5, 0.75, 1.0)  # of the gap that is left, up to which labels are set
+MOST = 40_000_000  # labels that are kept at once
 BEAMS = (100, 1000, 5000)  # widths of the searches for a first path
 ALMOST = 1e-9  # over a value: a path must be better by more than this to be better
 
@@ -40,32 +41,6 @@ class Chosen(NamedTuple):
     bound: float
     labels: tuple[Labels, ...] = ()
     late: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Asked:
-    """The problem of the least makespan of a build in time.
-
-    ``carrying``: states, moves and resources; ``kept`` (m,): the moves that may be taken; ``caps``:
-    what paths must keep to; ``prices``: multipliers that bound builds; ``first``: a first path, of
-    no states if none was found; ``watch``: says when to stop.
-    """
-
-    carrying: Carrying
-    kept: Bools
-    caps: Caps
-    prices: Prices
-    first: Chosen
-    watch: Watch
-
-    def by(self, kept: Bools) -> Chosen:
-        """Return the best path by some moves (m,), with its exact makespan."""
-        caps = Caps(sums=self.caps.sums)
-        swept = self.carrying.sweep(kept, caps, self.prices, Watch())
-        return Chosen(swept.path, swept.best, self.prices.bound)
-
-
-Choose = Callable[[Asked], Chosen]
 
 
 @dataclass
@@ -113,6 +88,33 @@ def beams(
     return best
 
 
+Least = Callable[[Carrying, StageFound, Chosen, Prices, Watch], Chosen]
+"""Returns the path of least makespan by the moves and caps that are left, from a first one."""
+
+
+def by_labels(
+    carrying: Carrying, stage: StageFound, best: Chosen, prices: Prices, watch: Watch
+) -> Chosen:
+    """Return the path of least makespan, with the labels that prove it."""
+    bound, labels = best.bound, tuple[Labels, ...]()
+    start, shares = bound, SHARES if best.path else ()
+    for share in shares or (np.inf,):  # narrow searches find nothing where budgets leave little
+        limit = start + (best.value - start) * share if share < 1 else best.value * (1 - ALMOST)
+        caps = replace(stage.caps, time=min(limit, stage.caps.time))
+        try:
+            swept = carrying.sweep(stage.kept, caps, prices, watch, most=MOST)
+        except LateError:
+            return Chosen(best.path, best.value, bound, labels, late=True)
+        watch.tell(bound=bound)
+        labels = tuple(swept.kept)
+        if swept.path or not best.path:
+            return Chosen(swept.path, swept.best, swept.best, labels)
+        bound = max(bound, min(swept.left_out, best.value))
+        if bound >= best.value * (1 - ALMOST):
+            break
+    return Chosen(best.path, best.value, best.value, labels)
+
+
 class Goals(NamedTuple):
     """Goals, of which the last ones are capped by ``budgets``; the first are the ``aims``."""
 
@@ -125,9 +127,9 @@ class Stages:
     """Goals of a problem one after the other, on a graph in time."""
 
     def __init__(
-        self, problem: Goals, visited: Visited, choose: Choose, watch: Watch, carrying: Carrying
+        self, problem: Goals, visited: Visited, least: Least, watch: Watch, carrying: Carrying
     ) -> None:
-        self._problem, self._choose, self._watch = problem, choose, watch
+        self._problem, self._least, self._watch = problem, least, watch
         self._visited, self._carrying, self._graph = visited, carrying, carrying.graph
         budgets = dict(enumerate(problem.budgets, start=len(problem.aims)))
         is_time = {k: problem.goals[k].in_time for k in budgets}
@@ -172,21 +174,17 @@ class Stages:
         stage, carrying = self._stage, self._carrying
         prices = carrying.prices(stage.kept, self._watch)
         swept = beams(carrying, stage.kept, stage.caps, prices, self._watch)
-        first = Chosen(swept.path, swept.best, prices.bound)
-        found = first
-        if first.value > prices.bound * (1 + ALMOST):
-            found = self._choose(
-                Asked(carrying, stage.kept, stage.caps, prices, first, self._watch)
-            )
+        found = Chosen(swept.path, swept.best, prices.bound)
+        if found.value > prices.bound * (1 + ALMOST):
+            found = self._least(carrying, stage, found, prices, self._watch)
         if not found.path and found.late:
             raise StopError("time")
-        if not found.path or found.value > tied(stage.caps.time):
-            if found.bound == np.inf or found.bound > tied(stage.caps.time):
-                raise InfeasibleError("no plan is within all budgets")
-            raise NothingFoundError(
-                f"no plan within all budgets was found, and none takes less than {found.bound:.6g} "
-                "s; makespan_labels looks at all"
-            )
+        if not found.path:
+            if found.bound < np.inf:
+                raise NothingFoundError(
+                    "no plan within all budgets was found; take makespan_labels"
+                )
+            raise InfeasibleError("no plan is within all budgets")
         stage.path, stage.late = found.path, found.late
         stage.bounds.append(min(found.bound, found.value))
         stage.proofs.append(self._proof(found.labels, prices))

@@ -18,48 +18,55 @@ the best of a first one and that of the flow.
 
 from __future__ import annotations
 
+from functools import partial
+
 import cvxpy as cp
 import numpy as np
 
 from formulations.flow import conserved, unit_flow
 from formulations.solvers import EXACTLY, minimize_by_highs
-from formulations.times._labels import useful
-from formulations.times._search import in_time
-from formulations.times._stages import Asked, Chosen
+from formulations.times._labels import Caps, Carrying, Prices, useful
+from formulations.times._search import plan_in_time
+from formulations.times._stages import Chosen, StageFound
 from seqopt.errors import InfeasibleError
-from seqopt.graph.formulation import FormulationKind
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 
 
-def _bounded(asked: Asked) -> Chosen:
+def _bounded(
+    carrying: Carrying, stage: StageFound, first: Chosen, prices: Prices, watch: Watch
+) -> Chosen:
     """Return the better one of the incumbent and the path of the flow, with the flow's bound."""
-    first, watch, timed = asked.first, asked.watch, asked.carrying.timed
+    timed, caps = carrying.timed, stage.caps
     assert timed is not None  # no further resource is asked of it
-    most = min(first.value, asked.caps.time)
-    kept = useful(timed, asked.prices, asked.kept, most) if np.isfinite(most) else asked.kept
+    most = min(first.value, caps.time)
+    kept = useful(timed, prices, stage.kept, most) if np.isfinite(most) else stage.kept
     kept = kept & ~timed.graph.ends[timed.graph.source]
     flow, work = unit_flow(timed.graph.only(kept)), timed.work[kept]
-    scale = asked.prices.bound or 1.0
+    scale = prices.bound or 1.0
     arcs, makespan = cp.Variable(len(flow.cost), boolean=True), cp.Variable(nonneg=True)
     shared = cp.NonNeg(makespan * timed.sizes - work.T / scale @ arcs)
-    sums = [
-        cp.NonNeg(cap - flow.graph.amounts[:, column] @ arcs) for column, cap in asked.caps.sums
-    ]
+    sums = [cp.NonNeg(cap - flow.graph.amounts[:, column] @ arcs) for column, cap in caps.sums]
     program = cp.Problem(cp.Minimize(makespan), [conserved(flow, arcs), shared, *sums])
     try:
         found = minimize_by_highs(program, feasible=False, watch=watch, tolerance=EXACTLY)
     except InfeasibleError:
         return first._replace(bound=first.value)
-    bound = max(asked.prices.bound, scale * found.bound * (1 - 1e-9))
+    bound = max(prices.bound, scale * found.bound * (1 - 1e-9))
     if np.isfinite(found.value):
         every = np.zeros(len(kept), dtype=bool)
         every[np.flatnonzero(kept)[np.asarray(arcs.value) > 0.5]] = True
-        first = min(first, asked.by(every), key=lambda each: each.value)
+        swept = carrying.sweep(every, Caps(sums=caps.sums), prices, Watch())
+        other = Chosen(swept.path, swept.best, bound)
+        first = min(first, other, key=lambda each: each.value)
     return Chosen(first.path, first.value, min(bound, first.value), late=found.stopped)
 
 
-FORMULATION = in_time(
+FORMULATION = Formulation(
     "makespan_flow",
     "a whole unit flow that shares the robots' time: a bound",
     FormulationKind.BOUND,
-    _bounded,
+    None,
+    partial(plan_in_time, least=_bounded),
+    answers=("time", "instance"),
+    takes_budgets=True,
 )

@@ -28,53 +28,15 @@ end, none ends before the least bound that was left out.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from formulations.times._search import plan_in_time
+from seqopt.graph.formulation import Formulation, FormulationKind
 
-import numpy as np
-
-from formulations.times._search import in_time
-from formulations.times._stages import ALMOST, Asked, Chosen
-from seqopt.graph._labels import Labels, LateError
-from seqopt.graph.formulation import FormulationKind
-
-SHARES = (0.25, 0.5, 0.75, 1.0)  # of the gap that is left, up to which labels are set
-MOST = 40_000_000  # labels that are kept at once
-
-
-def _least(asked: Asked) -> Chosen:
-    """Return the path of least makespan, with the labels that prove it."""
-    best, bound = asked.first, asked.prices.bound
-    labels: tuple[Labels, ...] = ()
-    if not best.path:  # narrow searches found nothing, as budgets leave little
-        try:
-            own = asked.kept, asked.caps, asked.prices
-            found = asked.carrying.sweep(*own, asked.watch, most=MOST)
-        except LateError:
-            return Chosen((), np.inf, bound, late=True)
-        return Chosen(found.path, found.best, found.best, tuple(found.kept))
-    start = bound
-    for share in SHARES:
-        limit = start + (best.value - start) * share if share < 1.0 else best.value * (1 - ALMOST)
-        caps = replace(asked.caps, time=min(limit, asked.caps.time))
-        try:
-            own = asked.kept, caps, asked.prices
-            swept = asked.carrying.sweep(*own, asked.watch, most=MOST)
-        except LateError:
-            return Chosen(best.path, best.value, bound, labels, late=True)
-        asked.watch.tell(bound=bound)
-        labels = tuple(swept.kept)
-        if swept.path:
-            return Chosen(swept.path, swept.best, swept.best, labels)
-        bound = max(bound, min(swept.left_out, best.value))
-        if bound >= best.value * (1 - ALMOST):
-            break
-    return Chosen(best.path, best.value, best.value, labels)
-
-
-FORMULATION = in_time(
+FORMULATION = Formulation(
     "makespan_labels",
     "labels of time and readiness, bounded by multipliers of the robots' time",
     FormulationKind.EXACT,
-    _least,
-    exact=True,
+    None,
+    plan_in_time,
+    answers=("time", "resource", "instance"),
+    takes_budgets=True,
 )

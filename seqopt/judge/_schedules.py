@@ -59,7 +59,7 @@ def judge_schedule(
     step breaks a rule.
     """
     own, aims = ordered(problem, selection.order), len(problem.aims)
-    values, none = _as_claimed(own, selection, steps), (-np.inf,) * len(problem.goals)
+    values = _as_claimed(own, selection, steps)
     for goal, spent, cap in zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True):
         if not spent <= cap + TOLERANCE * cap:
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
@@ -67,7 +67,7 @@ def judge_schedule(
     if problem.is_timed:
         proves = _path_twin(problem) is not None and bool(np.isfinite(selection.bound).any())
     is_claimed = not proves and (selection.stopped or by_labels)
-    bounds = _with_counts(problem, values, none)  # bounds are claimed alone
+    bounds: Bounds = (-np.inf,) * len(problem.goals)  # they are claimed alone
     with suppress(TooManyPartsError):
         if not is_claimed and _has_twins(problem):
             return _proven(problem, selection, values, hint, exact=exact)
@@ -111,7 +111,7 @@ def _proven(
         found = proof.budget_bounds(values, claimed, selection.prices)
     else:
         found = proof.bounds(values) if len(margins) < len(values) else margins
-    bounds = _with_counts(problem, values, _closed(values, (*margins, *found[len(margins) :])))
+    bounds = _closed(values, (*margins, *found[len(margins) :]))
     if not (problem.is_timed or problem.totals or problem.paths):
         promised = values if exact and not budgets else claimed
         for goal, bound, least in zip(problem.aims, bounds, promised, strict=False):
@@ -173,17 +173,6 @@ def _margin_bounds(problem: States, proof: Proof, values: Bounds) -> Bounds:
                 raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
             out.append(bound)
     return tuple(out)
-
-
-def _with_counts(problem: States, values: Bounds, bounds: Bounds) -> Bounds:
-    """Return bounds of the first goals, raised to the combinatorial bound of makespans."""
-    if (twin := _path_twin(problem)) is None:
-        return bounds
-    least = twin.least(problem.network, problem.rules)
-    return tuple(
-        max(bound, min(least, value)) if goal.in_time else bound
-        for goal, value, bound in zip(problem.goals, values, bounds, strict=False)
-    )
 
 
 def _as_claimed(problem: States, selection: Solution, steps: Sequence[Step]) -> Bounds:

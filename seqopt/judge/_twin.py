@@ -16,12 +16,9 @@ from seqopt._registry import registered
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.graph import TimedGraph
-from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays
 from seqopt.problem.requirements import Limit
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.schedule import Schedule
 
 ROUNDED = 1e-9  # by which a response may be over a limit, over its size
 
@@ -41,15 +38,13 @@ class Twin(NamedTuple):
 class PathTwin(NamedTuple):
     """How an amount of whole paths is computed and bounded once more.
 
-    ``value``: of the steps of a problem, with the starts that are claimed; ``least``: combinatorial
-    lower bound of all builds by some rules; ``clocks``: makes of an evaluator, rebuilt states and
-    claimed motions these in time, as of `seqopt.times._clock.TimedRows`; ``path_value``: of arcs
-    and acts of an instance; ``claimed``: what a claim about an instance proves, as of
-    `seqopt.judge.arithmetic.proven`.
+    ``value``: of the steps of a problem, with the starts that are claimed; ``clocks``: makes of an
+    evaluator, rebuilt states and claimed motions these in time, as of
+    `seqopt.times._clock.TimedRows`; ``path_value``: of arcs and acts of an instance; ``claimed``:
+    what a claim about an instance proves, as of `seqopt.judge.arithmetic.proven`.
     """
 
     value: Callable[[Any, Sequence[Any], Sequence[float]], float]
-    least: Callable[[Network, FreeRules | Schedule], float]
     clocks: Callable[..., Any]
     path_value: Callable[[TimedGraph, Any, Any], float]
     claimed: Callable[..., float]

@@ -148,19 +148,16 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
         with suppress(InfeasibleError, NothingFoundError):
             within_budgets(graph, problem.budgets)
             return SolverError(f"formulation {name} {ALLOWED}")
-    said, proven = list[str](), False
+    said = list[str]()
     for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
         goal, unit = problem.goals[k], " s" * problem.goals[k].in_time
-        if goal.in_time:
-            known = goal.twin is not None
-            least = goal.twin.least(problem.network, problem.rules) if known else -np.inf
-            proven |= least > tied(cap)
-        else:
+        least = -np.inf  # of a makespan
+        if not goal.in_time:
             least = distances(graph, graph.amounts[:, k])[graph.ends].min()
         alone = " by itself" if least <= tied(cap) else ""
         at_least = f"{goal} is at least {least:.6g}{unit}{alone}, and " * bool(np.isfinite(least))
         said.append(f"{at_least}{cap:g}{unit} is allowed")
-    proven = proven or Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
+    proven = Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
     why = f"{problem.title}: no plan is within all budgets; {', '.join(said)}"
     return InfeasibleError(why) if proven else claimed(name, why, exact=exact)
 

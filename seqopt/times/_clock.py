@@ -138,10 +138,9 @@ class Floors:
         for motion in motions:
             if len(motion) <= len(network.inner):
                 self._cuts.add(motion)
-        self._brick, self._points = joints.closing, [curing.points] * len(joints.names)
-        ages = np.array([points[-1][0] if points else 0.0 for points in self._points])
+        self._brick, self._points = joints.closing, curing.points
         self.full = np.zeros(len(network.inner))  # age at which all joints of a brick are cured, s
-        np.maximum.at(self.full, self._brick, ages)
+        self.full[self._brick] = max((age for age, _ in curing.points), default=0.0)
 
     def starts(self, bricks: int, grips: Grips, placed: Floats, start: Floats) -> Floats:
         """Return from when on, no sooner than times (k,), s, states are not proven to fall.
@@ -158,7 +157,7 @@ class Floors:
             for j in joints:
                 since = placed[rows, self._brick[j]]
                 age = np.maximum(now - since, 0.0) + CLOSE * np.abs(now)
-                for at, share in self._points[j]:
+                for at, share in self._points:
                     bond[age >= at, j] = share
                     ahead = since + at > now + 2 * CLOSE * np.abs(now)
                     later = np.where(ahead & (since + at < later), since + at, later)

@@ -7,7 +7,6 @@ grow, so a state that stands with what its joints have when it begins stands whi
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 
 import numpy as np
 
@@ -28,7 +27,8 @@ class JointsInTime:
     """The joints of a scene, and which share of its bond each has when.
 
     ``names`` (J,): in the order of contacts; ``closing`` (J,): index, in build order, of the brick
-    that closes it; ``ages``, ``shares`` (J, k): what is reached when.
+    that closes it; ``ages``, ``shares`` (k,): what is reached when; ``full`` (b,): at which age all
+    joints that a brick closes have their full bond, s.
     """
 
     def __init__(self, network: Network, curing: Curing) -> None:
@@ -37,16 +37,9 @@ class JointsInTime:
             _contact_at(network, i)[0] for i in springs.acting(len(network.inner)).tolist()
         )
         self.closing = np.asarray(springs.since[springs.acting(len(network.inner))] - 1)
-        reached = np.array(curing.points).reshape(-1, 2).T
-        self.ages, self.shares = (np.tile(row, (len(self.names), 1)) for row in reached)
-
-    @cached_property
-    def full(self) -> Floats:
-        """At which age all joints that a brick closes have their full bond, (b,), s."""
-        last = np.where(np.isfinite(self.ages), self.ages, 0.0).max(axis=1, initial=0.0)
-        out = np.zeros(int(self.closing.max(initial=-1)) + 1)
-        np.maximum.at(out, self.closing, last)
-        return out
+        self.ages, self.shares = np.array(curing.points).reshape(-1, 2).T
+        self.full = np.zeros(len(network.inner))
+        self.full[self.closing] = self.ages.max(initial=0.0)
 
     def count(self, bricks: int) -> int:
         """Return how many joints so many bricks have."""
@@ -61,15 +54,13 @@ class JointsInTime:
         count = self.count(bricks)
         since = placed[:, self.closing[:count]]
         age = np.maximum(time[:, None] - since, 0.0) + SLACK * np.abs(time[:, None])
-        reached = (age[:, :, None] >= self.ages[:count]).sum(axis=2)
-        table = np.pad(self.shares[:count], ((0, 0), (1, 0)))
-        return np.asarray(np.take_along_axis(table[None], reached[:, :, None], axis=2)[:, :, 0])
+        return np.append(0.0, self.shares)[(age[:, :, None] >= self.ages).sum(axis=2)]
 
     def events(self, bricks: int, placed: Floats) -> Floats:
         """Return when joints reach points, (n, j * k), s; see `at`."""
         count = self.count(bricks)
         since = placed[:, self.closing[:count]]
-        return np.asarray((since[:, :, None] + self.ages[:count]).reshape(len(placed), -1))
+        return np.asarray((since[:, :, None] + self.ages).reshape(len(placed), -1))
 
 
 Waits = Callable[[AnyStep, Sequence[float], float], tuple[float, str]]
@@ -133,8 +124,7 @@ class CuringBuilds:
             low, high = (low, middle) if self._stands(step, times[middle], rows) else (middle, high)
         if high == len(times):
             return np.inf, ""
-        per_joint = self.joints.ages.shape[1]
-        joint = int(np.flatnonzero(events == times[high])[0]) // per_joint
+        joint = int(np.flatnonzero(events == times[high])[0]) // len(self.joints.ages)
         return float(times[high]), self.joints.names[joint]
 
     @property

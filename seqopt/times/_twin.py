@@ -7,11 +7,10 @@ from seqopt.judge._twin import PathTwin
 from seqopt.problem.amounts import Amount
 from seqopt.sequence.rules import FreeRules
 from seqopt.times._clock import TimedRows, claimed_time, path_makespan
-from seqopt.times._counts import least_by_counts
 from seqopt.times._step_check import makespan_of_steps
 from seqopt.times._steps import have_speeds, require_durations
 
-TWIN = PathTwin(makespan_of_steps, least_by_counts, TimedRows, path_makespan, claimed_time)
+TWIN = PathTwin(makespan_of_steps, TimedRows, path_makespan, claimed_time)
 
 
 def _check(problem: Any) -> None:

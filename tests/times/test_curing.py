@@ -197,5 +197,5 @@ def test_what_is_not_modeled_says_so():
     with pytest.raises(ProblemError, match="tilt: it is not modeled while mortar cures"):
         Standing("epoxy", 0.1, "15min")
     problem = seqopt.pose(engine, ALONE, ONES, "makespan", stands=Standing("epoxy", curing="1h"))
-    with pytest.raises(ProblemError, match="makespan_flow: it does not know mortar that cures"):
+    with pytest.raises(ProblemError, match="it does not know mortar that cures"):
         seqopt.solve(problem, "makespan_flow")
