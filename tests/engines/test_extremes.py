@@ -138,14 +138,14 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
         "def refuse(*_, **__): raise OSError('read only')\n"
         "tempfile.TemporaryFile = refuse\n"  # what numba tries folders by
         "import numpy as np\n"
-        "from seqopt.engines.rigid._compiled import solve_lower as solve\n"
-        "low, share, pivot = np.full((1, 1), -2.0), np.ones(1), np.ones(1)\n"
-        "solve(low, share, pivot)\n"
-        "print(share[0], type(solve._cache).__name__)\n"
+        "from seqopt.engines.rigid._compiled import _add_six as add\n"
+        "out = np.zeros(2)\n"
+        "add(out, np.ones((6, 2)), 0, np.ones(6))\n"
+        "print(out[0], type(add._cache).__name__)\n"
     )
     command = [sys.executable, "-W", "error", "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["-0.5", "NullCache"]
+    assert done.stdout.split() == ["6.0", "NullCache"]
 
 
 def test_without_numba_fields_answer(monkeypatch):

@@ -20,7 +20,13 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Fields, Want
-from seqopt.engines.rigid._grip_equations import _GripForces, well_conditioned
+from seqopt.engines.rigid._grip_equations import (
+    GripForces,
+    brace,
+    pairs_of,
+    solve_positive,
+    well_conditioned,
+)
 from seqopt.engines.rigid._operator import Doubts, OperatorBuilder, load_rows
 from seqopt.engines.rigid._response_maps import SceneMaps, inner_edges
 from seqopt.work._threads import cores, in_threads, one_thread
@@ -191,14 +197,12 @@ class GrownExtremes:
         These are answered not well enough. Two grips on one brick share. ``most``: as of
         `well_conditioned`.
         """
-        force = np.empty((len(columns), 3 * columns.shape[1]))
-        pivot = np.empty(force.shape[::-1])
-        _loops().solve_grown(self._grown, self._part.axis, columns, force, pivot)
-        index = load_rows(columns, 0)
-        apart = ~well_conditioned(self, index, _GripForces(force, pivot), most)
+        grown, maps, loops, axis = self._grown, self._maps, _loops(), self._part.axis
+        solution, pivot = _solve_grips(grown, columns, np.stack([axis, -axis], 1).reshape(-1, 3))
+        force = np.ascontiguousarray(solution.T)
+        apart = ~well_conditioned(self, load_rows(columns, 0), GripForces(force, pivot), most)
         force[apart] = 0.0
         part = self._part if want & Want.DISPLACEMENTS else self._part._replace(nodes=0)
-        grown, maps, loops = self._grown, self._maps, _loops()
 
         def reduce(own: slice) -> Floats:
             squares: Floats = loops.reduce_sets(grown, maps, part, columns[own], force[own])
@@ -210,3 +214,22 @@ class GrownExtremes:
         np.sqrt(found[2:], out=found[2:])
         size = np.sqrt((force.reshape(*columns.shape, 3) ** 2).sum(axis=2))
         return found, size, apart | ~np.isfinite(found).all(axis=0)
+
+
+def _solve_grips(grown: Grown, columns: Ints, across: Floats) -> tuple[Floats, Floats]:
+    """Return forces (k, S) that hold nodes (S, r) still, and scaled pivots (k, S).
+
+    ``across``: as of `pairs_of`.
+    """
+    sets, count = len(columns), 3 * columns.shape[1]
+    at = 6 * (columns // 2)[..., None] + np.arange(6)
+    rows = 3 * (columns % 2)[..., None] + np.arange(3)
+    nodes = grown.nodes[(columns // 2)[..., None], rows]  # (S, r, 3, 6)
+    moved = grown.twist[1 + at[:, :, None, :, None], at[:, None, :, None]]  # (S, r, r, 6, 6)
+    flexibility = nodes[:, :, None] @ moved @ nodes[:, None].swapaxes(3, 4)
+    system = np.empty((count + 1, count, sets))
+    system[:count] = flexibility.transpose(1, 3, 2, 4, 0).reshape(count, count, sets)
+    dead = nodes @ grown.twist[0, at][..., None]
+    system[count] = -dead.reshape(sets, count).T
+    brace(system[:count], pairs_of(across, columns), 3)
+    return solve_positive(system)

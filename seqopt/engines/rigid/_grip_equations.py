@@ -45,8 +45,11 @@ class Pairs(NamedTuple):
         return np.asarray(~yields[self.sets, self.first] & ~yields[self.sets, self.second])
 
 
-def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
-    """Return all pairs of grips of the sets that share a brick."""
+def pairs_of(across: Floats, columns: Ints) -> Pairs:
+    """Return all pairs of grips of the sets that share a brick.
+
+    ``across`` (2b, 3): unit vectors from each inner node to the other of its brick.
+    """
     couples = np.array(np.triu_indices(columns.shape[1], 1))
     one, other = columns.T.take(couples, axis=0)
     same = one ^ 1 == other  # the two nodes of a brick
@@ -55,7 +58,7 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
         return Pairs(none, none, none, none, np.empty((0, 3)))
     couple, sets = same.nonzero()
     node, (first, second) = one[same], couples.take(couple, axis=1)
-    return Pairs(sets, first, second, node // 2, operator.across.take(node, axis=0))
+    return Pairs(sets, first, second, node // 2, across.take(node, axis=0))
 
 
 def _as_rows(each: Floats) -> Floats:
@@ -63,7 +66,7 @@ def _as_rows(each: Floats) -> Floats:
     return np.ascontiguousarray(each.reshape(len(each), each.shape[1] * each.shape[2]).T)
 
 
-def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tuple[Floats, Floats]:
+def solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tuple[Floats, Floats]:
     """Solve S positive definite systems of k unknowns in place, the batch along the last axis.
 
     Up to three times as fast as ``numpy.linalg.solve`` for a thousand 9 x 9 systems, which calls
@@ -95,7 +98,7 @@ def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tu
     return answer, pivots
 
 
-class _GripForces(NamedTuple):
+class GripForces(NamedTuple):
     """The forces of the grips of sets, and how well they are determined."""
 
     force: Floats  # (S, k); N
@@ -113,7 +116,7 @@ def grip_forces(
     index: Ints,
     pairs: Pairs | None = None,
     compliance: GripCompliance = RIGID,
-) -> _GripForces:
+) -> GripForces:
     """Return the forces of grips, by which their nodes stay, or go as far as they are compliant.
 
     Two rigid grips on one rigid brick leave the force between them along the brick undetermined:
@@ -122,12 +125,12 @@ def grip_forces(
     ``index`` (S, k): the loads at the grips, from `ComplianceOperator.load_index`; ``pairs``: of
     the sets, if they are known; ``compliance``: of the sets.
     """
-    pairs = pairs_of(operator, columns) if pairs is None else pairs
+    pairs = pairs_of(operator.across, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
     off = None if compliance.moved is None else _as_rows(-_offsets(operator, compliance.moved))
     dead = operator.dead_displacement.take(rows)
     force, pivot = _solved(operator, pairs, rows, dead, compliance, off)
-    return _GripForces(force.T, pivot)
+    return GripForces(force.T, pivot)
 
 
 class _Doubted(Protocol):
@@ -141,7 +144,7 @@ class _Doubted(Protocol):
 def well_conditioned(
     operator: _Doubted,
     index: Ints,
-    found: _GripForces,
+    found: GripForces,
     most: float,
     compliance: GripCompliance = RIGID,
 ) -> Bools:
@@ -154,7 +157,7 @@ def well_conditioned(
 
 
 def _doubts(
-    operator: _Doubted, index: Ints, found: _GripForces, compliance: GripCompliance = RIGID
+    operator: _Doubted, index: Ints, found: GripForces, compliance: GripCompliance = RIGID
 ) -> Floats:
     """Return the error (S,) of forces for rounding of one part in one, over the largest of each.
 
@@ -202,7 +205,7 @@ def still_forces(
     grips; ``off`` (S, r, w): how far they are from where they should be, m, what they yield
     counted. Between two rigid grips on one brick there is no force.
     """
-    pairs, rows = pairs_of(operator, columns), np.ascontiguousarray(index.T)
+    pairs, rows = pairs_of(operator.across, columns), np.ascontiguousarray(index.T)
     apart = None if off is None else _as_rows(off)
     return _solved(operator, pairs, rows, np.ascontiguousarray(moved.T), compliance, apart)[0].T
 
@@ -223,7 +226,7 @@ def share_pairs(
     ``force`` (S, k), ``carried`` (S, E), (S, 0): of grips and edges, changed in place, N; where
     there are none of edges, they are computed. Others: as of `grip_forces`.
     """
-    pairs = pairs_of(operator, columns) if pairs is None else pairs
+    pairs = pairs_of(operator.across, columns) if pairs is None else pairs
     if not len(pairs.sets):
         return
     sets, edges = pairs.sets, operator.inner_edge[pairs.brick]
@@ -263,16 +266,24 @@ def _solved(
         pairs = pairs.only(pairs.rigid(compliance, sets, nodes // operator.width))
     if off is not None:
         system[-1, : len(off)] -= off
-    if len(pairs.sets):  # the force between two on one brick gets a flexibility
-        width, grips = operator.width, nodes // operator.width
-        whole = system[:nodes, :nodes].reshape(grips, width, grips, width, sets)
-        blocks = whole[:, :3, :, :3]
-        trace = np.einsum("ririt->t", blocks)[pairs.sets]
-        block = (trace[:, None] * pairs.axis)[:, :, None] * pairs.axis[:, None]
-        first = np.array([pairs.first, pairs.second, pairs.second])
-        second = np.array([pairs.first, pairs.second, pairs.first])
-        blocks[first, :, second, :, pairs.sets] += np.array([block, block, -block])
-    return _solve_positive(system, operator.loose, scale)
+    brace(system[:nodes, :nodes], pairs, operator.width)
+    return solve_positive(system, operator.loose, scale)
+
+
+def brace(matrices: Floats, pairs: Pairs, width: int) -> None:
+    """Give the force between two grips on one brick a flexibility, so that there is one answer.
+
+    ``matrices`` (n, n, S): the sets' equations, changed in place; ``width``: unknowns of a grip.
+    """
+    if not len(pairs.sets):
+        return
+    grips, sets = len(matrices) // width, matrices.shape[2]
+    blocks = matrices.reshape(grips, width, grips, width, sets)[:, :3, :, :3]
+    trace = np.einsum("ririt->t", blocks)[pairs.sets]
+    block = (trace[:, None] * pairs.axis)[:, :, None] * pairs.axis[:, None]
+    first = np.array([pairs.first, pairs.second, pairs.second])
+    second = np.array([pairs.first, pairs.second, pairs.first])
+    blocks[first, :, second, :, pairs.sets] += np.array([block, block, -block])
 
 
 _CLOSE = 1e-4  # flexibility of two grips on one brick, over its own, below which digits are lost

@@ -283,7 +283,7 @@ class _Corrector:
         """Return the fields of a few sets."""
         operator, parts, network = self.operator, self.system.parts, self.system.network
         index = operator.load_index(columns)
-        pairs = pairs_of(operator, columns)
+        pairs = pairs_of(operator.across, columns)
         found = grip_forces(operator, columns, index, pairs, compliance)
         if operator.loose:
             for at in np.flatnonzero(~(found.lowest >= _HARDLY_HELD)):

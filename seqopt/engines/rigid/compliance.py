@@ -108,7 +108,8 @@ def _solve_fast(
     ``accuracy``: largest error of fields,
     over the largest entry of each, that is accepted.
     """
-    sets, index, pairs = len(columns), operator.load_index(columns), pairs_of(operator, columns)
+    sets, index = len(columns), operator.load_index(columns)
+    pairs = pairs_of(operator.across, columns)
     force, good = np.empty(index.shape), np.empty(sets, dtype=bool)
     for start in range(0, sets, _CHUNK):
         part = slice(start, start + _CHUNK)
