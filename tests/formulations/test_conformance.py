@@ -68,6 +68,7 @@ def test_answers_are_certified_or_refused_as_infeasible(name, aim, problem):
         with pytest.raises(InfeasibleError, match="move"):
             answer(problem, name, aim=aim)
         return
+    assert aim.costs(problem).least(aim) == pytest.approx(best)
     found = answer(problem, name, aim=aim)
     proof = found.certificate
     assert found.objective == proof.objective == problem.worth(found.choice, aim)
@@ -87,6 +88,33 @@ def test_wide_searches_are_exact(problem):
     moves = len(problem.sums.sizes)
     for name, options in (("beam", {"width": 4}), ("rank_search", {"horizon": moves})):
         assert answer(problem, name, **options).objective == pytest.approx(best)
+
+
+SETTINGS = [
+    *(("cascade", {"charge": charge}) for charge in ("later", "earlier")),
+    *(("beam", {"width": width}) for width in (1, 2, 3)),
+    *(("rank_search", {"horizon": horizon}) for horizon in (1, 2, 3)),
+]
+CHOSEN = {  # by enumeration of what the texts of these formulations display
+    6: ["20021", "00001", "22001", "00101", "00101", "20021", "00021", "02001"],
+    10: ["00000", "20000", "03020", "03200", "03110", "00000", "00010", "00030"],
+    11: ["02030", "00031", "03231", "03220", "03220", "02030", "03031", "03001"],
+}
+
+
+@pytest.mark.parametrize("seed", CHOSEN)
+def test_heuristics_do_what_they_display(seed):
+    """Also where the shared step, once the choice before is made, is ranked otherwise."""
+    rng, pairs = np.random.default_rng(seed), [(1, 3), (3, 4), (4, 3), (3, 4), (4, 2)]
+    single = tuple(rng.integers(0, 9, pair[1]) + 0.0 for pair in pairs)
+    shared, own = ([rng.integers(0, 9, pair) + 0.0 for pair in pairs] for _ in range(2))
+    shared[2][1] = np.inf
+    alone = (np.where(np.isinf(s), s, a) for s, a in zip(shared[1:], own[1:], strict=True))
+    costs = Costs(
+        LayeredCosts(single, tuple(shared)), alone=LayeredCosts(single, (shared[0], *alone))
+    )
+    found = [answer(costs, name, **options).choice for name, options in SETTINGS]
+    assert ["".join(map(str, choice)) for choice in found] == CHOSEN[seed]
 
 
 @pytest.mark.parametrize("name", SHOWN)
