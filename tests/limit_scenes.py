@@ -6,10 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
-from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.scene import Scene
+import seqopt
 from tests.builders import on_soft_ground
 
 Grips = tuple[int, ...]
@@ -17,13 +14,13 @@ LOOSE_AT = 11  # the joint that is loosened: between bricks 12 and 13 of 25
 HELD = (40, 45, 49)  # three grips off one line, all beyond that joint
 
 
-def chain(count: int, **shape: object) -> Scene:
+def chain(count: int, **shape: object) -> seqopt.Scene:
     """Return a chain that leans forward and stays off the ground."""
     pitch = np.linspace(1.4, -0.2, count)
-    return arch_scene(ArchShape(pitch=pitch, closed=False, **shape))  # type: ignore[arg-type]
+    return seqopt.arch_scene(seqopt.ArchShape(pitch=pitch, closed=False, **shape))  # type: ignore[arg-type]
 
 
-def loosened(scene: Scene, factor: float, *, only_turning: bool) -> Scene:
+def loosened(scene: seqopt.Scene, factor: float, *, only_turning: bool) -> seqopt.Scene:
     """Return the scene with one joint's stiffness multiplied."""
     joints = list(scene.joints)
     joint = joints[LOOSE_AT]
@@ -45,9 +42,9 @@ def far_grips(count: int) -> tuple[Grips, ...]:
     return tuple(dict.fromkeys(sets))
 
 
-def without_joint(scene: Scene) -> Network:
+def without_joint(scene: seqopt.Scene) -> seqopt.Network:
     joints = scene.joints[:LOOSE_AT] + scene.joints[LOOSE_AT + 1 :]
-    return build_network(replace(scene, joints=joints))
+    return seqopt.build_network(replace(scene, joints=joints))
 
 
 def softened(arch, i):

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+import seqopt
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import EPOXY
 from seqopt.engines._grip_compliance import RIGID, read_compliance
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete._system import build_system, settle
@@ -27,11 +27,9 @@ from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.exchange.contacts import flat_face, touching_faces
 from seqopt.network._mechanics import build_statics
-from seqopt.network.build import build_network
 from seqopt.scene.arm import HeldPostures
 from seqopt.scene.boxes import _faces, boxes
 from seqopt.scene.shape import Surface
-from seqopt.sequence.methods import sequential
 from seqopt.stability._load_factor import load_factor
 from seqopt.stability._prover import Prover
 from seqopt.stability._steps import each_verdict
@@ -44,14 +42,14 @@ COMPRESSED = (sparse.csr_array, sparse.csc_array)
 @pytest.fixture(scope="module")
 def values(arch25):
     """Return a value of every class of the mechanics that holds arrays, by the class's name."""
-    network = build_network(arch25)
+    network = seqopt.build_network(arch25)
     tree = grow_tree(network)
     grips = np.array([2])
     assembly = step_assembly(network, 2, (2, None, None))
-    system = build_system(network, 2, EPOXY, None)
+    system = build_system(network, 2, seqopt.EPOXY, None)
     held = _held_nodes(network, system, grips, RIGID, [])
     parts = ungripped_system(network, 2)
-    proven = Prover(assembly, _compiled())(bonded(assembly, EPOXY))
+    proven = Prover(assembly, _compiled())(bonded(assembly, seqopt.EPOXY))
     maps, operator = scene_maps(network), OperatorBuilder(network, tree).operator(2)
     shapes = boxes(arch25.bricks)
     cube = box((1, 1, 1))
@@ -62,16 +60,16 @@ def values(arch25):
         *_faces(np.array(cube.vertices), cube),
         *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, network.compliances, build_statics(network)),
-        *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
+        *(assembly, face_quadrature(assembly), find_elastic_limits(network, seqopt.EPOXY)),
         *(tree, operator, operator.doubts, parts, share(network)),
         mixed_system(parts, grips),
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
-        *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
-        *(load_factor(assembly, EPOXY), arch25.grip_kinds),
+        *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, seqopt.EPOXY)),
+        *(load_factor(assembly, seqopt.EPOXY), arch25.grip_kinds),
         HeldPostures(np.array([0]), np.array([1]), np.array([[0]]), (np.ones((1, 6, 2)),)),
         read_compliance(network, grips[None], [[2]], np.ones((1, 1, 3))),
-        *each_verdict(network, sequential(network)[:1], EPOXY),
+        *each_verdict(network, seqopt.sequential(network)[:1], seqopt.EPOXY),
     )
     return {type(value).__name__: value for value in every}
 

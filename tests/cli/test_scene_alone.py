@@ -43,16 +43,6 @@ def test_no_command_that_takes_a_scene_is_left_out():
     assert takes == {*ALONE}
 
 
-def required(name):
-    commands = parser(name)._subparsers._group_actions[0]
-    actions = commands.choices[name]._actions
-    return [action.dest for action in actions if action.required and action.option_strings]
-
-
-def test_no_option_must_be_given():
-    assert {name: must for name in ALONE if (must := required(name))} == {}
-
-
 def test_what_is_taken_is_said_in_one_line(capsys, here):
     _, _, err = command(capsys, "analyze", "arch.json")
     assert err.startswith("steps: of the sequential method; --method, --plan or a plan's folder")

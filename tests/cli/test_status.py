@@ -20,7 +20,6 @@ from tests.builders import ROOT
 from tests.commands import beside_models
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and devices are POSIX's")
-ANALYZE = ("analyze", "--method", "sequential")
 
 
 def shell(line):

@@ -10,10 +10,8 @@ from seqopt._registry import ADDED
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.exchange import Content, FileBlock, Format, Given, export_plan, import_scene
 from seqopt.exchange._formats import readable, writable
-from seqopt.network.build import build_network
 from seqopt.problem import Amount
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
-from seqopt.sequence.methods import sequential
 
 GIVEN = Given(density=2000.0)
 
@@ -51,7 +49,7 @@ def test_a_format_of_ones_own_is_read_and_written(path):
         import_scene(path, given=Given(unit="mm", density=2000.0))
     scene = import_scene(path, given=GIVEN)
     assert scene.bricks[0].mass == pytest.approx(2000.0 * 0.4 * 0.2 * 0.1)
-    steps = sequential(build_network(seqopt.load_scene("chain:bricks=7")))
+    steps = seqopt.sequential(seqopt.build_network(seqopt.load_scene("chain:bricks=7")))
     assert export_plan(scene, steps, "corners") == f"{len(steps)}\n"
     with pytest.raises(StepError, match="format corners takes no distance; leave it out"):
         export_plan(scene, steps, "corners", distance=0.1)

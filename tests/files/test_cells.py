@@ -13,10 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import seqopt
 from seqopt._files import _FORMULA, csv_text, harmless, plain, rows_text
-from seqopt.engines.registry import make_engine
-from seqopt.network.build import build_network
-from seqopt.responses.table import analyze
 from seqopt.sequence.methods import METHODS, three_robot_loop
 from seqopt.sequence.schedule_file import parse_plan, parse_schedule, schedule_text
 from tests.builders import small_arch
@@ -40,9 +38,9 @@ def test_no_cell_begins_as_a_formula_and_every_one_comes_back(text):
 @pytest.mark.parametrize("names", [NAMES[:3], NAMES[2:]])
 def test_a_plan_of_robots_with_such_names_is_read_again(names):
     scene = named(names)
-    network = build_network(scene)
+    network = seqopt.build_network(scene)
     steps = METHODS["sequential"](network, names[:2])
-    table = csv_text(analyze(make_engine("compliance", network), steps))
+    table = csv_text(seqopt.analyze(seqopt.make_engine("compliance", network), steps))
     cells = [cell for row in csv.reader(io.StringIO(table)) for cell in row]
     assert not [c for c in cells if c.startswith(_FORMULA) and not is_number(c)]
     assert parse_plan(scene, table, "plan") == steps

@@ -12,17 +12,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import seqopt
 from formulations.choice import Choice
 from formulations.on_graph import on_graph
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.decisions import pose_decisions, steps_over, travel
 from seqopt.graph.formulation import GROUP, End, FormulationKind, exhibits, formulations
-from seqopt.network.build import build_network
-from seqopt.plan.solve import solve
 from seqopt.problem.problem import Aim
-from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS
 from tests.builders import small_arch
 from tests.layered import Costs, answer
@@ -119,7 +116,7 @@ def test_heuristics_do_what_they_display(seed):
 
 @pytest.mark.parametrize("name", SHOWN)
 def test_it_is_repeatable(name, problem8):
-    assert solve(problem8, name).choice == solve(problem8, name).choice
+    assert seqopt.solve(problem8, name).choice == seqopt.solve(problem8, name).choice
 
 
 @every
@@ -185,7 +182,7 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
 
 @timely
 def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
-    plan = solve(problem25, ALL[name], time_limit=0)
+    plan = seqopt.solve(problem25, ALL[name], time_limit=0)
     assert plan.ended is End.STOPPED
     if name in OURS:
         assert plan.certificate.gap < 0.3
@@ -197,7 +194,7 @@ def test_an_interrupt_leaves_an_allowed_choice_and_a_bound_that_holds(name, prob
     """It comes with the first finding; a second one would end the program."""
     formulation, came = ALL[name], []
     problem = problem8
-    best = solve(problem, "overlap_dp")
+    best = seqopt.solve(problem, "overlap_dp")
     if formulation.takes_budgets:
         way = travel(problem, np.inf)
         way = replace(way, bound=0.95 * way.spent(best.choice))
@@ -208,7 +205,7 @@ def test_an_interrupt_leaves_an_allowed_choice_and_a_bound_that_holds(name, prob
             signal.raise_signal(signal.SIGINT)
         came.append(finding)
 
-    plan = solve(problem, formulation, progress=interrupt)
+    plan = seqopt.solve(problem, formulation, progress=interrupt)
     assert plan.ended is End.INTERRUPTED
     assert plan.trace == tuple(came)
     assert plan.selection.bound[0] <= plan.certificate.objective + 1e-6
@@ -232,10 +229,10 @@ def test_where_no_path_is_found_yet_its_bound_is_said(problem25):
     budgets = (travel(problem25, 13.0), steps_over(problem25, "F_largest", 300.0, 1.0))
     capped, told = replace(problem25, budgets=budgets), r"no path was .* \(no path is below 612.5\)"
     with pytest.raises(TimeUpError, match=told):
-        solve(capped, late)
+        seqopt.solve(capped, late)
     with pytest.raises(KeyboardInterrupt, match=told):
-        solve(capped, late, progress=once())
-    plan = solve(capped, "labels", progress=once())
+        seqopt.solve(capped, late, progress=once())
+    plan = seqopt.solve(capped, "labels", progress=once())
     assert plan.ended is End.INTERRUPTED
     assert all(b.spent(plan.choice) <= b.bound for b in budgets)
 
@@ -280,19 +277,19 @@ def test_budgets_against_brute_force(name, examples):
 
 
 def valued(problem, name, **options):
-    return solve(problem, name, **options).certificate.objective
+    return seqopt.solve(problem, name, **options).certificate.objective
 
 
 @pytest.fixture(scope="module")
 def problem8():
-    engine = ComplianceEngine(build_network(small_arch(8)))
-    return pose_decisions(engine, three_robot_loop(engine.network), EQUATIONS)
+    engine = seqopt.make_engine("compliance", small_arch(8))
+    return pose_decisions(engine, seqopt.three_robot_loop(engine.network), EQUATIONS)
 
 
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
 def test_all_exact_ones_equal_brute_force_on_a_small_arch(criterion):
-    engine, count = ComplianceEngine(build_network(small_arch(5))), 5
-    problem = pose_decisions(engine, three_robot_loop(engine.network), criterion)
+    engine, count = seqopt.make_engine("compliance", small_arch(5)), 5
+    problem = pose_decisions(engine, seqopt.three_robot_loop(engine.network), criterion)
     best = valued(problem, "rank_search", horizon=count)
     assert best == pytest.approx(Costs(problem.sums).best())
     for name in EXACT_SUMS:

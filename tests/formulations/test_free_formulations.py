@@ -13,14 +13,10 @@ import seqopt
 from formulations.choice import Choice
 from formulations.on_graph import on_graph
 from formulations.states._search import path_values
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.formulation import FormulationKind, Watch, formulations
 from seqopt.graph.paths import _on_paths, fewest_moves
 from seqopt.graph.states.states import build_states
-from seqopt.network.build import build_network
-from seqopt.plan.solve import solve
-from seqopt.problem.requirements import Limit
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.stability.assessment import Verdict
 from tests.brute_force import ONES, best_values
@@ -45,7 +41,7 @@ CASES = [
 def small(bricks=4, robots=2):
     """The engine and the rules of a small arch."""
     scene = with_robots(small_arch(bricks), robots)
-    return ComplianceEngine(build_network(scene)), FreeRules(least_grips=1)
+    return seqopt.make_engine("compliance", scene), FreeRules(least_grips=1)
 
 
 @cache
@@ -61,9 +57,9 @@ def check(name, problem, best):
     """An exact one finds what brute force does, a heuristic nothing better; both are judged."""
     if best is None:
         with pytest.raises(InfeasibleError, match="free schedule: "):
-            solve(problem, ALL[name])
+            seqopt.solve(problem, ALL[name])
         return
-    plan = solve(problem, ALL[name])
+    plan = seqopt.solve(problem, ALL[name])
     found, proof = plan.selection, plan.certificate
     assert proof.values == pytest.approx(found.objective)
     assert proof.bounds[0] == pytest.approx(best[0])
@@ -93,7 +89,7 @@ SYMMETRIC = with_robots(from_both_sides(2, "VL"), 2)  # its peaks are equal but 
 @example(build=(SYMMETRIC, FreeRules(least_grips=0, newest="free")))
 @settings(max_examples=4)
 def test_they_agree_with_brute_force_under_any_rules(names, build):
-    engine, rules = ComplianceEngine(build_network(build[0])), build[1]
+    engine, rules = seqopt.make_engine("compliance", build[0]), build[1]
     for aim in ("minmax,steps", "regrips,sum", "steps,minmax"):
         best = best_values(engine, rules, aim)
         for name in names:
@@ -114,7 +110,7 @@ def test_it_finds_the_best_path_of_any_graph(name, graph):
 
 @every
 def test_limits_that_leave_no_plan_are_said(name):
-    check(name, posed("minmax", limits=[Limit("F_largest", 1.0)]), None)
+    check(name, posed("minmax", limits=[seqopt.Limit("F_largest", 1.0)]), None)
 
 
 @every
@@ -124,10 +120,10 @@ def test_what_does_not_fit_gets_one_line(name):
             "speed: " if option == "speed" else "option|width is 0|no plan was found yet; give more"
         )
         with pytest.raises((ProblemError, TimeUpError), match=said) as caught:
-            solve(posed("minmax"), name, **{option: value})
+            seqopt.solve(posed("minmax"), name, **{option: value})
         assert "\n" not in str(caught.value)
     with pytest.raises(ProblemError, match="name bond, friction and tilt before all others"):
-        solve(posed("minmax,bond"), name)
+        seqopt.solve(posed("minmax,bond"), name)
 
 
 @every
@@ -141,7 +137,7 @@ def test_an_interrupt_leaves_a_plan_or_is_passed_on(name):
                 raise KeyboardInterrupt
 
         try:
-            plan = solve(posed("minmax"), name, progress=interrupt, proof=False)
+            plan = seqopt.solve(posed("minmax"), name, progress=interrupt, proof=False)
         except KeyboardInterrupt:
             continue
         assert after > 4
@@ -151,7 +147,7 @@ def test_an_interrupt_leaves_a_plan_or_is_passed_on(name):
 @cache
 def standing(name, aim):
     words = {"stands": "bond=3000"} if aim != "bond,steps" else {}
-    return solve(posed(aim, **words), name)
+    return seqopt.solve(posed(aim, **words), name)
 
 
 @every
@@ -179,7 +175,7 @@ def test_where_time_is_over_a_bound_is_left(name, aim, monkeypatch):
 
     monkeypatch.setattr("formulations.on_graph.watched", lambda *_: lambda _: None)
     monkeypatch.setattr("formulations.on_graph.Watch", Late)
-    plan, best = solve(posed(aim), name), known((4, 2), aim)
+    plan, best = seqopt.solve(posed(aim), name), known((4, 2), aim)
     assert (plan.status, plan.selection.stopped) == ("feasible", "time")
     assert plan.selection.bound[0] <= best[0] * (1 + 1e-9)
     assert plan.selection.objective >= best or plan.selection.objective == pytest.approx(best)
@@ -190,14 +186,14 @@ def test_a_heuristic_that_promises_nothing_is_shown_with_its_gap():
         "modest", "fewest moves", lambda g, _: Choice(fewest_moves(g)), FormulationKind.HEURISTIC
     )
     problem, best = posed("sum"), known((4, 2), "sum")[0]
-    plan = solve(problem, modest)
+    plan = seqopt.solve(problem, modest)
     value = plan.certificate.values[0]
     assert value > best * (1 + 1e-6)
     assert plan.certificate.bounds[0] == pytest.approx(best)
     assert plan.certificate.gap == pytest.approx((value - best) / value)
     assert plan.status == "feasible"
     assert f"feasible within {plan.certificate.gap:.2g}" in plan.result
-    assert solve(problem, modest, proof=False).status == "unproven"
+    assert seqopt.solve(problem, modest, proof=False).status == "unproven"
 
 
 AIM = "minmax,steps"

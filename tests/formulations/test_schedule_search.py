@@ -13,7 +13,6 @@ from hypothesis import given, settings
 
 import seqopt
 from experiments.harness.scenes import longer
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError, TimeUpError
 from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states
@@ -35,7 +34,7 @@ def test_over_scenarios_it_equals_brute_force(build):
     """A state is what it is in its worst scenario, and is allowed in all; so says the judge."""
     scene, rules = build
     scenes = seqopt.scenarios(scene, stiffness=(0.3, 3.0), count=3, seed=1).scenes
-    graphs = [whole_graph(ComplianceEngine(build_network(each)), rules) for each in scenes]
+    graphs = [whole_graph(seqopt.make_engine("compliance", each), rules) for each in scenes]
     common = graphs[0][0].copy()
     common.remove_nodes_from([n for n in graphs[0][0] if any(n not in g for g, _ in graphs)])
     costs = {n: max(peaks(g)[n] for g, _ in graphs) for n in common if n != "end"}
@@ -86,7 +85,7 @@ def brute_front(engine, rules, step):
 @settings(max_examples=6, deadline=None)
 def test_pareto_sets_equal_brute_force(build):
     scene, rules = build
-    engine = ComplianceEngine(build_network(scene))
+    engine = seqopt.make_engine("compliance", scene)
     step = np.array([5.0, 2.0])
     problem = build_states(engine, rules, ONES, "F_largest,M_sup")
     expected = brute_front(engine, rules, step)
@@ -106,7 +105,7 @@ def arch(engine25):
 
 
 def pose_goals(text):
-    engine = ComplianceEngine(build_network(small_arch(4)))
+    engine = seqopt.make_engine("compliance", small_arch(4))
     return build_states(engine, FreeRules(), ONES, text).goals
 
 
@@ -149,7 +148,7 @@ class Clock:
 )
 def test_a_time_limit_holds_while_it_is_asked_what_helps(monkeypatch, limit, said):
     """What is known by then is said."""
-    engine = ComplianceEngine(build_network(small_arch(5)))
+    engine = seqopt.make_engine("compliance", small_arch(5))
     problem = build_states(engine, FreeRules(), ONES, "steps", [Limit("F_largest", 1.0)])
     clock = Clock()
     for module in ("_infeasible",):
@@ -176,7 +175,7 @@ def test_refusals_name_the_brick_and_what_opens_a_way(arch, engine25):
 
 def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force():
     """Where a step without an open grip decides, less in the open ones is worth nothing."""
-    engine = ComplianceEngine(build_network(small_arch(5)))
+    engine = seqopt.make_engine("compliance", small_arch(5))
     loop = modified_sequential(engine.network)
     problem = build_states(engine, loop, ONES, "T_max,F_largest")
     front, values = find_front(FrontProblem(problem)), set()

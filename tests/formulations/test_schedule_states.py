@@ -17,10 +17,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
 from seqopt.graph.states.states import build_states, within
 from seqopt.judge._schedules import judge_schedule
-from seqopt.network.build import build_network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.quantities import CHOSEN_BY
-from seqopt.sequence.methods import modified_sequential, three_robot_loop
 from seqopt.sequence.rules import with_robots
 from seqopt.sequence.schedule_file import parse_schedule
 from seqopt.stability.assessment import Verdict, verdict
@@ -41,10 +39,10 @@ FOUR_OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node
 def built(name):
     """An engine and a schedule: how many grips are open at once."""
     if name == "four":
-        engine = ComplianceEngine(build_network(with_robots(small_arch(4), 4)))
+        engine = ComplianceEngine(seqopt.build_network(with_robots(small_arch(4), 4)))
         return engine, parse_schedule(engine.network, FOUR_OPEN, "four")
-    engine = ComplianceEngine(build_network(small_arch(6)))
-    loop = three_robot_loop if name == "three-robot" else modified_sequential
+    engine = seqopt.make_engine("compliance", small_arch(6))
+    loop = seqopt.three_robot_loop if name == "three-robot" else seqopt.modified_sequential
     return engine, loop(engine.network)
 
 

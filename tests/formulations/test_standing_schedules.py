@@ -12,16 +12,12 @@ import seqopt
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.states.states import build_states
 from seqopt.judge._schedules import judge_schedule
-from seqopt.network.build import build_network
 from seqopt.plan._infeasible import Look
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.standing import NARROW, Standing, _without_implied, slack
-from seqopt.sequence.methods import three_robot_loop
-from seqopt.sequence.rules import FreeRules
 from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import GAP
@@ -55,7 +51,7 @@ def brute_force(engine, rules, mortar):
 
 @pytest.mark.slow
 def test_a_small_arch_equals_brute_force():
-    engine, rules = ComplianceEngine(build_network(small_arch(4))), FreeRules()
+    engine, rules = seqopt.make_engine("compliance", small_arch(4)), seqopt.FreeRules()
     best = brute_force(engine, rules, find_mortar("dry"))
     problem = build_states(engine, rules, FOUR_ONES, "minmax", stands="dry")
     plan = seqopt.solve(problem, "schedule_search")
@@ -66,8 +62,8 @@ def test_a_small_arch_equals_brute_force():
 
 @pytest.fixture(scope="module")
 def dry():
-    engine = ComplianceEngine(build_network(small_arch(5)))
-    return build_states(engine, FreeRules(), ONES, "minmax", stands="dry")
+    engine = seqopt.make_engine("compliance", small_arch(5))
+    return build_states(engine, seqopt.FreeRules(), ONES, "minmax", stands="dry")
 
 
 def test_a_plan_that_does_not_stand_is_seen(dry):
@@ -108,8 +104,8 @@ def leaning(scale=1.0, stands=None, aim="bond"):
     scene = seqopt.arch_scene(
         seqopt.ArchShape(pitch=(1.2, 0.0, -1.2), pattern="VLR", density=2000.0 * scale)
     )
-    engine = ComplianceEngine(build_network(scene))
-    return build_states(engine, FreeRules(), ONES, aim, stands=stands)
+    engine = seqopt.make_engine("compliance", scene)
+    return build_states(engine, seqopt.FreeRules(), ONES, aim, stands=stands)
 
 
 @pytest.mark.parametrize("aim", [pytest.param("bond,minmax", marks=slow), "friction,minmax", TILTS])
@@ -152,9 +148,9 @@ def test_a_bond_is_found_to_its_share_at_every_size(scale):
 )
 def test_a_margin_is_that_of_the_worst_step_to_two_percent(aim, way):
     """Friction and tilt were found to a step of their own, a tenth of what they were."""
-    engine = ComplianceEngine(build_network(small_arch(4)))
-    free = FreeRules(robots=("rob1", "rob2"), least_grips=1)
-    rules = three_robot_loop(engine.network) if way == "loop" else free
+    engine = seqopt.make_engine("compliance", small_arch(4))
+    free = seqopt.FreeRules(robots=("rob1", "rob2"), least_grips=1)
+    rules = seqopt.three_robot_loop(engine.network) if way == "loop" else free
     plan = seqopt.solve(build_states(engine, rules, ONES, aim), "schedule_search")
     found, bound = plan.objective[aim], plan.summary()["bound"][aim]
     assert plan.certificate.gap == pytest.approx(abs(found - bound) / found)
@@ -182,8 +178,8 @@ def test_demands_that_others_imply_are_not_asked():
 
 @slow
 def test_the_bond_that_is_named_is_enough():
-    engine = ComplianceEngine(build_network(small_arch(6)))
-    loop = three_robot_loop(engine.network)
+    engine = seqopt.make_engine("compliance", small_arch(6))
+    loop = seqopt.three_robot_loop(engine.network)
     with pytest.raises(InfeasibleError, match="a bond of") as caught:
         seqopt.solve(build_states(engine, loop, ONES, "minmax", stands="dry"), "schedule_search")
     said = float(re.search(r"a bond of ([\d.e+]+) Pa", str(caught.value))[1])

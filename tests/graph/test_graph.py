@@ -14,7 +14,7 @@ from scipy.optimize import linprog
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph import Explorer, Graph, lexicographic
 from seqopt.graph._budgets import Plane, Polyhedron, highest_bound, is_beyond, within_budgets
-from seqopt.graph.paths import _sum_bound, distances, least_peak, lexicographic_bounds, reached
+from seqopt.graph.paths import _sum_bound, distances, lexicographic_bounds, reached
 from seqopt.graph.space import Moves, Space
 from seqopt.judge.arithmetic import budget_bounds
 from tests.random_graphs import graphs, simple_paths, values_of
@@ -38,15 +38,6 @@ def test_the_best_path_and_its_bounds_equal_brute_force(graph):
     assert len(best.path) == fewest
 
 
-@given(graph=graphs(), more=st.integers(1, 3))
-@few
-def test_of_a_worse_value_less_is_proven(graph, more):
-    found = sorted(values_of(graph, moves) for moves in simple_paths(graph))
-    if found:
-        bounds = lexicographic_bounds(graph, (found[0][0] + more, found[0][1]))
-        assert bounds[0] == pytest.approx(found[0][0])
-
-
 @given(graph=graphs(goals=1))
 @few
 def test_distances_are_those_of_networkx(graph):
@@ -60,24 +51,6 @@ def test_distances_are_those_of_networkx(graph):
     expected = [lengths.get(state, np.inf) for state in range(graph.states)]
     assert distances(graph, graph.amounts[:, 0]).tolist() == expected
     assert reached(graph).tolist() == [np.isfinite(length) for length in expected]
-
-
-def tried(graph, goal):
-    """The least worst amount of any path, by trying every one; infinite without a path."""
-    if graph.ends[0]:
-        return 0.0
-    amounts = graph.amounts[:, goal]
-    ways = (v for v in np.unique(amounts) if graph.ends[reached(graph, amounts <= v)].any())
-    return next(ways, np.inf)
-
-
-@given(graph=graphs(), goal=st.integers(0, 1))
-@few
-def test_the_least_worst_amount_is_that_of_trying_every_one(graph, goal):
-    try:
-        assert least_peak(graph, goal) == tried(graph, goal)
-    except InfeasibleError:
-        assert tried(graph, goal) == np.inf
 
 
 def line():

@@ -129,14 +129,6 @@ def test_none_is_within_only_where_enumeration_finds_none(name, draws):
     assert refused
 
 
-def test_a_choice_exactly_at_its_budget_is_within():
-    none = (np.zeros((1, 2)),)
-    costs = LayeredCosts((np.array([3.7, 1.85]),), none)
-    problem = Costs(costs, (Budget("use", (np.array([1.0, 2.0]),), none, 1.0),))
-    for name in TAKERS:
-        assert answer(problem, name).choice == (0,)
-
-
 def test_what_rounding_puts_above_a_bound_is_not_proven_to_exceed_it():
     """0.1 + 1.1 is more than 1.2 in binary fractions; a choice that takes it counts as within."""
     pairs = (np.zeros((1, 2)), np.zeros((2, 1)))

@@ -14,19 +14,15 @@ import pytest
 
 import seqopt
 from formulations.times._labels import InTime
-from seqopt.errors import SeqoptError
 from seqopt.graph.states.explored import bisected
 from seqopt.graph.states.states import States
 from seqopt.problem import Amount, Filter, filters
 from seqopt.problem.amounts import BUILT_IN, find_amount, worst
-from seqopt.problem.requirements import Limit
-from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence._rule_space import FreeSpace
-from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.builders import small_arch
 
-HELD = FreeRules(ending="held")
+HELD = seqopt.FreeRules(ending="held")
 
 
 def few(states):
@@ -82,7 +78,7 @@ def is_refused(problem):
     """Whether the judge objects, or the search says that nothing is feasible without a proof."""
     try:
         solved(problem)
-    except SeqoptError as error:
+    except seqopt.SeqoptError as error:
         return "failed" not in str(error)
     return False
 
@@ -165,7 +161,7 @@ def base(space, aim="F_largest"):
 def scened(space, payload=None):
     scene, (_, rules, words) = small_arch(6 if space == "loop" else 4), SPACES[space]
     if space == "orders":  # the mirrored order is as good in one that is symmetric
-        scene = arch_scene(ArchShape(pitch=[1.3, 0.5, -0.3, -1.2]))
+        scene = seqopt.arch_scene(seqopt.ArchShape(pitch=[1.3, 0.5, -0.3, -1.2]))
     if payload is not None:
         scene = scene.with_robots(*(replace(robot, payload=payload) for robot in scene.robots))
     engine = seqopt.make_engine("compliance", scene)
@@ -178,7 +174,7 @@ def filtered(space, kind):
     """A question that the filter of a kind decides."""
     problem = scened(space)
     if kind == "limit":
-        return problem.but(limits=(Limit("T_max", 0.999 * largest(base(space), "F_max_N")),))
+        return problem.but(limits=(seqopt.Limit("T_max", 0.999 * largest(base(space), "F_max_N")),))
     if kind == "stands":
         return problem.but(stands=STANDS[space])
     if kind == "payload":
@@ -308,7 +304,7 @@ def with_readiness(monkeypatch, change):
     monkeypatch.setattr(InTime, "extend", changed)
     try:
         plan = seqopt.solve(replace(in_time()))
-    except SeqoptError as error:
+    except seqopt.SeqoptError as error:
         return "failed" not in str(error)
     return str(plan.status) != "optimal"
 

@@ -11,10 +11,8 @@ import seqopt
 from seqopt._registry import ADDED
 from seqopt.errors import SolverError
 from seqopt.judge._schedules import judge_schedule
-from seqopt.plan.solve import solve
 from seqopt.problem import Amount
 from seqopt.problem.criteria import WorstRatio
-from seqopt.sequence.rules import FreeRules
 from tests.builders import small_arch
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
@@ -24,11 +22,11 @@ def test_weights_of_scenarios_that_prove_little_leave_a_gap():
     """Wrong weights are no error, but prove less; a wrong total, or none for a scenario, is one."""
     scene = small_arch(5)
     problem = seqopt.pose(
-        *(seqopt.make_engine("compliance", scene), FreeRules(), ONES),
+        *(seqopt.make_engine("compliance", scene), seqopt.FreeRules(), ONES),
         scenarios=seqopt.scenarios(scene, count=3, seed=1),
         over="worst-total",
     )
-    plan = solve(problem, "schedule_search")
+    plan = seqopt.solve(problem, "schedule_search")
     states, found = plan.states, plan.selection
     assert 0 < plan.certificate.gap < 0.02  # what labels alone close is claimed
     assert plan.status == "claimed optimal"

@@ -10,16 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import build_states
 from seqopt.judge._proof import Proof
 from seqopt.judge._rule_moves import RuleTables
-from seqopt.network.build import build_network
-from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.steps import StepKind
 from tests.builders import first
 from tests.plain_rules import PlainBook
@@ -48,7 +43,7 @@ def told(book, tables, bricks, state):
 def test_tables_say_what_the_book_says(build, data):
     """All states that rules lead to, robots that could change places told apart."""
     scene, rules = build
-    book = PlainBook(build_network(scene), rules)
+    book = PlainBook(seqopt.build_network(scene), rules)
     tables = RuleTables(book, [])
     reached = {(0, tuple(tables.start()[0].tolist()))}
     work = [*reached]
@@ -77,9 +72,9 @@ def test_tables_say_what_the_book_says(build, data):
 def test_bounds_are_the_values_of_the_best_plan(aim, build, told):
     """Whatever states it is told of; and of a worse plan they are less than its values."""
     scene, rules = build
-    problem = build_states(ComplianceEngine(build_network(scene)), rules, ONES, aim)
+    problem = build_states(seqopt.make_engine("compliance", scene), rules, ONES, aim)
     try:
-        best = solve(problem, "schedule_search").selection
+        best = seqopt.solve(problem, "schedule_search").selection
     except InfeasibleError:
         assert Proof(problem).is_impossible()
         return
@@ -92,11 +87,13 @@ def test_bounds_are_the_values_of_the_best_plan(aim, build, told):
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_the_models_of_a_proof_are_those_that_engines_solved(count):
-    engines = [seqopt.make_engine("auto", build_network(first(load_scene("arch25"), 9)))]
+    engines = [
+        seqopt.make_engine("auto", seqopt.build_network(first(seqopt.load_scene("arch25"), 9)))
+    ]
     engines += [seqopt.make_engine("auto", engines[0].network) for _ in range(1, count)]
-    problem = build_states(engines[0], FreeRules(), ONES, "minmax")
+    problem = build_states(engines[0], seqopt.FreeRules(), ONES, "minmax")
     problem = replace(problem, scenarios=tuple(engines) if count > 1 else ())
-    value = solve(problem).objective["minmax"]
+    value = seqopt.solve(problem).objective["minmax"]
     before = sum(engine.tally.total() for engine in engines)
     proof = Proof(problem)
     proof.bounds((value,))

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
 from seqopt.graph import Explorer
 from seqopt.graph._orders import among_orders
@@ -18,13 +17,8 @@ from seqopt.graph.states._visits import StateSpace
 from seqopt.graph.states.explored import barred, explore
 from seqopt.graph.states.states import build_states
 from seqopt.judge._proof import Proof
-from seqopt.network.build import build_network
 from seqopt.plan.front import FrontProblem, find_front
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.requirements import Limit
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.methods import three_robot_loop
-from seqopt.sequence.rules import FreeRules
 from tests.builders import small_arch
 from tests.strategies import free_builds
 
@@ -35,8 +29,8 @@ END = r"the finished structure, which nobody holds, "
 def windy(wind, stands="dry", limits=(), bricks=5, rules=None):
     """An arch in wind along it, over the weight of every brick, all of whose states must stand."""
     scene = replace(small_arch(bricks), wind=(wind, 0.0, 0.0))
-    engine = seqopt.make_engine("compliance", build_network(scene))
-    return build_states(engine, rules or FreeRules(), ONES, "steps", limits, stands)
+    engine = seqopt.make_engine("compliance", seqopt.build_network(scene))
+    return build_states(engine, rules or seqopt.FreeRules(), ONES, "steps", limits, stands)
 
 
 def test_that_the_whole_falls_is_known_before_a_plan_is_sought():
@@ -64,8 +58,8 @@ def test_all_orders_and_fronts_end_in_it_too():
 
 def test_a_step_without_an_open_grip_is_asked_before_those_with_one():
     """In the loop of three robots two steps have none; a storm is more than robots hold."""
-    network = build_network(replace(load_scene("arch25"), wind=(0.0, 30.0, 0.0)))
-    engine, loop = seqopt.make_engine("compliance", network), three_robot_loop(network)
+    network = seqopt.build_network(replace(seqopt.load_scene("arch25"), wind=(0.0, 30.0, 0.0)))
+    engine, loop = seqopt.make_engine("compliance", network), seqopt.three_robot_loop(network)
     problem = build_states(engine, loop, ONES, "minmax", stands="dry")
     assert [level for level, _ in problem.space.without_choice()] == [2, 1]
     level, state = barred(problem)
@@ -75,7 +69,7 @@ def test_a_step_without_an_open_grip_is_asked_before_those_with_one():
     with pytest.raises(InfeasibleError, match=said):
         seqopt.solve(problem, "schedule_search", time_limit=1.0)
     calm = build_states(
-        ComplianceEngine(build_network(load_scene("arch25"))), loop, ONES, stands="dry"
+        seqopt.make_engine("compliance", seqopt.load_scene("arch25")), loop, ONES, stands="dry"
     )
     assert barred(calm) is None
 
@@ -85,8 +79,8 @@ def test_a_step_without_an_open_grip_is_asked_before_those_with_one():
 def test_where_it_says_that_no_plan_is_there_is_none(build, limit):
     """By all states, none left out, and by the judge; where it says nothing, they decide."""
     scene, rules = build
-    engine = ComplianceEngine(build_network(scene))
-    problem = build_states(engine, rules, ONES, "steps", [Limit("D_max", 10.0**limit)])
+    engine = seqopt.make_engine("compliance", scene)
+    problem = build_states(engine, rules, ONES, "steps", [seqopt.Limit("D_max", 10.0**limit)])
     every = Explorer(StateSpace(replace(problem)))
     found = every.rise()
     assert explore(problem).whole == found

@@ -127,13 +127,6 @@ def solved(kind):
     return repr(solver(pose(), real))
 
 
-@pytest.mark.parametrize("kind", ["plan", "front"])
-def test_what_a_formulation_only_computes_is_no_change(kind):
-    pose, solver, real = KINDS[kind]
-    problem = pose()
-    assert solved(kind) == repr(solver(problem, real)) == repr(solver(problem, real))
-
-
 NONSENSE = {
     "plan": {
         "states beyond": {"states": ((1, 10**30, 0, 0),)},

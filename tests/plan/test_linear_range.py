@@ -6,7 +6,6 @@ import json
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import seqopt
@@ -100,17 +99,6 @@ def test_the_best_plan_keeps_the_range_wherever_one_does(words, formulation):
     assert plan.summary()["limits"] == {}
 
 
-def test_nothing_is_solved_twice_where_the_best_plan_keeps_it():
-    problem = posed(small_arch(5), goals="T_max")
-    plan = seqopt.solve(problem)
-    lifted = seqopt.solve(posed(small_arch(5), goals="T_max", limits=[LIFTED]))
-    assert plan.models == lifted.models
-    assert plan.certificate == lifted.certificate
-    assert "D_max" not in plan.states.named
-    assert list(problem.graphs) == ["states"]
-    assert plan.status is lifted.status is Status.OPTIMAL
-
-
 SOFT = 1e-6
 
 
@@ -161,15 +149,6 @@ def test_only_a_proof_says_that_no_plan_keeps_it(error, why):
     assert keeping("first", Moved(1.5, 3), again) == ("first", why)
     assert keeping("first", Moved(1.0, 3), again) == ("first", "")
     assert keeping("first", Moved(1.5, 3), lambda: "second") == ("second", "")
-
-
-def test_the_largest_motion_is_that_of_the_table():
-    for scene in (small_arch(5), small_arch(5).with_props(seqopt.Prop(node=5))):
-        plan = seqopt.solve(posed(scene, goals="minmax"))
-        table = plan.responses()
-        most = table["D_max_1e-3mm"].max() * 1e-6 / linear_limit(scene)
-        assert plan.moved.share == pytest.approx(most, rel=1e-5)
-        assert plan.moved.step == table["step"][int(np.argmax(table["D_max_1e-3mm"]))]
 
 
 def test_the_judge_finds_by_itself_that_steps_leave_the_range():

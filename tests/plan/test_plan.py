@@ -13,7 +13,7 @@ from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError
 from seqopt.graph.decision_costs import LayeredCosts
 from seqopt.graph.decisions import pose_decisions
-from seqopt.graph.formulation import Watch, find_formulation
+from seqopt.graph.formulation import find_formulation
 from seqopt.plan.solve import solve
 from seqopt.workflow import Robust
 from tests.builders import small_arch
@@ -65,15 +65,6 @@ def test_a_search_without_proof_computes_only_what_it_meets(counted):
     assert "not compared" in repr(plan)
 
 
-def test_a_changed_problem_keeps_its_responses(counted):
-    engine, problem = counted
-    before = problem.evaluation.models
-    other = replace(problem, criterion=problem.criterion, limits=())
-    assert other.sums == problem.sums
-    assert other == problem
-    assert engine.asked == before + len(problem.given)  # once for both, where no grip is open
-
-
 def test_a_plan_shows_its_steps_and_choices(engine25):
     plan = seqopt.optimize(engine25.network.scene, engine="compliance")
     assert next(iter(plan.seconds)) == "assemble"
@@ -118,15 +109,6 @@ def test_every_plan_has_one_summary():
 
 def criterion_of(plan):
     return plan.problem.criterion
-
-
-def test_only_what_is_better_is_told():
-    told = []
-    watch = Watch(progress=told.append)
-    for objective, bound in ((np.inf, -np.inf), (9, 1), (9, 1), (10, 0), (8, 0), (9, 2)):
-        watch.tell(objective, bound)
-    assert [(f.objective, f.bound) for f in told] == [(np.inf, -np.inf), (9, 1), (8, 1), (8, 2)]
-    assert tuple(told) == watch.trace
 
 
 def problem():

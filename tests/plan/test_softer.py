@@ -11,13 +11,9 @@ import pytest
 import seqopt
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import build_states
-from seqopt.network.build import build_network
 from seqopt.plan._infeasible import payload_advice
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import overloads
-from seqopt.responses.table import analyze
-from seqopt.sequence.methods import sequential
-from seqopt.sequence.rules import FreeRules
 from tests.builders import small_arch
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
@@ -35,12 +31,12 @@ def settled(fall=-0.005, payload=None, bricks=7):
 def advice(scene):
     """What is said of the sequential method, and how much the largest grip would hold, N."""
     engine = seqopt.make_engine("compliance", scene)
-    over = overloads(scene, analyze(engine, sequential(engine.network)))
+    over = overloads(scene, seqopt.analyze(engine, seqopt.sequential(engine.network)))
     return payload_advice(engine.network, over), max(each.largest for each in over)
 
 
 def weight(scene):
-    return np.linalg.norm(build_network(scene).weight, axis=1).sum()
+    return np.linalg.norm(seqopt.build_network(scene).weight, axis=1).sum()
 
 
 @pytest.mark.parametrize(("fall", "stiff"), [(-0.005, True), (0.0, False)])
@@ -52,13 +48,13 @@ def test_a_payload_beyond_all_weights_comes_with_the_grips_that_need_less(fall, 
     assert least <= float(newton) < 1.1 * least
     if stiff:
         soft = seqopt.make_engine("compliance", scene.with_grips(1e3))
-        table = analyze(soft, sequential(soft.network))
+        table = seqopt.analyze(soft, seqopt.sequential(soft.network))
         assert max(each.largest for each in overloads(scene, table)) < weight(scene)
 
 
 def test_a_free_schedule_says_so_too():
     engine = seqopt.make_engine("compliance", settled(bricks=4))
-    problem = build_states(engine, FreeRules(), ONES, "steps")
+    problem = build_states(engine, seqopt.FreeRules(), ONES, "steps")
     with pytest.raises(InfeasibleError, match=r"a payload of .* softer grips") as found:
         seqopt.solve(problem, "schedule_search")
     assert str(found.value).count("softer grips") == 1

@@ -5,9 +5,7 @@ from __future__ import annotations
 import pytest
 
 import seqopt
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
-from seqopt.network.build import build_network
 from seqopt.plan.pose import graph_of
 from seqopt.sequence.methods import three_robot_loop
 from tests.builders import small_arch
@@ -16,7 +14,7 @@ WORST = seqopt.CRITERIA["worst-ratio"]
 
 
 def posed(goals):
-    engine = ComplianceEngine(build_network(small_arch(4)))
+    engine = seqopt.make_engine("compliance", small_arch(4))
     return seqopt.pose(engine, three_robot_loop(engine.network), WORST, goals)
 
 

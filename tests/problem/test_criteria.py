@@ -17,7 +17,6 @@ from seqopt.problem.criteria import (
     RankSum,
     WeightedSum,
     _mean_ranks,
-    _ranks_of,
     equal,
 )
 from seqopt.problem.criteria import WorstRatio as Worst
@@ -64,27 +63,6 @@ def test_the_crown_parts_before_from_after():
     assert own.costs(RESPONSES, 3, 3).tolist() == [3, 1, 2]
     assert own.costs(RESPONSES, 4, 3).tolist() == own.costs(RESPONSES, 5, 3).tolist() == [1, 2, 3]
     assert [own.wanted(bricks) for bricks in (3, 4)] == [("T_max",), ("M_sup",)]
-
-
-def test_what_is_below_the_resolution_decides_nothing():
-    """Each response has its own, by its first letter."""
-    coarse = ranked((("T_max", 1.0),), resolution=(("T", 100.0), ("M", 1e-9)))
-    assert coarse.costs(RESPONSES, 3, 3).tolist() == [2, 2, 2]
-    assert ranked((("D_max", 1.0),)).costs(RESPONSES, 3, 3) == pytest.approx(
-        [2, NAN, 1], nan_ok=True
-    )
-
-
-def test_ranks_of_pairs_run_as_far_as_those_of_candidates():
-    pairs = np.array([[4.0, 1.0, 2.0], [3.0, NAN, NAN]])
-    assert _ranks_of(pairs, 2) == pytest.approx(
-        np.array([[2.25, 0.75, 1.25], [1.75, NAN, NAN]]), nan_ok=True
-    )
-    assert _ranks_of(np.full((2, 3), NAN), 4).tolist() == [[2.5] * 3] * 2
-    assert _ranks_of(np.array([NAN, 5.0, np.inf, 2.0]), 4) == pytest.approx(
-        [NAN, 2, NAN, 1], nan_ok=True
-    )
-    assert _mean_ranks(np.array([7.0, 1.0, 7.0, 7.0, 3.0])).tolist() == [4, 1, 4, 4, 2]
 
 
 def test_what_ranks_take_from_a_scene():

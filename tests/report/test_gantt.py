@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
 
+import seqopt
 from seqopt.errors import StepError
-from seqopt.plan.build import GivenSequence
-from seqopt.plan.solve import solve
 from seqopt.report._gantt import gantt_picture
-from seqopt.sequence.methods import sequential
 from seqopt.sequence.schedule import holds
 
 
 @pytest.fixture(scope="module")
 def plan25(problem25):
-    return solve(problem25, "overlap_dp")
+    return seqopt.solve(problem25, "overlap_dp")
 
 
 def bars(figure):
@@ -42,7 +40,7 @@ def test_bars_are_the_grips_of_the_steps(plan25, arch25, loop25):
 
 
 def test_shades_follow_the_forces(engine25):
-    build = GivenSequence(engine25, sequential(engine25.network))
+    build = seqopt.GivenSequence(engine25, seqopt.sequential(engine25.network))
     figure = build.gantt()
     table = build.responses()
     shaded = [p for p in figure.axes[0].patches if p.get_gid() is None]

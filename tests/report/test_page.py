@@ -12,18 +12,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import seqopt
 from seqopt._cli.main import main
 from seqopt._files import csv_text
 from seqopt.engines.interface import Want
-from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
-from seqopt.network.build import build_network
-from seqopt.plan.build import GivenSequence
 from seqopt.report import page
 from seqopt.report._pages import OVER, plan_page
 from seqopt.report.page import LARGEST, Build, _build_data, _structure_data, report_page
-from seqopt.responses.table import analyze
-from seqopt.sequence.methods import cantilever, sequential
 from tests.browser import BROWSER, PLAIN, WORDS, browsed, browses
 
 browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
@@ -33,9 +29,9 @@ SMALL = "chain:bricks=7"
 @pytest.fixture(scope="module")
 def builds(engine25):
     found = {}
-    for method in (sequential, cantilever):
+    for method in (seqopt.sequential, seqopt.cantilever):
         steps = method(engine25.network)
-        found[method.__name__] = Build(method.__name__, steps, analyze(engine25, steps))
+        found[method.__name__] = Build(method.__name__, steps, seqopt.analyze(engine25, steps))
     return found
 
 
@@ -171,9 +167,9 @@ def test_a_browser_shows_the_numbers_of_the_step_that_is_asked_for(
 
 @browser
 def test_a_build_in_another_order_shows_its_own_bricks(engine25, builds, shown, tmp_path):
-    own = build_network(engine25.network.scene, "reversed")
-    steps = sequential(own)
-    table = analyze(make_engine("compliance", own), steps)
+    own = seqopt.build_network(engine25.network.scene, "reversed")
+    steps = seqopt.sequential(own)
+    table = seqopt.analyze(seqopt.make_engine("compliance", own), steps)
     other = Build("backward", steps, table, order=own.scene.build_order)
     text = report_page(engine25, [builds["sequential"], other], "")
     data = data_of(text)
@@ -196,7 +192,9 @@ def tables_of(text):
 def test_what_robots_cannot_carry_is_said_first_in_the_table_and_at_the_step(engine25, builds):
     table = builds["sequential"].table.copy()
     table.loc[[3, 8], "F_rob1_N"] = [1565.0, 400.0]
-    text = plan_page(GivenSequence(engine25, builds["sequential"].steps, "cascade"), table=table)
+    text = plan_page(
+        seqopt.GivenSequence(engine25, builds["sequential"].steps, "cascade"), table=table
+    )
     sentence = re.search('<p id="sentence">(.*?)</p>', text)[1]
     assert sentence.startswith("Not buildable: payload exceeded in 3 of 49 steps, first in step 4 ")
     assert "(robot 1 would hold up to 1,565 N and can hold 392.4 N)" in sentence

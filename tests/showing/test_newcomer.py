@@ -39,15 +39,6 @@ def test_a_report_shows_plans_side_by_side():
         free.report(seqopt.optimize("wall:columns=2,courses=2"))
 
 
-def test_rules_can_be_given_one_by_one_or_as_a_value():
-    one = seqopt.optimize("wall:columns=2,courses=2", "free", rules="newest=placing")
-    rules = seqopt.FreeRules(newest="placing")
-    assert one.steps == seqopt.optimize("wall:columns=2,courses=2", "free", rules=rules).steps
-    assert one.problem.moves == rules
-    with pytest.raises(seqopt.SeqoptError, match="rules: only the free schedule has them"):
-        seqopt.optimize("wall:columns=2,courses=2", rules=rules)
-
-
 def test_a_given_sequence_shows_itself_as_a_plan_does():
     scene = seqopt.load_scene("wall:columns=2,courses=2")
     engine = seqopt.make_engine("auto", scene)
