@@ -41,7 +41,7 @@ VIEW = View(azimuth=35, elevation=22)
 WORDS = (
     "arch:span=2,rise=0.8",
     "arch:span=2,rise=1.2,curve=catenary,pattern=VLR",
-    "arch:span=2,rise=1.3,curve=pointed,dimensions=0.12x0.1x0.06",
+    "arch:span=2,rise=1,dimensions=0.12x0.1x0.06",
     "vault:span=2,rise=0.8,columns=4",
     "wall:columns=6,courses=8,corbel=-0.03,gap=0.005",
     "dome163",

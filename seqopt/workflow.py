@@ -291,8 +291,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         Over which scenarios, and what counts of them.
     order : str or sequence of int, optional
         In which order bricks are placed, if not in the scene's own: reversed, ends (from all ground
-        ends at once), sides (course by course, from both ends of each to its middle), the names
-        of all bricks, as 1..12,25..13, or search for the best.
+        ends at once), the names of all bricks, as 1..12,25..13, or search for the best.
     mortar : Mortar or str, optional
         What holds the joints, in verdicts and in the engines auto and discrete: epoxy, that of
         Bruun et al. (default), dry, nothing, or bond=STRENGTH (Pa).

@@ -108,8 +108,7 @@ class Built:
         arch25); seqopt scene --list shows all.
     order : str
         In which order bricks are placed, if not in the scene's own: reversed, ends (from all ground
-        ends at once), sides (course by course, from both ends of each to its middle), or the names
-        of all bricks, as 1..12,25..13.
+        ends at once), or the names of all bricks, as 1..12,25..13.
     grips : float or str
         How stiff the grips of all robots are, if not as the scene says: rigid, or N/m, as 1e6, or
         three along its axes, as 1e6x1e6x5e5; turning=N m/rad after a comma keeps held bricks from

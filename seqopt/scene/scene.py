@@ -465,23 +465,9 @@ def _from_all_ends(scene: Scene) -> Order:
     return tuple(sorted(scene.build_order, key=lambda name: far.get(name, last)))
 
 
-def _from_both_sides(scene: Scene) -> Order:
-    """Return the order that builds course by course, from both ends of each to its middle."""
-    where, high = np.array([brick.position for brick in scene.placed]), np.array(scene.up)
-    level = where - np.outer(where @ high, high)
-    axis = np.linalg.svd(level - level.mean(axis=0))[2][0]  # along which it is longest
-    along = np.round(level @ axis * np.sign(axis[np.abs(axis).argmax()]), 6)
-    courses, course = np.unique(np.round(where @ high, 6), return_inverse=True)
-    ends = [along[course == k] for k in range(len(courses))]
-    middle = np.array([0.5 * (each.min() + each.max()) for each in ends])[course]
-    rank = np.lexsort((along, np.round(-np.abs(along - middle), 6), course))
-    return tuple(scene.build_order[k] for k in rank)
-
-
 ORDERS: dict[str, Callable[[Scene], Order]] = {
     "reversed": lambda scene: scene.build_order[::-1],
     "ends": _from_all_ends,
-    "sides": _from_both_sides,
 }
 """Orders by name."""
 

@@ -64,7 +64,7 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     """Return the checked steps of a plan, numbered from 1, or of a part of one, numbered on.
 
     The text is CSV with the columns ``step``, ``type``, ``bricks`` and, for every robot,
-    ``NAME_node`` and, if present, ``NAME_brick``; an empty cell means that the robot does not grip.
+    ``NAME_node``; an empty cell means that the robot does not grip.
     Other columns are ignored. A take-down may begin with any bricks.
     """
     what, out = f"plan {source}", list[Step]()
@@ -110,7 +110,7 @@ def _read_steps(
         number, bricks = (_integer(row[name], f"{where}: {name}") for name in ("step", "bricks"))
         now: list[int | OpenGrip | None] = []
         for robot, held in zip(scene.robots, grips, strict=True):
-            now.append(_read_grip(scene, robot, row, where, held, opened))
+            now.append(_read_grip(robot, row, where, held, opened))
             opened += isinstance(now[-1], OpenGrip) and now[-1] != held
         grips = tuple(now)
         out.append((where, OpenStep(number, kinds[kind], bricks, grips)))
@@ -143,11 +143,11 @@ def _check_rows(scene: Scene, rows: Sequence[tuple[str, OpenStep]], *, part: boo
 
 
 def _read_grip(
-    scene: Scene, robot: Robot, row: Row, where: str, held: object, opened: int
+    robot: Robot, row: Row, where: str, held: object, opened: int
 ) -> int | OpenGrip | None:
     """Return a robot's grip; a mark continues the open grip that it held, or is a new move.
 
-    ``opened``: moves so far. A brick named with a node must be the node's.
+    ``opened``: moves so far.
     """
     column = f"{robot.name}_node"
     cell = row[column].strip()
@@ -162,15 +162,7 @@ def _read_grip(
                 f"let {robot.name} release first"
             )
         return grip
-    node = _integer(cell, f"{where}: {column}", "a node, ? for an open grip, or nothing")
-    named = row.get(f"{robot.name}_brick", "").strip()
-    if named and node in scene.brick_of_node:
-        brick, actual = _integer(named, f"{where}: brick"), scene.brick_of_node[node].name
-        if brick != actual:
-            raise StepError(
-                f"{where}: {robot.name} holds node {node} of brick {brick}; it is on brick {actual}"
-            )
-    return node
+    return _integer(cell, f"{where}: {column}", "a node, ? for an open grip, or nothing")
 
 
 def _integer(cell: str, where: str, wanted: str = "a whole number") -> int:

@@ -33,7 +33,6 @@ LARGE = ("vault338", "dome163", ARMADILLO)
 WORDS = (
     "arch:span=2,rise=0.8",
     "arch:span=3,rise=1.2,curve=catenary",
-    "arch:span=2,rise=1.2,curve=pointed",
     "vault:span=2,rise=0.8,columns=3",
     "wall:columns=6,courses=5",
     "wall:columns=5,courses=4,corbel=0.02",

@@ -34,7 +34,7 @@ def test_from_all_ends_leaves_nothing_that_hangs():
 @pytest.mark.parametrize(
     ("order", "said"),
     [
-        ("backwards", "order 'backwards': give reversed, ends, sides, or names of bricks"),
+        ("backwards", "order 'backwards': give reversed, ends, or names of bricks"),
         ("1,2,3", "order: 2 bricks are missing, 4 among them"),
         ("1,2,3,4,4", "order: 4 occurs twice"),
         ((1, 2, 3, 4, 7), "order: 7 is no brick"),
@@ -48,13 +48,6 @@ def test_what_is_no_order_gets_one_line(order, said):
 
 
 # orders after words
-
-
-def test_a_wall_from_both_sides_meets_in_the_middle():
-    scene = load_scene("wall:columns=4,courses=2,order=sides")
-    assert scene.build_order == (1, 4, 2, 3, 5, 8, 6, 7)
-    with pytest.raises(SceneError, match=r"order 'side' \(did you mean sides\?\)"):
-        load_scene("wall:columns=4,courses=2,order=side")
 
 
 def test_a_vault_closes_from_both_springings():

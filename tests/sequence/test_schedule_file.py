@@ -147,7 +147,6 @@ COLUMNS = "step,type,bricks,rob1_brick,rob1_node,rob2_brick,rob2_node,rob3_brick
         (COLUMNS, "no steps"),
         (COLUMNS + "1,put,1,1,1,,,,\n", "line 2: type is 'put'"),
         (COLUMNS + "1,place,1,1,a,,,,\n", "line 2: rob1_node is 'a'"),
-        (COLUMNS + "1,place,1,2,1,,,,\n", "rob1 holds node 1 of brick 2; it is on brick 1"),
         (COLUMNS + "2,place,1,1,1,,,,\n", "step 2 should be 1"),
     ],
 )

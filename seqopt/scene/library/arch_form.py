@@ -39,7 +39,7 @@ def _circular(span: float, rise: float) -> _Line:
     if rise > 0.5 * span * (1 + 1e-12):
         raise SceneError(
             f"arch: rise is {rise:g} m; a circular arch rises at most half of its span, "
-            f"{0.5 * span:g}: give less, or the curve pointed or catenary"
+            f"{0.5 * span:g}: give less, or the curve catenary"
         )
     radius = (0.25 * span**2 + rise**2) / (2 * rise)
     half = 2 * math.atan(2 * rise / span)
@@ -65,25 +65,7 @@ def _catenary(span: float, rise: float) -> _Line:
     return line
 
 
-def _pointed(span: float, rise: float) -> _Line:
-    """Return two arcs that leave the springings upright and meet in a point."""
-    if rise <= 0.5 * span:
-        raise SceneError(
-            f"arch: rise is {rise:g} m; a pointed arch rises more than half of its span, "
-            f"{0.5 * span:g}: give more, or the curve circular"
-        )
-    radius = (0.25 * span**2 + rise**2) / span
-    turn = math.asin(rise / radius) if radius > rise else 0.5 * math.pi
-
-    def line(at: float) -> Floats:
-        angle = turn * (2 * at if at <= 0.5 else 2 - 2 * at)
-        x = radius * (1 - math.cos(angle))
-        return np.array([x if at <= 0.5 else span - x, radius * math.sin(angle)])
-
-    return line
-
-
-_CURVES = {"circular": _circular, "catenary": _catenary, "pointed": _pointed}
+_CURVES = {"circular": _circular, "catenary": _catenary}
 """By name; each takes span and rise, m."""
 
 
@@ -114,7 +96,7 @@ class ArchForm:
     as wide as it takes for the bricks to fill the curve.
 
     ``span``, ``rise``: between the springings, and from there to the crown; ``curve``:
-    ``_circular``, ``_catenary`` or ``_pointed``; ``bricks``: by default as many as make the joints
+    ``circular`` or ``catenary``; ``bricks``: by default as many as make the joints
     most nearly as wide as ``gap``; ``pattern``: a letter per brick, repeated: ``V`` lies along the
     arch, ``L`` and ``R`` lie across it and stick out to the left and to the right; ``dimensions``:
     length, width and thickness of a brick; ``gap``: how wide joints are to be where the number of

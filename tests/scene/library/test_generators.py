@@ -32,14 +32,10 @@ def small_walls(draw):
 @st.composite
 def small_arches(draw):
     """Arches by span and rise whose bricks fit; those that do not are refused in a line."""
-    span, curve = (
-        draw(st.floats(1.0, 4.0)),
-        draw(st.sampled_from(["circular", "catenary", "pointed"])),
-    )
-    steep = (0.52, 1.0) if curve == "pointed" else (0.15, 0.5)
+    span, curve = (draw(st.floats(1.0, 4.0)), draw(st.sampled_from(["circular", "catenary"])))
     form = ArchForm(
         span=span,
-        rise=span * draw(st.floats(*steep)),
+        rise=span * draw(st.floats(0.15, 0.5)),
         curve=curve,
         pattern=draw(st.sampled_from(["V", "VLR"])),
     )
@@ -104,10 +100,6 @@ def test_every_joint_lies_between_the_faces_of_its_bricks(scene):
         (
             lambda: arch(ArchForm(span=2.0, rise=1.2)),
             "arch: rise is 1.2 m; a circular arch rises at most half of its span, 1: give less",
-        ),
-        (
-            lambda: arch(ArchForm(span=2.0, rise=1.0, curve="pointed")),
-            "arch: rise is 1 m; a pointed arch rises more than half of its span, 1: give more",
         ),
         (
             lambda: arch(ArchForm(span=2.0, rise=0.7, bricks=40)),
