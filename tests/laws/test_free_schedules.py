@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,12 +12,16 @@ from hypothesis import strategies as st
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
+from seqopt.graph.decisions import pose_decisions
+from seqopt.graph.formulation import find_formulation
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.scene.parts import Anywhere, Robot, Sphere
+from seqopt.sequence.methods import three_robot_loop
 from seqopt.sequence.rules import FreeRules
+from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import rescaled
 from tests.strategies import free_builds
 
@@ -105,3 +110,44 @@ def test_a_worse_optimum_is_seen():
     assert not_worse(np.array([1.0]), np.array([np.inf]))
     with pytest.raises(TypeError):
         FreeRules(2)
+
+
+# units and scale change no rank, no choice and no verdict
+
+
+UNITS = [(1e3, 1e-3, 1e3), (1e3, 1, 1), (1e-3, 1e3, 1e-3), (1e-3, 1, 1)]
+CASES = [(criterion, scales) for criterion in (EQUATIONS, CLOSEST) for scales in UNITS]
+CASES = [CASES[0], *(pytest.param(*case, marks=pytest.mark.slow) for case in CASES[1:])]
+
+
+def solved(scene, criterion):
+    problem = pose_decisions(
+        ComplianceEngine(build_network(scene)), three_robot_loop(build_network(scene)), criterion
+    )
+    plan = solve(problem, find_formulation("overlap_dp"))
+    return problem, plan.nodes, plan.certificate
+
+
+@pytest.fixture(scope="module")
+def plain(arch25):
+    return cache(lambda criterion: solved(arch25, criterion))
+
+
+@pytest.mark.parametrize(("criterion", "scales"), CASES)
+def test_ranks_and_choices_do_not_know_units(arch25, plain, criterion, scales):
+    """Responses are rounded for ranks in the scene's own units."""
+    own, nodes, certificate = plain(criterion)
+    other, others, certified = solved(rescaled(arch25, *scales), criterion)
+    assert others == nodes
+    assert certified.objective == pytest.approx(certificate.objective, rel=1e-9)
+    for a, b in zip(own.sums.shared, other.sums.shared, strict=True):
+        np.testing.assert_allclose(b, a, rtol=1e-9)
+
+
+def test_a_resolution_in_other_units_is_another_criterion(arch25, plain):
+    """The control: forces in kN rounded to 1 kN decide nothing."""
+    _, nodes, _ = plain(EQUATIONS)
+    absolute = replace(EQUATIONS, resolution=RESOLUTION)
+    assert solved(arch25, absolute)[1] == nodes
+    _, others, _ = solved(rescaled(arch25, 1, 1e-3, 1), absolute)
+    assert others != nodes
