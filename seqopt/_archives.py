@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterable
@@ -92,7 +93,7 @@ class Archive:
         content = io.BytesIO(self.read(f"{name}.npy"))
         try:
             found = np.lib.format.read_array(content, allow_pickle=False)
-        except (*_BROKEN, MemoryError):
+        except (*_BROKEN, MemoryError, SyntaxError, TypeError, tokenize.TokenError):
             raise FileError(f"{self._where}: {name} is no array that numpy.save wrote") from None
         wanted = zip(found.shape, shape, strict=False)
         fits = found.ndim == len(shape) and all(want in (None, has) for has, want in wanted)
