@@ -6,7 +6,7 @@ reaches is then looked up in a table of postures, which pinocchio and coal compu
 
     scene = seqopt.load_scene("mine.json")             # whose robots have arms
     table = find_postures(scene, cache="postures")     # kept there for the next time
-    table.table()                                      # every posture with its joints
+    table.rows("rob1", 12)                             # its postures at a node, as in table.joints
     plan = seqopt.optimize(scene, "free")              # with postures in every step
     print(plan.arms)                                   # whether they are kept while robots hold
 

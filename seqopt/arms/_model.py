@@ -188,19 +188,6 @@ class ArmModel:
         turned[:3] += np.cross(turned[3:], away, axis=0)
         return np.asarray(turned)
 
-    def grip_compliance(self, posture: Floats) -> Floats:
-        """Return the compliance of a grip in a posture (6, 6): J diag(1/k) Jᵀ, of the node held.
-
-        Motion by force, translations first, in the axes of the scene: m/N, rad/N, m/(N m) and
-        rad/(N m). Links and tool are rigid here; joints alone are compliant, each by its own
-        stiffness.
-        """
-        stiffness = np.array(self.arm.joint_stiffness)
-        if not len(stiffness):
-            raise SceneError("arm: its joints have no stiffness; give joint_stiffness")
-        jacobian = self.jacobian(posture)
-        return np.asarray(jacobian / stiffness @ jacobian.T)
-
     def placed(self, postures: Floats, tools: Floats) -> Placed:
         """Return where moving bodies are in postures (P, joints).
 
@@ -288,7 +275,7 @@ def _bodies(model: Any, geometry: Any) -> Iterator[Body]:
 
 _AROUND = 12  # points around each end of a tool
 
-_model = lru_cache(maxsize=16)(ArmModel)
+arm_model = lru_cache(maxsize=16)(ArmModel)
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,7 +296,7 @@ class PosedArm:
 
         Of the foot the last point is there twice: there is no tool.
         """
-        model = _model(self.arm)
+        model = arm_model(self.arm)
         axes, flange = model.flange_pose(self._own)
         data, root = model.data, model.base.translation
         pin.forwardKinematics(model.model, data, self._own)
@@ -325,7 +312,7 @@ class PosedArm:
 
         Of the foot, those that do not move.
         """
-        model = _model(self.arm)
+        model = arm_model(self.arm)
         out = [
             (body.points @ body.rotation.T + body.shift) @ model.base.rotation.T
             + model.base.translation
@@ -343,9 +330,9 @@ class PosedArm:
 
     @property
     def _own(self) -> Floats:
-        return np.asarray(self.joints)[: _model(self.arm).joints]
+        return np.asarray(self.joints)[: arm_model(self.arm).joints]
 
 
 def idle_arm(arm: Arm) -> PosedArm:
     """Return the shapes of an arm that holds nothing."""
-    return PosedArm(arm, np.zeros(_model(arm).joints), holds=False)
+    return PosedArm(arm, np.zeros(arm_model(arm).joints), holds=False)

@@ -177,28 +177,6 @@ def find_table(scene: Scene) -> PostureTable:
     return found
 
 
-def reach_without_arms(scene: Scene) -> pd.DataFrame:
-    """Return which nodes lie within the reach of each robot, a row for each."""
-    rows = (
-        {"robot": robot.name, "brick": brick.name, "node": node, "reached": node in reached}
-        for robot in scene.robots
-        for brick, reached in zip(scene.placed, scene.within_reach(robot), strict=True)
-        for node in brick.nodes
-        if node not in scene.blocked_nodes
-    )
-    return pd.DataFrame(rows)
-
-
-def reach_covered(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
-    """Yield how much lies within the reach of each robot, none of which has an arm."""
-    yield f"no robot of {scene.name} has an arm: this is the reach that the scene gives them"
-    for robot, (_, rows) in zip(scene.robots, table.groupby("robot", sort=False), strict=True):
-        yield f"{robot.name}: reach {robot.reach}, {rows['reached'].sum()} of {len(rows)} nodes"
-        lacking = [str(node) for node in rows["node"][~rows["reached"]]]
-        if lacking:
-            yield f"  never: {_listed(lacking)}"
-
-
 def reach_described(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
     """Yield what each robot reaches, in words."""
     free = [node for node in table["node"].unique() if node not in scene.blocked_nodes]

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from seqopt.arms._model import SAYS
@@ -42,8 +41,6 @@ class PostureTable(FrozenValue):
         Which of these hits each brick, the one nearest to the base; -1 for none.
     collide : (P, P) bool
         Which pairs of postures, of different robots, are in each other's way.
-    compliance : (P, 6, 6) float
-        Compliance of a grip in it by the joints of the arm, m/N and rad/(N m); NaN if not known.
     found : (R, N) int
         How many postures were found, of which at most `MOST` are kept.
     why : (R, N) str
@@ -62,7 +59,6 @@ class PostureTable(FrozenValue):
     links: tuple[str, ...]
     strikes: Ints
     collide: Bools
-    compliance: Floats
     found: Ints
     why: NDArray[np.str_]
 
@@ -91,24 +87,6 @@ class PostureTable(FrozenValue):
         brick = int(first[best].argmin())
         link = int(first[best, brick])
         return self.links[link].replace(SAYS, f"hits brick {self.bricks[brick]}")
-
-    def table(self) -> pd.DataFrame:
-        """Return every posture: joints, flange, and the bricks that the arm hits in it.
-
-        Result: a row for every posture: ``robot``, ``node``; ``joint_1`` and so on, rad or m;
-        ``flange_x`` and so on, where the flange is, m; ``toward_x`` and so on, where the tool
-        points; ``hits``, names of bricks with semicolons between.
-        """
-        columns: dict[str, object] = {
-            "robot": [self.robots[r] for r in self.robot],
-            "node": [self.nodes[n] for n in self.node],
-        }
-        columns |= {f"joint_{k}": joint for k, joint in enumerate(self.joints.T, start=1)}
-        columns |= {f"flange_{name}": self.place[:, i] for i, name in enumerate("xyz")}
-        columns |= {f"toward_{name}": self.axes[:, i, 2] for i, name in enumerate("xyz")}
-        names = np.array(self.bricks)
-        columns["hits"] = [";".join(map(str, names[hit].tolist())) for hit in self.hits]
-        return pd.DataFrame(columns)
 
     @cached_property
     def _rows(self) -> dict[tuple[str, int], Ints]:

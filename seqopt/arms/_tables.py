@@ -6,8 +6,10 @@ import hashlib
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import fields, replace
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields
 from functools import lru_cache, partial
 from itertools import combinations
 from pathlib import Path
@@ -18,7 +20,7 @@ import numpy as np
 from seqopt._archives import Archive
 from seqopt._files import make_folder, read_bytes, write_bytes
 from seqopt.arms._collisions import collide_pairs
-from seqopt.arms._model import UP, ArmModel
+from seqopt.arms._model import UP, ArmModel, arm_model
 from seqopt.arms._postures import PostureTable, choose
 from seqopt.arms._reached import Reached, Site, beside_others, reached_alone
 from seqopt.arms._urdf import model_path, shape_notes
@@ -71,7 +73,6 @@ def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
             ]
         ),
         collide=_collisions(site, reached, robot_of),
-        compliance=np.full((len(node), 6, 6), np.nan),
         found=np.array([each.found for each in reached]),
         why=np.array([[each.why.get(place, "") for place in places] for each in reached]),
     )
@@ -92,25 +93,22 @@ def _collisions(site: Site, reached: list[Reached], robot: Ints) -> Bools:
     return out
 
 
-def _with_compliance(table: PostureTable, arms: Sequence[tuple[str, Arm]]) -> PostureTable:
-    """Return a table with the compliance of grips by the joints of the arms, where it is known.
+def _soft_models(arms: Iterable[tuple[str, Arm | None]]) -> dict[str, ArmModel]:
+    """Return the models of arms with compliant joints, by the names of their robots.
 
     Raises `SceneError` if an arm does not give a stiffness for every joint.
     """
-    found = table.compliance.copy()
+    found = {}
     for name, arm in arms:
-        if arm.joint_stiffness:
-            rows = np.flatnonzero(table.robot == table.robots.index(name))
-            try:
-                model = ArmModel(arm)
-            except SceneError as error:
-                raise SceneError(f"robot {name}: {str(error).removeprefix('arm: ')}") from error
-            for row in rows.tolist():
-                found[row] = model.grip_compliance(table.joints[row, : model.joints])
-    return replace(table, compliance=found)
+        try:
+            found |= {name: arm_model(arm)} if arm is not None and arm.joint_stiffness else {}
+        except SceneError as error:
+            raise SceneError(f"robot {name}: {str(error).removeprefix('arm: ')}") from error
+    return found
 
 
-_VERSION = 2  # of what is computed: tables of another one are not taken
+_VERSION = 3  # of what is computed: tables of another one are not taken
+_DAMAGED = (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
 _NAMES = ("robots", "nodes", "bricks", "links")
 _MESH = re.compile(rb'filename="(?:package://|file://)?([^"]+)"')
 
@@ -164,34 +162,16 @@ def _read(path: Path, site: Site) -> PostureTable | None:
     try:
         archive = Archive(read_bytes(path), str(path))
         archive.require(f"{each.name}.npy" for each in fields(PostureTable))
-        robot = archive.array("robot", "iu", (None,))
-        p, r, n, b = len(robot), len(site.robots), len(site.nodes), len(site.bricks)
-        shapes: dict[str, tuple[str, tuple[int | None, ...]]] = {
-            "robots": ("U", (r,)),
-            "nodes": ("iu", (n,)),
-            "bricks": ("iu", (b,)),
-            "robot": ("iu", (p,)),
-            "node": ("iu", (p,)),
-            "found": ("iu", (r, n)),
-            "why": ("U", (r, n)),
-            "joints": ("f", (p, None)),
-            "axes": ("f", (p, 3, 3)),
-            "place": ("f", (p, 3)),
-            "tools": ("f", (p,)),
-            "links": ("U", (None,)),
-            "strikes": ("iu", (p, b)),
-            "collide": ("b", (p, p)),
-            "compliance": ("f", (p, 6, 6)),
-        }
-        content: dict[str, Any] = {name: archive.array(name, *how) for name, how in shapes.items()}
-        content |= {name: tuple(content[name].tolist()) for name in _NAMES}
-    except (OSError, ValueError):
+        with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as stored:
+            content: dict[str, Any] = {name: stored[name] for name in stored.files}
+        table = PostureTable(**content | {n: tuple(content[n].tolist()) for n in _NAMES})
+        shape = len(table.robot), len(site.bricks)
+        right = table.strikes.shape == shape and table.collide.shape == shape[:1] * 2
+        right &= len(table.joints) == len(table.node) == shape[0]
+    except _DAMAGED:
         return None
     wanted = tuple(each.name for each in site.robots), site.nodes
-    ends = {"robot": (0, r), "node": (0, n), "strikes": (-1, len(content["links"]))}
-    inside = (((low <= content[k]) & (content[k] < high)).all() for k, (low, high) in ends.items())
-    same = (content["robots"], content["nodes"]) == wanted
-    return PostureTable(**content) if same and all(inside) else None
+    return table if right and (table.robots, table.nodes) == wanted else None
 
 
 _SITES = 16  # of which tables are kept, the last ones that were asked for
@@ -209,15 +189,13 @@ def known_table(scene: Scene, cache: Path | str | None, progress: Tell | None) -
         known.setdefault(None, known[Path(cache)])
     if None not in known:
         known[None] = compute()
-    arms = tuple((robot.name, robot.arm) for robot in scene.robots if robot.arm is not None)
-    if any(arm.joint_stiffness for _, arm in arms) and arms not in known:
-        known[arms] = _with_compliance(known[None], arms)
-    return known.get(arms, known[None])
+    _soft_models((robot.name, robot.arm) for robot in scene.robots)
+    return known[None]
 
 
 @lru_cache(maxsize=_SITES)
 def _known(site: Site) -> dict[object, PostureTable]:  # noqa: ARG001  # kept by site
-    """Return the table of a site, if it is known, under the folders and soft arms that have it."""
+    """Return the table of a site, if it is known, under the folders that have it."""
     return {}
 
 
@@ -226,12 +204,12 @@ def held_by(
     site: Site, table: PostureTable, arms: tuple[tuple[str, Arm | None], ...]
 ) -> HeldPostures:
     """Return the postures in which arms with compliant joints hold; ``arms``: with their names."""
-    order = np.argsort(table.nodes)
-    chosen, robots, rows, found = _chosen(site, table)[:, order], [], [], []
-    for robot, (name, arm) in enumerate(arms):
-        if arm is None or not arm.joint_stiffness:
+    order, models = np.argsort(table.nodes), _soft_models(arms)
+    chosen, robots, rows, found = _chosen(site, table, models)[:, order], [], [], []
+    for robot, (name, _) in enumerate(arms):
+        if name not in models:
             continue
-        model, own = ArmModel(arm), chosen[table.robots.index(name)]
+        model, own = models[name], chosen[table.robots.index(name)]
         jacobian = np.full((len(own), 6, model.joints), np.nan)
         for place in np.flatnonzero(own >= 0).tolist():
             jacobian[place] = model.jacobian(table.joints[own[place], : model.joints])
@@ -243,7 +221,7 @@ def held_by(
     )
 
 
-def _chosen(site: Site, table: PostureTable) -> Ints:
+def _chosen(site: Site, table: PostureTable, models: Mapping[str, ArmModel]) -> Ints:
     """Return the posture of every arm at every node, (R, N), -1 where there is none.
 
     What is near counts most: bricks near the node, which stand when it is held, and postures at
@@ -256,6 +234,10 @@ def _chosen(site: Site, table: PostureTable) -> Ints:
     together = 1 / (1 + np.linalg.norm(at[:, None] - at, axis=2) / size)
     own = near[table.node]
     usable = 1 - (table.hits * own).sum(axis=1) / own.sum(axis=1)
-    give = np.nan_to_num(np.trace(table.compliance[:, :3, :3], axis1=1, axis2=2))
+    give = np.zeros(len(table.robot))  # how far a force moves a node, by the joints
+    for name, model in models.items():
+        for row in np.flatnonzero(table.robot == table.robots.index(name)).tolist():
+            moved = model.jacobian(table.joints[row, : model.joints])[:3]
+            give[row] = (moved**2 / np.array(model.arm.joint_stiffness)).sum()
     usable -= _STIFFER * give / max(give.max(initial=0.0), np.finfo(float).tiny)
     return choose((table.robot, table.node), usable, table.collide, together, len(table.robots))

@@ -49,6 +49,12 @@ def soft(bricks=5, robots=3):
     return scene.with_robots(*made[:robots])
 
 
+def by_springs(model, joints):
+    """How a force or moment at the node moves and turns it, by the joints alone: J diag(1/k) Jᵀ."""
+    jacobian = model.jacobian(joints)
+    return jacobian / np.array(model.arm.joint_stiffness) @ jacobian.T
+
+
 def by_joints(scene, grips):
     """How each grip of a step gives way, from the table; that of the crane is a number."""
     held, out = scene.held_postures, []
@@ -58,7 +64,7 @@ def by_joints(scene, grips):
             out.append(np.eye(3) / CRANE)
         elif node is not None:
             joints = table.joints[held.row(i, node)]
-            out.append(ArmModel(robot.arm).grip_compliance(joints)[:3, :3])
+            out.append(by_springs(ArmModel(robot.arm), joints)[:3, :3])
     return out
 
 
@@ -115,7 +121,7 @@ def arm_of(tmp_path, lengths, stiffness):
 
 def test_one_joint_gives_way_across_its_lever(tmp_path):
     """L² / k along the tangent and nothing else; 1 / k in turning, L / k between them."""
-    found = ArmModel(arm_of(tmp_path, [1.5], (2e5,))).grip_compliance(np.array([0.6]))
+    found = by_springs(ArmModel(arm_of(tmp_path, [1.5], (2e5,))), np.array([0.6]))
     tangent = np.array([-np.sin(0.6), np.cos(0.6), 0.0])
     assert found[:3, :3] == pytest.approx(1.5**2 / 2e5 * np.outer(tangent, tangent), abs=1e-18)
     assert found[:3, 5] == pytest.approx(1.5 / 2e5 * tangent, abs=1e-18)
@@ -125,7 +131,7 @@ def test_one_joint_gives_way_across_its_lever(tmp_path):
 def test_two_joints_add_what_each_does(tmp_path):
     first, second, (a, b) = 2e5, 5e4, (0.4, -1.1)
     model = ArmModel(arm_of(tmp_path, [1.0, 0.7], (first, second)))
-    found = model.grip_compliance(np.array([a, b]))
+    found = by_springs(model, np.array([a, b]))
     elbow = np.array([np.cos(a), np.sin(a)])
     tip = elbow + 0.7 * np.array([np.cos(a + b), np.sin(a + b)])
     turned = [np.array([-r[1], r[0]]) for r in (tip, tip - elbow)]
@@ -155,7 +161,10 @@ def test_the_stiffest_is_taken_of_those_that_are_as_good():
     """Where a posture hits nothing and is in no one's way, no such one is stiffer."""
     scene = soft()
     held, table = scene.held_postures, find_postures(scene)
-    give = np.trace(table.compliance[:, :3, :3], axis1=1, axis2=2)
+    give = np.zeros(len(table.robot))
+    for row, (robot, joints) in enumerate(zip(table.robot.tolist(), table.joints, strict=True)):
+        arm = next(r.arm for r in scene.robots if r.name == table.robots[robot])
+        give[row] = (ArmModel(arm).jacobian(joints)[:3] ** 2 / arm.joint_stiffness).sum()
     good = ~table.hits.any(axis=1) & ~table.collide.any(axis=1)
     rows = held.rows[held.rows >= 0]
     for row in rows[good[rows]].tolist():

@@ -9,13 +9,7 @@ from seqopt._cli.outputs import Output
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import ARCH25, Built, Folder
 from seqopt._files import csv_text
-from seqopt.arms._permits import (
-    find_table,
-    reach_covered,
-    reach_described,
-    reach_table,
-    reach_without_arms,
-)
+from seqopt.arms._permits import reach_described, reach_table
 from seqopt.arms.reach import find_postures
 from seqopt.work.progress import Tell
 
@@ -23,17 +17,16 @@ from seqopt.work.progress import Tell
 def reach(
     scene: Built = ARCH25, *, cache: Path | None = None, progress: Tell, out: Folder = None
 ) -> Answer:
-    """Say which robots reach which nodes.
+    """Say which arms reach which nodes, with how many postures, and up to how many bricks.
 
-    Of those with arms, with how many postures, and up to how many bricks. Robots have arms in the
-    scene file; the extra arms computes postures.
+    Robots have arms in the scene file; the extra arms computes postures.
 
     Parameters
     ----------
     scene, cache, progress : optional
         As of `optimize`.
     out : pathlib.Path, optional
-        Folder to write reach.csv, postures.csv and a picture to.
+        Folder to write reach.csv to.
 
     Examples
     --------
@@ -43,18 +36,13 @@ def reach(
     found, output = scene.read(), Output(out, scene.scene)
     output.require()
     find_postures(found, cache, progress)
-    table = reach_table(found) if found.has_arms else reach_without_arms(found)
-
-    def files() -> dict[str, bytes | str]:
-        postures = {"postures.csv": csv_text(find_table(found).table())} if found.has_arms else {}
-        return {"reach.csv": csv_text(table), **postures}
-
-    written = output.write(progress, files)
-    lines = [*(reach_described if found.has_arms else reach_covered)(found, table)]
-    if written:
-        names = "reach.csv, postures.csv" if found.has_arms else "reach.csv"
-        lines.append(f"written to {out}: {names}")
-    else:
-        lines.append("--out DIR writes a row for every robot and node, and postures of arms")
+    table = reach_table(found)
+    written = output.write(progress, lambda: {"reach.csv": csv_text(table)})
+    end = (
+        f"written to {out}: reach.csv"
+        if written
+        else "--out DIR writes a row for every robot and node"
+    )
+    lines = [*reach_described(found, table), end]
     text = "\n".join(map(wrapped, lines))
     return Answer({"reach": table}, text, scene=found, written=written)
