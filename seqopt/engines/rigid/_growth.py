@@ -118,6 +118,7 @@ class Growth:
         self.loss = np.ones(len(tree.spring))
         self.twist = np.empty((1 + most, most))
         self.wrench = np.zeros((1 + most, 6 * self._acting[-1]))
+        self._before: _Before | None = None
         self._start()
 
     def reach(self, bricks: int) -> None:
@@ -181,7 +182,7 @@ class Growth:
     def _start(self) -> None:
         self.wrench[:] = 0.0  # springs not of the tree act on all rows
         self.bricks, self._left = 0, 1.0  # rounding when the twists were summed anew
-        self._before: _Before | None = None
+        self._before = None
         self._tie(np.arange(0))
         self.twist[0] = 0.0
 

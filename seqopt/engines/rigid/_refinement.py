@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -258,19 +257,6 @@ class Refinement:
         return _join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
 
 
-class _Asked(NamedTuple):
-    """Grip sets that are corrected together."""
-
-    columns: Ints  # (S, r)
-    loads: Ints  # (S, k); rows of the operator's loads at the grips
-    compliance: GripCompliance
-
-    def of(self, which: Ints) -> _Asked:
-        """Return some of the sets."""
-        compliance = self.compliance.select(which)
-        return _Asked(self.columns[which], self.loads[which], compliance)
-
-
 @dataclass(frozen=True)
 class _Corrector:
     """Corrects answers of an operator, as `Refinement.solve`."""
@@ -291,7 +277,7 @@ class _Corrector:
                 require_resistance(network, parts.bricks, columns[at], mine)
         states = self._states(index, found.force)
         force = found.force[:, : len(index.T) - operator.loose].copy()
-        done = self._correct(_Asked(columns, index, compliance), states, force)
+        done = self._correct(columns, index, compliance, states, force)
         done &= ~nearly_rigid(operator, index, pairs, compliance)
         wrench, twist = unscaled(parts, states[done])
         mine = compliance.select(done)
@@ -308,27 +294,31 @@ class _Corrector:
         wrench, twist = (loads @ rows for rows in (self.operator.wrench, self.operator.twist))
         return rescaled(self.system.parts, wrench.reshape(len(index), -1, 6), twist)
 
-    def _correct(self, asked: _Asked, states: Floats, force: Floats) -> Bools:
+    def _correct(
+        self, columns: Ints, index: Ints, compliance: GripCompliance, states: Floats, force: Floats
+    ) -> Bools:
         """Correct answers in place until they no longer change; return which have come so far.
 
         ``states`` (S, n): scaled wrenches and twists; ``force`` (S, 3r): of the grips.
         """
-        done = np.zeros(len(asked.columns), dtype=bool)
+        done = np.zeros(len(columns), dtype=bool)
         left = np.flatnonzero(np.isfinite(states).all(axis=1))
         for _ in range(_STEPS):
             if not len(left):
                 break
-            before = states[left]
-            change, more = self._correction(asked.of(left), before, force[left])
+            before, own = states[left], compliance.select(left)
+            change, more = self._correction(columns[left], index[left], own, before, force[left])
             states[left] += change
             force[left] += more
             done[left] = unchanged(self.system.parts, before, change, self.largest)
             left = left[~done[left] & np.isfinite(change).all(axis=1)]
         return done
 
-    def _correction(self, asked: _Asked, states: Floats, force: Floats) -> tuple[Floats, Floats]:
+    def _correction(
+        self, columns: Ints, index: Ints, compliance: GripCompliance, states: Floats, force: Floats
+    ) -> tuple[Floats, Floats]:
         """Return the corrections of scaled answers (S, n) and grip forces (S, 3r)."""
-        operator, system, columns = self.operator, self.system, asked.columns
+        operator, system = self.operator, self.system
         parts, inner = system.parts, system.inner
         joints = len(parts.wrench_unit)
         at = load_rows(columns, operator.moments)
@@ -344,7 +334,7 @@ class _Corrector:
         if operator.loose:
             moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
         moved = np.hstack([np.take_along_axis(moved, at, axis=1), -pull])
-        compliance, off = asked.compliance, None
+        off = None
         if not compliance.rigid:  # how far grips let their nodes be
             bears = force.reshape(*columns.shape, operator.width)
             off = np.zeros(bears.shape)
@@ -352,7 +342,7 @@ class _Corrector:
                 off += np.einsum("srij,srj->sri", compliance.transmitted, bears)
             if compliance.moved is not None:
                 off[..., :3] -= compliance.moved
-        change = still_forces(operator, columns, asked.loads, moved, compliance, off)
+        change = still_forces(operator, columns, index, moved, compliance, off)
         more = change[:, : at.shape[1]].copy()
         change[:, change.shape[1] - operator.loose :] += loose
-        return answer + self._states(asked.loads, change, 0.0), more
+        return answer + self._states(index, change, 0.0), more
