@@ -98,7 +98,7 @@ def _soft_models(arms: Iterable[tuple[str, Arm | None]]) -> dict[str, ArmModel]:
 
     Raises `SceneError` if an arm does not give a stiffness for every joint.
     """
-    found = {}
+    found = dict[str, ArmModel]()
     for name, arm in arms:
         try:
             found |= {name: arm_model(arm)} if arm is not None and arm.joint_stiffness else {}

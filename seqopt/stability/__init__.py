@@ -24,7 +24,7 @@ from seqopt.stability._steps import assess_steps, stability_table
 from seqopt.stability.assessment import Stability, Verdict, assess
 
 if TYPE_CHECKING:
-    from seqopt.stability._load_factor import LoadFactor, load_factor_table, load_factors
+    from seqopt.stability._load_factor import LoadFactor, load_factors
 
 __all__ = [
     "LoadFactor",
@@ -34,10 +34,9 @@ __all__ = [
     "Verdict",
     "assess",
     "assess_steps",
-    "load_factor_table",
     "load_factors",
     "stability_table",
 ]
 __getattr__, __dir__ = later(
-    __name__, dict.fromkeys(("LoadFactor", "load_factor_table", "load_factors"), "_load_factor")
+    __name__, dict.fromkeys(("LoadFactor", "load_factors"), "_load_factor")
 )

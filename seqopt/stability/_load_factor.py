@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact.assembly import Assembly
@@ -138,35 +137,3 @@ def load_factors(
         load_factor(step_assembly(network, step.bricks, step.grips), mortar)
         for step in with_progress("finding load factors", require_steps(steps), progress)
     )
-
-
-def load_factor_table(steps: Sequence[Step], results: Sequence[LoadFactor]) -> pd.DataFrame:
-    """Return one row per step; an empty cell is a number that is not proven.
-
-    Parameters
-    ----------
-    steps : sequence of Step
-    results : sequence of LoadFactor
-        Of the steps.
-
-    Returns
-    -------
-    pandas.DataFrame
-        ``step``, ``type``, ``bricks``, ``load_N``, ``load_factor``, ``not_above``, ``unloaded``,
-        ``first_brick`` and ``first_joint``, as in `LoadFactor`.
-    """
-    rows = [
-        {
-            "step": step.number,
-            "type": step.kind.value,
-            "bricks": step.bricks,
-            "load_N": result.load,
-            "load_factor": result.factor,
-            "not_above": result.bound,
-            "unloaded": result.unloaded.value,
-            "first_brick": result.first_block,
-            "first_joint": result.first_contact,
-        }
-        for step, result in zip(steps, results, strict=True)
-    ]
-    return pd.DataFrame(rows)

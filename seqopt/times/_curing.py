@@ -54,7 +54,8 @@ class JointsInTime:
         count = self.count(bricks)
         since = placed[:, self.closing[:count]]
         age = np.maximum(time[:, None] - since, 0.0) + SLACK * np.abs(time[:, None])
-        return np.append(0.0, self.shares)[(age[:, :, None] >= self.ages).sum(axis=2)]
+        reached = (age[:, :, None] >= self.ages).sum(axis=2)
+        return np.asarray(np.append(0.0, self.shares)[reached])
 
     def events(self, bricks: int, placed: Floats) -> Floats:
         """Return when joints reach points, (n, j * k), s; see `at`."""

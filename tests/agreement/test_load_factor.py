@@ -16,7 +16,7 @@ from seqopt.errors import SceneError
 from seqopt.scene import Load
 from seqopt.scene.library import WallShape, wall
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability import Margins, Screen, Verdict, load_factor_table, load_factors
+from seqopt.stability import Margins, Screen, Verdict, load_factors
 from seqopt.stability._builds import BuildProver
 from seqopt.stability._load_factor import load_factor
 from seqopt.stability._steps import each_verdict
@@ -211,12 +211,11 @@ def test_what_acts_since_a_later_brick_and_what_does_not():
     late = replace(scene, loads=tuple(replace(load, since=4) for load in scene.loads))
     steps = seqopt.sequential(seqopt.build_network(late))
     results = load_factors(late, steps, DRY)
-    table = load_factor_table(steps, results)
-    acts = table.bricks >= 4
+    acts = np.array([step.bricks >= 4 for step in steps])
     assert acts.any()
     assert not acts.all()
-    assert (table.load_N == np.where(acts, 5.0, 0.0)).all()
-    assert (table.load_factor.isna() == ~acts).all()
+    assert [found.load for found in results] == np.where(acts, 5.0, 0.0).tolist()
+    assert (np.isnan([found.factor for found in results]) == ~acts).all()
     with pytest.raises(SceneError, match="no load acts on it"):
         load_factors(replace(late, loads=()), steps, DRY)
 
