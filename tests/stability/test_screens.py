@@ -67,11 +67,17 @@ LIES = {
 }
 
 
-@pytest.mark.parametrize("lie", LIES)
-def test_a_lie_is_not_believed(arch25, lie):
-    """It may leave sets open; it never turns a verdict."""
+@pytest.fixture(scope="module")
+def true(arch25):
+    """A structure, grip sets, and which of them stand."""
     network, sets = build_network(arch25), pairs_and_triples(5)
-    truth = Screen(network, DRY).stands(5, sets)
+    return network, sets, Screen(network, DRY).stands(5, sets)
+
+
+@pytest.mark.parametrize("lie", LIES)
+def test_a_lie_is_not_believed(true, lie):
+    """It may leave sets open; it never turns a verdict."""
+    network, sets, truth = true
     told = Screen(network, DRY, compiled=liar(LIES[lie])).stands(5, sets)
     assert {1, -1} <= set(truth.tolist())
     assert ((told == truth) | (told == OPEN)).all()
@@ -247,7 +253,7 @@ STRUCTURES = {
 
 @pytest.mark.xdist_group("least tilts")  # which are found once
 @pytest.mark.parametrize("name", STRUCTURES)
-@pytest.mark.parametrize("angle", [0.2, np.pi / 8])
+@pytest.mark.parametrize("angle", [np.pi / 8])
 def test_turning_about_the_vertical_makes_no_tilt_larger_than_is_safe(name, angle):
     """Eight fixed directions missed the worst: between them less was survived than was said."""
     assembly = turned(STRUCTURES[name], angle)
