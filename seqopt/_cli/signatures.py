@@ -186,12 +186,12 @@ class Signature:
         """The command lines that its docstring shows."""
         lines = _read(self.function.__doc__)[0].get("Examples", [])
         shell = [each[2:] for each in lines if each.startswith("$ ")]
-        return lines if self._foreign and not shell else shell
+        return lines if _is_foreign(self.function) and not shell else shell
 
     def fill(self, command: argparse.ArgumentParser, *, helps: bool = True) -> None:
         """Add the options, by question, and the help, which is read where it ``helps`` alone."""
         lines = _read(self.function.__doc__)[0]
-        texts = self.texts() if helps or self._foreign else {}
+        texts = self.texts() if helps or _is_foreign(self.function) else {}
         command.description = wrapped(self._spoken(" ".join(lines.get("", ()))))
         own = sorted(self.options.values(), key=lambda e: not e.place or e.default is MISSING)
         places = (each for each in own if each.place)  # as report [SCENE] FOLDER
@@ -212,10 +212,6 @@ class Signature:
                 upper = value if value == value.upper() else ""  # of packages of others
                 known = replace(option, more={"value": upper, **option.more}) if upper else option
                 known.add_to(group, self._help(option, said))
-
-    @property
-    def _foreign(self) -> bool:
-        return _is_foreign(self.function)
 
     def _spoken(self, text: str) -> str:
         """Return a text of a docstring as the command line says it: parameters are options."""

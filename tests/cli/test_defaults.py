@@ -85,7 +85,7 @@ def test_a_build_begins_where_python_says(arch):
 
 def test_help_is_what_docstrings_say():
     compared, chosen = (signature_of(COMMANDS[n].load()).texts() for n in ("compare", "optimize"))
-    assert compared["reference"][1].startswith("With ``speed``: the engine that values plans")
+    assert compared["speed"][1].startswith("Also chart speed against regret")
     assert compared["mortar"] == ("optional", chosen["mortar"][1])
     assert "(default: auto)" in chosen["engine"][1]
 

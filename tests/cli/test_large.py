@@ -8,7 +8,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from functools import partial
 
 import pytest
@@ -74,8 +73,6 @@ def test_what_does_not_fit_is_refused_before(capsys, tmp_path):
         err,
     )
     assert not (tmp_path / "out").exists()
-    assert main([*WORDS, "cascade", "--no-proof", *out, "--max-memory", "1kB"]) == 4
-    assert capsys.readouterr().err.count("\n") == 1
 
 
 @posix
@@ -98,39 +95,6 @@ def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path):
         assert out.exists() == (run.returncode == 0)
         assert beside_models(err).count("\n") == bool(run.returncode), (mebibytes, err)
     assert statuses == {0, 4}
-
-
-def hired(run, count):
-    """Return the workers of a run, once there are so many."""
-    command = ["ps", "-ww", "-o", "pid,args", "--ppid", str(run.pid)]
-    until = time.monotonic() + 60
-    while time.monotonic() < until:
-        shown = subprocess.run(command, capture_output=True, text=True, check=False).stdout
-        workers = [line.split()[0] for line in shown.splitlines() if "spawn_main" in line]
-        if len(workers) == count:
-            return workers
-        time.sleep(0.02)
-    raise AssertionError(f"no {count} workers:\n{shown}")
-
-
-@pytest.mark.slow
-@posix
-def test_a_killed_worker_is_replaced(tmp_path):
-    """By the slow engine: most of the work is still to be done when both workers are there."""
-    scene = tmp_path / "scene.json"
-    save_scene(small_arch(13), scene)
-    words = [*WORDS, "cascade", str(scene), "--no-proof", "--engine", "frame"]
-    words += ["--candidates", "near:6"]
-    run = start(*words, "--out", tmp_path / "out", "--workers", "2")
-    try:
-        os.kill(int(hired(run, 2)[0]), signal.SIGKILL)
-        _, err = run.communicate(timeout=120)
-    finally:
-        run.kill()
-        run.communicate()
-    assert (run.returncode, beside_models(err)) == (0, "")
-    assert main([*words, "--out", str(tmp_path / "plain")]) == 0
-    assert contents(tmp_path / "out") == contents(tmp_path / "plain")
 
 
 def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tmp_path):

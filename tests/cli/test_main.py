@@ -170,6 +170,6 @@ def test_a_comparison_with_speed(tmp_path, capsys):
     assert sentence.startswith("Take ")
     page = (out / "report.html").read_text(encoding="utf-8")
     assert f'alt="{sentence}"' in page
-    assert page.count("data:image/png;base64,") == 2  # for wide screens and for narrow ones
+    assert page.count("data:image/png;base64,") == 1
     assert (out / "speed.png").exists()
     assert "speed" not in json.loads(run(capsys, *words, "--json")[1])

@@ -106,8 +106,6 @@ BAD = {
         f"compare arch25 --speed={word}": f"--speed: '{word}' is not a positive number"
         for word in ("x", "-1", WALL)
     },
-    f"compare {WALL} --reference frame": "--reference: it values the plans of --speed",
-    f"compare {WALL} --speed 9 --reference rigid": "reference 'rigid' does not exist; give one of",
     f"{VLR} --margins tillt": "margin 'tillt' (did you mean tilt?): give all, or some of",
     f"{VLR} --map wind": "--map wind: give friction or tilt, with values as",
     f"{VLR} --map tilt=60": "--map tilt=60: 60 is too much; give tilt from 0 to 45",
