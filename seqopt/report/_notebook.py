@@ -13,7 +13,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from seqopt._showing import display
-from seqopt.errors import ExtraError, ProblemError
+from seqopt.errors import ExtraError
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.problem import Problem
 from seqopt.report.text import _in_a_sentence
@@ -81,26 +81,26 @@ def _(value: Problem) -> list[Figure]:
 
 @sentences.register(ShownBuild)
 def _(value: ShownBuild) -> list[str]:
-    try:
-        scene = value.engine.network.scene
-    except ProblemError:  # costs alone were given
-        return []
-    if len(scene.bricks) > SMALL:
+    if not _is_small(value):
         return ["Responses and stability are not computed here: see responses() and stability()."]
+    scene = value.engine.network.scene
     return [_in_a_sentence(scene, value.responses(), (), value.departures)]
 
 
 @pictures.register(ShownBuild)
 def _(value: ShownBuild) -> list[Figure]:
-    try:
-        small = len(value.engine.network.scene.bricks) <= SMALL
-    except ProblemError:
+    if not value.steps:  # costs alone were given
         return []
-    paint, count = display(ShownBuild, "plot"), len(value.steps)
+    paint = display(ShownBuild, "plot")
     from seqopt.report._pictures import spread_steps  # noqa: PLC0415  # matplotlib is an extra
 
-    if not small:
-        return [paint(value.engine, value.steps, value.steps[count // 2].number)]
-    last = value.steps[min(count, STEPS) - 1].number
+    if not _is_small(value):
+        return [paint(value.engine, value.steps, value.steps[len(value.steps) // 2].number)]
+    last = value.steps[min(len(value.steps), STEPS) - 1].number
     shown = spread_steps(value.steps, 3)
     return [paint(value.engine, value.steps, shown), value.gantt(None, last)]
+
+
+def _is_small(value: ShownBuild) -> bool:
+    """Return whether responses of a build are computed for its card."""
+    return bool(value.steps) and len(value.engine.network.scene.bricks) <= SMALL

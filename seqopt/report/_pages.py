@@ -43,7 +43,6 @@ LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: REMEDY[:-1]}
 FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once
 PLANS = ("plan.csv", "pick/plan.csv", "steps_*.csv")  # of optimize, pareto and compare
 GAP = "above the best, %"
-_MM = 1000.0  # µm
 SMALL = 60  # bricks up to which a plan is shown beside the fixed methods
 Tables = Mapping[str, pd.DataFrame]
 
@@ -91,14 +90,6 @@ def _captioned(caption: str, table: pd.DataFrame) -> tuple[str, pd.DataFrame]:
     return f"{caption}{said}. Such steps are marked in red" if said else caption, table
 
 
-def _worded(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table with responses in words; displacements in mm where the largest is one."""
-    out, moved = table.rename(columns=IN_UNITS), IN_UNITS["D_max"]
-    if moved in out and out[moved].max() >= _MM:
-        out = out.assign(**{moved: out[moved] / _MM}).rename(columns={moved: "displacement, mm"})
-    return out
-
-
 def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFrame]:
     """Return the largest responses of builds, a row each, under their caption."""
     rows = {build.name: largest(scene, build.table) for build in builds}
@@ -111,7 +102,8 @@ def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFra
         ]
     if any(build.departures for build in builds):
         found[OUTSIDE] = ["yes" if build.departures else "" for build in builds]
-    found = _worded(found.join(_falls(builds))).rename_axis("build").reset_index()
+    found = found.rename(columns=IN_UNITS).join(_falls(builds))
+    found = found.rename_axis("build").reset_index()
     return _captioned("Largest responses", found)
 
 
@@ -161,7 +153,7 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     columns = ["problem", "objective", "gap", *IN_UNITS, *marks, "models", "seconds"]
     shown = result.table[columns].replace({True: "yes", False: ""})
     shown = shown.assign(gap=100 * shown["gap"].astype(float))
-    shown = _worded(shown.rename(columns=marks | {"gap": GAP})).join(_falls(builds))
+    shown = shown.rename(columns={**marks, **IN_UNITS, "gap": GAP}).join(_falls(builds))
     shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
     shown = shown.rename_axis("method or formulation").reset_index()
     tables: list[tuple[str, pd.DataFrame | _Drawn]] = []
@@ -221,9 +213,10 @@ def front_page(
         (build,) = _builds(placed, {name: plan}, departures, verdicts)
         another = placed.build_order != scene.build_order
         builds.append(replace(build, order=placed.build_order) if another else build)
-    words = {"F_largest": IN_UNITS["F_rob"]}  # another name for the same
-    points = shown_table(front.table).rename(columns=words).set_axis([*plans])
-    points = _worded(points.assign(**{n: 1e6 * points[n] for n in ["D_max"] if n in points}))
+    words = {**IN_UNITS, "F_largest": IN_UNITS["F_rob"]}  # another name for the same
+    points = shown_table(front.table).set_axis([*plans])
+    points = points.assign(**{n: 1e6 * points[n] for n in ["D_max"] if n in points})
+    points = points.rename(columns=words)
     shown = points.join(_falls(builds)).rename_axis("plan").reset_index()
     if departures:
         shown[OUTSIDE] = ["yes" if name in departures else "" for name in plans]

@@ -21,14 +21,13 @@ from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation, formulations
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import pose
-from seqopt.plan.solve import keeping, on_the_way, solve
+from seqopt.plan.solve import on_the_way, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum, WorstRatio
 from seqopt.problem.problem import Aim
-from seqopt.problem.requirements import LINEAR_RANGE, Criterion, Limit, _prop_faults, overloads
+from seqopt.problem.requirements import Criterion, _prop_faults, overloads
 from seqopt.report._regret._measure import measure_regret
 from seqopt.report._regret._table import RegretTable
 from seqopt.responses._enough import Enough, what_was_enough
-from seqopt.responses._grip_sets import Moved
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
@@ -213,38 +212,24 @@ def _plans(
     """Return the plans of all formulations and the problem of the loop, or why there is none."""
     network = engine.network
     count = len(robots) or min(len(network.scene.robots), MOST)
+    plans: dict[str, Plan] = {}
 
-    def solved(
-        schedule: Schedule, named: Mapping[str, Formulation], limits: Sequence[Limit] = ()
-    ) -> tuple[dict[str, Plan], Decisions]:
+    def solved(schedule: Schedule, named: Mapping[str, Formulation]) -> Decisions:
         means = Resources(progress=progress)
-        problem, plans = pose_decisions(engine, schedule, criterion, limits, (), means), {}
+        problem = pose_decisions(engine, schedule, criterion, resources=means)
         for done, (name, formulation) in enumerate(named.items()):
             progress(Stage("comparing", (done + 1) / (len(named) + 1)))
             plans[name] = on_the_way(solve(problem, formulation))
-        return plans, problem
-
-    def kept(
-        schedule: Schedule, named: Mapping[str, Formulation]
-    ) -> tuple[dict[str, Plan], Decisions]:
-        """Within the linear range, if one of the plans leaves it and all can keep it."""
-        found, again = solved(schedule, named), (Limit(LINEAR_RANGE, 1.0),)
-        shift = RESPONSES["D_max"]
-        farthest = max(
-            float(np.max(plan._columns[shift.column])) / shift.scale / plan._within.far
-            for plan in found[0].values()
-        )
-        return keeping(found, Moved(farthest, 0), lambda: solved(schedule, named, again))[0]
+        return problem
 
     try:
-        loop, plans = find_schedule(network, robots=robots), dict[str, Plan]()  # it says most
+        loop = find_schedule(network, robots=robots)  # it says most
         if count >= MOST:
             cascade = {"modified-sequential": find_formulation("cascade")}
-            plans, _ = kept(modified_sequential(network, robots[:3]), cascade)
-        others, problem = kept(loop, formulations("costs"))
+            solved(modified_sequential(network, robots[:3]), cascade)
+        return plans, solved(loop, formulations("costs")), ""
     except (StepError, ProblemError) as error:
         return {}, None, str(error)
-    return plans | others, problem, ""
 
 
 def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
