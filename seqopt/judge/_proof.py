@@ -192,8 +192,9 @@ class Rebuilt:
         found = evaluator.reachable(level, *given, self._asked)
         self._spent = np.concatenate([self._spent, found.spent])
         within = [(m.source + self._count, m) for m in found.onward if m.level == level]
+        order = np.argsort(found.codes, kind="stable")
         for source, move in [*coming, *within]:
-            at, kept = places(found.codes, evaluator.tables.codes(move.states))
+            at, kept = places(found.codes, evaluator.tables.codes(move.states), order)
             target, taken = at[kept], move._replace(distance=move.distance[kept])
             amounts = evaluator.amounts(found.values[target], taken)
             self._moves.append((source[kept], self._count + target, amounts))

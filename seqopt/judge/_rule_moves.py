@@ -278,33 +278,32 @@ class RuleTables(_Tables):
 
     def keep(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, from 1 brick."""
-        return np.asarray(~np.any([each for each, _ in self._broken(bricks, states)], axis=0))
+        return np.asarray(~np.any([*self._broken(bricks, states).values()], axis=0))
 
-    def _broken(self, bricks: int, states: Ints) -> list[tuple[Bools, str]]:
-        """Return which states (n, c) break which rules, and that in words; the ending apart."""
+    def _broken(self, bricks: int, states: Ints) -> dict[str, Bools]:
+        """Return which states (n, c) break which rules, by what they say; the ending apart."""
         grips = states[:, : self.robots].clip(min=0)
         count = np.count_nonzero(grips, axis=1)
         struck = (bricks == self._book.span[1]) & (count == 0)  # where nobody holds, props are
         props = self._propped[: 2 * bricks + 1]
         held = np.where(struck, 0, count + props.sum())
         _, newest, loose = self._places(bricks)
-        words = f"{held.min(initial=self.robots)} grips, fewer than least_grips={self._least}"
-        out = [(held < self._least * (bricks > 1), words)]
+        fewer = f"{held.min(initial=self.robots)} grips, fewer than least_grips={self._least}"
+        out = {fewer: held < self._least * (bricks > 1)}
         if self._rules.newest is not Newest.FREE:
             on = newest[np.arange(self.robots), grips].any(axis=1) | (props[-2:].any() & ~struck)
-            out.append((~on, f"nobody holds the newest brick (newest={self._rules.newest.value})"))
-        for part in loose:
+            out[f"nobody holds the newest brick (newest={self._rules.newest.value})"] = ~on
+        for k, part in enumerate(loose):
             on = part[grips].any(axis=1) | ((part & self._propped).any() & ~struck)
-            out.append((~on, "a part that no joint ties to the ground is held by nobody"))
+            out[f"part {k + 1} that no joint ties to the ground is held by nobody"] = ~on
         return out
 
     def fault(self, bricks: int, state: Ints) -> str:
         """Return which rule a state (1, c) breaks, in a few words; empty if none."""
-        every = self._broken(bricks, state) if bricks else []
-        if not self._postures.allow(bricks, state)[0]:
-            held = [self.nodes[place].item() for place in state[0, : self.robots] if place > 0]
-            every = [*every, (np.ones(1, dtype=bool), f"arms cannot hold {held} together")]
-        return next((words for broken, words in every if broken[0]), "")
+        every = self._broken(bricks, state) if bricks else {}
+        held = [self.nodes[place].item() for place in state[0, : self.robots] if place > 0]
+        every[f"arms cannot hold {held} together"] = ~self._postures.allow(bricks, state)
+        return next((words for words, broken in every.items() if broken[0]), "")
 
     def ends(self, level: int, states: Ints) -> Bools:
         """Return which states (n, c) end the build."""

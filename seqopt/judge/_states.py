@@ -299,11 +299,14 @@ class StateEvaluator:
         return out
 
 
-def places(codes: Ints, wanted: Ints) -> tuple[Ints, Bools]:
-    """Return where wanted codes (n,) are among codes (m,), all different, and which are there."""
+def places(codes: Ints, wanted: Ints, order: Ints | None = None) -> tuple[Ints, Bools]:
+    """Return where wanted codes (n,) are among codes (m,), all different, and which are there.
+
+    ``order``: in which codes ascend.
+    """
     if not len(codes):
         return np.zeros(len(wanted), dtype=np.int64), np.zeros(len(wanted), dtype=bool)
-    order = np.argsort(codes, kind="stable")
+    order = np.argsort(codes, kind="stable") if order is None else order
     at = order[np.searchsorted(codes, wanted, sorter=order).clip(max=len(codes) - 1)]
     return at, codes[at] == wanted
 
