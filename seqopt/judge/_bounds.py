@@ -5,12 +5,11 @@ the caps proves a Lagrangian bound: the least cost of any path with them, by pot
 checked. The best ones come by cutting planes (`seqopt.graph._budgets`); wherever they come from,
 only the bound that they prove counts.
 
-Then labels are extended
-from the ends back to the start. One is dropped that cannot cost less than the answer, or exceeds a
-cap, or is dominated by another from the same state on. If none is left the answer is the best; if
-there are too many, the least bound of those pruned holds for all.
+Then labels of partial paths close what multipliers leave open. They too may come from wherever they
+do (`seqopt.graph._labels`): those that are no worse than the answer, within the caps and dominated
+by no other one; if there are too many, the least bound of those left out holds for all.
 
-Labels that a formulation hands over say of some states what paths to them have come to in all
+Labels, of a sweep or of a formulation, say of some states what paths to them have come to in all
 resources. They prove that no path is better if every successor of one of them is dominated by
 another one, or cannot end better: that is computed again, by the judge's own books of resources.
 """
@@ -26,8 +25,10 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._budgets import Plane, Polyhedron, _cheapest, highest_bound
+from seqopt.graph._labels import CappedSums, Sweep, Swept
+from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import _to_go, distances, least_sum, moves_out, tied
+from seqopt.graph.paths import _to_go, least_sum, moves_out, strictly_below, tied
 from seqopt.problem.resources import Resource, StepArrays
 
 MIXTURES = 80  # multipliers that are tried
@@ -40,7 +41,6 @@ BETTER = 1e-9  # over a value: a path must be better by more than this
 CHUNK = 400_000  # successors of labels that are looked at together
 Labelled = tuple[Ints, Floats]  # numbers of states (N,), and values (N, k)
 Excused = Callable[[Ints], Bools]  # which states need not be looked at: they are proven to fall
-NEIGHBORS = (1, 2, 3, 5, 8, 13, 21, 34)  # with which a partial path is compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,20 +61,6 @@ class _Case:
     def slack(self) -> float:
         """Rounding error of costs."""
         return SLACK * max(abs(self.value), TINY)
-
-
-class _Parts(NamedTuple):
-    """Labels of path ends: first state, Lagrangian and plain cost, uses of caps, and a bound."""
-
-    at: Ints
-    behind: Floats
-    cost: Floats
-    taken: Floats
-    bound: Floats
-
-    def of(self, rows: Ints | Bools) -> _Parts:
-        """Select rows."""
-        return _Parts._make(each[rows] for each in self)
 
 
 def _case(graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]], value: float) -> _Case:
@@ -103,14 +89,18 @@ def least_within(
     begin = np.array(prices) if len(prices) else np.zeros(len(limited))
     best, bound, _ = _best_multipliers(case, begin * case.sizes)
     if laid_down and value - bound > case.slack:
-        bound = max(bound, _laid_down(case, best)[0])
+        bound = max(bound, _by_labels(case, best))
     return (value if value - bound <= case.slack else bound), best / case.sizes
 
 
 def is_kept(graph: Graph, limited: Sequence[tuple[int, float]], *, laid_down: bool) -> bool:
     """Return whether a path is found that keeps all caps; ``laid_down``: as of `least_within`."""
     case, none = _case(graph, np.zeros(len(graph.source)), limited, 1.0), np.zeros(len(limited))
-    return _best_multipliers(case, none).met or (laid_down and _laid_down(case, none)[1])
+    best = _best_multipliers(case, none)
+    if best.met or not laid_down:
+        return best.met
+    arcs = _swept(case, best.multipliers).arcs
+    return bool(len(arcs) and (case.takes[arcs].sum(axis=0) <= case.caps).all())
 
 
 def is_beyond(graph: Graph, limited: Sequence[tuple[int, float]]) -> bool:
@@ -155,46 +145,28 @@ def _best_multipliers(case: _Case, start: Floats) -> _Ascent:
     return best._replace(bound=best.bound - SLACK**0.5 * case.slack)
 
 
-def _laid_down(case: _Case, prices: Floats) -> tuple[float, bool]:
-    """Return the least that a path within the caps costs, or bounds it, from the ends back.
+def _swept(case: _Case, multipliers: Floats) -> Swept:
+    """Return labels of partial paths below the value and within the caps, and the best path."""
+    growth = CappedSums(case.graph, case.costs, case.takes, case.caps, multipliers)
+    limits = np.array([strictly_below(case.value), *case.caps])
+    return Sweep(growth, limits, width=MOST).run(Watch())
 
-    And whether one was found that costs less than the answer.
+
+def _by_labels(case: _Case, multipliers: Floats) -> float:
+    """Return the bound that labels of a sweep prove, wherever they come from; they are checked.
+
+    A path below it and within the caps has a Lagrangian cost below it, too: what is pruned by that.
     """
-    graph, priced = case.graph, case.costs + case.takes @ prices
-    begun = distances(graph, priced) - float(prices @ case.caps)
-    spared = np.column_stack([distances(graph, takes) for takes in case.takes.T])
-    amounts = np.column_stack([priced, case.costs, case.takes])
-    back = Graph(graph.target, graph.source, amounts, (True,) * amounts.shape[1], graph.ends)
-    ends = np.flatnonzero(graph.ends)
-    zero = np.zeros(len(ends))
-    now, aside = _Parts(ends, zero, zero, np.zeros((len(ends), len(case.caps))), zero), np.inf
-    while (now.at > 0).any():
-        row, move = moves_out(back, now.at)
-        to, behind = back.target[move].astype(np.int64), now.behind[row] + back.amounts[move, 0]
-        bound, taken = behind + begun[to], now.taken[row] + back.amounts[move, 2:]
-        grown = _Parts(to, behind, now.cost[row] + back.amounts[move, 1], taken, bound)
-        fits = (taken + spared[to] <= case.caps).all(axis=1)
-        now = grown.of(fits & (bound < case.value - case.slack))
-        now = now.of(_undominated(now.at, now.cost, now.taken))
-        if len(now.at) > MOST:
-            ranked = np.argsort(now.bound, kind="stable")
-            aside = min(aside, float(now.bound[ranked[MOST]]))
-            now = now.of(ranked[:MOST])
-    return min(aside, float(now.cost.min(initial=case.value))), len(now.at) > 0
-
-
-def _undominated(at: Ints, cost: Floats, taken: Floats) -> Bools:
-    """Return which labels none is found to dominate in cost and in all caps."""
-    order = np.lexsort((taken.sum(axis=1), cost, at))
-    at, cost, taken = at[order], cost[order], taken[order]
-    good = np.ones(len(at), dtype=bool)
-    for n in NEIGHBORS:
-        if n < len(at):
-            dominates = (taken[:-n] <= taken[n:]).all(axis=1) & (cost[:-n] <= cost[n:])
-            good[n:] &= ~(dominates & (at[:-n] == at[n:]))
-    out = np.zeros(len(at), dtype=bool)
-    out[order] = good
-    return out
+    found, graph, move = _swept(case, multipliers), case.graph, np.arange(len(case.graph.source))
+    bound = min(case.value, found.best, found.left_out)
+    paid, below = float(multipliers @ case.caps), limit_below(bound)
+    most, strict = np.array([below, *case.caps, below + paid]), np.ones(2 + len(case.caps), bool)
+    strict[1:-1] = False
+    amounts = np.column_stack([case.costs, case.takes, case.costs + case.takes @ multipliers])
+    closed = Closed(graph, move, [SumBook(graph, move, amounts, (most, strict))])
+    state, taken = (np.concatenate([own[k] for own in found.kept]) for k in (0, 1))
+    labels = state, np.column_stack([taken, taken[:, 0] + taken[:, 1:] @ multipliers])
+    return bound if closed.is_proof(labels, lambda some: np.zeros(len(some), bool)) else -np.inf
 
 
 class Book:

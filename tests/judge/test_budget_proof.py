@@ -176,3 +176,20 @@ def test_few_labels_stop_with_a_bound(problem25):
     tight = replace(capped, budgets=(*capped.budgets, travel(problem25, 11.4)))
     with pytest.raises(TimeUpError, match="no path within all caps was found yet"):
         solve(tight, "labels", most=1, time_limit=0)
+
+
+def test_labels_prove_only_what_all_of_them_close(monkeypatch):
+    """Both cheap candidates exceed the cap together; multipliers alone say half of what is left."""
+    pairs = (np.zeros((1, 2)), np.zeros((2, 2)))
+    costs = LayeredCosts((np.array([0.0, 1.0]), np.array([0.0, 2.0])), pairs)
+    use = (np.array([1.0, 0.0]),) * 2
+    problem = Costs(costs, (Budget("use", use, pairs, 1.5),))
+    assert bounded(problem, 1.0, {}) == pytest.approx(1.0)
+    whole = budget_proof._swept
+
+    def spoiled(*asked):
+        found = whole(*asked)
+        return replace(found, kept=found.kept[:1])
+
+    monkeypatch.setattr(budget_proof, "_swept", spoiled)
+    assert bounded(problem, 1.0, {}) == pytest.approx(0.5)
