@@ -29,6 +29,8 @@ from seqopt.network._mechanics import spring_maps
 from seqopt.network.build import build_network
 from seqopt.study.published import printed
 
+pytestmark = pytest.mark.slow
+
 VAULTS = vaults()
 MODELS = laws(VAULTS)
 ALL = np.ones(8, dtype=bool)

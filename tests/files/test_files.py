@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import stat
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -132,24 +131,6 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path, monkeypatch, there, coun
     assert names(folder) == sorted(FILES)
     assert (folder / "one").read_text(encoding="utf-8") == "1"
     assert names(tmp_path) == sorted(["new", "out", *FILES])
-
-
-def test_nobody_sees_a_part_of_a_new_folder(tmp_path):
-    """Watched by another thread while it is written."""
-    seen, done = set(), threading.Event()
-
-    def watch():
-        while not done.is_set():
-            if (tmp_path / "out").exists():
-                seen.add(tuple(names(tmp_path / "out")))
-
-    thread = threading.Thread(target=watch)
-    thread.start()
-    write_folder(tmp_path / "out", {str(i): "x" * 100_000 for i in range(30)})
-    time.sleep(0.01)
-    done.set()
-    thread.join()
-    assert seen == {tuple(sorted(map(str, range(30))))}
 
 
 def test_a_folder_that_cannot_be_is_refused_early(tmp_path):

@@ -150,7 +150,9 @@ def standing(name, aim):
     return seqopt.solve(posed(aim, **words), name)
 
 
-@every
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[slow] * (n not in ("schedule_search", "path_dp"))) for n in ALL]
+)
 @pytest.mark.parametrize("aim", ["minmax,steps", pytest.param("bond,steps", marks=slow)])
 @pytest.mark.xdist_group("what stands")  # of which the first is held against all others
 def test_states_stand_where_they_must(name, aim):

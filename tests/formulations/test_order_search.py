@@ -147,7 +147,8 @@ def test_formulations_of_states_find_the_best_order_too(name, aim, bricks):
 
 
 @once
-@pytest.mark.parametrize(("workers", "bricks"), [(1, 3), pytest.param(2, 4, marks=LONG[:1])])
+@pytest.mark.slow
+@pytest.mark.parametrize(("workers", "bricks"), [(1, 3), (2, 4)])
 def test_the_worst_of_scenarios_equals_brute_force(workers, bricks):
     """Another order is the best where the worst of some scenarios counts, and it is found."""
     scene = small_arch(bricks)
@@ -286,8 +287,8 @@ def test_time_leaves_an_order_and_a_bound():
 @once
 @pytest.mark.parametrize(("least", "order", "said"), [
     (True, "worst", "is promised as the least; a plan has less"),
-    (False, "worst", ""),
-    (True, "best", ""),
+    pytest.param(False, "worst", "", marks=pytest.mark.slow),
+    pytest.param(True, "best", "", marks=pytest.mark.slow),
     (np.nan, "best", "a value or bound is NaN"),
 ])  # fmt: skip
 def test_a_formulation_that_names_a_bad_order_is_not_believed(least, order, said):

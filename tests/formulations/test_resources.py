@@ -208,7 +208,9 @@ def test_a_label_that_is_let_through_is_seen(space):
     assert is_refused(posed(space).but(limits=[wrong]))
 
 
-@pytest.mark.parametrize("space", AIMS)
+@pytest.mark.parametrize(
+    "space", ["loop", *(pytest.param(s, marks=pytest.mark.slow) for s in ("free", "sum"))]
+)
 def test_a_label_that_is_left_out_is_missed(space):
     """Whatever label of the best plan: a plan as good is found, or the judge finds a better."""
     plan = seqopt.solve(posed(space).but(limits=[heat(space)]))

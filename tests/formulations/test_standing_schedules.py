@@ -140,7 +140,7 @@ def test_a_bond_is_found_to_its_share_at_every_size(scale):
 @pytest.mark.parametrize(
     ("aim", "way"),
     [
-        ("friction", "loop"),
+        pytest.param("friction", "loop", marks=slow),
         pytest.param("bond", "free", marks=slow),
         pytest.param("friction", "free", marks=slow),
         pytest.param("tilt", "loop", marks=slow),

@@ -135,6 +135,7 @@ def test_the_proof_lets_robots_carry_all_they_may(aim, by):
     assert Proof(problem).bounds((best * (1 + 1e-6),)) == pytest.approx((best,), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_what_was_left_out_for_a_threshold_bounds_all_orders(monkeypatch):
     """Whatever the threshold; and with few sets looked at nothing is proven."""
     problem = among_orders(posed("F_largest", count=4), "tied")

@@ -52,14 +52,6 @@ def test_bricks_of_a_wall_hide_what_is_behind(azimuth, elevation):
     assert hidden_wrongly(WALL, view, order, 80) == 0
 
 
-@pytest.mark.parametrize(("corbel", "azimuth"), [(-0.03, -60), (0.03, 145)])
-def test_bricks_that_touch_and_are_corbelled_are_drawn_in_order(corbel, azimuth):
-    """Planes that part two of them along an edge disagree: neither hides the other."""
-    scene, view = load_scene(f"wall:columns=4,courses=5,corbel={corbel}"), View(azimuth, 20)
-    order = _drawing_order(boxes(scene.bricks).corners(), view.axes())
-    assert hidden_wrongly(scene, view, order, 150) == 0
-
-
 @pytest.mark.parametrize("name", ["arch25", "dome163"])
 def test_built_in_scenes_are_drawn_in_order(name):
     scene, view = load_scene(name), View(35, 22)

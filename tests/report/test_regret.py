@@ -129,6 +129,7 @@ def test_every_way_is_a_row_and_nothing_is_drawn_wrong(measured):
     assert flaws(regret_chart(measured, made(*FOUR), width=3.9)) == []
 
 
+@pytest.mark.slow
 def test_softer_grips_are_the_reference_and_rigid_ones_a_way():
     scene = small_arch(3).with_grips(1e5)
     found = measure_regret(seqopt.make_engine("compliance", scene), WORST, **ONCE)
