@@ -11,15 +11,6 @@ import seqopt
 from seqopt.errors import InfeasibleError, StepError
 
 ARCH = "arch:span=1.2,rise=0.5"
-CENTERS = ((0.2, -0.5, 0.4), (1.0, -0.5, 0.4), (0.6, 0.5, 0.4))
-
-
-def reaching(*radii):
-    """Return an arch whose robots reach so far."""
-    scene = seqopt.load_scene(ARCH)
-    each = zip(scene.robots, CENTERS, radii, strict=True)
-    robots = [replace(r, reach=seqopt.Sphere(center=c, radius=far)) for r, c, far in each]
-    return scene.with_robots(*robots)
 
 
 def refusal(make, *given, **options):
