@@ -22,8 +22,7 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import share, ungripped_system
 from seqopt.engines.rigid._mixed import Solution, mixed_system
-from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
+from seqopt.engines.rigid._operator import OperatorBuilder, ResponseMaps, scene_maps
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.exchange.contacts import flat_face, touching_faces
 from seqopt.network._mechanics import build_statics

@@ -27,8 +27,13 @@ from seqopt.engines.rigid._grip_equations import (
     solve_positive,
     well_conditioned,
 )
-from seqopt.engines.rigid._operator import Doubts, OperatorBuilder, load_rows
-from seqopt.engines.rigid._response_maps import SceneMaps, inner_edges
+from seqopt.engines.rigid._operator import (
+    Doubts,
+    OperatorBuilder,
+    SceneMaps,
+    inner_edges,
+    load_rows,
+)
 from seqopt.work._threads import cores, in_threads, one_thread
 
 _SETS = 64  # grip sets that a thread takes at least

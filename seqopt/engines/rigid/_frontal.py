@@ -41,7 +41,7 @@ from seqopt.engines.rigid._mixed import (
     sizes,
     unscaled,
 )
-from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
+from seqopt.engines.rigid._operator import ResponseMaps, scene_maps
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.work._threads import one_thread

@@ -49,8 +49,13 @@ from seqopt.engines.rigid._mixed import (
     unchanged,
     unscaled,
 )
-from seqopt.engines.rigid._operator import ComplianceOperator, load_rows
-from seqopt.engines.rigid._response_maps import ResponseMaps, inner_edges, scene_maps
+from seqopt.engines.rigid._operator import (
+    ComplianceOperator,
+    ResponseMaps,
+    inner_edges,
+    load_rows,
+    scene_maps,
+)
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import point_motion
 from seqopt.network.network import GROUND, Network
