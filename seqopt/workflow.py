@@ -36,13 +36,13 @@ from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules, with_robots
 from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.schedule_file import find_schedule, read_plan, read_site, without
+from seqopt.sequence.schedule_file import find_schedule, read_plan, without
 from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.study.published import EQUATIONS, find_criterion
 from seqopt.work.progress import Clock, Tell, within
 
 SEARCH = "search"  # the order that is sought
-FORMS = "PLAN:STEP (a plan's folder or CSV file), a STATE.json, or a number of bricks"
+FORMS = "PLAN:STEP (a plan's folder or CSV file), or a number of bricks"
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 
 
@@ -199,9 +199,8 @@ class Part:
         all robots), or a CSV file of steps; open grips are marked ? in it (default: the loop of
         three robots, or of two where there is no third).
     begin : Site, int or str, optional
-        Where the build begins: after a step of a plan (its folder or CSV file); in a state of a
-        JSON file (bricks that stand, by names or how many, grips by robot, ages of bricks in s
-        where mortar cures, else just placed); or with so many bricks that nobody holds.
+        Where the build begins: after a step of a plan (its folder or CSV file, of one step too);
+        or with so many bricks that nobody holds.
     to : Site, int or str, optional
         Where it ends, said in the same ways; a number of bricks, of a take-down those that stay,
         leaves grips to the rule ending.
@@ -354,13 +353,12 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
     scene, begin = _find_start(scene, part, stands)
     if part.lost:
         robots = [robot.name for robot in scene.robots if robot.name not in part.lost]
-    if (turned := _find_place(part.to, "to", scene))[0] != scene:
-        raise StepError(f"to {part.to}: its bricks are not those that follow in this order")
+    end = _find_place(part.to, "to", scene).site
     find_postures(scene, search.cache, asked["progress"])
     own = make_engine(asked["engine"], build_network(scene), asked["mortar"])
     moves = _find_moves(own.network, part, robots, asked["candidates"], asked["rules"])
-    if begin.site is not None or turned[1].site is not None:
-        moves = replace(moves.free(), begin=begin.site, finish=turned[1].site)
+    if begin.site is not None or end is not None:
+        moves = replace(moves.free(), begin=begin.site, finish=end)
     limits: Sequence[Any] = parse_limits(asked["limits"], scene)
     others = (asked["aim"], stands, sought)
     states = _chooses_states(moves, asked["formulation"], limits, others)
@@ -414,25 +412,20 @@ def _find_moves(
     return opened if candidates is None else thin(opened, candidates)
 
 
-def _find_place(
-    given: Site | _Place | int | str | None, name: str, scene: Scene
-) -> tuple[Scene, _Place]:
-    """Return where a build begins or ends, and the scene in an order that begins so."""
+def _find_place(given: Site | _Place | int | str | None, name: str, scene: Scene) -> _Place:
+    """Return where a build begins or ends."""
     text = str(given)
     try:
         if given is None or isinstance(given, Site | _Place):
-            return scene, _Place(given) if isinstance(given, Site) else given or _Place()
+            return _Place(given) if isinstance(given, Site) else given or _Place()
         if text.isdecimal():
             site = Site(int(text), (None,) * len(scene.robots) if name == "begin" else None)
             site.holds(scene)
-            return scene, _Place(site)
+            return _Place(site)
         file, _, step = text.rpartition(":")
         if file and step.isdecimal():
-            return scene, _of_plan(scene, Path(file), int(step))
-        if not text.endswith(".json"):
-            raise StepError(f"give {FORMS}")
-        found, site = read_site(scene, Path(text))
-        return found, _Place(site)
+            return _of_plan(scene, Path(file), int(step))
+        raise StepError(f"give {FORMS}")
     except StepError as error:
         raise StepError(f"{name} {text}: {error}") from None
 
@@ -456,7 +449,7 @@ def _find_start(
     scene: Scene, part: Part, stands: Standing | Mortar | str | None
 ) -> tuple[Scene, _Place]:
     """Return where a build begins after changes, and the scene in an order of those bricks."""
-    scene, begin = _find_place(part.begin, "begin", scene)
+    begin = _find_place(part.begin, "begin", scene)
     if wrong := [name for name in part.missing if not str(name).isdecimal()]:
         raise StepError(f"missing {wrong[0]}: give the number of a brick")
     if begin.site is None:
@@ -467,11 +460,7 @@ def _find_start(
         return scene, begin
     if begin.done and isinstance(stands, Standing) and stands.curing is not None:
         waits = offered("mortar_waits")(build_network(scene), stands)
-        try:
-            times = offered("step_times")(scene, begin.done, waits)
-        except StepError as error:
-            said = f"{error}; or give a STATE.json with the ages of its bricks"
-            raise StepError(said) from None
+        times = offered("step_times")(scene, begin.done, waits)
         ends = [t.end for t, s in zip(times, begin.done, strict=True) if s.kind is StepKind.PLACE]
         ages = tuple(times[-1].end - end for end in ends)
         begin = replace(begin, site=replace(begin.site, ages=ages))

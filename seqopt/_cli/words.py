@@ -71,8 +71,8 @@ VALUES = dict(
         criterion=NAME formulation=NAME name=NAME format=NAME margins=NAMES holds=NAMES
         aim=NAME,NAME rules=NAME=VALUE vary=NAME=VALUE options=NAME=VALUE over=NAME=VALUES
         rounding=NAME=STEP limits=LIMIT budgets=BUDGET stands=MORTAR friction=F tilt=DEG
-        schedule=NAME|FILE begin=PLAN:STEP|STATE|N
-        to=PLAN:STEP|STATE|N direction=build|take-down robust=AIM scenarios=N seed=N workers=N
+        schedule=NAME|FILE begin=PLAN:STEP|N
+        to=PLAN:STEP|N direction=build|take-down robust=AIM scenarios=N seed=N workers=N
         candidates=RULE time_limit=SECONDS max_memory=SIZE plan=FILE source=FILE bound=FILE
         cache=DIR at=STEP lost=ROBOT missing=BRICK
         """,

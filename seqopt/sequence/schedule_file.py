@@ -1,16 +1,16 @@
-"""Files of schedules, plans and sites: tables of steps, some grips of which may be open."""
+"""Files of schedules and plans: tables of steps, some grips of which may be open."""
 
 from __future__ import annotations
 
 import csv
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from seqopt._files import Row, harmless, parse_json, read_table, read_text
-from seqopt.errors import SceneError, StepError, did_you_mean
+from seqopt._files import Row, harmless, read_table, read_text
+from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene._checks import short, whole
@@ -174,7 +174,6 @@ def _integer(cell: str, where: str, wanted: str = "a whole number") -> int:
         raise StepError(f"{where} is {short(text)}; give {wanted}") from error
 
 
-KEYS = ("bricks", "grips", "last", "regrips", "step", "ages")
 _MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
 MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.
 
@@ -285,58 +284,6 @@ def find_schedule(
             f"give one of {known}"
         )
     return read_schedule(network, path)
-
-
-def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
-    """Return a site from a JSON file, and the scene in an order that begins with its bricks."""
-    where = f"state {path}"
-    told = parse_json(read_text(path), where, StepError)
-    if not isinstance(told, dict) or "bricks" not in told:
-        raise StepError(f"{where}: give an object with bricks, and grips by robot")
-    for key in told:
-        if key not in KEYS:
-            hint = did_you_mean(key, KEYS)
-            raise StepError(f"{where}: {key} is not known{hint}; give {', '.join(KEYS)}")
-    scene, count = _standing(scene, told["bricks"], where)
-    grips = _by_robot(scene, told.get("grips"), f"{where}, grips")
-    last = _by_robot(scene, told.get("last", {}), f"{where}, last") or ()
-    more = {key: told[key] for key in ("regrips", "step") if key in told}
-    if any(not isinstance(value, int) or value < 0 for value in more.values()):
-        raise StepError(f"{where}: {short(more)}; give whole numbers from 0")
-    ages, names = told.get("ages", {}), [str(brick.name) for brick in scene.placed[:count]]
-    try:
-        if not isinstance(ages, Mapping) or any(name not in names for name in ages):
-            raise StepError(f"ages {short(ages)}; give seconds by brick, of those that stand")
-        seconds = tuple(ages.get(name, 0.0) for name in names) if ages else ()
-        site = Site(count, grips, last, **more, ages=seconds)
-        site.holds(scene)
-    except (SceneError, StepError) as error:
-        raise StepError(f"{where}: {error}") from None
-    return scene, site
-
-
-def _standing(scene: Scene, told: object, where: str) -> tuple[Scene, int]:
-    """Return a scene in an order that begins with the standing bricks, and their number."""
-    if isinstance(told, int) and not isinstance(told, bool):
-        return scene, told
-    known = scene.build_order
-    if not isinstance(told, list) or any(name not in known for name in told):
-        raise StepError(f"{where}: bricks {short(told)}; give their number, or names of the scene")
-    if len({*told}) < len(told):
-        raise StepError(f"{where}: a brick of {short(told)} stands there twice; name it once")
-    if {*told} == {*known[: len(told)]}:
-        return scene, len(told)
-    return in_order(scene, (*told, *(name for name in known if name not in told))), len(told)
-
-
-def _by_robot(scene: Scene, told: object, where: str) -> tuple[int | None, ...] | None:
-    """Return the node of each robot; None if none are given."""
-    if told is None:
-        return None
-    names = [robot.name for robot in scene.robots]
-    if not isinstance(told, Mapping) or any(name not in names for name in told):
-        raise StepError(f"{where}: {short(told)}; give nodes by robot, of {', '.join(names)}")
-    return tuple(told.get(name) for name in names)
 
 
 def without(

@@ -29,7 +29,6 @@ from seqopt.exchange.exports import export_plan
 from seqopt.exchange.imports import import_scene, read_content, read_measured
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import with_robots
-from seqopt.sequence.schedule_file import read_site
 from tests.arms.scenes import two_arms
 from tests.builders import small_arch
 from tests.documents import BOXES, DOCUMENTS
@@ -96,10 +95,6 @@ def _of_scenes() -> Iterator[tuple[str, File]]:
     plan = plan_text(scene, steps).encode()
     yield "plan", ("plan.csv", plan, lambda path: seqopt.read_plan(scene, path))
     yield "schedule", ("l.csv", loop.encode(), lambda path: seqopt.read_schedule(scene, path))
-    node = scene.placed[0].nodes[0]
-    state = {"bricks": [1, 2], "grips": {"rob1": node}, "last": {}, "regrips": 0, "step": 3}
-    state |= {"ages": {"1": 5.0, "2": 1.0}}
-    yield "state", ("state.json", _json(state), lambda path: read_site(scene, path))
     rows = "".join(f"{b.name},{','.join(map(str, b.position))}\n" for b in scene.bricks)
     measured = f"brick,x,y,z\n{rows}".encode()
     yield "measured", ("m.csv", measured, lambda path: read_measured(scene, path))
