@@ -19,8 +19,6 @@ from seqopt.problem.requirements import (
 )
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import MOST_ROBOTS, FreeRules, _usual_grips
-from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import BuildProver, BuildVerdicts, _settlement_said
 
@@ -54,17 +52,6 @@ def exceeded(scene: Scene, *tables: _Columns) -> tuple[str, ...]:
 def carrying_notes(scene: Scene, steps: Sequence[Step]) -> tuple[str, ...]:
     """Describe robots that place or remove bricks heavier than their payload."""
     return tuple(f"payload exceeded: {excess}" for excess in _carrying_excesses(scene, steps))
-
-
-def rule_notes(rules: FreeRules | Schedule, scene: Scene) -> tuple[str, ...]:
-    """Describe the default rule that is relaxed because few robots take part, if it is."""
-    if not isinstance(rules, FreeRules) or rules.least_grips is not None:
-        return ()
-    team, least = len(rules.team(scene)), rules.fewest_grips(scene)
-    if least == _usual_grips(MOST_ROBOTS):
-        return ()
-    robots = "1 robot takes" if team == 1 else f"{team} robots take"
-    return (f"rules: least_grips={least}, as {robots} part",)
 
 
 def waits_said(build: ShownBuild) -> Iterator[str]:

@@ -358,9 +358,7 @@ class Problem(Shown):
     @property
     def schedule(self) -> Schedule:
         """The schedule whose grips are open; a `ProblemError` where rules say what can be done."""
-        if isinstance(self.moves, FreeRules):
-            raise ProblemError("the free schedule has no open grips; it has states")
-        return self.moves
+        return self.moves.scheduled()
 
     @classmethod
     def asked(

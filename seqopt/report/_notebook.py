@@ -76,7 +76,7 @@ def _(value: Schedule) -> list[Figure]:
 
 @pictures.register(Problem)
 def _(value: Problem) -> list[Figure]:
-    return pictures(value.moves if isinstance(value.moves, Schedule) else value.scene)
+    return pictures(value.moves) or pictures(value.scene)
 
 
 @sentences.register(ShownBuild)

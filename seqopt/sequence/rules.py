@@ -6,11 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from numbers import Integral
+from typing import NoReturn
 
 import numpy as np
 
 from seqopt.arrays import Bools, Ints
-from seqopt.errors import StepError, did_you_mean
+from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene
@@ -179,6 +180,18 @@ class FreeRules:
         """
         return self.payload is Payload.KEPT
 
+    def scheduled(self) -> NoReturn:
+        """Raise a `ProblemError`: rules say what can be done."""
+        raise ProblemError("the free schedule has no open grips; it has states")
+
+    def relaxed(self, scene: Scene) -> tuple[str, ...]:
+        """Return the default rule that is relaxed because few robots take part, in words."""
+        team, least = len(self.team(scene)), self.fewest_grips(scene)
+        if self.least_grips is not None or least == _usual_grips(MOST_ROBOTS):
+            return ()
+        robots = "1 robot takes" if team == 1 else f"{team} robots take"
+        return (f"least_grips={least}, as {robots} part",)
+
     def places(self, before: Ints, after: Ints) -> Bools:
         """Return which moves from levels to levels, (m,), place a brick."""
         return np.asarray(after > before)
@@ -331,12 +344,12 @@ def parse_rules(
 
     ``where``: for messages.
     """
-    several = (given,) if isinstance(given, str | FreeRules) else given
-    if not isinstance(several, Sequence):
+    several = given if isinstance(given, list | tuple) else (given,)
+    if {*map(type, several)} - {str, FreeRules}:
         raise StepError(f"{where} {short(given)}: give a seqopt.FreeRules, or as least_grips=1")
     found, loosest = FreeRules(), {(name, said): value for name, value, said in _LOOSEST}
     for each in several:
-        if isinstance(each, FreeRules):
+        if not isinstance(each, str):
             found = each
             continue
         name, _, text = each.partition("=")

@@ -187,6 +187,10 @@ class Schedule(Shown):
         """Return the number of last steps that only release against rules: zero, without rules."""
         return 0
 
+    def scheduled(self) -> Schedule:
+        """Return itself: whose grips are open."""
+        return self
+
     def free(self) -> NoReturn:
         """Raise a `ProblemError`: steps are given."""
         raise ProblemError(
@@ -201,6 +205,14 @@ class Schedule(Shown):
     def keeps_payloads(self, *, stands: bool) -> bool:
         """Return whether robots hold no more than their payloads: where states must stand."""
         return stands
+
+    def team(self, scene: Scene) -> tuple[int, ...]:
+        """Return the indices of the participating robots of a scene: all."""
+        return tuple(range(len(scene.robots)))
+
+    def relaxed(self, scene: Scene) -> tuple[str, ...]:
+        """Return the default rules that are relaxed: there are none."""
+        return ()
 
     def places(self, before: Ints, after: Ints) -> Bools:
         """Return which moves from levels to levels, (m,), place a brick."""

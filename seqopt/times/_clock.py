@@ -19,8 +19,6 @@ from seqopt.judge._states import StateEvaluator
 from seqopt.judge.arithmetic import Claim, Labels, Stage, _sum, sum_books
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
-from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.steps import StepKind
 from seqopt.times._acts import Acts, Team, acts_of_instance, acts_of_rows, alike_in_order
 from seqopt.times._curing import JointsInTime
 from seqopt.times._fall_cuts import CuringStates, FallCuts
@@ -99,10 +97,7 @@ class TimedRows:
 
     def acts(self, graph: Graph) -> Acts:
         """Return who may act in the moves of a graph of these states, and for how long."""
-        places = self._level[graph.target] > self._level[graph.source]
-        if isinstance(self._rules, Schedule):
-            kinds = [False, *(step.kind is StepKind.PLACE for step in self._rules.steps)]
-            places = np.array(kinds)[self._level[graph.target]]
+        places = self._rules.places(self._level[graph.source], self._level[graph.target])
         return acts_of_rows(graph, self._rows, places, self._team, self._cured)
 
     def clock(

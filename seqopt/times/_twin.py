@@ -5,7 +5,6 @@ from typing import Any
 from seqopt.errors import ProblemError, StepError
 from seqopt.judge._twin import PathTwin
 from seqopt.problem.amounts import Amount
-from seqopt.sequence.rules import FreeRules
 from seqopt.times._clock import TimedRows, claimed_time, path_makespan
 from seqopt.times._step_check import makespan_of_steps
 from seqopt.times._steps import have_speeds, require_durations
@@ -16,9 +15,8 @@ TWIN = PathTwin(makespan_of_steps, TimedRows, path_makespan, claimed_time)
 def _check(problem: Any) -> None:
     """Raise a `ProblemError` unless it is known how long those take who take part."""
     scene, rules = problem.network.scene, problem.rules
-    team = rules.team(scene) if isinstance(rules, FreeRules) else None
     try:
-        require_durations(scene, team)
+        require_durations(scene, rules.team(scene))
     except StepError as error:
         raise ProblemError(f"makespan: {error}") from None
 

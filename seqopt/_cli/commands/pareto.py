@@ -110,7 +110,7 @@ def pareto(
     written = output.write(progress, files)
     notes = (
         *remarks.level_notes(words.get("engine"), free.engine),
-        *remarks.rule_notes(free.rules, free.engine.network.scene),
+        *(f"rules: {each}" for each in free.rules.relaxed(free.engine.network.scene)),
         *remarks.refused(next(iter(provers.values()))),
         *outputs.figure_notes(written),
     )
