@@ -322,4 +322,4 @@ def pick(table: pd.DataFrame, least: str, under: Mapping[str, float] | None = No
         raise ProblemError(
             f"pick {least}: no plan of the set is below all bounds; it has {closest}"
         )
-    return int(table.index.get_loc(rows[least].idxmin()))
+    return [*table.index].index(rows[least].idxmin())
