@@ -38,7 +38,10 @@ def test_without_a_mortar_both_answers_are_given(capsys, tmp_path):
     assert [e.verdict.value for each in both for e in each] == table["verdict"].tolist()
 
 
-@pytest.mark.parametrize(("fall", "said"), [(-0.005, "leaves their balance"), (-0.5, "not small")])
+@pytest.mark.parametrize(
+    ("fall", "said"),
+    [(-0.005, "leaves their balance"), pytest.param(-0.5, "not small", marks=pytest.mark.slow)],
+)
 def test_a_movement_of_the_ground_is_said_to_enter_no_verdict(capsys, tmp_path, fall, said):
     """It was left out without a word; of ground at rest nothing is said."""
     scene = load_scene(ARCH)

@@ -93,6 +93,7 @@ def test_one_robot_gets_one_advice_that_works(capsys):
     assert run(capsys, *asked, *advice)[0] == 0
 
 
+@pytest.mark.slow
 def test_one_robot_has_nothing_to_compare(capsys, tmp_path):
     """What needs two is named, and by which rules one builds; with two nothing is left out."""
     scene = "wall:columns=2,courses=2"

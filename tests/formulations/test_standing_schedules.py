@@ -108,7 +108,8 @@ def leaning(scale=1.0, stands=None, aim="bond"):
     return build_states(engine, seqopt.FreeRules(), ONES, aim, stands=stands)
 
 
-@pytest.mark.parametrize("aim", [pytest.param("bond,minmax", marks=slow), "friction,minmax", TILTS])
+@slow
+@pytest.mark.parametrize("aim", ["bond,minmax", "friction,minmax", TILTS])
 def test_a_margin_is_sought_among_what_stands_as_demanded(aim):
     """The demand was forgotten for the margin: plans were found that do not meet it."""
     with pytest.raises(InfeasibleError, match=r"brick 2 \(2 of 3\) is never placed.*a bond of"):
