@@ -35,14 +35,12 @@ def reach(
     """
     found, output = scene.read(), Output(out, scene.scene)
     output.require()
+    if not found.has_arms:
+        said = f"no robot of {found.name} has an arm; seqopt scene says how far each reaches"
+        return Answer({"reach": []}, wrapped(said), scene=found)
     find_postures(found, cache, progress)
     table = reach_table(found)
     written = output.write(progress, lambda: {"reach.csv": csv_text(table)})
-    end = (
-        f"written to {out}: reach.csv"
-        if written
-        else "--out DIR writes a row for every robot and node"
-    )
-    lines = [*reach_described(found, table), end]
-    text = "\n".join(map(wrapped, lines))
-    return Answer({"reach": table}, text, scene=found, written=written)
+    hint = "--out DIR writes a row for every robot and node"
+    lines = [*reach_described(found, table), f"written to {out}: reach.csv" if written else hint]
+    return Answer({"reach": table}, "\n".join(map(wrapped, lines)), scene=found, written=written)
