@@ -93,18 +93,16 @@ class _Residuals:
     ``joints``: wrench of a joint less stiffness times deformation, over the sum of the magnitudes
     in it, or over the weight of a brick where they are smaller; ``grips``: what is between a held
     node and its grip over the largest motion of any brick, or over what the weight of a brick does
-    to the stiffest joint where all are smaller; ``plain``: stiffness times motions less load, over
-    the load: no measure of quality, shown to compare.
+    to the stiffest joint where all are smaller.
     """
 
     equilibrium: float
     joints: float
     grips: float
-    plain: float
 
     @property
     def backward_error(self) -> float:
-        """The largest of the three that measure quality."""
+        """The largest of the three."""
         return max(self.equilibrium, self.joints, self.grips)
 
 
@@ -144,16 +142,13 @@ def residual(
     dead = np.hstack([network.weight[:bricks], np.zeros((bricks, 3))])
     outside = [(np.arange(bricks), center, dead), (owner, node[columns], grip)]
     outside += _loads(network, bricks)
-    left, (plain, _) = (
-        _balance(center, [*((b, at[t], sign * pull[t]) for t, b, sign in ends), *outside])
-        for pull in (wrench, -law)
-    )
+    inside = [(body, at[there], sign * wrench[there]) for there, body, sign in ends]
+    left = _balance(center, [*inside, *outside])
     rest, most = (np.abs(part).reshape(-1, 2, 3).max(axis=(0, 2)) for part in left)
     return _Residuals(
         equilibrium=float((rest / np.maximum(most, np.finfo(float).tiny)).max()),
         joints=float((apart / np.maximum(scale, heavy)).max()),
         grips=float(np.abs(still).max(initial=0.0) / max(motion, least)),
-        plain=float(np.linalg.norm(plain[:, :3]) / (np.linalg.norm(dead) or 1.0)),
     )
 
 
@@ -276,7 +271,7 @@ class Diagnosis(FrozenValue):
 
     @property
     def backward_error(self) -> float:
-        """Largest residual that measures quality; infinite if the engine refused."""
+        """Largest residual; infinite if the engine refused."""
         return np.inf if self.residuals is None else self.residuals.backward_error
 
 

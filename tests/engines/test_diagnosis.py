@@ -11,7 +11,7 @@ from experiments.harness.scenes import running_bond
 from seqopt.engines.diagnosis import _LEAST_DIAGONAL, UNRESISTED, WELL, Finding, _spectrum, diagnose
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid._mixed import mixed_system, ungripped_system
+from seqopt.engines.rigid._mixed import held_rows, ungripped_system
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError
 from seqopt.network.build import build_network
@@ -63,11 +63,10 @@ def test_the_smallest_eigenvalue_is_that_of_the_dense_matrix():
     net = build_network(running_bond(3, 3))
     grips = places(net, 9, [13, 18])
     parts = ungripped_system(net, 9)
-    system = mixed_system(parts, grips)
     dense = parts.deformation.toarray()
     matrix = dense.T * parts.stiffness @ dense
     scale = np.sqrt(np.maximum(matrix.diagonal(), _LEAST_DIAGONAL * matrix.diagonal().max()))
-    null = np.linalg.svd(system.forbidden.toarray() / scale)[2][6:].T
+    null = np.linalg.svd(held_rows(parts, grips).rows / scale)[2][6:].T
     values, vectors = np.linalg.eigh(null.T @ (matrix / scale / scale[:, None]) @ null)
     lowest, condition, mode = _spectrum(net, 9, grips)
     assert lowest == pytest.approx(values[0], rel=1e-6)
@@ -75,7 +74,7 @@ def test_the_smallest_eigenvalue_is_that_of_the_dense_matrix():
     want = null @ vectors[:, 0] / scale
     want = want / want[np.abs(want).argmax()]
     assert mode.ravel() == pytest.approx(want, abs=1e-4)
-    assert system.forbidden @ mode.ravel() == pytest.approx(0, abs=1e-9)
+    assert held_rows(parts, grips).rows @ mode.ravel() == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize("grips", [(), (48, 49)])
@@ -110,11 +109,10 @@ def test_nearly_loose_is_solved_or_refused_never_wrong():
 
 
 @pytest.mark.slow
-def test_a_long_chain_is_solved_well_though_the_plain_residual_says_no():
+def test_a_long_chain_is_solved_well():
     told = diagnose(build_network(chain(1500)), 1500, [])
     assert told.finding is Finding.SOLVED_WELL
     assert told.backward_error < 1e-14
-    assert told.residuals.plain > 1e-5  # by this measure, hopeless
     assert told.condition > 1e12
     assert np.abs(told.mode).max(axis=1).argmax() == 1499
     engine = ComplianceEngine(build_network(chain(338)))

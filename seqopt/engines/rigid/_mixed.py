@@ -131,7 +131,6 @@ def split_pairs(
 class MixedSystem(FrozenValue):
     """The system of one grip set."""
 
-    forbidden: sparse.csr_array  # (c, 6b); scaled twists that the grips forbid
     matrix: sparse.csc_array  # (6s + 6b + c,)
     force: Floats  # (rw, c); forces of each grip, then its moments, for unit multipliers
     weight: Floats  # (c,); by which the grips' equations are multiplied
@@ -174,14 +173,13 @@ def mixed_system(
     factored; ``compliance``: of this set.
     """
     rows, force, corner = held_rows(parts, grips, compliance)
-    forbidden: sparse.csr_array = sparse.csr_array(rows)
     weight = 1 / np.maximum(1.0, np.diag(corner))
     matrix = parts.matrix
     if shift is not None:
         added = sparse.diags_array(np.concatenate([np.zeros(len(parts.wrench_unit)), shift]))
         matrix = sparse.csc_array(matrix + added)
     below = None if compliance.matrix is None else weight[:, None] * corner
-    return MixedSystem(forbidden, bordered(matrix, forbidden, below, weight), force, weight)
+    return MixedSystem(bordered(matrix, sparse.csr_array(rows), below, weight), force, weight)
 
 
 def _with_flexibility(
