@@ -148,7 +148,6 @@ def _of_caches() -> Iterator[tuple[str, File]]:
         "strikes": np.zeros((p, b), int),
         "why": np.full((r, n), ""),
         "collide": np.zeros((p, p), bool),
-        "compliance": np.zeros((p, 6, 6)),
         "found": np.ones((r, n), int),
     }
     assert {*table} == {each.name for each in fields(PostureTable)}
