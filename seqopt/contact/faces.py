@@ -256,7 +256,6 @@ class PartialAssemblies:
         self._lever = np.maximum.accumulate(whole.levers)
         self._map = whole.contact_map.tocsc()
         self._turning = self._map.indices % 6 >= 3  # which entries are moments
-        self._last: dict[tuple[int, float], sparse.csr_array] = {}  # asked again by its next step
         self._made: dict[tuple[int, tuple[int | None, ...]], Assembly] = {}
 
     def __call__(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
@@ -287,17 +286,13 @@ class PartialAssemblies:
             **fields,
             bond=np.zeros(0),
             scales=scales,
-            contact_map=self._contact_map(bricks, corners, scales[1]),
+            contact_map=self._map_of(6 * bricks, 3 * corners, scales[1]),
         )
 
-    def _contact_map(self, bricks: int, corners: int, lever: float) -> sparse.csr_array:
+    def _map_of(self, rows: int, columns: int, lever: float) -> sparse.csr_array:
         """Return the first columns of the whole's map, its moments over another lever."""
-        key = bricks, lever
-        if key not in self._last:
-            ends = self._map.indptr[: 3 * corners + 1]
-            kept = slice(0, int(ends[-1]))
-            ratio = np.where(self._turning[kept], self._whole.scales[1] / lever, 1.0)
-            entries = self._map.data[kept] * ratio, self._map.indices[kept], ends
-            shape = 6 * bricks, 3 * corners
-            self._last = {key: sparse.csc_array(entries, shape=shape).tocsr()}
-        return self._last[key]
+        ends = self._map.indptr[: columns + 1]
+        kept = slice(0, int(ends[-1]))
+        ratio = np.where(self._turning[kept], self._whole.scales[1] / lever, 1.0)
+        entries = self._map.data[kept] * ratio, self._map.indices[kept], ends
+        return sparse.csc_array(entries, shape=(rows, columns)).tocsr()

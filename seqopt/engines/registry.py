@@ -32,7 +32,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SceneError
 from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network
-from seqopt.scene._armed import hold_alike
+from seqopt.scene.arm import from_arms
 from seqopt.scene.scene import Scene
 
 REASONS = {
@@ -149,7 +149,10 @@ def engine_for(engine: Engine, scene: Scene) -> Engine:
             f"engine {type(engine).__name__}: scenarios need engines of their own; take "
             "one of seqopt.make_engine"
         )
-    return replace(recipe, scene=hold_alike(engine.network.scene, scene)).make()
+    nominal = engine.network.scene
+    if nominal.grip_kinds.arms.any():
+        scene = from_arms("hold_alike")(nominal, scene)
+    return replace(recipe, scene=scene).make()
 
 
 def _frame(network: Network | Scene) -> Engine:

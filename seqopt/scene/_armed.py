@@ -94,16 +94,6 @@ def can_hold(scene: Scene, kind: int, node: int) -> bool:
     return held.row([*scene.grip_kinds.of_robot].index(kind), node) != -1
 
 
-def hold_alike(nominal: Scene, scene: Scene) -> Scene:
-    """Return a variation of a scene in which robots hold in the postures of the nominal one.
-
-    It is as it was where it has other arms: joints may have other stiffnesses.
-    """
-    arms = nominal.grip_kinds.arms.any()
-    alike: Scene = from_arms("hold_alike")(nominal, scene) if arms else scene
-    return alike
-
-
 class _NoRules:
     """Which states arms can be in, by a second way for the judge: all, of robots without any."""
 
