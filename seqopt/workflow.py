@@ -39,7 +39,7 @@ from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule, read_plan, without
 from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.study.published import EQUATIONS, find_criterion
-from seqopt.work.progress import Clock, Tell, within
+from seqopt.work.progress import Clock, Tell
 
 SEARCH = "search"  # the order that is sought
 FORMS = "PLAN:STEP (a plan's folder or CSV file), or a number of bricks"
@@ -330,8 +330,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         problem = pose_build(asked)
         found = as_formulation(formulation or graph_of(problem).default_formulation)
         options = search.parse_options(found)
-    tell = within(progress, clock.left) if progress and not found.of_states else progress
-    run = Run(search.time_limit, tell, search.proof, options, clock=clock)
+    run = Run(search.time_limit, progress, search.proof, options, clock=clock)
     assemble = time.perf_counter() - start
     plan = _solve_run(problem, found, run)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})

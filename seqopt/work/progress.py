@@ -93,29 +93,6 @@ def with_progress(what: str, items: Collection[_Item], tell: Tell | None) -> Ite
         yield item
 
 
-def within(tell: Tell, seconds: float) -> Tell:
-    """Return a callback that reports words as stages of a computation with a time limit.
-
-    ``tell``: called with a `Stage` whose share is that of the time, or with the `Stage` given;
-    ``seconds``: the limit, from now on; if infinite, words are passed on as they are.
-
-    Examples
-    --------
-    >>> within(print, 60.0)("12 points")
-    12 points: 0 %, 60 s left
-    """
-    if math.isinf(seconds) or seconds <= 0:
-        return tell
-    start = time.perf_counter()
-
-    def timed(told: object) -> None:
-        took = time.perf_counter() - start
-        share, left = min(took / seconds, 1.0), max(seconds - took, 0.0)
-        tell(told if isinstance(told, Stage) else Stage(str(told), share, left))
-
-    return timed
-
-
 def duration(seconds: float) -> str:
     """Return a time in words.
 

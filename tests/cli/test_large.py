@@ -12,6 +12,7 @@ from functools import partial
 
 import pytest
 
+from seqopt import workflow
 from seqopt._cli.main import main
 from seqopt.plan import _answers as paths
 from seqopt.scene.scene_file import save_scene
@@ -106,7 +107,10 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
         if len(came) == 1:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("seqopt.workflow.within", lambda tell, seconds: interrupt)
+    real = workflow.Run
+    monkeypatch.setattr(
+        workflow, "Run", lambda seconds, _, *rest, **more: real(seconds, interrupt, *rest, **more)
+    )
     words = [*WORDS, "labels", "--budget", "travel=0.8"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 130
     out, err = capsys.readouterr()

@@ -34,7 +34,7 @@ from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.work.progress import INTERRUPT, Clock, Tell, within
+from seqopt.work.progress import INTERRUPT, Clock, Tell
 from seqopt.workflow import optimize, pose_build
 
 INTERRUPTED = "seqopt: interrupted; the points are those that were found"
@@ -92,8 +92,8 @@ def pareto(
         problem = pose_build(values)
         free = states_of(problem)
     steps = parse_numbers("--round", rounding, [str(goal) for goal in free.goals])
-    tell, stands = within(progress, clock.left), values["stands"]
-    front = find_front(problem, rounding=steps, progress=tell, clock=clock)
+    stands = values["stands"]
+    front = find_front(problem, rounding=steps, progress=progress, clock=clock)
     shown = None if stands else mortar
     provers = {
         each: find_prover(each.network, shown, progress, asks=stability, stands=stands)
