@@ -1,14 +1,15 @@
-"""What people read first: forces and displacements, the usual rules of few robots, and causes."""
+"""What people read first, and that what messages call enough is enough."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 import seqopt
-from seqopt.errors import InfeasibleError
+from seqopt.errors import InfeasibleError, StepError
 from seqopt.sequence.rules import FreeRules
 from tests.commands import command as run
 
@@ -61,3 +62,32 @@ def test_a_limit_that_helps_has_three_digits_and_does_help():
     assert asked(float(enough)).steps
     with pytest.raises(InfeasibleError):
         asked(0.99 * float(enough))
+
+
+ARCH = "arch:span=1.2,rise=0.5"
+
+
+def refusal(make, *given, **options):
+    """Return what an error says."""
+    with pytest.raises((InfeasibleError, StepError)) as error:
+        make(*given, **options)
+    return str(error.value)
+
+
+def said(text, pattern):
+    """Return the values that a message names."""
+    found = re.findall(pattern, text)
+    assert found, text
+    return found
+
+
+@pytest.mark.parametrize("asked", [{}, pytest.param({"stands": "dry"}, marks=pytest.mark.slow)])
+def test_a_payload_that_is_enough_for_a_free_schedule(asked):
+    def make(payload):
+        scene = seqopt.load_scene(ARCH)
+        robots = (replace(robot, payload=payload) for robot in scene.robots)
+        return seqopt.optimize(scene.with_robots(*robots), "free", aim="steps", **asked)
+
+    (newton,) = said(refusal(make, 20.0), r"a payload of (\d+) N \(--payload \1\)")
+    assert make(float(newton)).steps
+    refusal(make, float(newton) - 1)

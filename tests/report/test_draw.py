@@ -1,4 +1,4 @@
-"""Pictures, charts and comparisons hold what they should show."""
+"""Pictures, charts and comparisons hold what they should show, in one style."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import matplotlib as mpl
 import numpy as np
+import pandas as pd
 import pytest
 
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.network.build import build_network
-from seqopt.report._style import WIDTH
-from seqopt.report.charts import responses_figure
+from seqopt.report._style import WIDTH, look, looks, new_figure, picture_files, plain
+from seqopt.report.charts import COLUMNS, responses_figure
 from seqopt.report.comparison import LARGEST, compare
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network
 from seqopt.study.published import CRITERIA, EQUATIONS
@@ -101,3 +102,51 @@ def test_the_free_schedule_is_compared_by_the_criterion_that_is_asked_for(engine
     least = ranks.criteria["free"].limits
     assert dict(least)["F_largest"] == pytest.approx(others["F_rob"].min())
     assert dict(least)["D_max"] == pytest.approx(1e-6 * others["D_max"].min())
+
+
+def test_seventy_series_differ_and_ten_do_without_color():
+    every = [look(number) for number in range(70)]
+    assert len({(one.color, one.marker) for one in every}) == 70
+    assert len({one.marker for one in every[:10]}) == 10
+    assert len({one.color for one in every[:7]}) == 7
+    assert list(looks(["a", "b", "a"])) == ["a", "b"]
+
+
+def test_a_figure_is_written_twice_and_always_alike():
+    def files():
+        figure = new_figure(1.0)
+        figure.subplots().plot([1, 2])
+        return picture_files("name", figure)
+
+    once, again = files(), files()
+    assert list(once) == ["name.png", "name.svg"]
+    assert once == again
+    assert once["name.png"].startswith(b"\x89PNG")
+    assert b"<svg" in once["name.svg"]
+
+
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [
+        ((0.01, 1000), ["0.01", "0.1", "1", "10", "100", "1,000"]),
+        ((3, 80), ["5", "10", "20", "50"]),
+        ((1e5, 1e9), ["100,000", "$10^{6}$", "$10^{7}$", "$10^{8}$", "$10^{9}$"]),
+    ],
+)
+def test_logarithmic_axes_have_plain_numbers(limits, words):
+    axes = new_figure(1.0).subplots()
+    axes.set(xscale="log", xlim=limits)
+    plain(axes.xaxis)
+    low, high = limits
+    ticks = [tick for tick in axes.get_xticks() if low <= tick <= high]
+    assert [axes.xaxis.get_major_formatter()(tick) for tick in ticks] == words
+    assert len(axes.xaxis.get_minorticklocs()) == 0
+
+
+def test_equal_tables_are_one_line():
+    rows = {"step": [1, 2, 3], "bricks": [1, 1, 2], **{name: [1.0, 3.0, 2.0] for name in COLUMNS}}
+    table = pd.DataFrame(rows | {"phase": list("abc")})
+    other = table.assign(M_sup_Nm=[1.0, 3.0, 2.5])
+    figure = responses_figure({"a": table, "b": other, "c": table.copy()})
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["the same plan: a, c", "b"]
