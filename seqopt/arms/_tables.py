@@ -6,6 +6,7 @@ import hashlib
 import io
 import re
 import warnings
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -108,7 +109,10 @@ def _soft_models(arms: Iterable[tuple[str, Arm | None]]) -> dict[str, ArmModel]:
 
 
 _VERSION = 3  # of what is computed: tables of another one are not taken
-_DAMAGED = (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
+_DAMAGED = (
+    *(OSError, ValueError, TypeError, EOFError, SyntaxError),
+    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError),
+)  # what reading broken bytes raises
 _NAMES = ("robots", "nodes", "bricks", "links")
 _MESH = re.compile(rb'filename="(?:package://|file://)?([^"]+)"')
 
