@@ -15,11 +15,7 @@ from types import FrameType
 
 from seqopt._interrupts import interrupt_main
 
-INTERRUPTED, FAILED, CRASHED = (
-    130,
-    4,
-    70,
-)  # as seqopt._cli.answer has it, which may not be there yet
+INTERRUPTED, FAILED, CRASHED = 130, 4, 70  # as `Status`, which may not be there yet
 LEAST = 400e6  # bytes of addresses with which a program starts
 AGAIN = 0.05  # s after which an interrupt that was lost is raised again
 

@@ -35,7 +35,6 @@ COLUMNS = {
     "F_max_N": "largest tension\nT_max [N]",
     "D_max_1e-3mm": "largest displacement\nD_max [µm]",
 }
-BOUND = "_bound"
 CASE = 0.27  # inches: of a row of a map of failure
 MARKS = 12  # along a line, so that lines are told apart without their color
 LABELS = {
