@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import io
 import re
-import warnings
 import tokenize
+import warnings
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
