@@ -134,21 +134,8 @@ def collide_pairs(
 ) -> Bools:
     """Return which pairs of postures of two arms collide, (n,).
 
-    Where ways are checked, one arm holds while the other comes or goes. ``rows``: of the first and
-    of the second, (n,) each.
+    ``rows``: of the first and of the second, (n,) each.
     """
-    out = np.zeros(len(rows[0]), dtype=bool)
-    coming = [(way, second) for way in first.ways] + [(first, way) for way in second.ways]
-    for one, two in ((first, second), *coming):
-        left = np.flatnonzero(~out)
-        out[left] = _collide(models, one, two, (rows[0][left], rows[1][left]))
-    return out
-
-
-def _collide(
-    models: tuple[ArmModel, ArmModel], first: Placed, second: Placed, rows: tuple[Ints, Ints]
-) -> Bools:
-    """Return which pairs of postures of two arms collide, (n,), as they are."""
     collide = _Collider()
     ours, theirs = _Bodies(models[0], first), _Bodies(models[1], second)
     out = np.zeros(len(rows[0]), dtype=bool)

@@ -59,8 +59,7 @@ class Placed:
     """Where moving bodies are in postures, in the axes of the scene.
 
     ``rotation`` (P, L, 3, 3); ``shift`` (P, L, 3), m; ``low``, ``high`` (P, L, 3): boxes around
-    them, m; ``tools`` (P,): how long the body of the tool, the last one, is, m; ``ways``: the same
-    at points of the way to and from a node, where that is checked.
+    them, m; ``tools`` (P,): how long the body of the tool, the last one, is, m.
     """
 
     rotation: Floats
@@ -68,13 +67,11 @@ class Placed:
     low: Floats
     high: Floats
     tools: Floats
-    ways: tuple[Placed, ...] = ()
 
     def rows(self, rows: Ints | Bools) -> Placed:
         """Return those of some postures."""
-        names = ("rotation", "shift", "low", "high", "tools")
-        parts = {name: getattr(self, name)[rows] for name in names}
-        return Placed(**parts, ways=tuple(each.rows(rows) for each in self.ways))
+        parts = (self.rotation, self.shift, self.low, self.high, self.tools)
+        return Placed(*(part[rows] for part in parts))
 
 
 class ArmModel:

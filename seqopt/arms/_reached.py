@@ -56,8 +56,6 @@ _STEPS = 60  # of Newton's method from each
 _LONGEST = 0.4  # step of a joint, rad or m
 _DAMPING = 1e-5
 _CLOSE = 1e-6  # m and rad; how far a flange may be from its target
-WAY = 4  # points of the way to a node at which an arm is checked
-_JUMP = 0.7  # rad or m; by which a joint goes at most from one of these to the next
 _SAME = 1e-2  # rad or m; postures closer than this are one
 _AXES = {"length": 0, "width": 1, "thickness": 2}
 
@@ -115,24 +113,6 @@ def solve(model: ArmModel, target: Target, draws: np.random.Generator) -> list[F
         if inside and all(np.abs(posture - other).max() > _SAME for other in found):
             found.append(posture)
     return found
-
-
-def way(model: ArmModel, target: Target, posture: Floats) -> Floats | None:
-    """Return postures at points of the way straight back from a target, (k, joints), the far last.
-
-    None if it cannot be gone without a jump: where a joint ends, or the arm does.
-    """
-    out, last = [], posture
-    for share in np.linspace(0.0, 1.0, WAY + 1)[1:]:
-        place = target.place - share * model.arm.approach * target.axes[:, 2]
-        found = _descend(model, model.base.actInv(pin.SE3(target.axes, place)), last)
-        if found is None or np.abs(found - last).max() > _JUMP:
-            return None
-        if (found < model.low).any() or (found > model.high).any():
-            return None
-        out.append(found)
-        last = found
-    return np.array(out)
 
 
 def _descend(model: ArmModel, wanted: object, posture: Floats) -> Floats | None:
@@ -258,8 +238,7 @@ def reached_alone(site: Site, most: int) -> Reached:
     """Return the postures of the one robot of a site at all nodes: at most so many at each.
 
     They touch neither the ground, which is level with the lower one of its base and of the lowest
-    brick, nor the arm itself, nor, except by its tool, the brick that is gripped: where they hold,
-    and on the way there and back, if that is checked.
+    brick, nor the arm itself, nor, except by its tool, the brick that is gripped.
     """
     (robot,) = site.robots
     assert robot.arm is not None
@@ -272,16 +251,13 @@ def reached_alone(site: Site, most: int) -> Reached:
         name = site.bricks[int(inside.argmax())].name
         raise SceneError(f"robot {robot.name}: the base of its arm hits brick {name}; move it")
     places, joints, flanges, why = _solved(site, model)
-    placed, able = _with_ways(model, joints, flanges, np.array([each.tool for each in flanges]))
+    placed = model.placed(joints, np.array([each.tool for each in flanges]))
     up = np.array(site.up)
     ground = min(float(model.base.translation @ up), *(float((c @ up).min()) for c in corners))
-    faults: list[_Fault | None] = [None] * len(able)
-    stuck = f"there is no straight way of {robot.arm.approach:g} m to it"
-    _blame(faults, ~able[:, None], [stuck], 0)
+    faults: list[_Fault | None] = [None] * len(joints)
     _blame_itself(model, faults, placed, (up, ground))
     rows = np.flatnonzero([fault is None for fault in faults])
-    free = placed.rows(rows)
-    struck = np.logical_or.reduce([hits(model, each, bricks) for each in (free, *free.ways)])
+    struck = hits(model, placed.rows(rows), bricks)
     held = places[rows] // 2  # the tool goes around the brick that it grips, the arm does not
     at = np.arange(len(rows))
     struck[at, -1, held] = False
@@ -314,33 +290,15 @@ def _blame_itself(
     both = [names[j].replace(SAYS, f"touches {names[i].split(f' {SAYS}')[0]}") for i, j in pairs]
     above = names[len(model.fixed) + model.above :]
     low = [name.replace(SAYS, "touches the ground") for name in above]
-    for each in (placed, *placed.ways):
-        _blame(faults, touching(model, each, pairs), both, 1)
-        lowest = each.shift @ up  # point of each moving body, (P, L)
-        for k, body in enumerate(model.moving):
-            turned = each.rotation[:, k].transpose(0, 2, 1) @ up
-            lowest[:, k] += (turned @ body.points.T).min(axis=1)
-        lean = each.rotation[:, -1, :, 2] @ up
-        lowest[:, -1] -= 0.5 * each.tools * np.abs(lean)
-        lowest[:, -1] -= model.arm.tool_radius * np.sqrt(np.clip(1.0 - lean**2, 0.0, None))
-        _blame(faults, lowest[:, model.above :] <= height, low, 2)
-
-
-def _with_ways(
-    model: ArmModel, joints: Floats, flanges: list[Target], tools: Floats
-) -> tuple[Placed, Bools]:
-    """Return where bodies are in postures, also on their ways, and which have one (P,)."""
-    placed, able = model.placed(joints, tools), np.ones(len(joints), dtype=bool)
-    if not model.arm.approach:
-        return placed, able
-    found = [way(model, *each) for each in zip(flanges, joints, strict=True)]
-    able = np.array([each is not None for each in found], dtype=bool)
-    still = np.repeat(joints[:, None], WAY, axis=1)  # where there is no way
-    points = np.array([still[i] if each is None else each for i, each in enumerate(found)]).reshape(
-        -1, WAY, model.joints
-    )
-    ways = tuple(model.placed(points[:, k], tools) for k in range(WAY))
-    return replace(placed, ways=ways), able
+    _blame(faults, touching(model, placed, pairs), both, 1)
+    lowest = placed.shift @ up  # point of each moving body, (P, L)
+    for k, body in enumerate(model.moving):
+        turned = placed.rotation[:, k].transpose(0, 2, 1) @ up
+        lowest[:, k] += (turned @ body.points.T).min(axis=1)
+    lean = placed.rotation[:, -1, :, 2] @ up
+    lowest[:, -1] -= 0.5 * placed.tools * np.abs(lean)
+    lowest[:, -1] -= model.arm.tool_radius * np.sqrt(np.clip(1.0 - lean**2, 0.0, None))
+    _blame(faults, lowest[:, model.above :] <= height, low, 2)
 
 
 def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
@@ -355,9 +313,8 @@ def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
             if overlap(bases[i], bases[j]).any():
                 raise SceneError(f"robot {one}: the base of its arm hits that of {two}; move one")
             said = [name.replace(SAYS, f"hits the base of {two}") for name in names]
-            for placed in (own.placed, *own.placed.ways):
-                struck = np.asarray(hits(own.model, placed, bases[j]).any(axis=2))
-                _blame(faults, struck, said, 4)
+            struck = np.asarray(hits(own.model, own.placed, bases[j]).any(axis=2))
+            _blame(faults, struck, said, 4)
         rows = np.flatnonzero([fault is None for fault in faults])
         parts = {name: getattr(own, name)[rows] for name in _BY_POSTURE}
         why = own.why | _lacking(own.node, faults)

@@ -66,9 +66,6 @@ class Arm(Terse):
     postures : int
         With how many postures at each node plans are made: with one, every plan keeps it; of
         several, a step needs some that go together, and whether they can be kept is found after.
-    approach : float
-        How far the tool comes straight to a node and goes straight back, m: there the arm is
-        checked too, at a few points; with 0, the default, only where it holds.
     keeps_apart : bool
         Whether it must not touch other arms that keep apart; False for what reach alone allows.
     tool_mass : float
@@ -93,7 +90,6 @@ class Arm(Terse):
     faces: tuple[str, ...] = ("width", "thickness")
     flange: str = ""
     postures: int = MOST
-    approach: float = 0.0
     keeps_apart: bool = True
     tool_mass: float = 0.0
     joint_stiffness: tuple[float, ...] = ()
@@ -111,7 +107,7 @@ class Arm(Terse):
         check(self, "arm", position=vector, flange=printable)
         unit_axes(self, "arm", "x_axis", "y_axis")
         check(self, "arm", tool_length=length, tool_radius=length, fingers=not_negative)
-        check(self, "arm", approach=not_negative, tool_mass=not_negative)
+        check(self, "arm", tool_mass=not_negative)
         where = "arm: joint_stiffness"
         joints = rows(where, self.joint_stiffness, "numbers")
         settle(self, joint_stiffness=tuple(positive(where, each, "N m/rad") for each in joints))

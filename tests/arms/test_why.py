@@ -47,7 +47,6 @@ def test_a_tool_in_the_model_is_found_and_its_end_named(tmp_path):
     [
         (9.0, {}, "too far: its flange gets about 2.5 m from its base"),
         (0.9, {"tool_length": 0.05}, "the tool is too short: the flange would be in the brick"),
-        (0.9, {"approach": 3.0}, "there is no straight way of 3 m to it"),
         (0.9, {}, "link l5 touches the ground"),
         (2.35, {}, "no posture was found within joint limits with the tool square to a face"),
     ],
