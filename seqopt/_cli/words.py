@@ -125,8 +125,7 @@ class Built:
         How long robots take, s: fetch=30,place=10,approach=10,grip=5,release=5 or speed=0.2 (m/s,
         of ways between grips); that is to bring the next brick, to place it, to come to one that
         stands, to grip it, to let go; who is free fetches and approaches while others act; of one
-        robot with its name before, as rob3:fetch=75 or rob3:slower=2.5 (default: as the scene
-        says).
+        robot with its name before, as rob3:fetch=75 (default: as the scene says).
     """
 
     scene: Any = "arch25"

@@ -180,7 +180,6 @@ def from_arms(name: str) -> Any:
 _seconds = partial(finite, least=0.0, wanted="seconds, zero or more")
 _METERS = "a positive number of m/s, or none if ways take no time"
 _speed = partial(finite, least=1e-12, wanted=_METERS)
-SLOWER = "slower"  # the word for a factor on all durations
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -206,9 +205,8 @@ class Durations(Terse):
 
     Examples
     --------
-    >>> durations = Durations(fetch=30.0, place=10.0, approach=10.0, grip=5.0, release=5.0)
-    >>> durations.slower(2.0).fetch
-    60.0
+    >>> print(Durations(fetch=30.0, place=10.0, approach=10.0, grip=5.0, release=5.0))
+    fetch=30,place=10,approach=10,grip=5,release=5
     """
 
     fetch: float
@@ -221,13 +219,6 @@ class Durations(Terse):
     def __post_init__(self) -> None:
         names = [name for name in _NAMES if name != "speed"]
         check(self, "durations", **dict.fromkeys(names, _seconds), speed=_speed)
-
-    def slower(self, factor: float) -> Durations:
-        """Return durations that are longer by a factor, the speed lower by as much."""
-        times = finite("durations: slower", factor, 1e-9, "a positive factor")
-        values = {name: times * getattr(self, name) for name in _NAMES if name != "speed"}
-        speed = None if self.speed is None else self.speed / times
-        return replace(self, **values, speed=speed)
 
     def __str__(self) -> str:
         said = [(name, getattr(self, name)) for name in _NAMES]
@@ -244,7 +235,7 @@ def _durations_in_words(
     """Return the durations of robots as words say, those before being for all, or as given.
 
     ``names``: of the robots; ``given``: their own; ``texts``: as `EXAMPLE`, for one robot with its
-    name and a colon before; ``slower=2`` among the words multiplies what it has by then.
+    name and a colon before.
     """
     out = list(given)
     for text in texts:
@@ -252,9 +243,8 @@ def _durations_in_words(
         if colon and name not in names:
             hint = did_you_mean(name, names)
             raise SceneError(f"durations {text}: no robot {name!r}{hint}; give {', '.join(names)}")
-        known = dict.fromkeys((*_NAMES, SLOWER), (float, f"a number, as {EXAMPLE}"))
+        known = dict.fromkeys(_NAMES, (float, f"a number, as {EXAMPLE}"))
         said = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
-        factor = said.pop(SLOWER, None)
         for index in (i for i, robot in enumerate(names) if robot == name or not colon):
             before = out[index]
             lacking = [each for each in _NAMES if each not in said and each != "speed"]
@@ -263,6 +253,5 @@ def _durations_in_words(
                     f"durations {text}: {', '.join(lacking)} not given, nor in the scene; give "
                     f"all, as {EXAMPLE}"
                 )
-            found = Durations(**said) if before is None else replace(before, **said)
-            out[index] = found if factor is None else found.slower(factor)
+            out[index] = Durations(**said) if before is None else replace(before, **said)
     return tuple(out)

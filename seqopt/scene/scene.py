@@ -333,7 +333,7 @@ class Scene(Shown):
         --------
         >>> import seqopt
         >>> words = "fetch=30,place=10,approach=10,grip=5,release=5"
-        >>> scene = seqopt.load_scene("arch25").with_durations(words, "rob3:slower=2.5")
+        >>> scene = seqopt.load_scene("arch25").with_durations(words, "rob3:place=25")
         >>> [robot.durations.place for robot in scene.robots]
         [10.0, 10.0, 25.0]
         """

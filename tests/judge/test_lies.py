@@ -43,7 +43,9 @@ def over_scenarios(make, scene, over):
 
 
 CHAIN, ARCH, HOLD_NO = seqopt.load_scene("chain:bricks=8"), small_arch(5), FreeRules()
-TIMED = with_robots(small_arch(4), 3).with_durations(TIMES, "rob3:slower=2.5")
+TIMED = with_robots(small_arch(4), 3).with_durations(
+    TIMES, "rob3:fetch=75,place=25,approach=25,grip=12.5,release=12.5"
+)
 WITHIN = {"scene": ARCH, "rules": HOLD_NO, "budgets": "travel=0.7m"}
 POSED = {
     "loop": (loop, "overlap_dp"),

@@ -236,7 +236,9 @@ def test_steps_that_are_given_are_reported():
 def test_a_robot_takes_over_only_what_it_carries(payload, places):
     """A third robot is much quicker, and bears what first grips hold, but not what they lift."""
     words = "fetch=30,place=10,approach=10,grip=5,release=5"
-    scene = wall(400.0, 400.0, payload).with_durations(words, "rob3:slower=0.01")
+    scene = wall(400.0, 400.0, payload).with_durations(
+        words, "rob3:fetch=0.3,place=0.1,approach=0.1,grip=0.05,release=0.05"
+    )
     engine = seqopt.make_engine("compliance", scene)
     build = seqopt.plan.build.GivenSequence(engine, seqopt.sequential(engine.network))
     assert build.responses()[["F_rob1_N", "F_rob2_N"]][:3].abs().max().max() < 20 < LIGHT < 24

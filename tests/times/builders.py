@@ -19,6 +19,7 @@ from tests.builders import small_arch
 from tests.plain_rules import PlainBook
 
 WORDS = "fetch=30,place=10,approach=10,grip=5,release=5"
+SLOW = "rob3:fetch=75,place=25,approach=25,grip=12.5,release=12.5"  # than others
 SCALES = np.array([scale for _, scale in ONES.limits])
 RULES = FreeRules(ending="held")
 

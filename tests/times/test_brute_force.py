@@ -16,15 +16,21 @@ from seqopt.sequence.steps import Site
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
 from tests.brute_force import ONES
-from tests.times.builders import RULES, engine_of, least_cured_makespan, least_makespan
+from tests.times.builders import RULES, SLOW, engine_of, least_cured_makespan, least_makespan
 
 LONG = (pytest.mark.slow, pytest.mark.long)
 CASES = [
     (3, 2, (), FreeRules(ending="held", least_grips=1)),
-    (3, 3, ("rob3:slower=2.5",), RULES),
+    (3, 3, (SLOW,), RULES),
     (3, 3, ("speed=0.01", "rob2:speed=0.02"), FreeRules()),
     pytest.param(4, 3, ("rob1:fetch=75,approach=25",), RULES, marks=pytest.mark.slow),
-    pytest.param(4, 3, ("rob2:speed=0.02", "rob3:slower=0.5"), RULES, marks=pytest.mark.slow),
+    pytest.param(
+        4,
+        3,
+        ("rob2:speed=0.02", "rob3:fetch=15,place=5,approach=5,grip=2.5,release=2.5"),
+        RULES,
+        marks=pytest.mark.slow,
+    ),
     pytest.param(4, 3, ("speed=0.01",), FreeRules(), marks=pytest.mark.slow),
     pytest.param(
         5,
@@ -33,7 +39,7 @@ CASES = [
         FreeRules(ending="one-by-one", regrips=1),
         marks=pytest.mark.slow,
     ),
-    pytest.param(6, 3, ("rob3:slower=2.5",), RULES, marks=LONG),
+    pytest.param(6, 3, (SLOW,), RULES, marks=LONG),
     pytest.param(6, 4, ("rob4:fetch=75,approach=25",), RULES, marks=LONG),
 ]
 
@@ -58,7 +64,7 @@ def test_the_least_is_that_of_all_builds(bricks, robots, words, rules):
 
 @pytest.mark.parametrize("aim", ["makespan,steps", "makespan,regrips,minmax"])
 def test_goals_after_the_makespan_keep_it(aim):
-    engine = engine_of(4, 3, "rob3:slower=2.5")
+    engine = engine_of(4, 3, SLOW)
     plan = solved(engine, RULES, aim)
     assert plan.status is Status.OPTIMAL
     assert plan.makespan == pytest.approx(least_makespan(engine))
@@ -70,7 +76,7 @@ def test_goals_after_the_makespan_keep_it(aim):
 
 @pytest.mark.slow
 def test_budgets_are_kept_and_exact():
-    engine = engine_of(4, 3, "rob3:slower=2.5")
+    engine = engine_of(4, 3, SLOW)
     free = solved(engine, RULES, "makespan")
     plan = solved(engine, RULES, "makespan", budgets="regrips=0")
     assert plan.regrips == 0
@@ -84,7 +90,7 @@ def test_budgets_are_kept_and_exact():
 
 @pytest.mark.slow
 def test_a_flow_that_shares_the_time_of_robots_is_a_bound():
-    engine = engine_of(3, 3, "rob3:slower=2.5")
+    engine = engine_of(3, 3, SLOW)
     plan = solved(engine, RULES, "makespan", "makespan_flow")
     least = least_makespan(engine)
     assert plan.certificate.bounds[0] <= least * (1 + 1e-9)
@@ -113,9 +119,9 @@ def soonest(engine, rules, **asked):
 
 
 RESTS = [
-    (3, 3, ("rob3:slower=2.5",), RULES),
+    (3, 3, (SLOW,), RULES),
     (3, 3, ("speed=0.01", "rob2:speed=0.02"), FreeRules()),
-    pytest.param(4, 3, ("rob3:slower=2.5", "speed=0.02"), RULES, marks=pytest.mark.slow),
+    pytest.param(4, 3, (SLOW, "speed=0.02"), RULES, marks=pytest.mark.slow),
     pytest.param(4, 3, (), FreeRules(ending="one-by-one", regrips=1), marks=pytest.mark.slow),
 ]
 
@@ -138,7 +144,7 @@ def test_from_every_step_the_least_is_that_of_all_builds(bricks, robots, words, 
 
 
 def test_it_ends_where_it_is_told():
-    engine = engine_of(4, 3, "rob3:slower=2.5")
+    engine = engine_of(4, 3, SLOW)
     plan = soonest(engine, RULES)
     step = next(i for i, each in enumerate(plan.steps, start=1) if each.bricks == 3)
     rules = replace(RULES, finish=Site.after(plan.steps, step), begin=Site.after(plan.steps, 1))

@@ -38,7 +38,16 @@ def plan():
 
 CASES = [
     (3, 2, (), ALONE, "0s=0.002,10min=1"),
-    pytest.param(*(3, 2, ("rob2:slower=2.5",), ALONE, "0s=0.002,10min=1"), marks=pytest.mark.slow),
+    pytest.param(
+        *(
+            3,
+            2,
+            ("rob2:fetch=75,place=25,approach=25,grip=12.5,release=12.5",),
+            ALONE,
+            "0s=0.002,10min=1",
+        ),
+        marks=pytest.mark.slow,
+    ),
     pytest.param(4, 2, (), ALONE, "5min=1", marks=LONG),
     pytest.param(4, 2, (), ALONE, "1min=0.001,10min=1", marks=LONG),
 ]

@@ -16,12 +16,12 @@ from seqopt.graph.graph import LabelProof
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status
 from tests.brute_force import ONES
-from tests.times.builders import RULES, engine_of
+from tests.times.builders import RULES, SLOW, engine_of
 
 
 @pytest.fixture(scope="module")
 def plan():
-    problem = seqopt.pose(engine_of(4, 3, "rob3:slower=2.5"), RULES, ONES, "makespan")
+    problem = seqopt.pose(engine_of(4, 3, SLOW), RULES, ONES, "makespan")
     return seqopt.solve(problem)
 
 

@@ -66,7 +66,7 @@ def test_longer_durations_make_no_build_shorter(durations, robot, what, more):
 
 
 def test_reassigned_steps_are_the_best_of_all():
-    scene = SCENE.with_durations(WORDS, "rob3:slower=1.5")
+    scene = SCENE.with_durations(WORDS, "rob3:fetch=45,place=15,approach=15,grip=7.5,release=7.5")
     steps = seqopt.cantilever(NETWORK)[:9]
     engine = seqopt.make_engine("compliance", scene)
     table = seqopt.analyze(engine, steps)

@@ -53,7 +53,7 @@ def times(
 
     Examples
     --------
-    $ seqopt times timed.json --method cantilever --durations rob3:slower=2.5
+    $ seqopt times timed.json --method cantilever --durations rob3:fetch=75
     $ seqopt times my.json --plan plan.csv --reassign --out faster
     """
     output = Output(out, asked.words.get("scene"), asked.words.get("plan"))
