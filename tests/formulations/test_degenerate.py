@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import pairwise
 
 import cvxpy as cp
 import numpy as np
@@ -20,7 +20,6 @@ from experiments.failing.parts.choice_cells import (
     whole,
 )
 from formulations import solvers
-from formulations.flow import Flow
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, formulations
 from seqopt.problem.problem import Aim
@@ -143,30 +142,3 @@ def test_a_solver_that_fails_never_calls_the_problem_infeasible(monkeypatch, nam
     for problem in (small(), capped(SMALL, np.random.default_rng(0), 1.0, 0.6)):
         with pytest.raises(SolverError, match=named):
             answer(problem, name)
-
-
-PATH, BOUND = Flow.path, Flow.bound
-FLAWS = {
-    "zeros": ("path", lambda self, flow: PATH(self, np.zeros_like(flow))),
-    "NaN": ("path", lambda self, flow: PATH(self, np.full_like(flow, np.nan))),
-    "bound too high": ("bound", lambda self, optimum: 1.1 * BOUND(self, optimum)),
-    "NaN bound": ("bound", lambda self, optimum: np.nan),
-    "another path": ("path", lambda self, flow: PATH(self, 1 - flow)),
-}
-
-
-@pytest.mark.parametrize(
-    ("name", "flaw"),  # linear programs keep the moves of all best paths, and read no flow
-    [
-        *product(["overlap_mip"], FLAWS),
-        ("overlap_lp", "bound too high"),
-        ("overlap_lp", "NaN bound"),
-    ],
-)
-@pytest.mark.parametrize("scale", [1e-9, 1e9])
-def test_a_flow_that_is_wrong_is_caught(monkeypatch, name, flaw, scale):
-    problem = small(seed=1, scale=scale)
-    assert answer(problem).choice != (0, 0, 0)
-    monkeypatch.setattr(Flow, *FLAWS[flaw])
-    with pytest.raises(SolverError, match=r"promises the least|claimed bound|nonsense"):
-        answer(problem, name)

@@ -8,18 +8,15 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
 import pytest
 
 import seqopt
 from formulations.states._search import exact_best, narrow
-from seqopt.errors import InfeasibleError, NothingFoundError, SolverError
+from seqopt.errors import InfeasibleError, NothingFoundError
 from seqopt.graph._explore import Explorer
-from seqopt.graph.decisions import travel
 from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.states._visits import StateSpace
 from seqopt.graph.states.states import build_states, within
-from seqopt.plan.pose import decisions_of
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.builders import small_arch
@@ -105,33 +102,6 @@ def test_builds_in_time_have_a_plan_within_every_optimum(name, formulation):
             assert find_formulation(formulation).kind is FormulationKind.BOUND
             continue
         assert plan.objective[name] <= factor * least * (1 + 1e-6)
-
-
-@pytest.mark.parametrize("formulation", ["labels", "overlap_mip", "lagrangian", "overlap_lp"])
-def test_candidates_have_a_choice_within_every_optimum(formulation):
-    problem = decisions_of(posed(6, "loop").but(goals=()))
-    posed_way = travel(problem, np.inf)
-    least = least_spent(problem, posed_way)
-    kind = find_formulation(formulation).kind
-    for factor in FACTORS:
-        capped = replace(problem, budgets=(replace(posed_way, bound=factor * least),))
-        try:
-            plan = seqopt.solve(capped, formulation)
-        except SolverError:  # a mixture of choices, or none was met: never infeasible
-            assert kind is FormulationKind.BOUND
-            continue
-        assert posed_way.spent(plan.choice) <= factor * least * (1 + 1e-6)
-    tight = replace(problem, budgets=(replace(posed_way, bound=0.9 * least),))
-    with pytest.raises(InfeasibleError, match="every choice uses at least"):
-        seqopt.solve(tight, formulation)
-
-
-def least_spent(problem, budget):
-    """The least that any choice takes of a budget, by a shortest path of its own."""
-    reached = np.zeros(1)
-    for single, shared in zip(budget.single, budget.shared, strict=True):
-        reached = (reached[:, None] + shared).min(axis=0) + single
-    return float(reached.min())
 
 
 def test_pairs_of_optima_have_the_plans_that_they_are_of():

@@ -13,7 +13,6 @@ import seqopt
 from formulations.solvers import _solve_file
 from seqopt._cli.main import main
 from seqopt.errors import FileError, ProblemError, SolverError
-from seqopt.graph.instance import Instance, _Target
 from seqopt.sequence.rules import with_robots
 from tests.builders import small_arch
 
@@ -272,15 +271,3 @@ def test_commands_write_and_judge(tmp_path, capsys):
     assert "the path is at node 0" in capsys.readouterr().err
     assert main(["instance", "arch25", "--out", str(tmp_path / "x.txt")]) == 2
     assert main(["judge", str(mine), str(mine)]) == 2
-
-
-@pytest.mark.parametrize("name", ["path_dp", "schedule_search", "labels", "beam", "overlap_lp"])
-def test_of_arcs_side_by_side_the_least_counts(name):
-    source, target = np.array([0, 0, 1], np.int32), np.array([1, 1, 2], np.int32)
-    goal = _Target("least sum", "sum", (0,))
-    costs, ends = np.array([[3.0], [1.0], [1.0]]), np.array([False, False, True])
-    states = np.array([[0, 0], [1, 1], [2, 1]])
-    one = Instance("two ways", source, target, ends, ("cost",), costs, (goal,), (), states)
-    plan = seqopt.solve(one, name)
-    assert plan.objective == {"least sum": 2.0}
-    assert seqopt.judge_instance(one, plan.nodes).gap == 0
