@@ -98,7 +98,6 @@ def test_they_agree_with_brute_force_under_any_rules(names, build):
 
 @pytest.mark.parametrize("name", ["path_dp", "path_labels", "best_first", "flow_lp", "flow_mip"])
 @given(graph=graphs())
-@settings(max_examples=20)
 def test_it_finds_the_best_path_of_any_graph(name, graph):
     graph = graph.only(_on_paths(graph))
     found = sorted(values_of(graph, moves) for moves in simple_paths(graph))

@@ -29,6 +29,7 @@ def test_every_stored_value_is_asked_for():
     assert {*GOLDEN} <= {*QUICK, *SLOW, *LONG, *composed()}
 
 
+@slow
 def test_another_question_has_another_answer(tmp_path):
     """A control: what is compared does tell questions apart."""
     other = answer(QUICK["loop, ranks, cascade"], tmp_path)

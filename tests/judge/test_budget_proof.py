@@ -8,7 +8,7 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
@@ -40,7 +40,6 @@ def bounded(problem, value, claimed):
 
 @pytest.mark.parametrize("most", [1, 5_000])
 @given(problem=budgeted(), price=st.floats(0, 5))
-@settings(max_examples=30)
 def test_no_choice_costs_less_than_is_proven(problem, price, most):
     found = problem.within()
     claimed = {budget.name: price for budget in problem.budgets}
@@ -54,7 +53,6 @@ def test_no_choice_costs_less_than_is_proven(problem, price, most):
 
 
 @given(problem=budgeted())
-@settings(max_examples=30)
 def test_the_smallest_conflict(problem):
     def within(budgets):
         return replace(problem, budgets=tuple(budgets)).within()

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
@@ -131,7 +131,6 @@ def values(goals):
 
 
 @given(problem=problems(), data=st.data())
-@settings(max_examples=25)
 def test_aims_in_their_order_agree_with_brute_force(problem, data):
     goals = [(problem.sums, data.draw(st.sampled_from(Aim)))]
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
