@@ -29,7 +29,7 @@ from tests.builders import from_both_sides, small_arch
 AIMS = ("minmax,steps", "steps,minmax", "sum", "travel,steps", "minmax,regrips,steps")
 FEW = ("minmax,steps", "steps,minmax", "travel,steps")
 PLANS = [
-    name
+    pytest.param(name, marks=[pytest.mark.slow] * (name not in ("schedule_search", "flow_lp")))
     for name, found in formulations("goals").items()
     if found.of_states and found.kind is FormulationKind.EXACT
 ]

@@ -44,7 +44,7 @@ def off(net, columns, fields, row=0):
 
 
 @pytest.mark.parametrize("only_turning", [True, False])
-@pytest.mark.parametrize("factor", [1e-3, 1e-9, 1e-15])
+@pytest.mark.parametrize("factor", [1e-3, 1e-15])
 def test_grips_beyond_a_loose_joint(factor, only_turning):
     """The force method alone loses every digit here and says nothing: the second assertion."""
     net = build_network(loosened(chain(25), factor, only_turning=only_turning))

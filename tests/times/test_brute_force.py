@@ -20,7 +20,6 @@ from tests.times.builders import RULES, SLOW, engine_of, least_cured_makespan, l
 
 LONG = (pytest.mark.slow, pytest.mark.long)
 CASES = [
-    (3, 2, (), FreeRules(ending="held", least_grips=1)),
     (3, 3, (SLOW,), RULES),
     (3, 3, ("speed=0.01", "rob2:speed=0.02"), FreeRules()),
     pytest.param(4, 3, ("rob1:fetch=75,approach=25",), RULES, marks=pytest.mark.slow),
@@ -119,7 +118,7 @@ def soonest(engine, rules, **asked):
 
 
 RESTS = [
-    (3, 3, (SLOW,), RULES),
+    pytest.param(3, 3, (SLOW,), RULES, marks=pytest.mark.slow),
     (3, 3, ("speed=0.01", "rob2:speed=0.02"), FreeRules()),
     pytest.param(4, 3, (SLOW, "speed=0.02"), RULES, marks=pytest.mark.slow),
     pytest.param(4, 3, (), FreeRules(ending="one-by-one", regrips=1), marks=pytest.mark.slow),

@@ -81,7 +81,8 @@ def test_instant_bond_takes_as_long_as_ever_and_none_as_dry():
         assert plan.status is Status.OPTIMAL
 
 
-@pytest.mark.parametrize("robots", [2, pytest.param(3, marks=LONG)])
+@pytest.mark.slow
+@pytest.mark.parametrize("robots", [2, pytest.param(3, marks=pytest.mark.long)])
 def test_slower_mortar_makes_no_build_shorter(robots):
     engine = engine_of(4 if robots == 2 else 6, robots)
     rules = FreeRules(least_grips=robots - 1)

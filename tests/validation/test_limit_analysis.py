@@ -32,7 +32,7 @@ def inclined(angle):
     return replace(cube, weight=size * np.array([[sin(angle), 0.0, -cos(angle)]]))
 
 
-PRINTED = [case for case in CASES if case.source != "line of thrust"]  # all in the experiment
+PRINTED = [case for case in CASES if case.source != "line of thrust"][::2]  # others: experiment
 
 
 @pytest.mark.parametrize("case", PRINTED, ids=lambda case: f"{case.name}, {case.source}")
