@@ -90,15 +90,11 @@ def useful(timed: TimedGraph, prices: Prices, kept: Bools, most: float) -> Bools
     return out
 
 
-STEPS = -1  # the column that counts moves
-
-
 @dataclass(frozen=True, eq=False)
 class Caps:
     """Upper limits of paths.
 
-    ``time``: the end of the build, s; ``sums``: of columns of the graph, most that each may take;
-    `STEPS` is the number of moves.
+    ``time``: the end of the build, s; ``sums``: of columns of the graph, most that each may take.
     """
 
     time: float = np.inf
@@ -220,7 +216,7 @@ class Carrying:
             own.append(Sums(np.ones((len(moves), 1)), np.array([caps.time]), prices.left.T))
         if caps.sums:
             columns, most = zip(*caps.sums, strict=True)
-            amounts = np.column_stack([graph.amounts, np.ones(len(graph.source))])[:, columns]
+            amounts = graph.amounts[:, columns]
             some = graph.only(kept)
             left = [distances(some, each, back=True) for each in amounts[kept].T]
             own.append(Sums(amounts[moves], np.array(most), np.column_stack(left)))

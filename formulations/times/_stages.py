@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from formulations.states._search import StopError
-from formulations.times._labels import STEPS, Caps, Carrying, Prices
+from formulations.times._labels import Caps, Carrying, Prices
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError, NothingFoundError
 from seqopt.graph._explore import Visited
@@ -160,7 +160,6 @@ class Stages:
                 self._sum(k)
         if not self._stage.path:
             self._makespan()
-        self._shorten()
         return self._stage
 
     def _on_paths(self, kept: Bools) -> Bools:
@@ -244,21 +243,6 @@ class Stages:
         stage.bounds.append(bound)
         stage.proofs.append(self._proof(labels, prices))
         stage.caps = replace(stage.caps, sums=(*stage.caps.sums, (k, tied(value))))
-
-    def _shorten(self) -> None:
-        """Take a path of fewer steps that is as good, if a narrow search finds one."""
-        stage = self._stage
-        most = float(len(stage.path) - 1)
-        caps = replace(stage.caps, sums=(*stage.caps.sums, (STEPS, most)))
-        prices = self._carrying.prices(stage.kept, Watch(0.0))
-        try:
-            last = len(stage.caps.sums)
-            swept = self._carrying.sweep(
-                stage.kept, caps, prices, self._watch, width=BEAMS[1], goal=last
-            )
-        except LateError:
-            return
-        stage.path = swept.path or stage.path
 
     def _taken(self, path: Sequence[int], k: int) -> float:
         """Return the value of a goal, no makespan, of a path."""
