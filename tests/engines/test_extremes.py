@@ -75,6 +75,7 @@ def test_what_rows_do_not_answer_is_that_of_the_fields(alter):
 
 
 @needs_numba
+@pytest.mark.slow  # compiles where nothing has yet
 @once
 @pytest.mark.parametrize(("grips", "want"), [(1, Want.RESPONSES), (4, Want(0))])
 def test_few_sets_of_a_large_structure_are_read_from_what_grows(grips, want):
@@ -96,6 +97,7 @@ def test_few_sets_of_a_large_structure_are_read_from_what_grows(grips, want):
 
 
 @needs_numba
+@pytest.mark.slow  # compiles where nothing has yet
 @once
 def test_a_wrong_growth_is_seen():
     """The control of the comparison above."""
@@ -109,6 +111,7 @@ def test_a_wrong_growth_is_seen():
 
 
 @needs_numba
+@pytest.mark.slow  # compiles where nothing has yet
 @once
 def test_no_number_depends_on_how_many_threads_share_the_sets(monkeypatch):
     network = build_network(load_scene("dome163"))
