@@ -108,9 +108,16 @@ def within_budgets(
         else:
             told = watch if not goal else None
             found = _least_sum(graph, graph.amounts[:, goal], limited, told)
-            if most:
-                found = _by_labels(graph, goal, limited, found, told or watch.apart(), most)
-            bound, price, way = found.bound, found.prices, _path(graph, found.moves)
+            bound, price, moves = found.bound, found.prices, found.moves
+            if most:  # labels close the duality gap
+                columns, costs = [c for c, _ in limited], graph.amounts[:, goal]
+                within = np.array([tied(cap) for _, cap in limited])
+                growth = CappedSums(graph, costs, graph.amounts[:, columns], within, price)
+                known = np.inf if moves is None else float(costs[moves].sum())
+                met = LabelSearch(moves, known, bound)
+                met = widening(growth, within, met, told or watch.apart(), most)
+                bound, moves = met.bound, met.arcs
+            way = _path(graph, moves)
         best = _better(graph, goal, way, best)
         taken = _taken(graph, best)[goal]
         if graph.peaks[goal]:
@@ -149,23 +156,6 @@ def _some_path(graph: Graph, caps: Sequence[float], watch: Watch) -> _Path:
     if path is None:
         raise InfeasibleError("no path is within all budgets")
     return path
-
-
-def _by_labels(
-    graph: Graph,
-    goal: int,
-    limited: Sequence[tuple[int, float]],
-    found: _Found,
-    watch: Watch,
-    most: int,
-) -> _Found:
-    """Return incumbent and bound of a sum after labels that close its duality gap."""
-    columns, caps = [c for c, _ in limited], np.array([tied(cap) for _, cap in limited])
-    costs = graph.amounts[:, goal]
-    growth = CappedSums(graph, costs, graph.amounts[:, columns], caps, found.prices)
-    known = np.inf if found.moves is None else float(costs[found.moves].sum())
-    met = widening(growth, caps, LabelSearch(found.moves, known, found.bound), watch, most)
-    return found._replace(moves=met.arcs, bound=met.bound)
 
 
 def _rounding(graph: Graph, prices: Floats, caps: Floats | Sequence[float]) -> float:

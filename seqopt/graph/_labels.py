@@ -218,8 +218,6 @@ def _undominated(fresh: Labels, known: Sequence[Labels], growth: _Growth) -> Lab
     order = np.lexsort((new, *every.taken.T[::-1], every.state))
     state, taken, dominated = every.state[order], every.taken[order], np.zeros(every.size, bool)
     rows, back = np.flatnonzero(new[order]), 0
-    if taken.shape[1] == 2 and isinstance(growth, SummedLabels):
-        dominated, rows = _above_another(state, taken[:, 1]), rows[:0]
     while len(rows) and back < growth.look_back:
         back += 1
         rows = rows[rows >= back]
@@ -228,17 +226,6 @@ def _undominated(fresh: Labels, known: Sequence[Labels], growth: _Growth) -> Lab
         dominated[rows[worse]] = True
         rows = rows[~worse]
     return every.only(np.sort(order[~dominated & new[order]]))
-
-
-def _above_another(state: Ints, taken: Floats) -> Bools:
-    """Return where an earlier label of the same state has no larger value, (N,)."""
-    new = np.ones(len(state), dtype=bool)
-    new[1:] = state[1:] != state[:-1]
-    apart = (taken.max(initial=0.0) - taken.min(initial=0.0) + 1.0) * (np.cumsum(new) - 1)
-    lowest = np.minimum.accumulate(taken - apart)  # every state lies below the one before
-    out = np.zeros(len(state), dtype=bool)
-    out[1:] = ~new[1:] & (taken[1:] - apart[1:] >= lowest[:-1])
-    return out
 
 
 class LabelSearch(NamedTuple):
