@@ -233,6 +233,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     limits: Sequence[Limit | Filter | str] | str = (),
     budgets: Sequence[str] | str = (),
     stands: Standing | Mortar | str | None = None,
+    also: Sequence[str] = (),
     robust: Robust | None = None,
     order: str | Sequence[int] | None = None,
     mortar: Mortar | str | None = None,
@@ -283,6 +284,8 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE.
     stands : Standing, Mortar or str, optional
         What every state must be proven to stand with: ``"dry"``, ``"epoxy"``, a strength.
+    also : sequence of str
+        Further responses to compute, besides those that are needed.
     robust : Robust, optional
         Over which scenarios, and what counts of them.
     order : str or sequence of int, optional
@@ -375,6 +378,7 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
         scenarios=() if robust is None else robust.scenes or robust.draw(scene),
         over=over,
         orders=Orders.TIED if sought else None,
+        also=asked["also"],
         resources=Resources(
             search.workers, search.executor, search.memory, None if states else asked["progress"]
         ),

@@ -36,13 +36,14 @@ ROOMS = (
     {"plan"},
     {"study"},
     {"arms", "workflow"},
+    {"sweep"},
     {"exchange", "times", "instances"},
     {"report"},
     {"_cli"},
     {"__init__", "__main__"},
 )  # a room imports from rooms above it in this list only
 OUTER = {"arms", "exchange", "times", "instances", "report", "_cli"}  # the inner ones do without
-TOP = {"workflow", "__init__", "__main__"}  # open inner and outer rooms
+TOP = {"workflow", "sweep", "__init__", "__main__"}  # open inner and outer rooms
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import

@@ -94,7 +94,7 @@ HOW: dict[str, dict[str, Any]] = {
     "formulation": {"names": formulation_names},
     "margins": {"names": lambda: MARGINS},
 }  # what a parser knows of options beside their types; names are what help lists
-HIDDEN = ("executor", "made_by")  # that Python alone says
+HIDDEN = ("also", "executor", "made_by")  # that Python alone says
 
 
 @dataclass(frozen=True, kw_only=True)

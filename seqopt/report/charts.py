@@ -1,4 +1,4 @@
-"""Charts of comparisons, plans, Pareto sets and maps of failure (extra ``plot``)."""
+"""Charts of comparisons, plans, Pareto sets, sweeps and maps of failure (extra ``plot``)."""
 
 from __future__ import annotations
 

@@ -1,0 +1,59 @@
+"""Many problems side by side: rows as they come, what is left after an end, what has no plan."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import pandas as pd
+import pytest
+
+import seqopt
+from seqopt.errors import ProblemError
+from seqopt.sweep import sweep
+
+WORDS = [f"wall:columns=2,courses={count}" for count in (1, 2)]
+free = partial(seqopt.optimize, schedule="free", aim="F_largest,steps")
+
+
+def test_every_row_is_what_one_problem_has(tmp_path):
+    found = sweep(WORDS, free, mortars=["dry"], out=tmp_path / "rows.csv")
+    assert [*found["scene"]] == WORDS
+    for row in found.to_dict("records"):
+        plan = free(row["scene"])
+        assert row["F_largest"] == pytest.approx(plan.objective["F_largest"], rel=1e-8)
+        assert row["F_largest_bound"] == pytest.approx(row["F_largest"], rel=1e-8)
+        assert (row["steps"], row["status"]) == (len(plan.steps), "optimal")
+        falls = sum(verdict.value == "does not stand" for verdict in plan.verdicts("dry"))
+        assert row["falls_dry"] == falls
+    stored = pd.read_csv(tmp_path / "rows.csv")
+    pd.testing.assert_frame_equal(stored, found, check_dtype=False, rtol=1e-8)
+
+
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_sweep_that_was_interrupted_goes_on_where_it_ended(tmp_path, workers):
+    """Rows that are there are kept as they are, the others are the same as without an end."""
+    path = tmp_path / "rows.csv"
+    whole = sweep(WORDS, free, out=path)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([lines[0], lines[1].replace("optimal", "kept"), ""]))
+    again = sweep(WORDS, free, out=path, workers=workers)
+    assert [*again["status"]] == ["kept", "optimal"]
+    assert [*again["F_largest"]] == pytest.approx([*whole["F_largest"]], rel=1e-8)
+    sweep(WORDS, lambda scene: pytest.fail("it is known"), out=path)
+    other = replace(seqopt.load_scene(WORDS[0]), name="other")
+    assert len(sweep([other], free, out=path)) == 1
+    assert len(pd.read_csv(path)) == 3  # rows of other problems stay
+    path.write_text("a,b\n1,2\n")
+    with pytest.raises(ProblemError, match="no table of a sweep"):
+        sweep(WORDS, free, out=path)
+
+
+def test_a_problem_without_a_plan_is_a_row_that_says_why():
+    scene = seqopt.load_scene(WORDS[0])
+    weak = replace(scene.with_robots(*(replace(r, payload=1.0) for r in scene.robots)), name="weak")
+    found = sweep([scene, weak], free)
+    assert [*found["status"]] == ["optimal", "infeasible"]
+    assert "it becomes possible" in found["why"][1]
+    with pytest.raises(ProblemError, match="two problems are called wall 2 x 1; give scenes names"):
+        sweep([scene, scene.with_grips(1e6)], free)
