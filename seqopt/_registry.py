@@ -112,6 +112,7 @@ COMMANDS = {
         ("optimize", "optimize:run", "choose where robots hold, and write the plan"),
         ("replan", "replan:replan", "plan the rest of a build after a change"),
         ("pareto", "pareto:pareto", "find all plans that no other one beats in every aim"),
+        ("sweep", "sweep:run", "plan many problems, a row of a table for each"),
         ("analyze", "analyze:analyze", "compute forces and displacements in every step"),
         ("times", "times:times", "say how long a build takes, and who does what when"),
         ("assess", "assess:assess", "prove which steps stand, and with what margins"),

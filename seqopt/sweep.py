@@ -5,15 +5,18 @@ Rows are written as they come, so that what was interrupted goes on where it end
 
 from __future__ import annotations
 
+import re
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text, write_text
@@ -26,12 +29,38 @@ from seqopt.work._workers import hire, map_ordered
 from seqopt.work.progress import Stage, Tell
 from seqopt.workflow import optimize
 
+RANGE = re.compile(r"(?P<low>[^,=]+?)\.\.(?P<high>[^,=/]+)/(?P<count>\d+)(?P<log>log)?")
+MOST = 10_000  # problems
 DIGITS = 9  # of numbers in a table: a row that was read is one that was computed
 WHY = {InfeasibleError: "infeasible", MechanismError: "mechanism", SolverError: "failed"}
 
 
+def spread(text: str) -> tuple[str, ...]:
+    """Return words with every value of every range in them: even, or with ``log`` in proportion.
+
+    >>> spread("arch:span=1.5..2/2,rise=0.7")
+    ('arch:span=1.5,rise=0.7', 'arch:span=2,rise=0.7')
+    >>> spread("1e3..1e5/3log"), spread("1..12")  # the latter are bricks
+    (('1000', '10000', '100000'), ('1..12',))
+    """
+    parts, last = list[Sequence[str]](), 0
+    for found in RANGE.finditer(text):
+        count = int(found["count"])
+        try:
+            ends = float(found["low"]), float(found["high"])
+            values = (np.geomspace if found["log"] else np.linspace)(*ends, count)
+        except ValueError as error:
+            raise ProblemError(f"range {found[0]}: {error}; give LOW..HIGH/COUNT") from None
+        parts += [text[last : found.start()]], [f"{value:.12g}" for value in values.tolist()]
+        last = found.end()
+    every = tuple(map("".join, product(*parts, [text[last:]])))
+    if not 0 < len(every) <= MOST:
+        raise ProblemError(f"range {text}: give from 1 to {MOST} values")
+    return every
+
+
 def sweep(
-    scenes: Sequence[Scene | Path | str],
+    problems: str | Sequence[Scene | Path | str] | Mapping[str, Mapping[str, str]],
     plan: Callable[[Any], Plan] = optimize,
     *,
     mortars: Sequence[str] = (),
@@ -40,15 +69,16 @@ def sweep(
     executor: Executor | None = None,
     progress: Tell | None = None,
 ) -> pd.DataFrame:
-    """Plan many scenes, each by one worker.
+    """Plan many problems, each by one worker.
 
     Parameters
     ----------
-    scenes : sequence of Scene, str or pathlib.Path
-        Scenes, words or files, each with a name of its own.
+    problems : str, sequence of Scene, str or pathlib.Path, or mapping of str to mapping
+        Words with ranges, as ``"arch:span=2..3/5,rise=0.7"``; scenes, words or files, each with a
+        name of its own; or by name what tells problems apart, a column each.
     plan : callable, optional
-        Takes a scene, returns its plan: `seqopt.optimize`, of which ``functools.partial`` fixes
-        other arguments. Workers of other processes need a function of a module.
+        Takes a scene, or what tells a problem apart, returns its plan: `seqopt.optimize`, of which
+        ``functools.partial`` fixes other arguments. Other processes need a function of a module.
     mortars : sequence of str, optional
         With which it is proven how many steps fall: ``"dry"``, ``"epoxy"``.
     out : pathlib.Path or str, optional
@@ -61,14 +91,14 @@ def sweep(
     Returns
     -------
     pandas.DataFrame
-        A row per problem: ``scene``, ``status``, every goal and its lower bound
+        A row per problem: ``problem``, ``status``, every goal and its lower bound
         (``NAME_bound``), ``gap``, ``steps``, ``models``, ``falls_MORTAR``, ``outside_range``,
         ``seconds``; of one without a plan ``why``.
 
     Raises
     ------
     SeqoptError
-        If two scenes have one name, or the file is none of a sweep. A problem without a plan is a
+        If two problems have one name, or the file is none of a sweep. A problem without a plan is a
         row.
 
     Examples
@@ -76,19 +106,21 @@ def sweep(
     >>> from functools import partial
     >>> words = [f"chain:bricks={count}" for count in (7, 9)]
     >>> found = sweep(words, partial(optimize, schedule="free"))
-    >>> found[["scene", "status", "minmax", "steps"]].round(4).to_dict("records")[0]
-    {'scene': 'chain:bricks=7', 'status': 'optimal', 'minmax': 1.0, 'steps': 12}
+    >>> found[["problem", "status", "minmax", "steps"]].round(4).to_dict("records")[0]
+    {'problem': 'chain:bricks=7', 'status': 'optimal', 'minmax': 1.0, 'steps': 12}
     """
-    names = [each.name if isinstance(each, Scene) else str(each) for each in scenes]
+    given = spread(problems) if isinstance(problems, str) else problems
+    every = [*given.values()] if isinstance(given, Mapping) else [*given]
+    names = [getattr(each, "name", None) or str(each) for each in given]
     if twice := next((name for name in names if names.count(name) > 1), None):
         own = "give scenes names of their own, as dataclasses.replace(scene, name='stiff')"
         raise ProblemError(f"sweep: two problems are called {twice}; {own}")
     path = None if out is None else Path(out)
     rows = {} if path is None or not path.exists() else _read_rows(path)
-    todo = [(name, each) for name, each in zip(names, scenes, strict=True) if name not in rows]
+    todo = [(name, each) for name, each in zip(names, every, strict=True) if name not in rows]
 
     def done(case: tuple[str, Any], row: dict[str, Any]) -> None:
-        rows[case[0]] = row
+        rows[case[0]] = {**case[1], **row} if isinstance(case[1], Mapping) else row
         if path is not None:  # rows of other problems stay in the file
             write_text(path, csv_text(_table(rows, [*dict.fromkeys([*names, *rows])]), DIGITS))
         if progress is not None:
@@ -126,9 +158,9 @@ def _row(
 
 
 def _read_rows(path: Path) -> dict[str, dict[str, Any]]:
-    """Return the rows of a file by scene."""
+    """Return the rows of a file by problem."""
     try:
-        table = pd.read_csv(path, dtype={"scene": str}).set_index("scene")
+        table = pd.read_csv(path, dtype={"problem": str}).set_index("problem")
     except (OSError, ValueError, KeyError) as error:
         raise ProblemError(f"{path}: no table of a sweep: {error}; name another file") from None
     records = zip(table.index, table.to_dict("records"), strict=True)
@@ -137,6 +169,6 @@ def _read_rows(path: Path) -> dict[str, dict[str, Any]]:
 
 def _table(rows: Mapping[str, dict[str, Any]], names: Sequence[str]) -> pd.DataFrame:
     """Return the rows there are, in the order of names; ``seconds`` and ``why`` stand last."""
-    found = pd.DataFrame([{"scene": name, **rows[name]} for name in names if name in rows])
+    found = pd.DataFrame([{"problem": name, **rows[name]} for name in names if name in rows])
     last = [name for name in ("seconds", "why") if name in found]
     return found[[*(name for name in found if name not in last), *last]]

@@ -163,6 +163,37 @@ def front_figure(
     return figure
 
 
+def draw_sweep(table: pd.DataFrame, names: Sequence[str]) -> Figure:
+    """Draw the first goal over the first name, a line for every value of a second one.
+
+    Problems without a plan are crosses. ``table``: of `seqopt.sweep.sweep`; ``names``: its columns
+    of what differs.
+    """
+    first, second = (*names, "")[:2]
+    goal = next(c.removesuffix("_bound") for c in table.columns if c.endswith("_bound"))
+    figure = new_figure(3.4)
+    axes = figure.subplots()
+    numbers = pd.to_numeric(table[first], errors="coerce")
+    named = numbers.isna().any()  # then values stand one beside the other
+    place = pd.Series(pd.factorize(table[first])[0] if named else numbers, table.index, float)
+    groups = {"": table} if not second else {f"{second} {v}": t for v, t in table.groupby(second)}
+    for label, look in looks(groups).items():
+        own = groups[label]
+        axes.plot(place[own.index], own[goal].astype(float), label=label, **look.line())
+    lacking = table[table[goal].isna()].index
+    if len(lacking):
+        foot, low = axes.get_xaxis_transform(), np.full(len(lacking), 0.03)
+        axes.plot(place[lacking], low, "x", color=GRAY, transform=foot, label="no plan")
+    if named:
+        axes.set_xticks(range(table[first].nunique()), table[first].unique())
+    axes.set_xlabel(first)
+    axes.set_ylabel(LABELS.get(goal, goal))
+    if second or len(lacking):
+        axes.legend()
+    dress(axes)
+    return figure
+
+
 def _scale(axes: Axes, far: float) -> None:
     """Make the axis up logarithmic if it goes far, and keep rounding from looking like a trade-off.
 

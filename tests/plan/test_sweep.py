@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import seqopt
+from seqopt._cli.main import main
 from seqopt.errors import ProblemError
 from seqopt.sweep import sweep
 
@@ -18,9 +19,9 @@ free = partial(seqopt.optimize, schedule="free", aim="F_largest,steps")
 
 def test_every_row_is_what_one_problem_has(tmp_path):
     found = sweep(WORDS, free, mortars=["dry"], out=tmp_path / "rows.csv")
-    assert [*found["scene"]] == WORDS
+    assert [*found["problem"]] == WORDS
     for row in found.to_dict("records"):
-        plan = free(row["scene"])
+        plan = free(row["problem"])
         assert row["F_largest"] == pytest.approx(plan.objective["F_largest"], rel=1e-8)
         assert row["F_largest_bound"] == pytest.approx(row["F_largest"], rel=1e-8)
         assert (row["steps"], row["status"]) == (len(plan.steps), "optimal")
@@ -57,3 +58,35 @@ def test_a_problem_without_a_plan_is_a_row_that_says_why():
     assert "it becomes possible" in found["why"][1]
     with pytest.raises(ProblemError, match="two problems are called wall 2 x 1; give scenes names"):
         sweep([scene, scene.with_grips(1e6)], free)
+
+
+def told(*words):
+    return main(["sweep", *words, "--schedule", "free", "--aim", "F_largest,steps"])
+
+
+def test_a_command_sweeps_ranges_and_options(tmp_path, capsys):
+    out = tmp_path / "s"
+    words = ["wall:columns=2,courses=1..2/2", "--over", "payload=1,400", "--out", str(out)]
+    assert told(*words) == 0
+    assert "4 problems: 2 infeasible, 2 optimal" in capsys.readouterr().out
+    rows = pd.read_csv(out / "sweep.csv")
+    assert [*rows["payload"]] == [1, 400, 1, 400]
+    assert [*rows["scene"]] == [word for word in WORDS for _ in range(2)]
+    assert rows["F_largest"].notna().tolist() == [False, True, False, True]
+    assert (out / "sweep.png").stat().st_size > 5000
+    assert told(*words) == 0  # all rows are there
+    assert pd.read_csv(out / "sweep.csv").equals(rows)
+    assert told("wall:columns=2,courses=1", "--over", "payload=1") == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["wall:columns=2..x/2"], "range 2..x/2: could not convert"),
+        (["arch:span=1..2/0"], "give from 1 to"),
+        (["arch25", "--over", "payloads=2"], "no option payloads (did you mean payload?)"),
+    ],
+)
+def test_ranges_that_are_none_are_refused(words, said, capsys):
+    assert told(*words) == 2
+    assert said in capsys.readouterr().err
