@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import difflib
-import sys
 from collections.abc import Iterable
-from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 
 
 def plugins(group: str) -> dict[str, EntryPoint]:
-    """Return the entry points of a group by name, read once for the places of modules.
+    """Return the entry points of a group by name.
 
     >>> sorted(plugins("seqopt.limit_analysis"))
     ['lp', 'socp']
     """
-    return dict(_of_group(group, tuple(sys.path)))
-
-
-@lru_cache(maxsize=16)  # a comparison asks fifty times, each would take 7 ms
-def _of_group(group: str, places: tuple[str, ...]) -> dict[str, EntryPoint]:  # noqa: ARG001
     return {entry.name: entry for entry in entry_points(group=group)}
 
 

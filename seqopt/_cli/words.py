@@ -295,17 +295,14 @@ def with_grips(grips: str, scene: Scene) -> Scene:
     turning = rest.removeprefix("turning=")
     if comma and (turning == rest or "," in rest):
         raise SceneError(f"{where}: give a stiffness, and after a comma turning=STIFFNESS")
-
-    def numbers(word: str) -> tuple[float, ...]:
+    ways: list[Any] = []
+    for word in (shift, turning):
         try:
-            found = [float(number) for number in word.split("x")]
+            numbers = [] if word in ("", "rigid") else [float(one) for one in word.split("x")]
         except ValueError:
-            found = []
-        if len(found) not in (1, 3):
-            raise SceneError(f"{where}: {word!r} is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5")
-        return (*found,) * (3 // len(found))
-
-    ways: Any = (None if shift == "rigid" else numbers(shift), numbers(turning) if comma else None)
+            said = f"{word!r} is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5"
+            raise SceneError(f"{where}: {said}") from None
+        ways.append(None if not numbers else numbers[0] if len(numbers) == 1 else tuple(numbers))
     try:
         return scene.with_grips(*ways)
     except SceneError as error:

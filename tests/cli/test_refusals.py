@@ -99,7 +99,7 @@ BAD = {
     "optimize ARCH --max-memory much": "--max-memory much: give a size, as 500MB or 2GB",
     "optimize ARCH --time-limit soon": "--time-limit: 'soon' is not a positive number or zero",
     "scene arch25 --grips=soft": "--grips soft: 'soft' is no stiffness; give rigid, 1e6 or",
-    "scene arch25 --grips=0": "stiffness is (0.0, 0.0, 0.0); give one number or three",
+    "scene arch25 --grips=0": "stiffness is 0.0; give one number or three",
     "scene arch25 --grips=1e6,2e4": "give a stiffness, and after a comma turning=STIFFNESS",
     "scene arch25 --grips=1e6,turning=-1": "rotational_stiffness is",
     **{
