@@ -41,7 +41,7 @@ QUESTIONS = {
     "durations robots",
     "Which steps may a build have?": "schedule method plan begin to direction rules reassign",
     "What has changed?": "at lost missing measured",
-    "What counts as best?": "criterion aim rounding speed",
+    "What counts as best?": "criterion aim rounding speed reference",
     "What must hold?": "stands friction tilt curing limits budgets",
     "What is asked beside verdicts?": "margins map holds",
     "In which scenarios is it good?": "robust scenarios seed vary",

@@ -43,6 +43,8 @@ BAD = {
     "optimize ARCH --formulation labels --budget travel=few": "'few' is not a number from 0",
     "optimize ARCH --formulation labels --budget steps_over:T_max=80:3m": "steps have no meters",
     "optimize ARCH --formulation labels --budget robot_use:rob9=80:3": "response F_rob9 does not",
+    f"compare {WALL} --reference frame": "--reference: it values the plans of --speed",
+    f"compare {WALL} --speed 9 --reference rigid": "reference 'rigid' does not exist; give one of",
     "optimize ARCH --budget travel=2m --budget travel=0.5": "budget travel=0.5: it stands there",
     # scenarios
     f"{ROBUST} cvar=2": "--robust: cvar=2.0: give a level",

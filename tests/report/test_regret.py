@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -130,6 +131,15 @@ def test_every_way_is_a_row_and_nothing_is_drawn_wrong(measured):
 
 
 @pytest.mark.slow
+def test_incumbents_over_time_are_drawn_where_a_way_tells_them(measured):
+    curves = [found for found in measured.curves if len(found) > 1]
+    assert curves
+    lines = {line.get_linestyle() for line in regret_chart(measured).axes[0].get_lines()}
+    assert ":" in lines  # what bounds leave open
+    bare = replace(measured, curves=())
+    assert ":" not in {line.get_linestyle() for line in regret_chart(bare).axes[0].get_lines()}
+
+
 def test_softer_grips_are_the_reference_and_rigid_ones_a_way():
     scene = small_arch(3).with_grips(1e5)
     found = measure_regret(seqopt.make_engine("compliance", scene), WORST, **ONCE)
@@ -158,7 +168,8 @@ def test_a_plan_that_falls_has_no_regret():
 
 def test_the_chart_shows_both_and_pales_what_is_beaten():
     figure = regret_chart(made(*FOUR))
-    (regrets,) = figure.axes
+    regrets, parts = figure.axes
+    assert len(parts.get_yticks()) == 3  # the integer program is neither kept nor usual
     points = [line for line in regrets.get_lines() if len(line.get_xdata()) == 1]
     assert sum(line.get_alpha() == PALE for line in points) == 2
     (ring,) = (line for line in points if line.get_markersize() > 10)

@@ -19,8 +19,10 @@ from seqopt._showing import PAGE
 from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance, simplest
+from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.report._pages import comparison_page
+from seqopt.report._regret._measure import check_reference
 from seqopt.report.comparison import Comparison, _printed_largest, format_comparison
 from seqopt.report.comparison import compare as compare_builds
 from seqopt.responses.table import builds_in_words
@@ -43,6 +45,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     cache: Path | None = None,
     progress: Tell,
     speed: Annotated[float, ("value", "SECONDS"), ("const", "60")] = 0.0,
+    reference: Annotated[str, ("value", "ENGINE")] = "",
     out: Folder = None,
 ) -> Answer:
     """Build a scene in every way that seqopt knows, on paper, and show all side by side.
@@ -58,6 +61,9 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     speed : float, optional
         Also chart speed against regret: every engine, schedule and formulation, all within so many
         seconds together (60), each plan valued in the most detailed model that there is data for.
+    reference : str, optional
+        With ``speed``: the engine that values plans (compliance; with ``mortar`` every step has to
+        stand, too; discrete lets joints open).
     out : pathlib.Path, optional
         Write tables, figures and a page with all builds.
 
@@ -69,6 +75,9 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     $ seqopt compare arch25 --grips 1e6
     $ seqopt compare arch25 --grips 1e6 --speed 60 --out speed
     """
+    if reference and not speed:
+        raise ProblemError("--reference: it values the plans of --speed; give --speed 60 with it")
+    check_reference(reference)
     output, built = Output(out, scene.scene), scene.read(robots)
     find_postures(built, cache, progress)
     computed = find_engine(build_network(built), engine, mortar, verdicts=stability)
@@ -76,7 +85,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     output.require()
     prover = find_prover(computed.network, mortar, progress, asks=stability)
     named = robots if isinstance(robots, tuple) else ()
-    result = compare_builds(computed, costs, progress, named, prover, speed)
+    result = compare_builds(computed, costs, progress, named, prover, speed, reference)
     levels = remarks.level_notes(engine, simplest(computed))
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
     about = {"criteria": criteria, **provenance(computed)}

@@ -1,4 +1,4 @@
-"""The chart of speed against regret (extra ``plot``)."""
+"""The chart of speed against regret, and of the parts of regret (extra ``plot``)."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from seqopt.report._regret._table import (
     FAILED,
     FALLS,
     NAMED,
+    USUAL_NAMES,
     RegretTable,
     percent,
     seconds_text,
@@ -47,18 +48,27 @@ LINE = 24  # letters of a line beside a point
 SPOT = (-12, 9)  # points, from a point to its words
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
 LETTER = 0.072  # inches of a letter of a title
+PARTS = {"regret": "D", "gap": "|", "error": "x"}  # and their marks
 LOST = {CUT: "stopped", FAILED: "without a plan", FALLS: "fall", DONE: "not allowed"}
 
 
 @styled
 def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
-    """Return the chart of one scene, or of several side by side."""
+    """Return the chart of one scene, with the parts of regret, or of several side by side."""
     across = 1 if width < WIDTH or len(tables) == 1 else 2
-    rows = -(-len(tables) // across)
-    figure = new_figure(0.7 + (4.0 if len(tables) == 1 else 2.6) * rows, width)
-    panels = figure.subplots(rows, across, squeeze=False).ravel()
-    for axes in panels[len(tables) :]:
-        axes.set_visible(False)
+    if len(tables) == 1:
+        parts = _ways_shown(tables[0])
+        heights = [4.4, 0.6 + 0.28 * len(parts)]
+        figure = new_figure(0.7 + sum(heights), width)
+        panels = figure.subplots(2, 1, height_ratios=heights)
+        _draw_parts(panels[1], parts)
+        dress(panels[1])
+    else:
+        rows = -(-len(tables) // across)
+        figure = new_figure(0.7 + 2.6 * rows, width)
+        panels = figure.subplots(rows, across, squeeze=False).ravel()
+        for axes in panels[len(tables) :]:
+            axes.set_visible(False)
     for axes, each in zip(panels, tables, strict=False):
         _regrets(axes, each)
         took = each.take
@@ -107,6 +117,7 @@ def _regrets(axes: Axes, table: RegretTable) -> None:
     kept = seen[seen["kept"]][::-1]  # no way lies below these steps
     steps: dict[str, Any] = {"color": INK, "lw": 0.8, "drawstyle": "steps-post", "zorder": 1}
     axes.plot(kept["seconds"], kept["regret"].cummin().map(_height), **steps)
+    _draw_curves(axes, table)
     _scales(axes, table, seen)
     beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALL, "linespacing": 1.0}
     for _, row in kept.assign(same=kept["regret"].round(4)).drop_duplicates("same").iterrows():
@@ -115,6 +126,51 @@ def _regrets(axes: Axes, table: RegretTable) -> None:
         at = float(row["seconds"]), _height(float(row["regret"]))
         text = axes.annotate(words, at, SPOT, path_effects=HALO, zorder=5, **beside)
         text.set_in_layout(False)
+
+
+def _draw_curves(axes: Axes, table: RegretTable) -> None:
+    """Draw incumbents of ways with the reference over time, and dotted what bounds leave open."""
+    best = float(table.table["value"].min()) or 1.0
+    for (_, row), found in zip(table.table.iterrows(), table.curves, strict=False):
+        own = row["engine"] == table.reference and not row["without"]
+        if not own or len(found) < 2 or not np.isfinite(float(row["regret"])):
+            continue
+        start = max(float(row["seconds"]) - found[-1].seconds, 0.0)
+        seconds = [start + each.seconds for each in found]
+        color = _look(str(row["engine"]), str(row["schedule"]))["color"]
+        how: dict[str, Any] = {"color": color, "lw": 0.7, "alpha": 0.6, "zorder": 1}
+        above = [each.objective / best - 1.0 for each in found]
+        below = [1.0 - each.bound / best for each in found]
+        for shares, line in ((above, "-"), (below, ":")):
+            known = [_height(each) if np.isfinite(each) else np.nan for each in shares]
+            axes.plot(seconds, known, line, drawstyle="steps-post", **how)
+
+
+def _ways_shown(table: RegretTable) -> pd.DataFrame:
+    """Return the ways whose parts are drawn, the best last: not dominated, or usual."""
+    own = table.table[table.kept | table.table["formulation"].isin(USUAL_NAMES)]
+    own = own[np.isfinite(own["regret"].to_numpy(float))]
+    return own.sort_values(["regret", "seconds"], ascending=False, kind="stable")
+
+
+def _draw_parts(axes: Axes, rows: pd.DataFrame) -> None:
+    """Draw regret, proven gap and error of the model, a line for each way."""
+    most = 100 * LEAST
+    for line, (_, row) in enumerate(rows.iterrows()):
+        for name, marker in PARTS.items():
+            value = float(row[name])
+            if np.isfinite(value):
+                most = max(most, value)
+                mark = _look(str(row["engine"]), str(row["schedule"]), filled=name == "regret")
+                axes.plot(_height(value), line, clip_on=False, ms=6, **mark | {"marker": marker})
+    said = [f"{row['engine']}, {row['schedule']}: {_words(row)}" for _, row in rows.iterrows()]
+    axes.set_yticks(range(len(rows)), said, fontsize=SMALL)
+    axes.set(xscale="log", xlim=(NONE / 3, 4 * most), ylim=(-0.6, len(rows) - 0.4))
+    ticks = [10.0**power for power in range(-6, int(np.ceil(np.log10(most))) + 1, 2)]
+    axes.set_xticks([NONE, *ticks], ["0", *map(percent, ticks)])
+    axes.set_xticks([], minor=True)
+    axes.set(xlabel="share of the worst step", title="what regret is made of, way by way")
+    axes.axvspan(NONE / 3, 0.5 * LEAST, color=GREEN, alpha=0.13, lw=0, zorder=0)
 
 
 def _scales(axes: Axes, table: RegretTable, seen: pd.DataFrame) -> None:
@@ -147,4 +203,7 @@ def _legend(figure: Figure, tables: Sequence[RegretTable], across: int) -> None:
         Line2D([], [], color=INK, lw=0.8, label="frontier"),
         Line2D([], [], **mark, marker="o", mfc="none", ms=11, label="take this"),
     ]
+    if len(tables) == 1:
+        said = {"regret": "regret", "gap": "proven gap", "error": "error of the model"}
+        marks += [Line2D([], [], **mark, marker=each, label=said[n]) for n, each in PARTS.items()]
     figure.legend(handles=marks, loc="outside lower center", ncols=across)

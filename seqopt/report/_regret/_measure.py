@@ -34,7 +34,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
 from seqopt.engines.registry import USUAL as USUAL_ENGINE
 from seqopt.errors import MechanismError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
-from seqopt.graph.formulation import End, FormulationKind, find_formulation, formulations
+from seqopt.graph.formulation import End, Finding, FormulationKind, find_formulation, formulations
 from seqopt.judge._schedules import plan_values
 from seqopt.network.build import build_network
 from seqopt.plan.plan import Plan
@@ -127,6 +127,7 @@ class _Course:
     rules: FreeRules
     mortar: Mortar | None
     timer: Timer
+    findings: list[Finding] = field(default_factory=list)
     known: dict[Sequence[Step], Valued] = field(default_factory=dict)
 
     def engine(self, name: str) -> Engine:
@@ -158,9 +159,11 @@ class _Course:
 
     def row(self, way: Way, seconds: float) -> dict[str, object]:
         """Return the row of a way, which may take so long."""
+        proof, told = way.without != "no proof", list[Finding]()
 
         def call() -> Plan:
-            how: dict[str, Any] = {"proof": way.without != "no proof"}
+            told.clear()
+            how: dict[str, Any] = {"proof": proof, "progress": told.append}
             if "seconds" in find_formulation(way.formulation).options:
                 how["time_limit"] = KEPT * seconds
             return on_the_way(solve(self.problem(way), way.formulation, **how))
@@ -173,6 +176,7 @@ class _Course:
         except (SeqoptError, TimeoutError) as error:
             late = isinstance(error, TimeoutError | TimeUpError)
             return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}
+        self.findings[:] = [each for each in told if isinstance(each, Finding)]
         if plan.steps not in self.known:
             self.known[plan.steps] = self._value(plan.steps)
         value, along, status, why = self.known[plan.steps]
@@ -258,17 +262,19 @@ def measure_regret(
     with suppress(SeqoptError):
         loop = find_schedule(engine.network)
     course = _Course(problem, criterion, loop, rules, mortar, timer)
-    name, rows = _name_of(named), list[dict[str, object]]()
+    name, rows, curves = _name_of(named), list[dict[str, object]](), list[Sequence[Finding]]()
     ways, refused = _ways(course, name)
     late = set[tuple[str, str]]()  # engines and schedules that need too long to look at all
     for done, way in enumerate(ways):
         progress(Stage(f"regret: {way.engine}, {way.schedule}", done / len(ways)))
         left, others = seconds - (timer.now() - start), len(ways) - done
         most = left / 4 if way.formulation in FEW else min(left / 2, SHARE * left / others)
+        course.findings.clear()
         skips = (way.engine, way.schedule) in late and way.formulation not in FEW
         rows.append(course.row(way, 0.0 if skips else max(left / others, most)))
         if rows[-1]["status"] == CUT and way.formulation not in FEW:
             late.add((way.engine, way.schedule))
+        curves.append(tuple(course.findings))
     table = pd.DataFrame(rows)
     best = table["value"].min()
     regret = ((table["value"] - best) / (abs(best) or 1.0)).clip(lower=0.0)
@@ -281,7 +287,7 @@ def measure_regret(
     soft = ", soft grips" * bool(np.any(engine.network.compliances.compliance))
     stands = ", where every step stands" * (mortar is not None and name != "discrete")
     about = scene.name, len(scene.bricks), name, f"{name}{soft}{stands}", worst.name, seconds
-    return RegretTable(*about, table, refused)
+    return RegretTable(*about, table, refused, curves)
 
 
 def _name_of(engine: Engine) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ import pandas as pd
 
 from seqopt._showing import display
 from seqopt.arrays import Bools
+from seqopt.graph.formulation import Finding
 from seqopt.sequence.rules import FREE
 
 if TYPE_CHECKING:
@@ -55,7 +56,8 @@ class RegretTable:
     its ``own`` model, the ``regret`` over the best known, the ``gap`` to the bound that it proves
     and the ``error`` of what its model promised; whether it proves its plan (``exact``), the
     ``models`` that it solved, its ``status``, and ``why`` there is no plan, or none that holds;
-    ``refused``: engines that cannot model the scene, and why.
+    ``refused``: engines that cannot model the scene, and why; ``curves``: incumbents and bounds
+    over time, row by row.
 
     >>> row = {"engine": "compliance", "schedule": "free", "formulation": "schedule_search"}
     >>> row |= {"without": "", "exact": True, "seconds": 0.1, "status": "done", "why": ""}
@@ -73,6 +75,7 @@ class RegretTable:
     limit: float
     table: pd.DataFrame
     refused: Mapping[str, str] = field(default_factory=dict)
+    curves: Sequence[Sequence[Finding]] = ()
 
     def __repr__(self) -> str:
         return f"<RegretTable of {self.scene}: {self.sentence}>"
