@@ -194,13 +194,32 @@ def find_front(
 ) -> Front:
     """Return the Pareto set of a problem, its points recomputed and its completeness judged.
 
-    ``problem``: its goals are minimized simultaneously; ``rounding``: of a posed problem, steps to
-    whose multiples values are rounded up, by goal, SI units, which thins the set. Its plans are
-    within the linear range if any is, unless a limit on ``linear_range`` says otherwise.
-    ``seconds``: limit of the search, which then returns the points found; ``progress``: called
-    with the progress, as words or a `seqopt.work.Stage`; ``clock``: of search and proof. Raises
-    `InfeasibleError` if no plan is feasible; `SolverError` if the values of a plan differ from
-    those claimed, or a point is missing; `TimeUpError` if no plan is found in time.
+    Its plans are within the linear range if any is, unless a limit on ``linear_range`` says so.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its goals are minimized simultaneously.
+    formulation : Formulation or str, optional
+        What finds the set.
+    rounding : mapping of str to float, optional
+        Steps to whose multiples values are rounded up, by goal, SI units, which thins the set.
+    seconds : float, optional
+        Limit of the search, which then returns the points found.
+    progress : callable, optional
+        Called with the progress.
+    clock : Clock, optional
+        Of search and proof.
+
+    Returns
+    -------
+    Front
+
+    Raises
+    ------
+    InfeasibleError, SolverError, TimeUpError
+        If no plan is feasible; if values differ from those claimed, or a point is missing; if no
+        plan is found in time.
     """
     formulation = as_formulation(formulation, "front")
     if not isinstance(problem, Problem):
