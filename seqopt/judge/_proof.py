@@ -295,7 +295,8 @@ class Proof:
         below, steps = self.states, round(values[1]) - (len(values) == 2)
         graph = self.rebuilt(Filter(values, steps=steps)).graph()
         self.states = below + int(reached(graph).sum())
-        out = (values[0], *lexicographic_bounds(graph, values)[1:])
+        bounds = lexicographic_bounds(graph, values)[1:]  # infinite: no path has fewer steps
+        out = (values[0], *map(min, bounds, values[1:]))
         return None if self._leaves_room(values, out) else out
 
     def _reaches_no_end(self, values: Sequence[float]) -> bool:
