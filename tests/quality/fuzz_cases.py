@@ -98,20 +98,11 @@ def wrong_words(rng: np.random.Generator, words: tuple[str, ...]) -> tuple[str, 
     return tuple(out)
 
 
-ODD_NUMBERS = (0, -1, 1, 0.5, -0.0, 1e-320, 1e-160, 1e-9, 1e9, 1e30, 1e160, 1e308, 10**20, 10**400)
+ODD_NUMBERS = (
+    *(0, -1, 1, 2, 0.5, -0.0, 1e-320, 1e-160, 1e-9, 1e9, 1e30, 1e160, 1e308, 10**20, 10**400),
+)
 ODD_WORDS = (
-    "",
-    "sup",
-    "max",
-    "move",
-    "[sup]",
-    "a,b",
-    "a=b",
-    "\x1b[2J",
-    "\ud800",
-    "\0",
-    "ä",
-    "x" * 300,
+    *("", "sup", "max", "move", "[sup]", "a,b", "a=b", "\x1b[2J", "\ud800", "\0", "ä", "x" * 300),
 )
 ODD_VALUES = (*ODD_NUMBERS, *ODD_WORDS, None, True, [], {}, [1, 2, 3], float("nan"), float("inf"))
 NESTED = "[" * 5000 + "]" * 5000
@@ -275,7 +266,9 @@ def _list(document: dict[str, Any], key: str) -> list[dict[str, Any]]:
 
 
 Change = Callable[[np.random.Generator, dict[str, Any]], None]
-CHANGES: tuple[Change, ...] = (_replaced, _removed, _doubled, _swapped, *(_scaled, _plausible) * 2)
+CHANGES: tuple[Change, ...] = (
+    *(_replaced, _scaled, _scaled, _removed, _doubled, _swapped, _plausible, _plausible),
+)
 
 
 def _noise(rng: np.random.Generator, text: str) -> str:
