@@ -33,9 +33,11 @@ from matplotlib.figure import Figure
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
+from experiments.study.parts.ranks import rank_of
 from seqopt import Scene, Schedule, build_network, load_scene, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.decisions import Decisions, move_costs, pose_decisions, rank_of
+from seqopt.graph._decision_search import Windows
+from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.graph.formulation import find_formulation
 from seqopt.problem.requirements import Criterion, SceneFacts
 from seqopt.report._style import dress, looks, styled
@@ -170,9 +172,9 @@ def judge(problem: Decisions, nominal: Decision) -> dict[str, float]:
     plan = solve(problem, "overlap_dp")
     best = plan.certificate.objective
     regret = max(0.0, problem.sums.cost(chosen) - best)
-    first, three = [], []
+    first, three, windows = [], [], Windows(problem, [*searched])
     for k, node in enumerate(searched):
-        costs = move_costs(problem, k, searched[k - 1] if k else 0)
+        costs = windows.costs(k)
         first.append(int(np.argmin(costs)) == node)
         three.append(rank_of(costs, node) <= 3)
     average = sum(

@@ -54,8 +54,6 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step
 
-TIED = 1e-9  # costs this close, relative to the largest, are equal
-
 
 @dataclass(frozen=True, repr=False)
 class Decisions(Shown):
@@ -427,26 +425,3 @@ def _ways(schedule: Schedule) -> Iterator[tuple[str, tuple[_Grip, _Grip]]]:
         for ends in pairwise(grip for grip in grips if grip is not None):
             if ends[0] != ends[1]:
                 yield robot.name, ends
-
-
-def move_costs(problem: Decisions, move: int, before: int) -> Floats:
-    """Return the costs of a move's candidates, the choice before it being fixed.
-
-    The search of a single move (equation 1 of Bruun et al.): each step of the window is ranked over
-    the candidates of this move alone.
-
-    ``problem``: whose responses are evaluated if they are not yet; ``move``, ``before``: a move,
-    and the candidate chosen for the move before it. Result (C_k,).
-    """
-    costs = map(problem.step_costs, problem.window_choices(move, before))
-    return np.asarray(sum(costs, np.zeros(len(problem.schedule.moves[move].candidates))))
-
-
-def rank_of(costs: Floats, chosen: int) -> int:
-    """Return the rank of a candidate: 1 if none costs less.
-
-    ``costs`` (C,): equal if they differ by less than ``TIED`` of the largest; ``chosen``: index of
-    the candidate.
-    """
-    tie = TIED * float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
-    return int((costs < costs[chosen] - tie).sum()) + 1

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seqopt.graph._decision_search import Windows
 from seqopt.graph.decision_costs import best_in_order
-from seqopt.graph.decisions import move_costs, pose_decisions
+from seqopt.graph.decisions import pose_decisions
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, _ranks_of
 from seqopt.problem.problem import Aim
@@ -34,11 +35,12 @@ def test_rows_are_ranked_as_if_alone(rows):
 def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25, loop25):
     problem = pose_decisions(engine25, loop25, CONDITIONAL)
     choice = solve(problem, "cascade").choice
+    windows = Windows(problem, [*choice])
     for k in range(len(choice)):
         before = choice[k - 1] if k else 0
         charged = problem.sums.single[k] + problem.sums.shared[k][before]
         allowed = np.isfinite(charged)
-        np.testing.assert_allclose(charged[allowed], move_costs(problem, k, before)[allowed])
+        np.testing.assert_allclose(charged[allowed], windows.costs(k)[allowed])
         assert charged[choice[k]] == charged.min()
 
 

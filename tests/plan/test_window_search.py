@@ -9,8 +9,8 @@ from experiments.harness.scenes import half_circle
 from seqopt.engines.rigid._extremes import can_compile
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SolverError
-from seqopt.graph._decision_search import walk_windows
-from seqopt.graph.decisions import move_costs, pose_decisions
+from seqopt.graph._decision_search import Windows, walk_windows
+from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import Watch
 from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
@@ -34,7 +34,8 @@ def test_a_window_depends_on_the_choices_before_it(engine25):
     found = walk_windows(problem, Watch())
     before, costs = found.choice[8], found.costs(9)
     _ = problem.sums  # windows are parts of all responses from now on
-    own, other = (move_costs(problem, 9, c) for c in (before, 1 if before == 0 else 0))
+    chosen = ([*found.choice[:8], c] for c in (before, 1 if before == 0 else 0))
+    own, other = (Windows(problem, choice).costs(9) for choice in chosen)
     able = np.isfinite(costs)
     assert own[able] == pytest.approx(costs[able])
     assert other.tolist() != own.tolist()

@@ -9,9 +9,12 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
+from seqopt.graph._decision_search import Windows
 from seqopt.graph.decision_costs import LayeredCosts
-from seqopt.graph.decisions import Decisions, move_costs, rank_of
+from seqopt.graph.decisions import Decisions
 from seqopt.problem.problem import Aim
+
+TIED = 1e-9  # costs this close, relative to the largest, are equal
 
 
 def rank_choice(problem: Decisions, choice: Sequence[int]) -> pd.DataFrame:
@@ -24,9 +27,9 @@ def rank_choice(problem: Decisions, choice: Sequence[int]) -> pd.DataFrame:
     cost to the end.
     """
     sums, peaks = to_go(problem.sums, Aim.SUM), to_go(problem.peaks, Aim.PEAK)
-    rows = []
+    rows, windows = [], Windows(problem, [*choice])
     for k, (before, now) in enumerate(pairwise((0, *choice))):
-        move, window = problem.schedule.moves[k], move_costs(problem, k, before)
+        move, window = problem.schedule.moves[k], windows.costs(k)
         what = {"move": k + 1, "step": move.step, "bricks": move.bricks, "robot": move.robot}
         ranks = {
             "node": move.candidates[now],
@@ -46,3 +49,13 @@ def to_go(costs: LayeredCosts, aim: Aim) -> list[Floats]:
     for own, pairs in zip(costs.single[-2::-1], costs.shared[:0:-1], strict=True):
         out.insert(0, join(own, join(pairs, out[0]).min(axis=1)))
     return out
+
+
+def rank_of(costs: Floats, chosen: int) -> int:
+    """Return the rank of a candidate: 1 if none costs less.
+
+    ``costs`` (C,): equal if they differ by less than ``TIED`` of the largest; ``chosen``: index of
+    the candidate.
+    """
+    tie = TIED * float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
+    return int((costs < costs[chosen] - tie).sum()) + 1
