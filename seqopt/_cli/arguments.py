@@ -10,7 +10,6 @@ import argparse
 import re
 from argparse import SUPPRESS
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, NoReturn
@@ -30,17 +29,13 @@ EXAMPLES = """Three examples:
   seqopt optimize arch:span=2,rise=0.8 --formulation overlap_dp --out mine
       where to hold an arch of your own
 
-seqopt --help names all commands, seqopt COMMAND --help what each is for, and
-seqopt COMMAND --help-all what it can do.
+seqopt --help names all commands, seqopt COMMAND --help what each can do.
 """
 SIGNATURES = Later("seqopt._cli.signatures")  # 240 ms: it needs all that is computed
-LINES = 40  # of a screen
-ALL = "--help-all"
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
-LEADS = {"limit": "limits", "option": "options"}  # first words of messages, and their parameters
+LEADS = {"limit": "limits", "option": "options", "to": "to"}  # parameters, by what names them
 LEADS |= {n: n for n in ("begin", "criterion", "direction", "engine", "lost", "missing", "rules")}
-LEADS["to"] = "to"
 GIVEN = re.compile(r"\b(\w+)='([\w-]+)'")
 
 
@@ -63,10 +58,6 @@ def _nearest(message: str, options: Iterable[str]) -> str:
     return did_you_mean(found[1].lstrip("-"), known).replace("mean ", "mean --")
 
 
-def _layout(prog: str) -> argparse.HelpFormatter:
-    return argparse.RawDescriptionHelpFormatter(prog, width=columns())
-
-
 class _Parser(argparse.ArgumentParser):
     """A parser with one-line errors that prints help as a result on standard output."""
 
@@ -74,11 +65,11 @@ class _Parser(argparse.ArgumentParser):
     asked = ""  # the command that is asked for, and its options
     spoken: tuple[str, ...] = ()
 
-    def format_help(self) -> str:
-        return super().format_help().replace("?:\n", "?\n")  # titles that are questions
+    def _get_formatter(self) -> argparse.HelpFormatter:
+        return argparse.RawDescriptionHelpFormatter(self.prog, width=columns())
 
     def print_help(self, file: object = None) -> None:
-        show(first_screen(self))
+        show(self.format_help().replace("?:\n", "?\n"))  # titles that are questions
 
     def error(self, message: str) -> NoReturn:
         hint = _nearest(message, self.spoken or tuple(self._option_string_actions))
@@ -87,11 +78,9 @@ class _Parser(argparse.ArgumentParser):
         self.exit(Status.BAD_INPUT)
 
 
-class _Show(argparse.Action):
-    """An option that prints a text, created on demand."""
-
+class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        show(self.const(parser))
+        show(f"seqopt {version('seqopt')}\n")
         parser.exit()
 
 
@@ -103,26 +92,19 @@ def parser(asked: str | None = None, *, helps: bool = True) -> argparse.Argument
     """
     whole = _Parser(
         prog="seqopt",
-        formatter_class=_layout,
         description="Where should each robot hold a half-built structure, over the whole build?",
-        epilog="seqopt COMMAND --help has what a first use of a command needs, and examples;\n"
-        "seqopt COMMAND --help-all has all of its options.",
+        epilog="seqopt COMMAND --help has the options of a command by question, and examples.",
     )
     about = "show program's version number and exit"
-    how: dict[str, Any] = {"action": _Show, "nargs": 0, "default": SUPPRESS}
-    whole.add_argument(
-        "--version", const=lambda _: f"seqopt {version('seqopt')}\n", help=about, **how
-    )
+    whole.add_argument("--version", action=_Version, nargs=0, default=SUPPRESS, help=about)
     whole.color = False  # signs of color would be printed as codes
     commands = whole.add_subparsers(
         required=True, title="commands", metavar="COMMAND", dest="command"
     )
     for name, command in (COMMANDS if asked in COMMANDS else every_command()).items():
-        added = commands.add_parser(name, help=command.line, formatter_class=_layout)
+        added = commands.add_parser(name, help=command.line)
         added.color = False
         if asked in (None, name):
-            all_help = "show every option of the command, and exit"
-            added.add_argument(ALL, const=_Parser.format_help, help=all_help, **how)
             SIGNATURES.signature_of(command.load()).fill(added, helps=helps)
         if asked == name:
             whole.asked, whole.spoken = name, tuple(added._option_string_actions)
@@ -165,36 +147,6 @@ def request(words: Sequence[str]) -> Request:
     if name == "instance":
         values["made_by"] = words
     return Request(name, values, quiet=values.pop("quiet"), json=values.pop("json"))
-
-
-def first_screen(command: argparse.ArgumentParser) -> str:
-    """Return the help of a command on one screen, in full if that fits.
-
-    Otherwise only required options, those of examples, and positional arguments, with their help up
-    to the first semicolon.
-    """
-    whole = command.format_help()
-    if whole.count("\n") <= LINES or command._subparsers is not None:
-        return whole
-    given = {word.partition("=")[0] for word in (command.epilog or "").split()}
-    first = [
-        action
-        for action in command._actions
-        if action.required or not action.option_strings or given & {*action.option_strings}
-    ]
-    more = len(command._actions) - len(first) - 2  # both forms of help are no answer to more
-    lines = command._get_formatter()
-    lines.add_usage(command.usage, first, ())
-    lines.add_text(command.description)
-    lines.start_section("what a first use needs")
-    brief = [*map(copy, first)]
-    for action in brief:
-        action.help = re.split(r"; |\. ", action.help or "")[0]
-    lines.add_arguments(brief)
-    lines.end_section()
-    lines.add_text(command.epilog)
-    lines.add_text(f"{command.prog} {ALL} has {more} more options, by question.")
-    return lines.format_help()
 
 
 def named_command(words: Sequence[str]) -> str:

@@ -51,10 +51,10 @@ def read_steps(
     scene: Built = ARCH25,
     *,
     robots: int | str | None = None,
-    method: str | None = None,
-    plan: Annotated[Path | None, ("value", "FILE")] = None,
     cache: Path | None = None,
     progress: Tell,
+    method: str | None = None,
+    plan: Annotated[Path | None, ("value", "FILE")] = None,
 ) -> Sequenced:
     """Return the steps that a command is about.
 

@@ -1,4 +1,4 @@
-"""Help in two lengths, examples, and the word that was meant."""
+"""Help, its examples, and the word that was meant."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from seqopt._cli.arguments import EXAMPLES, LINES, parser
+from seqopt._cli.arguments import EXAMPLES, parser
 from seqopt._cli.main import main
 from seqopt._cli.signatures import signature_of
 from seqopt._registry import COMMANDS
@@ -46,32 +46,9 @@ def flags(command):
     return [names[0] for names in named if names[0] is not None]
 
 
-@pytest.mark.parametrize("name", ["", *COMMANDS])
-def test_help_fits_one_screen_and_shows_what_is_needed_first(printed, name):
-    """What must be given, what examples use, and how many more there are."""
-    out = printed(*([name] if name else []), "--help")
-    assert len(out.splitlines()) <= LINES == 40
-    assert max(map(len, out.splitlines())) <= 80
-    assert all(text.count("(") == text.count(")") for text in out.split("\n\n"))
-    if not name:
-        return
-    command, examples = command_of(name), signature_of(COMMANDS[name].load()).examples
-    assert [example for example in examples if f"\n  {example}\n" not in out] == []
-    shown = defined(out.partition("\nexample")[0])
-    assert len(shown) == len({*shown})
-    needed = {a.option_strings[0] for a in command._actions if a.required and a.option_strings}
-    used = {word for example in examples for word in example.split()} & {*flags(command)}
-    assert needed | used <= {*shown}
-    if "--help-all has" in out:
-        more = int(out.rpartition("--help-all has ")[2].split()[0])
-        assert more == len({*flags(command)} - {*shown} - {"-h", "--help-all"})
-    else:
-        assert out == printed(name, "--help-all")
-
-
 @pytest.mark.parametrize("name", COMMANDS)
-def test_all_help_has_every_option_once(printed, name):
-    out = printed(name, "--help-all")
+def test_help_has_every_option_once_and_examples_on_lines_of_their_own(printed, name):
+    out = printed(name, "--help")
     assert max(map(len, out.splitlines())) <= 80
     command = command_of(name)
     about = "\n".join(group.description or "" for group in command._action_groups)
@@ -80,6 +57,14 @@ def test_all_help_has_every_option_once(printed, name):
     body = defined("\n".join(kept).partition("\nexample")[0])
     for flag in flags(command):
         assert body.count(flag) == 1, flag
+    examples = signature_of(COMMANDS[name].load()).examples
+    assert [example for example in examples if f"\n  {example}\n" not in out] == []
+
+
+def test_help_without_a_command_fits_one_screen(printed):
+    lines = printed("--help").splitlines()
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= 80
 
 
 def test_numbers_are_read_where_they_are_given():

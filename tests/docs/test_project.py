@@ -149,7 +149,7 @@ def unknown(text, known):
 
 
 def test_pages_name_options_that_commands_have(capsys):
-    helps = [command(capsys, name, "--help-all")[1] for name in COMMANDS]
+    helps = [command(capsys, name, "--help")[1] for name in COMMANDS]
     known = {*OPTION.findall(" ".join(helps))}
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     texts = {str(page): page.read_text(encoding="utf-8") for page in pages}
