@@ -149,8 +149,9 @@ def _draw_curves(axes: Axes, table: RegretTable) -> None:
 def _ways_shown(table: RegretTable) -> pd.DataFrame:
     """Return the ways whose parts are drawn, the best last: not dominated, or usual."""
     own = table.table[table.kept | table.table["formulation"].isin(USUAL_NAMES)]
-    own = own[np.isfinite(own["regret"].to_numpy(float))]
-    return own.sort_values(["regret", "seconds"], ascending=False, kind="stable")
+    by = own[np.isfinite(own["regret"].to_numpy(float))].sort_values(["regret", "seconds"])
+    found: pd.DataFrame = by[::-1]
+    return found
 
 
 def _draw_parts(axes: Axes, rows: pd.DataFrame) -> None:
