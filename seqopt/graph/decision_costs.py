@@ -32,8 +32,7 @@ class LayeredCosts(FrozenValue):
     ``single`` (tuple of (C_k,) float): of each candidate in the steps in which its move alone is
     open; infinite where it is not allowed; ``shared`` (tuple of (C_{k-1}, C_k) float): of each pair
     in the steps that the move shares with the one before; of the first move (1, C_0). Raises
-    `ProblemError` if there is no move, a move has no candidates, a shape is wrong, a value is NaN,
-    or values are so large that their sum overflows.
+    `ProblemError` if a move has no candidates, or values are so large that their sum overflows.
     """
 
     single: tuple[Floats, ...]
@@ -43,32 +42,13 @@ class LayeredCosts(FrozenValue):
         for name in ("single", "shared"):
             copied = tuple(_copied(costs) for costs in getattr(self, name))
             object.__setattr__(self, name, copied)
-        if not self.single:
-            raise ProblemError("the problem has no moves; give at least one")
-        if len(self.shared) != len(self.single):
-            raise ProblemError(
-                f"{len(self.single)} single and {len(self.shared)} shared costs; give as many"
-            )
-        for k, shape in enumerate(zip((1, *self.sizes[:-1]), self.sizes, strict=True)):
-            self._check_move(k, shape)
+        if 0 in self.sizes:
+            move = self.sizes.index(0) + 1
+            raise ProblemError(f"move {move} has no candidates; widen a reach or free a node")
         some = [*map(_values, (*self.single, *self.shared))]  # the largest that is allowed counts
         if sum(float(np.abs(v[np.isfinite(v)]).max(initial=0.0)) for v in some) == np.inf:
             raise ProblemError("the costs are so large that their sum overflows; rescale them")
         super().__post_init__()
-
-    def _check_move(self, k: int, shape: tuple[int, int]) -> None:
-        if not shape[1]:
-            raise ProblemError(f"move {k + 1} has no candidates; widen a reach or free a node")
-        if self.shared[k].shape != shape:
-            raise ProblemError(
-                f"move {k + 1}: shared costs {self.shared[k].shape}; give them for {shape}"
-            )
-        for name, costs in (("single", self.single[k]), ("shared", self.shared[k])):
-            some = _values(costs)
-            if np.isnan(some).any() or (some == -np.inf).any():
-                raise ProblemError(
-                    f"move {k + 1}: a {name} cost is NaN or -inf; mark what is not allowed as inf"
-                )
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -121,27 +101,14 @@ def _values(costs: Floats) -> Floats:
 class Budget(FrozenValue):
     """A cap on a total over the build.
 
-    ``name``: what is capped, with its unit; ``single`` (tuple of (C_k,) float): use of each choice,
-    finite; ``shared`` (tuple of (C_{k-1}, C_k) float): use of each pair, finite; ``bound``:
-    infinite if there is no cap. Raises `ProblemError` if a shape is wrong, an amount is not finite,
-    or the bound is NaN or -inf.
+    ``name``: what is capped, with its unit; ``single``, ``shared``: use of each choice and of each
+    pair, finite, as of `LayeredCosts`; ``bound``: infinite if there is no cap.
     """
 
     name: str
     single: tuple[Floats, ...]
     shared: tuple[Floats, ...]
     bound: float
-
-    def __post_init__(self) -> None:
-        try:
-            _ = self.amounts
-        except ProblemError as error:
-            raise ProblemError(f"budget {self.name!r}: {error}") from error
-        if not all(np.isfinite(amounts).all() for amounts in (*self.single, *self.shared)):
-            raise ProblemError(f"budget {self.name!r}: an amount is infinite; limit the choice")
-        if not self.bound > -np.inf:
-            raise ProblemError(f"budget {self.name!r}: the bound is {self.bound}; give a number")
-        super().__post_init__()
 
     @property
     def amounts(self) -> LayeredCosts:

@@ -67,18 +67,9 @@ def test_the_move_that_ends_every_choice_is_named(part, move, value, named):
         Costs(changed(part, move, np.array(value))).compiled()
 
 
-@pytest.mark.parametrize(
-    ("part", "move", "value", "named"),
-    [
-        ("single", 0, [], "move 1 has no candidates"),
-        ("shared", 0, np.zeros((2, 2)), r"move 1: shared costs \(2, 2\); give them for \(1, 2\)"),
-        ("single", 0, [0.0, -INF], "move 1: a single cost is NaN or -inf"),
-        ("shared", 1, [[0, 0, 0], [0, 0, np.nan]], "move 2: a shared cost is NaN"),
-    ],
-)
-def test_what_is_wrong_with_costs_is_named_with_its_move(part, move, value, named):
-    with pytest.raises(ProblemError, match=named):
-        changed(part, move, np.array(value, dtype=float))
+def test_a_move_without_candidates_is_named():
+    with pytest.raises(ProblemError, match="move 1 has no candidates"):
+        changed("single", 0, np.zeros(0))
 
 
 def use(bound):
@@ -97,18 +88,3 @@ def test_what_a_choice_takes_of_a_budget(choice, taken):
     budget = use(12.0)
     assert budget.spent(choice) == taken
     assert budget.spent(choice) == LayeredCosts(budget.single, budget.shared).cost(choice)
-
-
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        ({"bound": np.nan}, "budget 'use': the bound is nan"),
-        ({"bound": -INF}, "budget 'use': the bound is -inf"),
-        ({"single": (np.zeros(2), np.array([0.0, INF]))}, "budget 'use': an amount is infinite"),
-        ({"shared": (np.array([[INF, 0.0]]), np.zeros((2, 2)))}, "use': an amount is infinite"),
-        ({"single": (np.zeros(2),)}, "budget 'use': 1 single and 2 shared costs"),
-    ],
-)
-def test_a_budget_that_is_no_budget_is_named(change, named):
-    with pytest.raises(ProblemError, match=named):
-        replace(use(1.0), **change)
