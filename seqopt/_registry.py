@@ -19,8 +19,8 @@ _Kind = TypeVar("_Kind")
 
 VIEWS = {
     "Shown.html": "seqopt.report._notebook:card",
-    "Scene.plot": "seqopt.report._pictures:scene_picture",
-    "Network.plot": "seqopt.report._pictures:network_picture",
+    "Scene.plot": "seqopt.report._pictures:structure_picture",
+    "Network.plot": "seqopt.report._pictures:structure_picture",
     "Schedule.gantt": "seqopt.report._gantt:gantt_picture",
     "ShownBuild.plot": "seqopt.report._pictures:steps_picture",
     "ShownBuild.gantt": "seqopt.report._gantt:gantt_picture",

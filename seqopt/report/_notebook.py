@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 from base64 import b64encode
 from contextlib import suppress
-from functools import singledispatch
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -33,9 +32,16 @@ STYLE = "display:block;max-width:100%;height:auto;background:#fff"
 
 def card(value: object) -> str:
     """Return what a value says of itself and, with matplotlib, small pictures of it, as HTML."""
-    said, images = [repr(value), *sentences(value)], ""
+    said, images = [repr(value)], ""
+    if isinstance(value, Scene) and value.loading:
+        said.append(f"Beside the weight: {value.loading}.")
+    elif isinstance(value, ShownBuild) and _is_small(value):
+        scene = value.engine.network.scene
+        said.append(_in_a_sentence(scene, value.responses(), (), value.departures))
+    elif isinstance(value, ShownBuild):
+        said.append("Responses and stability are not computed here: see responses(), stability().")
     with suppress(ExtraError):
-        for figure in pictures(value):
+        for figure in _pictures(value):
             from PIL import Image  # noqa: PLC0415  # comes with matplotlib, an extra
 
             large, small = io.BytesIO(), io.BytesIO()
@@ -47,58 +53,22 @@ def card(value: object) -> str:
     return f"<div>{''.join(f'<p>{escape(line)}</p>' for line in said)}{images}</div>"
 
 
-@singledispatch
-def sentences(_: object) -> list[str]:
-    """Return what is said of a value beside its representation."""
-    return []
-
-
-@singledispatch
-def pictures(_: object) -> list[Figure]:
+def _pictures(value: object) -> list[Figure]:
     """Return small pictures of a value."""
-    return []
-
-
-@sentences.register(Scene)
-def _(value: Scene) -> list[str]:
-    return [f"Beside the weight: {value.loading}."] if value.loading else []
-
-
-@pictures.register(Scene)
-def _(value: Scene) -> list[Figure]:
-    return [display(Scene, "plot")(value, width=WIDTH)]
-
-
-@pictures.register(Schedule)
-def _(value: Schedule) -> list[Figure]:
-    return [value.gantt(1, min(len(value.steps), STEPS))]
-
-
-@pictures.register(Problem)
-def _(value: Problem) -> list[Figure]:
-    return pictures(value.moves) or pictures(value.scene)
-
-
-@sentences.register(ShownBuild)
-def _(value: ShownBuild) -> list[str]:
-    if not _is_small(value):
-        return ["Responses and stability are not computed here: see responses() and stability()."]
-    scene = value.engine.network.scene
-    return [_in_a_sentence(scene, value.responses(), (), value.departures)]
-
-
-@pictures.register(ShownBuild)
-def _(value: ShownBuild) -> list[Figure]:
-    if not value.steps:  # costs alone were given
+    if isinstance(value, Problem):
+        value = value.moves if isinstance(value.moves, Schedule) else value.scene
+    if isinstance(value, Scene):
+        return [display(Scene, "plot")(value, width=WIDTH)]
+    if isinstance(value, Schedule):
+        return [value.gantt(1, min(len(value.steps), STEPS))]
+    if not isinstance(value, ShownBuild) or not value.steps:  # costs alone were given
         return []
-    paint = display(ShownBuild, "plot")
-    from seqopt.report._pictures import spread_steps  # noqa: PLC0415  # matplotlib is an extra
-
+    paint, steps = display(ShownBuild, "plot"), value.steps
     if not _is_small(value):
-        return [paint(value.engine, value.steps, value.steps[len(value.steps) // 2].number)]
-    last = value.steps[min(len(value.steps), STEPS) - 1].number
-    shown = spread_steps(value.steps, 3)
-    return [paint(value.engine, value.steps, shown), value.gantt(None, last)]
+        return [paint(value.engine, steps, steps[len(steps) // 2].number)]
+    thirds = sorted({steps[(len(steps) * k - 1) // 3].number for k in (1, 2, 3)})
+    last = steps[min(len(steps), STEPS) - 1].number
+    return [paint(value.engine, steps, thirds), value.gantt(None, last)]
 
 
 def _is_small(value: ShownBuild) -> bool:

@@ -16,13 +16,12 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ExtraError, FileError, ProblemError
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
-from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import overloads
 from seqopt.report._regret._table import RegretTable
 from seqopt.report._robots import _known_arms
 from seqopt.report.comparison import CLOSED, Comparison, largest, method_tables, shown_table
 from seqopt.report.page import Build, _Drawn, report_page
-from seqopt.report.text import IN_UNITS, spent_said
+from seqopt.report.text import IN_UNITS
 from seqopt.responses.table import (
     OUTSIDE,
     REMEDY,
@@ -138,9 +137,7 @@ def plan_page(
     verdicts = prover.of_builds({key: _steps_in_table(scene, t) for key, t in tables.items()})
     left = plan._within.of_builds(tables)  # knows the plan's own steps
     builds = _builds(scene, tables, left, verdicts)
-    found = f"Found by: {name} ({plan.result})."
-    found += f" {spent_said(plan, prover)}" if isinstance(plan, Plan) and plan.steps else ""
-    shown = [_worst_table(scene, builds)]
+    shown, found = [_worst_table(scene, builds)], f"Found by: {name} ({plan.result})."
     return report_page(engine, builds, builds[0].sentence(scene), shown, found=found)
 
 

@@ -16,7 +16,7 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.report._robots import Arms, Cell, _known_arms, _require_arms
+from seqopt.report._robots import Arms, Cell, _known_arms
 from seqopt.report._style import WIDTH, new_picture, styled
 from seqopt.report.draw import (
     PROP_MARK,
@@ -63,39 +63,32 @@ def _seen_box(scene: Scene) -> Box:
 
 
 @styled
-def scene_picture(scene: Scene, bricks: int | None = None, width: float = WIDTH) -> Figure:
-    """Return a picture of a scene, or of its first bricks in build order, the others pale."""
-    network, most, count = build_network(scene), len(scene.bricks), _bricks(scene, bricks)
-    figure, (axes,) = _panels(_seen_box(scene), 1, width, 0.35)
+def structure_picture(
+    shown: Scene | Network, bricks: int | None = None, width: float = WIDTH
+) -> Figure:
+    """Return a picture of a scene, or of a network, up to some brick in build order.
+
+    Bricks of a scene that come later are pale.
+    """
+    network = shown if isinstance(shown, Network) else build_network(shown)
+    scene, most = network.scene, len(network.scene.bricks)
+    count = most if bricks is None else bricks
+    if not isinstance(count, Integral) or not 1 <= count <= most:
+        raise StepError(f"{short(bricks)} bricks: scene {scene.name} has 1 to {most}")
+    figure, (axes,) = _panels(_seen_box(scene), 1, width, 0.5 if network is shown else 0.35)
+    if network is shown:
+        draw_network(axes, network, count, VIEW, numbers=count <= NUMBERED and width >= WIDTH)
+        axes.set_title(
+            f"network of {scene.name}, {count} bricks\n"
+            "filled circles can be held, open ones are joints, squares are supports"
+        )
+        return figure
     if count < most:
         draw_bricks(axes, network, most, VIEW, alpha=0.15)
     _draw_props(axes, network.scene, count, held=True, view=VIEW)
     draw_bricks(axes, network, count, VIEW)
     axes.set_title(f"{scene.name}: {count} of {most} bricks")
     return figure
-
-
-@styled
-def network_picture(network: Network, bricks: int | None = None, width: float = WIDTH) -> Figure:
-    """Return a picture of a network, or of its part of the first bricks in build order."""
-    count = _bricks(network.scene, bricks)
-    figure, (axes,) = _panels(_seen_box(network.scene), 1, width, 0.5)
-    draw_network(axes, network, count, VIEW, numbers=count <= NUMBERED and width >= WIDTH)
-    axes.set_title(
-        f"network of {network.scene.name}, {count} bricks\n"
-        "filled circles can be held, open ones are joints, squares are supports"
-    )
-    return figure
-
-
-def _bricks(scene: Scene, bricks: int | None) -> int:
-    """Return how many bricks are drawn, if there are as many."""
-    most = len(scene.bricks)
-    if bricks is None:
-        return most
-    if not isinstance(bricks, Integral) or not 1 <= bricks <= most:
-        raise StepError(f"{short(bricks)} bricks: scene {scene.name} has 1 to {most}")
-    return bricks
 
 
 def _build_box(cell: Cell) -> Box:
@@ -126,7 +119,6 @@ def steps_picture(
     """
     picked, scene = _picked(steps, chosen), engine.network.scene
     arms = arms if arms is not None or forces else _known_arms(scene, steps)
-    _require_arms(scene, steps, arms or {})
     cell = Cell(scene, arms)
     low, high = box = _build_box(cell)
     figure, panels = _panels(box, len(picked), WIDTH, 0.35)
@@ -186,26 +178,20 @@ def _mark_grips(axes: Axes, scene: Scene, grips: Grips) -> dict[int, Line2D]:
     return key
 
 
-def spread_steps(steps: Sequence[Step], most: int) -> tuple[int, ...]:
-    """Return numbers of steps spread over a build, ascending: some that place, and the last one.
-
-    Of a take-down some that remove.
-    """
-    kinds = (StepKind.PLACE, StepKind.REMOVE)
-    placing = [step.number for step in steps if step.kind in kinds]
-    parts = range(1, most if placing else 1)
-    picked = {placing[round(k * (len(placing) - 1) / most)] for k in parts}
-    return tuple(sorted({*picked, steps[-1].number}))
-
-
 def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[int]:
-    """Return the places of the steps of some numbers, from 1."""
+    """Return the places of steps by their numbers, from 1; by default spread over the build.
+
+    These are some that place, of a take-down that remove, and the last one.
+    """
+    first, last = steps[0].number, steps[-1].number
     if chosen is None:
-        chosen = spread_steps(steps, FRAMES)
+        kinds = (StepKind.PLACE, StepKind.REMOVE)
+        placing = [step.number for step in steps if step.kind in kinds] or [last]
+        spread = {placing[round(k * (len(placing) - 1) / FRAMES)] for k in range(1, FRAMES)}
+        chosen = sorted({*spread, last})
     numbers: list[Any] = [*chosen] if isinstance(chosen, tuple | list | range) else [chosen]
     if not 1 <= len(numbers) <= MOST:
         raise StepError(f"{len(numbers)} steps to draw: give 1 to {MOST}")
-    first, last = steps[0].number, steps[-1].number
     for number in numbers:
         if not isinstance(number, Integral) or not first <= int(number) <= last:
             raise StepError(f"step {short(number)}: the build has steps {first} to {last}")

@@ -14,7 +14,7 @@ import numpy as np
 from seqopt.arms._model import PosedArm, idle_arm
 from seqopt.arms._plan_postures import plan_postures
 from seqopt.arrays import Floats
-from seqopt.errors import ExtraError, ProblemError, SceneError
+from seqopt.errors import ExtraError, SceneError
 from seqopt.exchange._grip_frames import hold
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Prop, Robot, Side, Sphere
@@ -92,28 +92,26 @@ class Cell:
     def shoulders(self) -> dict[str, tuple[Floats, float]]:
         """The shoulder (3,) and the reach, m, of every robot, where it may be anywhere as sketched.
 
-        Such a robot stands at the end of the structure at which fewer stand.
+        Such robots stand at both ends of the structure in turn.
         """
-        out, beside = dict[str, tuple[Floats, float]](), list[tuple[Robot, Floats]]()
+        out, beside = dict[str, tuple[Floats, float]](), dict[str, Floats]()
+        along = self._sides[np.ptp(self.corners @ self._sides.T, axis=0).argmax()]  # it is longest
         for robot in self.scene.robots:
             reach = robot.reach
             if isinstance(reach, Sphere):
                 out[robot.name] = (np.array(reach.center), reach.radius)
-            elif isinstance(reach, Side):
-                beside.append((robot, self._away(np.array(reach.toward))))
-        along = self._sides[np.ptp(self.corners @ self._sides.T, axis=0).argmax()]  # it is longest
-        for robot in self.scene.robots:
-            if not isinstance(robot.reach, Sphere | Side):
-                ends = along * np.array([[1.0], [-1.0]])
-                beside.append((robot, min(ends, key=lambda end: sum(o @ end for _, o in beside))))
-        for robot, away in beside:
-            same = [each.name for each, other in beside if away @ other > 0.5]
-            place = same.index(robot.name) - 0.5 * (len(same) - 1)
+            else:
+                side = isinstance(reach, Side)
+                beside[robot.name] = self._away(np.array(reach.toward)) if side else along
+                along = along if side else -along
+        for name, away in beside.items():
+            same = [each for each, other in beside.items() if away @ other > 0.5]
+            place = same.index(name) - 0.5 * (len(same) - 1)
             out_to = float(((self.corners - self.middle) @ away).max()) + _BESIDE * self.size
             foot = self.middle + out_to * away
             foot = foot + _APART * self.size * place * np.cross(self.up, away)
             far = float(np.linalg.norm(self.corners - foot, axis=1).max())
-            out[robot.name] = (foot + _HIGH * far * self.up, far)
+            out[name] = (foot + _HIGH * far * self.up, far)
         return out
 
     def reach(self, robot: Robot) -> list[float] | None:
@@ -216,24 +214,12 @@ def _known_arms(scene: Scene, steps: Sequence[Step]) -> Arms:
     return out
 
 
-def _require_arms(scene: Scene, steps: Sequence[Step], given: Arms) -> None:
-    """Raise a `ProblemError` unless arms have a line a step, by names of robots."""
-    known = {robot.name for robot in scene.robots}
-    for name, own in given.items():
-        if name not in known or len(own) != len(steps):
-            raise ProblemError(
-                f"arms of {name}: {len(own)} for {len(steps)} steps; give one a step, "
-                f"by the name of a robot: {', '.join(sorted(known))}"
-            )
-
-
 def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, object]:
     """Return the arms of robots in every step, ready for JSON.
 
     ``lines`` are points, each line once; ``at`` has a row for every step with the place of each
     robot's among them, or -1.
     """
-    _require_arms(scene, steps, given)
     cell, places, known = Cell(scene, given), dict[str, int](), {id(None): -1}
     lines, at = list[object](), list[list[int]]()
     for s, step in enumerate(steps):

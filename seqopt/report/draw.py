@@ -44,8 +44,6 @@ TOUCH = 1e-6  # share of a box's size up to which boxes that touch are parted
 INK, TENSION, COMPRESSION = "#2b2b2b", VERMILION, BLUE
 THIN, THICK = 1.2, 7.0  # points: edges without force, and with the largest
 SPARE = 0.3  # share of a node's area where the colors of edges count
-Faces = tuple[tuple[int, ...], ...]
-FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
 ROBOT_MARKERS = "XPDs"
@@ -211,20 +209,18 @@ def draw_bricks(  # what is drawn, and how, each by its name
     The twist of every brick (b, 6), m and rad, is drawn so many times larger; bricks of marked
     names have another color.
     """
-    boxed = boxes(network.scene.placed[:bricks]).corners()
-    if twist is not None:
-        turned = np.cross(twist[:bricks, None, 3:], boxed - boxed.mean(axis=1, keepdims=True))
-        boxed = boxed + magnify * (twist[:bricks, None, :3] + turned)
+    placed, toward = network.scene.placed[:bricks], view.axes()
+    motion = np.zeros((bricks, 6)) if twist is None else magnify * twist
+
+    def moved(b: int, points: Floats) -> Floats:
+        shift, turn = np.split(motion[b], 2)
+        return np.asarray(points + shift + np.cross(turn, points - placed[b].position))
+
+    boxed = np.array([moved(b, corners) for b, corners in enumerate(boxes(placed).corners())])
     polygons, colors = [], []
-    rim, toward = (0.25, 0.15, 0.1, alpha), view.axes()
     for b in _drawing_order(boxed, toward):
-        brick, points, faces = network.scene.placed[b], boxed[b], FACES
-        if brick.shape is not None:
-            points, shape = vertices_of(brick)
-            faces = tuple(map(tuple, shape))
-            if twist is not None:
-                shift, turn = np.split(magnify * twist[b], 2)
-                points = points + shift + np.cross(turn, points - brick.position)
+        brick, (points, faces) = placed[b], vertices_of(placed[b])
+        points = moved(b, points)
         seen = points @ toward.T
         for face in sorted(map(list, faces), key=lambda face: float(seen[face, 2].mean())):
             if brick.shape is not None and normal_of(seen[face])[2] <= 0:  # turned away
@@ -233,6 +229,7 @@ def draw_bricks(  # what is drawn, and how, each by its name
             normal = normal_of(points[face])  # whose direction says how bright a face is
             light = 0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal)
             colors.append((*(light * (MARKED if brick.name in marked else CLAY)), alpha))
+    rim = (0.25, 0.15, 0.1, alpha)
     drawn: Any = {"facecolors": colors, "edgecolors": [rim], "linewidths": 0.4}
     axes.add_collection(PolyCollection(polygons, **drawn))
     _frame(axes)

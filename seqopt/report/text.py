@@ -10,12 +10,11 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import _prop_faults, _response_along, overloads
 from seqopt.responses.quantities import _plain, length_text, robot_response
 from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
 from seqopt.scene.scene import Scene
-from seqopt.stability._builds import BuildProver, BuildVerdicts, _settlement_said
+from seqopt.stability._builds import BuildVerdicts, _settlement_said
 from seqopt.stability.assessment import Verdict
 
 _NUMBERED = re.compile(r"rob(?:ot)?[ _-]?(\d+)")
@@ -50,24 +49,6 @@ def _headline(scene: Scene, table: _Columns) -> str:
     share = _plain(100 * force / robot.payload, 3)
     said = f"largest force {_plain(force, 3)} N ({share} % of payload)"
     return f"{said}, displacement {length_text(float(f'{moved:.3g}'))}"
-
-
-def spent_said(plan: Plan, prover: BuildProver) -> str:
-    """Return what a plan took beside what it needs: models, digits, responses and verdicts."""
-    spent, steps = plan.spent, prover.spent
-    models, responses, sets = (spent[name] for name in ("models", "responses", "verdicts"))
-    proof = "" if models["proof"] is None else f", and in the proof {models['proof']:,}"
-    more = {*responses["computed"]} - {*responses["asked"]}
-    names = f"{', '.join(responses['computed']) or 'grip forces'}, "
-    names += f"of which nobody asked for {', '.join(sorted(more))}" if more else "all asked for"
-    verdicts = (
-        f"{steps['verdicts']:,} of steps, {steps['proven']:,} of them proven, the others implied"
-    )
-    verdicts += f"; {sets['asked']:,} in the search, by {sets['programs']:,} linear programs"
-    return (
-        f"Spent: models searched {models['searched']:,}, of these in six digits "
-        f"{models['six_digits']:,}{proof}. Responses: {names}. Verdicts: {verdicts}."
-    )
 
 
 def _deciding_step(scene: Scene, table: pd.DataFrame, verdicts: Sequence[BuildVerdicts]) -> int:
@@ -155,11 +136,6 @@ def _stands(verdicts: Sequence[BuildVerdicts]) -> Iterator[str]:
             return  # with more than this it stands too
 
 
-QUANTITIES = {
-    "F_rob": "grip force",
-    "M_sup": "support moment",
-    "T_max": "tension",
-    "D_max": "displacement",
-}
 UNITS = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "µm"}  # in which people read these
-IN_UNITS = {name: f"{words}, {UNITS[name]}" for name, words in QUANTITIES.items()}
+_WORDS = ("grip force", "support moment", "tension", "displacement")
+IN_UNITS = {name: f"{words}, {UNITS[name]}" for name, words in zip(UNITS, _WORDS, strict=True)}

@@ -14,10 +14,9 @@ from seqopt._cli.main import main
 from seqopt._cli.outputs import task_files
 from seqopt._files import csv_text
 from seqopt.arms._model import ArmModel, idle_arm
-from seqopt.errors import ExtraError, ProblemError, SceneError
+from seqopt.errors import ExtraError, SceneError
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_json
 from seqopt.exchange.exports import export_plan
-from seqopt.report._pictures import steps_picture
 from seqopt.report._robots import _known_arms
 from tests.arms.scenes import TOOL, beside, two_arms
 
@@ -114,11 +113,6 @@ def test_an_export_names_steps_that_arms_cannot_be_in(folder, tmp_path, capsys):
     words = ["export", str(tmp_path), "--format", "tasks", "--out", str(tmp_path / "tasks.json")]
     assert main(words) == 0
     assert "arms cannot: " in capsys.readouterr().err
-
-
-def test_arms_that_are_given_must_be_of_robots(plan):
-    with pytest.raises(ProblemError, match="give one a step, by the name of a robot: crane"):
-        steps_picture(plan.engine, plan.steps, 1, arms={"nobody": [None]})
 
 
 def test_bodies_are_those_that_collisions_are_looked_for_with(plan):

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import seqopt
 from seqopt.graph.decisions import pose_decisions
-from seqopt.report.text import spent_said
 from seqopt.stability._builds import BuildProver
 from tests.commands import command
 
@@ -20,9 +19,6 @@ def test_no_response_is_computed_that_nobody_asks_for():
         assert 0 <= spent["models"]["six_digits"] <= spent["models"]["searched"] == plan.models
         assert spent["verdicts"] == {"asked": 0, "programs": 0}
     assert spent["responses"]["computed"] == ["T_max"]
-    said = spent_said(plan, BuildProver(plan.engine.network))
-    assert f"models searched {plan.models:,}" in said
-    assert "T_max, all asked for" in said
 
 
 def test_a_response_that_nobody_asks_for_is_named():
@@ -31,7 +27,7 @@ def test_a_response_that_nobody_asks_for_is_named():
     problem = pose_decisions(engine, schedule, seqopt.CRITERIA["worst-ratio"], also=("C_max",))
     plan = seqopt.solve(problem)
     assert "C_max" not in plan.spent["responses"]["asked"]
-    assert "nobody asked for C_max" in spent_said(plan, BuildProver(engine.network))
+    assert "C_max" in plan.spent["responses"]["computed"]
 
 
 def test_verdicts_are_counted_once():
@@ -54,4 +50,3 @@ def test_the_summary_has_it(tmp_path, capsys):
     assert {*found["spent"]} == {"models", "responses", "verdicts"}
     assert min(found["spent"]["models"]["proof"], found["spent_on_showing"]["proven"]) > 0
     assert found["spent_on_showing"]["pictures"] == 0
-    assert "Spent: models searched" in (tmp_path / "plan/report.html").read_text()
