@@ -18,6 +18,7 @@ from seqopt.problem.problem import Problem
 from seqopt.report.text import _in_a_sentence
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.steps import StepKind
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,9 +67,10 @@ def _pictures(value: object) -> list[Figure]:
     paint, steps = display(ShownBuild, "plot"), value.steps
     if not _is_small(value):
         return [paint(value.engine, steps, steps[len(steps) // 2].number)]
-    thirds = sorted({steps[(len(steps) * k - 1) // 3].number for k in (1, 2, 3)})
+    placing = [step.number for step in steps if step.kind in (StepKind.PLACE, StepKind.REMOVE)]
+    thirds = {placing[len(placing) * k // 3] for k in (1, 2) if placing} | {steps[-1].number}
     last = steps[min(len(steps), STEPS) - 1].number
-    return [paint(value.engine, steps, thirds), value.gantt(None, last)]
+    return [paint(value.engine, steps, sorted(thirds)), value.gantt(None, last)]
 
 
 def _is_small(value: ShownBuild) -> bool:
