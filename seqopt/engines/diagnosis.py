@@ -320,20 +320,13 @@ def diagnose(
         residuals = residual(network, bricks, columns[0], fields, compliance)
     except (MechanismError, SolverError) as error:
         refusal = error
-    finding, reason = _judge(lowest, condition, residuals, refusal)
-    return Diagnosis(finding, reason, residuals, lowest, condition, mode)
-
-
-def _judge(
-    lowest: float, condition: float, residuals: _Residuals | None, refusal: Exception | None
-) -> tuple[Finding, str]:
-    if not lowest:
-        return Finding.MECHANISM, "neither joints nor ground nor grips resist the motion"
-    if residuals is None:
-        return Finding.ILL_CONDITIONED, f"condition {condition:.1e}; the engine refused: {refusal}"
-    error = residuals.backward_error
+    error = np.inf if residuals is None else residuals.backward_error
+    finding = Finding.SOLVED_WELL if error <= WELL else Finding.ILL_CONDITIONED
     most = f"{'at most' if error <= WELL else 'above'} {WELL:g}"
-    text = f"backward error {error:.1e}, {most}, at a condition of {condition:.1e}"
-    if error <= WELL:
-        return Finding.SOLVED_WELL, text
-    return Finding.ILL_CONDITIONED, f"{text}: the fields do not solve the equations"
+    reason = f"backward error {error:.1e}, {most}, at a condition of {condition:.1e}"
+    reason += ": the fields do not solve the equations" if error > WELL else ""
+    if not lowest:
+        finding, reason = Finding.MECHANISM, "neither joints nor ground nor grips resist the motion"
+    elif residuals is None:
+        reason = f"condition {condition:.1e}; the engine refused: {refusal}"
+    return Diagnosis(finding, reason, residuals, lowest, condition, mode)

@@ -23,7 +23,7 @@ from contextvars import ContextVar
 from itertools import islice
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -106,11 +106,18 @@ def _follow(end: Connection) -> None:
     threading.Thread(target=wait_and_end, daemon=True).start()
 
 
-class Crew:
-    """Workers that are hired: an executor, and how many tasks it works on at once."""
+class Crew(NamedTuple):
+    """Workers that are hired.
 
-    def __init__(self, executor: Executor, workers: int) -> None:
-        self.executor, self.workers = executor, workers
+    Attributes
+    ----------
+    executor : concurrent.futures.Executor
+    workers : int
+        How many tasks it works on at once.
+    """
+
+    executor: Executor
+    workers: int
 
 
 _KEPT: ContextVar[Crew | None] = ContextVar("_KEPT", default=None)

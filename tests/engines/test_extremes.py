@@ -157,7 +157,7 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
 
 def test_without_numba_fields_answer(monkeypatch):
     monkeypatch.setattr("seqopt.engines.rigid.compliance.can_compile", lambda: False)
-    monkeypatch.setattr(_extremes, "_loops", None)
+    monkeypatch.setattr("seqopt.engines.rigid.compliance.GrownExtremes", None)
     engine = ComplianceEngine(build_network(six_bricks()))
     sets = sets_of(engine.network, 6, 2, 10)
     asked = engine._extremes(6, sets, Want.RESPONSES, compiled=True)

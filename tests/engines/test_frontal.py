@@ -269,7 +269,10 @@ def kept_bytes(net, most=compliance._KEPT):
             known, index = net.index_of_grip
             engine.solve(bricks, known[index < 2 * bricks][:, None], Want.EDGES)
     operators = engine._kept.values()
-    return engine._builder.growth.nbytes + sum(operator.nbytes for operator in operators)
+    growth = engine._builder.growth
+    return (
+        growth.twist.nbytes + growth.wrench.nbytes + sum(operator.nbytes for operator in operators)
+    )
 
 
 @pytest.mark.parametrize("make", [half_circle, lambda n: build_network(running_bond(n // 8, 8))])

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact._elastic_limits import face_quadrature, first_points, opening_maps
 from seqopt.contact._elastic_limits import quadrature_stiffness as bed_stiffness
 from seqopt.contact.faces import bare_assembly
@@ -40,10 +40,6 @@ class _Points(FrozenValue):
     tangential: Floats
     mortar: Mortar
     stress_scale: float
-
-    def slipped(self, opening: Floats, force: Floats) -> Floats:
-        """Return the slip (P, 2) that is left when points carry forces (P, 3)."""
-        return np.asarray(opening[:, 1:] + force[:, 1:] / self.tangential[:, None])
 
     def exceeds(self, force: Floats) -> Bools:
         """Return at which points (P,) bonds do not hold forces (P, 3)."""
@@ -112,14 +108,6 @@ class System(FrozenValue):
         maps, ends = self.maps.reshape(-1, 6), [*3 * self._starts, None]
         parts = [slice(*part) for part in pairwise(ends)]
         return _diagonal(np.array([maps[part].T @ falls[part] for part in parts]))
-
-    def openings(self, across: Floats, share: float) -> Floats:
-        """Return the openings (P, 3) of the points for twists (6J,) across the beds.
-
-        ``share``: of its way that the ground has gone.
-        """
-        across = (across - share * self.moved).reshape(-1, 6)
-        return np.asarray(np.einsum("pij,pj->pi", self.maps, across[self.face]))
 
     @cached_property
     def scale(self) -> float:
@@ -205,15 +193,31 @@ _HALVINGS = 4
 _LENT_STIFFNESS = 1e-12  # lent to every motion, over its own: a loose body can come to rest
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Held(FrozenValue):
-    """A system and the forces of its grips."""
+class Held:
+    """A system and the forces of its grips.
 
-    system: System
-    free: sparse.csr_array  # (6n, m); motions that the grips leave
-    pads: sparse.csr_array  # (6n, 6n); stiffness of compliant grips
-    far: Floats  # (6n,); how grips move the bodies that they hold, all the way
-    pull: Floats  # (6n,); how compliant grips pull at bodies that stay, all the way
+    ``free`` (6n, m): motions that the grips leave; ``pads`` (6n, 6n): stiffness of compliant grips;
+    ``far`` (6n,): how grips move the bodies that they hold, all the way; ``pull`` (6n,): how
+    compliant grips pull at bodies that stay, all the way. ``diagonal`` (m,): of the unbroken
+    stiffness in the free motions.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        free: sparse.csr_array,
+        pads: sparse.csr_array,
+        far: Floats,
+        pull: Floats,
+    ) -> None:
+        self.system, self.free, self.pads, self.far, self.pull = system, free, pads, far, pull
+        self._across = sparse.csr_array(system.gap @ free)  # twists across the beds, (6J, m)
+        self._taken, stiff = system.gap @ far, system.layers + pads
+        self._unbroken = sparse.csr_array(free.T @ stiff @ free)  # but for beds, (m, m)
+        self._sizes = sparse.csr_array(abs(system.layers) + abs(pads))
+        none = np.zeros((len(system.points.area), 3))
+        _, slope = system.points.forces(none, none[:, 1:], np.zeros(len(none), bool))
+        self.diagonal = self.stiffness(slope).diagonal()
 
     def moved(self, motion: Floats, share: float = 1.0) -> Floats:
         """Return how bodies move (6n,). ``motion`` (m,): in the free motions; ``share``: of it."""
@@ -232,57 +236,26 @@ class Held(FrozenValue):
 
     def openings(self, motion: Floats, share: float) -> Floats:
         """Return the openings (P, 3) of the points; as of `reaction`."""
-        return self.system.openings(self.across @ motion + share * self._taken, share)
-
-    @cached_property
-    def _taken(self) -> Floats:
-        return frozen(np.asarray(self.system.gap @ self.far))
+        system, across = self.system, self._across @ motion + share * self._taken
+        across = (across - share * system.moved).reshape(-1, 6)
+        return np.asarray(np.einsum("pij,pj->pi", system.maps, across[system.face]))
 
     def rounding(self, motion: Floats, force: Floats) -> float:
         """Return the rounding error of a balance between large forces, N."""
         moved = np.abs(self.moved(motion))
         return _ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
 
-    @cached_property
-    def _sizes(self) -> sparse.csr_array:
-        return frozen(sparse.csr_array(abs(self.system.layers) + abs(self.pads)))
-
     def gone(self, state: Settled) -> bool:
         """Return whether a state has moved too far for the bricks to be where they were."""
         return bool(np.abs(state.motion).max(initial=0.0) > FAR * self.system.length)
-
-    def left_faces(self, state: Settled) -> bool:
-        """Return whether joints that can open let a brick move by more than its length.
-
-        It has then left the faces it stood on, and no residual below rounding counts.
-        """
-        return bool(state.broken.any() and np.abs(state.motion).max(initial=0) > self.system.length)
-
-    @cached_property
-    def across(self) -> sparse.csr_array:
-        """Twists across the beds for the free motions, (6J, m)."""
-        return frozen(sparse.csr_array(self.system.gap @ self.free))
-
-    @cached_property
-    def _unbroken(self) -> sparse.csr_array:
-        """Stiffness of layers and compliant grips in the free motions, (m, m)."""
-        return frozen(sparse.csr_array(self.free.T @ (self.system.layers + self.pads) @ self.free))
 
     def stiffness(self, slope: Floats) -> sparse.csr_array:
         """Return the stiffness (m, m) in the free motions.
 
         ``slope`` (P, 3, 3): how fast the forces of the points fall, N/m.
         """
-        across = self.across
+        across = self._across
         return sparse.csr_array(across.T @ self.system.beds(slope) @ across + self._unbroken)
-
-    @cached_property
-    def diagonal(self) -> Floats:
-        """The diagonal of the unbroken stiffness in the free motions, (m,)."""
-        points = self.system.points
-        none = np.zeros((len(points.area), 3))
-        _, slope = points.forces(none, none[:, 1:], np.zeros(len(none), bool))
-        return frozen(np.asarray(self.stiffness(slope).diagonal()))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -328,7 +301,9 @@ def settle(held: Held) -> Settled:
     state, at, step = Settled.start(held, broken=False), 0.0, LARGEST_STEP
     while at < 1.0:
         target = min(at + step, 1.0)
-        found = _after_breaking(held, state, target)
+        found = _balance(held, state, target)
+        while found.rests and (breaks := points.exceeds(found.force) & ~found.broken).any():
+            found = _balance(held, replace(found, broken=found.broken | breaks), target)
         if found.rests:
             state, at, step = found, target, min(2 * step, LARGEST_STEP)
         elif step > SMALLEST_STEP:
@@ -336,16 +311,6 @@ def settle(held: Held) -> Settled:
         else:
             return found
     return state
-
-
-def _after_breaking(held: Held, state: Settled, share: float) -> Settled:
-    """Return the state under a share of the load once no further bond breaks."""
-    while True:
-        found = _balance(held, state, share)
-        breaks = held.system.points.exceeds(found.force) & ~found.broken
-        if not found.rests or not breaks.any():
-            return found
-        state = replace(found, broken=found.broken | breaks)
 
 
 def _balance(held: Held, state: Settled, share: float) -> Settled:
@@ -359,7 +324,9 @@ def _balance(held: Held, state: Settled, share: float) -> Settled:
     resistance = _FIRST_RESISTANCE
     for _ in range(_MOVES):
         if found is not None and (found.rests or held.gone(found)):
-            return replace(found, left=np.inf) if held.left_faces(found) else found
+            # a brick that moved by its length left its faces: no small residual counts
+            far = np.abs(found.motion).max(initial=0) > held.system.length
+            return replace(found, left=np.inf) if far and found.broken.any() else found
         found = _newton(held, state, share, resistance)
         if found is None:
             resistance *= 8
@@ -382,7 +349,7 @@ def _newton(held: Held, state: Settled, share: float, resistance: float) -> Sett
         rounding = min(held.rounding(motion, force), _HIDDEN * system.scale)
         unit = max(system.scale, rounding / _BALANCED)
         if np.abs(missing).max() <= _BALANCED * unit:
-            slip = system.points.slipped(opening, force)
+            slip = opening[:, 1:] + force[:, 1:] / system.points.tangential[:, None]
             return Settled(motion, force, slip, state.broken, float(np.abs(left).max() / unit))
         if size >= best and shorter < _HALVINGS:
             step *= 0.5

@@ -87,15 +87,6 @@ class _Spring(NamedTuple):
     stiffness: Floats  # (w, w)
     far: Floats  # (w,); how far its end is moved
 
-    @property
-    def pads(self) -> Floats:
-        """Its stiffness for the scaled twists of the body, (6, 6)."""
-        return np.asarray(self.motion.T @ self.stiffness @ self.motion)
-
-    def force(self, twist: Floats) -> Floats:
-        """Return its wrench (w,) on a body that is moved by a scaled twist (6,)."""
-        return np.asarray(self.stiffness @ (self.far - self.motion @ twist))
-
 
 def _held_nodes(
     network: Network,
@@ -119,7 +110,8 @@ def _held_nodes(
         taken[own] = np.linalg.lstsq(moved, far[mine].ravel(), rcond=None)[0]
     for spring in springs:
         own = slice(6 * spring.body, 6 * spring.body + 6)
-        pads[spring.body] = pads[spring.body] + sparse.csr_array(spring.pads)
+        pad = spring.motion.T @ spring.stiffness @ spring.motion
+        pads[spring.body] = pads[spring.body] + sparse.csr_array(pad)
         pull[own] += spring.motion.T @ spring.stiffness @ spring.far
     free = sparse.csr_array(sparse.block_diag([sparse.csr_array(block) for block in blocks]))
     return Held(system, free, sparse.csr_array(sparse.block_diag(pads)), taken, pull)
@@ -138,8 +130,8 @@ def _fields(
     exerted = -held.reaction(found.motion, found.force)
     (force, moment), compliant = np.zeros((2, len(columns), 3)), np.zeros(len(columns), dtype=bool)
     for spring in springs:
-        both = np.zeros(6)
-        both[spring.ways] = spring.force(moved[6 * spring.body : 6 * spring.body + 6])
+        both, twist = np.zeros(6), moved[6 * spring.body : 6 * spring.body + 6]
+        both[spring.ways] = spring.stiffness @ (spring.far - spring.motion @ twist)
         force[spring.grip], moment[spring.grip] = both[:3], both[3:]
         compliant[spring.grip] = 0 in spring.ways
     nodes = network.node_position[network.inner.ravel()[columns]]

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from functools import cache
 from importlib.util import find_spec
-from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -78,14 +77,6 @@ def _squared(vectors: Floats) -> Floats:
 def can_compile() -> bool:
     """Return whether loops can be compiled: numba is there."""
     return find_spec("numba") is not None
-
-
-@cache
-def _loops() -> ModuleType:
-    """Return the compiled functions; loading them takes half a second."""
-    from seqopt.engines.rigid import _compiled  # noqa: PLC0415  # numba is an extra
-
-    return _compiled
 
 
 class Grown(NamedTuple):
@@ -202,15 +193,19 @@ class GrownExtremes:
         These are answered not well enough. Two grips on one brick share. ``most``: as of
         `well_conditioned`.
         """
-        grown, maps, loops, axis = self._grown, self._maps, _loops(), self._part.axis
+        from seqopt.engines.rigid import _compiled  # noqa: PLC0415  # numba is an extra
+
+        grown, maps, axis = self._grown, self._maps, self._part.axis
         solution, pivot = _solve_grips(grown, columns, np.stack([axis, -axis], 1).reshape(-1, 3))
         force = np.ascontiguousarray(solution.T)
-        apart = ~well_conditioned(self, load_rows(columns, 0), GripForces(force, pivot), most)
+        apart = ~well_conditioned(
+            self.doubts, load_rows(columns, 0), GripForces(force, pivot), most
+        )
         force[apart] = 0.0
         part = self._part if want & Want.DISPLACEMENTS else self._part._replace(nodes=0)
 
         def reduce(own: slice) -> Floats:
-            squares: Floats = loops.reduce_sets(grown, maps, part, columns[own], force[own])
+            squares: Floats = _compiled.reduce_sets(grown, maps, part, columns[own], force[own])
             return squares
 
         step = max(_SETS, -(-len(columns) // cores()))

@@ -7,7 +7,7 @@ equations; where two that are nearly rigid share a brick, digits are lost (`near
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,7 +61,7 @@ def pairs_of(across: Floats, columns: Ints) -> Pairs:
     return Pairs(sets, first, second, node // 2, across.take(node, axis=0))
 
 
-def _as_rows(each: Floats) -> Floats:
+def as_rows(each: Floats) -> Floats:
     """Return numbers of grips (S, r, w) as rows (k, S) of unknowns, loose motions left out."""
     return np.ascontiguousarray(each.reshape(len(each), each.shape[1] * each.shape[2]).T)
 
@@ -127,87 +127,48 @@ def grip_forces(
     """
     pairs = pairs_of(operator.across, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
-    off = None if compliance.moved is None else _as_rows(-_offsets(operator, compliance.moved))
+    off = None
+    if compliance.moved is not None:  # rotations are none
+        off = as_rows(np.pad(-compliance.moved, ((0, 0), (0, 0), (0, operator.moments))))
     dead = operator.dead_displacement.take(rows)
-    force, pivot = _solved(operator, pairs, rows, dead, compliance, off)
+    force, pivot = undone(operator, pairs, rows, dead, compliance, off)
     return GripForces(force.T, pivot)
 
 
-class _Doubted(Protocol):
-    """What finds forces: an operator or, of rigid grips, what has grown."""
-
-    @property
-    def doubts(self) -> Doubts:
-        """What rounding may leave of its answers."""
-
-
 def well_conditioned(
-    operator: _Doubted,
+    doubts: Doubts,
     index: Ints,
     found: GripForces,
     most: float,
+    operator: ComplianceOperator | None = None,
     compliance: GripCompliance = RIGID,
 ) -> Bools:
-    """Return which sets' forces (S,) rounding changes little enough.
+    """Return which sets' forces (S,) rounding of one part in one changes by no more than ``most``.
 
-    ``most``: largest of `_doubts` that is accepted; ``compliance``: as of `grip_forces`.
-    """
-    sure = _doubts(operator, index, found, compliance) <= most
-    return np.asarray(sure & (found.lowest > 0))
-
-
-def _doubts(
-    operator: _Doubted, index: Ints, found: GripForces, compliance: GripCompliance = RIGID
-) -> Floats:
-    """Return the error (S,) of forces for rounding of one part in one, over the largest of each.
-
-    A displacement is known to a share of all that adds up in it; with ``|G_ij| ≤ √(G_ii G_jj)``
-    that is read off the diagonal. Over its pivot, which must be positive, it is the force that it
-    leaves undetermined.
+    Over the largest force of each. A displacement is known to a share of all that adds up in it;
+    with ``|G_ij| ≤ √(G_ii G_jj)`` that is read off the diagonal. Over its pivot, which must be
+    positive, it is the force that it leaves undetermined. ``operator``: of compliant grips.
     """
     size = np.abs(found.force.T)
-    root, own, scale = operator.doubts.shares.take(np.ascontiguousarray(index.T), axis=1)
+    root, own, scale = doubts.shares.take(np.ascontiguousarray(index.T), axis=1)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         own += (root * size).sum(axis=0)
         own *= scale
-        if isinstance(operator, ComplianceOperator) and not compliance.rigid:
+        if operator is not None and not compliance.rigid:
             flexibility, nodes = root / scale, len(own) - operator.loose
             given, softer = np.zeros_like(own), np.zeros_like(own)
             if compliance.moved is not None:
-                given[:nodes] += _as_rows(_offsets(operator, np.abs(compliance.moved)))
+                far = np.pad(np.abs(compliance.moved), ((0, 0), (0, 0), (0, operator.moments)))
+                given[:nodes] += as_rows(far)
             if compliance.matrix is not None:
                 parts = np.abs(compliance.transmitted)
                 yielded = np.einsum("srij,srj->sri", parts, operator.by_grip(size.T))
-                given[:nodes] += _as_rows(yielded)
-                softer[:nodes] = _as_rows(np.diagonal(parts, axis1=2, axis2=3))
+                given[:nodes] += as_rows(yielded)
+                softer[:nodes] = as_rows(np.diagonal(parts, axis1=2, axis2=3))
             own = (own * flexibility + given) / (flexibility + softer)
         own /= found.pivot
-        most = size.max(axis=0, initial=np.finfo(float).tiny)
-        return np.asarray(own.max(axis=0, initial=0.0) / most)
-
-
-def _offsets(operator: ComplianceOperator, moved: Floats) -> Floats:
-    """Return offsets of grips (S, r, 3) beside rotations that are none, (S, r, w)."""
-    return np.pad(moved, ((0, 0), (0, 0), (0, operator.moments)))
-
-
-def still_forces(
-    operator: ComplianceOperator,
-    columns: Ints,
-    index: Ints,
-    moved: Floats,
-    compliance: GripCompliance = RIGID,
-    off: Floats | None = None,
-) -> Floats:
-    """Return the forces (S, k) with which grips undo given displacements of their nodes.
-
-    ``moved`` (S, k): m; of loose motions, the force that pulls at them, N; ``compliance``: of
-    grips; ``off`` (S, r, w): how far they are from where they should be, m, what they yield
-    counted. Between two rigid grips on one brick there is no force.
-    """
-    pairs, rows = pairs_of(operator.across, columns), np.ascontiguousarray(index.T)
-    apart = None if off is None else _as_rows(off)
-    return _solved(operator, pairs, rows, np.ascontiguousarray(moved.T), compliance, apart)[0].T
+        error = own.max(axis=0, initial=0.0) / size.max(axis=0, initial=np.finfo(float).tiny)
+    return np.asarray((error <= most) & (found.lowest > 0))
 
 
 def share_pairs(
@@ -241,7 +202,7 @@ def share_pairs(
     nodes[sets, pairs.second] -= shift
 
 
-def _solved(
+def undone(
     operator: ComplianceOperator,
     pairs: Pairs,
     rows: Ints,
@@ -251,7 +212,8 @@ def _solved(
 ) -> tuple[Floats, Floats]:
     """Return forces at loads (k, S) that undo displacements (k, S), and scaled pivots (k, S).
 
-    ``off`` (n, S): by how much grips already let their nodes move, where they bear something.
+    ``dead`` (k, S): m; of loose motions, the force that pulls at them, N; ``off`` (n, S): by how
+    much grips already let their nodes move, where they bear something.
     """
     count, sets = rows.shape
     size = len(operator.flexibility)

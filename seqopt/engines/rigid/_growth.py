@@ -166,11 +166,6 @@ class Growth:
         return found[0], found[1], loss[held]
 
     @property
-    def nbytes(self) -> int:
-        """Bytes of the arrays for all bricks."""
-        return self.twist.nbytes + self.wrench.nbytes
-
-    @property
     def _moves(self) -> int:
         return 6 * self.bricks
 

@@ -108,19 +108,6 @@ class ResponseMaps(FrozenValue):
         return out
 
 
-def loads_of(index: Ints, force: Floats, count: int, weight: float = 1.0) -> sparse.csr_array:
-    """Return forces (S, k) at loads (S, k) beside a share of the weight, the last of the rows.
-
-    Result (S, count): times the rows of a response map, the sums of sets.
-    """
-    sets, loads = index.shape
-    rows, share = np.empty((sets, loads + 1), dtype=np.int32), np.empty((sets, loads + 1))
-    rows[:, :-1], share[:, :-1] = index, force
-    rows[:, -1], share[:, -1] = count - 1, weight
-    first = np.arange(0, rows.size + 1, loads + 1, dtype=np.int32)
-    return sparse.csr_array((share.ravel(), rows.ravel(), first), shape=(sets, count))
-
-
 def inner_edges(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
     """Return the inner edges of bricks, and the weight on their second nodes.
 
@@ -243,8 +230,16 @@ class ComplianceOperator(FrozenValue):
         return rows
 
     def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> sparse.csr_array:
-        """Return forces (S, k) at loads (S, k), and a share of the weight, as `loads_of`."""
-        return loads_of(index, force, len(self.twist), weight)
+        """Return forces (S, k) at loads (S, k) beside a share of the weight, the last of the rows.
+
+        Result (S, l + 1): times the rows of a response map, the sums of sets.
+        """
+        (sets, loads), count = index.shape, len(self.twist)
+        rows, share = np.empty((sets, loads + 1), dtype=np.int32), np.empty((sets, loads + 1))
+        rows[:, :-1], share[:, :-1] = index, force
+        rows[:, -1], share[:, -1] = count - 1, weight
+        first = np.arange(0, rows.size + 1, loads + 1, dtype=np.int32)
+        return sparse.csr_array((share.ravel(), rows.ravel(), first), shape=(sets, count))
 
     def answers(self, names: Sequence[str], index: Ints, force: Floats) -> dict[str, Floats]:
         """Return fields (S, Q) of sets of forces beside the weight.
@@ -288,12 +283,8 @@ class ComplianceOperator(FrozenValue):
 
     def of_loads(self, name: str) -> Floats:
         """Return a field under every load, (l + 1, Q), made when first asked for."""
-        if name not in self._made:
-            self._made[name] = frozen(self.mean(name))
-        return self._made[name]
-
-    def mean(self, name: str) -> Floats:
-        """Return a field under every load, (l + 1, Q), and keep it nowhere."""
+        if name in self._made:
+            return self._made[name]
         out = self.maps.apply(name, self._states(name))
         if name == "edge_force":
             out[-1, self.inner_edge] += self.at_second
@@ -302,6 +293,7 @@ class ComplianceOperator(FrozenValue):
             out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
         if name == "displacement":
             out[-1] += self.maps.ground
+        self._made[name] = frozen(out)
         return out
 
     @cached_property

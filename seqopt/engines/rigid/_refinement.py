@@ -26,12 +26,18 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._grip_compliance import RIGID, GripCompliance
 from seqopt.engines.interface import Fields, _join_sets, _merge_sets, no_sets
-from seqopt.engines.rigid._grip_equations import grip_forces, nearly_rigid, pairs_of, still_forces
+from seqopt.engines.rigid._grip_equations import (
+    as_rows,
+    grip_forces,
+    nearly_rigid,
+    pairs_of,
+    undone,
+)
 from seqopt.engines.rigid._mechanism import (
     LAST_CORRECTION,
     Shared,
@@ -65,13 +71,24 @@ _PANEL = 4  # columns that are eliminated together: few, since each meets few ot
 _SOFT = 1e-7  # stiffness over the typical one below which a direction ties nothing
 
 
-@dataclass(frozen=True)
 class _HeldSystem:
-    """The factored system of a partial structure whose loose motions are held."""
+    """The factored system of a partial structure whose loose motions, ``loose``, are held.
 
-    parts: Ungripped
-    loose: int  # how many loose motions there are, m
-    factors: SuperLU  # of the system of 6s wrenches, 6b twists and m forces that hold
+    ``tied``: whether springs are known to tie every brick to the ground, however softly. Raises
+    `SolverError` if it is exactly singular all the same.
+    """
+
+    def __init__(self, parts: Ungripped, *, tied: bool) -> None:
+        rows = _held_motions(parts, tied=tied)
+        self.parts, self.loose = parts, rows.shape[0]
+        matrix, near = bordered(parts.matrix, rows), _NEAR
+        try:
+            # springs first, then bricks as they are built: neighbors stand near each other
+            self._factors = splu(matrix, "NATURAL", diag_pivot_thresh=near, panel_size=_PANEL)
+        except RuntimeError as error:  # SuperLU met an exactly zero pivot
+            raise SolverError(
+                f"{parts.bricks} bricks: exactly singular in double precision; stiffen what is soft"
+            ) from error
 
     def solve(self, loads: Floats, moved: Floats | None = None) -> tuple[Floats, Floats]:
         """Return scaled states (S, 6s + 6b) and the forces (S, m) that pull at loose motions, N.
@@ -84,26 +101,8 @@ class _HeldSystem:
         whole[:size] = loads.T
         if moved is not None:
             whole[size:] = moved.T
-        answer = self.factors.solve(whole).T
+        answer = self._factors.solve(whole).T
         return answer[:, :size], answer[:, size:] * self.parts.unit
-
-
-def _hold_loose(parts: Ungripped, *, tied: bool = False) -> _HeldSystem:
-    """Return the factored system of a partial structure with its loose motions held.
-
-    ``tied``: whether springs are known to tie every brick to the ground, however softly. Raises
-    `SolverError` if it is exactly singular all the same.
-    """
-    rows = _held_motions(parts, tied=tied)
-    matrix = bordered(parts.matrix, rows)
-    try:
-        # springs first, then bricks as they are built: neighbors stand near each other
-        factors = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=_NEAR, panel_size=_PANEL)
-    except RuntimeError as error:  # SuperLU met an exactly zero pivot
-        raise SolverError(
-            f"{parts.bricks} bricks: exactly singular in double precision; stiffen what is soft"
-        ) from error
-    return _HeldSystem(parts, rows.shape[0], factors)
 
 
 def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
@@ -223,7 +222,7 @@ class Refinement:
     ) -> None:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, shared)
-        self.held = _hold_loose(self.parts, tied=tied)
+        self.held = _HeldSystem(self.parts, tied=tied)
         size = 6 * bricks
         self.inner = self.parts.inner  # loads on scaled twists, (l, 6b), as of `load_rows`
         if network.scene.grip_kinds.turns.any():
@@ -347,7 +346,10 @@ class _Corrector:
                 off += np.einsum("srij,srj->sri", compliance.transmitted, bears)
             if compliance.moved is not None:
                 off[..., :3] -= compliance.moved
-        change = still_forces(operator, columns, index, moved, compliance, off)
+        apart = None if off is None else as_rows(off)
+        pairs, rows = pairs_of(operator.across, columns), np.ascontiguousarray(index.T)
+        right = np.ascontiguousarray(moved.T)
+        change = undone(operator, pairs, rows, right, compliance, apart)[0].T
         more = change[:, : at.shape[1]].copy()
         change[:, change.shape[1] - operator.loose :] += loose
         return answer + self._states(index, change, 0.0), more

@@ -117,7 +117,8 @@ def _solve_fast(
         own = compliance.select(part)
         found = grip_forces(operator, columns[part], index[part], mine, own)
         force[part] = found.force
-        good[part] = well_conditioned(operator, index[part], found, accuracy / _UNSEEN, own)
+        most = accuracy / _UNSEEN
+        good[part] = well_conditioned(operator.doubts, index[part], found, most, operator, own)
         good[part] &= ~nearly_rigid(operator, index[part], mine, own)
     if np.count_nonzero(good) < sets:
         force[~good] = 0.0
@@ -180,7 +181,8 @@ class ComplianceEngine(NamedEngine):
 
     def _found(self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want) -> Fields:
         """Return the fields of grip sets, corrected where the operator is not accurate enough."""
-        if self._is_frontal(len(columns)):
+        size = len(self._network.inner)
+        if size >= max(_LARGE, _EACH * len(columns)) and "_builder" not in vars(self):
             with suppress(SolverError):  # of what blocks of the stiffness do not answer
                 answer = self._frontal.solve(bricks, columns, compliance, _last_correction(want))
                 return keep_wanted(answer, want)
@@ -217,7 +219,10 @@ class ComplianceEngine(NamedEngine):
             return extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
-        if self._grows(bricks, len(columns)):
+        large = bricks <= min(self._uniform, len(self._tree.spring))
+        large = large and not are_few(3 * bricks, len(columns))
+        moves = large and (self._network.springs.movement.any() or self._builder.moments)
+        if large and not moves and self._builder.growth.bricks <= bricks:
             if self._grown is None:
                 self._grown = GrownExtremes(self._builder)
             self._grown.reach(bricks)
@@ -227,13 +232,6 @@ class ComplianceEngine(NamedEngine):
             rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
-
-    def _grows(self, bricks: int, sets: int) -> bool:
-        """Return whether compiled loops are made for a structure, and pay for so many sets."""
-        if bricks > min(self._uniform, len(self._tree.spring)) or are_few(3 * bricks, sets):
-            return False
-        moves = self._network.springs.movement.any() or self._builder.moments
-        return not moves and self._builder.growth.bricks <= bricks
 
     def _recalls(self, bricks: int) -> bool:
         """Return whether fields of a brick count come from the data grown for extremes."""
@@ -267,11 +265,6 @@ class ComplianceEngine(NamedEngine):
     def _builder(self) -> OperatorBuilder:
         """Made when the first operator is: a scene that is loose from the start has none."""
         return OperatorBuilder(self._network, self._tree)
-
-    def _is_frontal(self, sets: int) -> bool:
-        """Return whether grip sets are so few that no operator is grown for them."""
-        bricks = len(self._network.inner)
-        return bricks >= max(_LARGE, _EACH * sets) and "_builder" not in vars(self)
 
     @cached_property
     def _frontal(self) -> FrontalSystem:
