@@ -62,7 +62,7 @@ def values(arch25):
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, seqopt.EPOXY)),
         *(tree, operator, operator.doubts, parts, share(network)),
         mixed_system(parts, grips),
-        *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
+        *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, seqopt.EPOXY)),
         *(load_factor(assembly, seqopt.EPOXY), arch25.grip_kinds),

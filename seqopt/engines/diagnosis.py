@@ -320,11 +320,11 @@ def diagnose(
         residuals = residual(network, bricks, columns[0], fields, compliance)
     except (MechanismError, SolverError) as error:
         refusal = error
-    error = np.inf if residuals is None else residuals.backward_error
-    finding = Finding.SOLVED_WELL if error <= WELL else Finding.ILL_CONDITIONED
-    most = f"{'at most' if error <= WELL else 'above'} {WELL:g}"
-    reason = f"backward error {error:.1e}, {most}, at a condition of {condition:.1e}"
-    reason += ": the fields do not solve the equations" if error > WELL else ""
+    rest = np.inf if residuals is None else residuals.backward_error
+    finding = Finding.SOLVED_WELL if rest <= WELL else Finding.ILL_CONDITIONED
+    most = f"{'at most' if rest <= WELL else 'above'} {WELL:g}"
+    reason = f"backward error {rest:.1e}, {most}, at a condition of {condition:.1e}"
+    reason += ": the fields do not solve the equations" if rest > WELL else ""
     if not lowest:
         finding, reason = Finding.MECHANISM, "neither joints nor ground nor grips resist the motion"
     elif residuals is None:
