@@ -121,7 +121,6 @@ def _outside(table: pd.DataFrame) -> dict[str, str]:
         "outside_elsewhere": str(int(elsewhere.sum())),
         "outside_plans": str(counts["plan"]),
         "outside_lacks": str(counts["lacks"]),
-        "outside_found": f"{table['found'].median():.4g}",
     }
 
 

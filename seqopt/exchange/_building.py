@@ -52,7 +52,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         said += [f"{text}: {count}" for text, count in total.items()]
         bricks = _bricks(content, given, blocks, supports, said)
         sunk, lines = _interpenetrating(content, given, blocks, bricks)
-        touching, found = _find_contacts(content, given, blocks, bricks)
+        touching, found = _find_contacts(given, blocks, bricks)
         said = [*lines, *said, *found]
         law = a_law("law", given.law or MASONRY)
         origin = "as given" if given.law else "by default"

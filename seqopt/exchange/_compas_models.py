@@ -22,14 +22,12 @@ from seqopt.exchange._content import (
     Content,
     Entry,
     FileBlock,
-    FileFace,
     assembly_json,
     entry,
     listing,
     mapping,
     moved,
     number,
-    points,
 )
 from seqopt.exchange._meshes import object_content
 from seqopt.scene._checks import short
@@ -91,19 +89,8 @@ def read_assembly(document: Any, source: str) -> Content:
     for key in keys:
         node = common | mapping(source, nodes[key])
         blocks.append(_node_block(f"{source}: block {key}", key, node, meshes))
-    place = {key: i for i, key in enumerate(keys)}
-    faces = list[FileFace]()
-    for a, b, where, held in _edges(source, mapping(f"{source}: edge", graph.get("edge") or {})):
-        own = held if isinstance(held, dict) else {}
-        found = listing(where, own.get("interfaces") or [])  # under the key of some version
-        found = [own["interface"]] if not found and own.get("interface") else found
-        if own.get("interface_points"):
-            found = [{"points": own["interface_points"]}]
-        corners = [points(where, entry(where, payload(face), "points")) for face in found]
-        both = a in place and b in place
-        faces += [FileFace((place[a], place[b]), each) for each in corners if both]
     said = [f"{len(nodes) - len(keys)} nodes have no block"] if len(keys) < len(nodes) else []
-    return Content(tuple(blocks), tuple(faces), said=tuple(said))
+    return Content(tuple(blocks), said=tuple(said))
 
 
 def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
@@ -132,13 +119,6 @@ def _node_block(where: str, key: str, node: Entry, meshes: dict[str, Any] | None
     )
 
 
-def _edges(source: str, found: Entry) -> Iterator[tuple[str, str, str, Any]]:
-    """Yield the ends of a graph's edges, their names for messages, and their data."""
-    for a, ends in found.items():
-        for b, held in mapping(f"{source}: edge {a}", ends).items():
-            yield a, b, f"{source}: edge {a}-{b}", held
-
-
 def read_model(document: Any, source: str) -> Content:
     """Return the content of a block model, or of a problem about one."""
     held = held_by(source, document)
@@ -159,10 +139,9 @@ def read_model(document: Any, source: str) -> Content:
     densities = {
         g: number(f"{source}: density", value) for g, value in found.items() if value is not None
     }
-    blocks, place = list[FileBlock](), dict[str, int | None]()  # of elements; of groups none
+    blocks = list[FileBlock]()
     for i, (guid, item) in enumerate(rows):
-        place[guid] = None if kind(item) == "group" else len(blocks)
-        if place[guid] is not None:
+        if kind(item) != "group":
             at, own = elements[guid]
             vertices, faces = solid_of(at, entry(at, own, "geometry", "shape"))
             density = densities.get(str(own.get("material")))
@@ -170,24 +149,7 @@ def read_model(document: Any, source: str) -> Content:
             blocks.append(FileBlock(str(i), moved(vertices, placed[guid]), faces, **about))
     if len(blocks) < len(rows):
         said.append(f"{len(rows) - len(blocks)} groups only place what is in them")
-    contacts = tuple(_contacts(source, held, place))
-    return Content(tuple(blocks), contacts, said=tuple(said))
-
-
-def _contacts(source: str, held: Entry, known: dict[str, int | None]) -> Iterator[FileFace]:
-    """Yield the faces where blocks touch; ``known``: places of elements, none of groups."""
-    graph, place = mapping(source, held.get("graph") or {}), dict[str, int]()
-    for key, node in mapping(source, graph.get("node") or {}).items():
-        element = mapping(f"{source}: node {key}", node).get("element")
-        if str(element) not in known:
-            raise SceneError(f"{source}: node {key} is of element {element}, which is not there")
-        if (at := known[str(element)]) is not None:
-            place[key] = at
-    for a, b, where, item in _edges(source, mapping(source, graph.get("edge") or {})):
-        for face in listing(where, mapping(where, item or {}).get("contacts") or []):
-            corners = points(where, held_by(where, face).get("points") or [])
-            if len(corners) > 2:  # of points and edges nothing is carried over a face
-                yield FileFace((entry(source, place, a), entry(source, place, b)), corners)
+    return Content(tuple(blocks), said=tuple(said))
 
 
 _SOLIDS = ("mesh", "box", "polyhedron")

@@ -58,21 +58,13 @@ class FileBlock:
 
 
 @dataclass(frozen=True)
-class FileFace:
-    """Where two blocks touch, as a file has it."""
-
-    blocks: tuple[int, int]  # places among the blocks
-    corners: Floats  # (m, 3); once around, in the file's unit of length
-
-
-@dataclass(frozen=True)
 class Content:
     """What a file says about an assembly.
 
     Parameters
     ----------
-    blocks, faces
-        What is built, and where blocks touch; no faces where the file has none.
+    blocks
+        What is built.
     unit
         Unit of length, one of `UNITS`, if the file says it.
     said
@@ -80,7 +72,6 @@ class Content:
     """
 
     blocks: tuple[FileBlock, ...]
-    faces: tuple[FileFace, ...] = ()
     unit: str | None = None
     said: tuple[str, ...] = ()
 
@@ -88,8 +79,7 @@ class Content:
         """Return the content in m, with z up. ``unit``: of its lengths, m; ``up``: one of `UPS`."""
         turn = _Y_TO_Z if up == "y" else np.eye(3)
         blocks = (replace(b, vertices=unit * b.vertices @ turn) for b in self.blocks)
-        faces = (replace(f, corners=unit * f.corners @ turn) for f in self.faces)
-        return replace(self, blocks=tuple(blocks), faces=tuple(faces))
+        return replace(self, blocks=tuple(blocks))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,8 +100,6 @@ class Given:
         Stiffness of joints by area; by default `seqopt.scene.library.common.MASONRY`.
     gap : float, optional
         Most that may lie between faces that touch, m (default: a twentieth of the thinnest block).
-    detect : bool, optional
-        Look for faces although the file has some.
     accept_overlaps : bool, optional
         Import blocks that interpenetrate by more than faces tolerate.
     robots : int, optional
@@ -128,7 +116,6 @@ class Given:
     supports: Sequence[str] | None = None
     law: JointLaw | None = None
     gap: Annotated[float | None, ("value", "M")] = None
-    detect: bool = False
     accept_overlaps: bool = False
     robots: Annotated[int | None, ("value", "N"), ("most", 100)] = None
     name: str | None = None
@@ -186,11 +173,6 @@ def point(where: str, value: object) -> Floats:
     if len(row) != 3:
         raise SceneError(f"{where} is {short(value)}; three numbers are expected")
     return np.array([number(where, x) for x in row])
-
-
-def points(where: str, value: object) -> Floats:
-    """Return the points (k, 3) of a list of a document."""
-    return np.array([point(where, row) for row in listing(where, value)]).reshape(-1, 3)
 
 
 def moved(place: Floats, matrix: Floats) -> Floats:

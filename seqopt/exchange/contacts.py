@@ -1,4 +1,4 @@
-"""Where the blocks of a file touch each other and the ground: its own faces, or those found.
+"""Where the blocks of a file touch each other and the ground.
 
 Polygons are shapely's.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from seqopt._later import Later
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SceneError
-from seqopt.exchange._content import GROUND, Content, Given
+from seqopt.exchange._content import GROUND, Given
 from seqopt.exchange._meshes import Repaired
 from seqopt.scene._checks import positive, short, units
 from seqopt.scene.boxes import TOLERATED, _bounds_of, _near_pairs, _spring_fields, as_vector
@@ -256,39 +256,29 @@ def _fields(face: _FlatFace, law: JointLaw) -> dict[str, Any]:
     return {**fields, "face": tuple((x, y) for x, y in face.corners.tolist())}
 
 
-_OFF = 0.05  # of a face from a block that it joins, over the size of the block
-_ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
-
 _Held = tuple[tuple[int, int], _FlatFace]
 
 
 def _find_contacts(
-    content: Content, given: Given, blocks: Sequence[Repaired], bricks: Mapping[int, Brick]
+    given: Given, blocks: Sequence[Repaired], bricks: Mapping[int, Brick]
 ) -> tuple[list[_Held], list[str]]:
     """Return faces where blocks touch, their normals into the second; and how they were found.
 
     Places are those of the file; the ground, which blocks not built belong to, comes first.
     """
     _require_polygons()
-    solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]
-    gap = _widest_gap(given, bricks)
-    if content.faces and not given.detect:
-        off = _off_blocks(content, facets, gap)
-        found = [*_file_faces(content, solids)]
-        said = [f"faces are those of the file: {len(content.faces)}", *off]
-    else:
-        touching = touching_faces(facets, gap, given.progress)
-        found = [(f.blocks, flat_face(f.corners, f.normal)) for f in touching]
-        said = [f"faces are found where blocks are no more than {1e3 * gap:.3g} mm apart"]
+    facets, gap = [block.facets for block in blocks], _widest_gap(given, bricks)
+    said = [f"faces are found where blocks are no more than {1e3 * gap:.3g} mm apart"]
     faces = list[_Held]()
-    for pair, face in found:
-        a, b = (i if i in bricks else GROUND for i in pair)
+    for found in touching_faces(facets, gap, given.progress):
+        face = flat_face(found.corners, found.normal)
+        a, b = (i if i in bricks else GROUND for i in found.blocks)
         if b == GROUND != a:
             turned = flat_face(face.center + face.corners @ face.axes[1:], -face.axes[0])
             faces.append(((GROUND, a), turned))
         elif b != GROUND:
             faces.append(((a, b), face))
-    if len(bricks) == len(solids):
+    if len(bricks) == len(blocks):
         faces += _standing(bricks, facets, gap)
         said.append("no supports are named: blocks with a face at the lowest level stand there")
     return faces, said
@@ -298,63 +288,6 @@ def _widest_gap(given: Given, bricks: Mapping[int, Brick]) -> float:
     """Return the most that may lie between faces that touch, m."""
     thinnest = min(min(brick.dimensions) for brick in bricks.values())
     return TOLERATED * thinnest if given.gap is None else positive("gap", given.gap, "m")
-
-
-def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list[str]:
-    """Say how far faces of a file lie off the blocks that they join; too far is an error."""
-    farthest = 0.0
-    sides = {
-        i: [flat_face(facets[i].points[list(face)]) for face in facets[i].faces]
-        for i in {i for face in content.faces for i in face.blocks}
-    }
-    for held in content.faces:
-        for i in held.blocks:
-            away = np.full(len(held.corners), np.inf)
-            for side in sides[i]:
-                seen = (held.corners - side.center) @ side.axes.T
-                beside = SHAPELY.distance(_valid(side.corners), SHAPELY.points(seen[:, 1:]))
-                away = np.minimum(away, np.hypot(seen[:, 0], beside))
-            off = float(away.max(initial=0.0))
-            if off > max(gap, _OFF * float(np.ptp(facets[i].points, axis=0).max())):
-                a, b = (content.blocks[k].key for k in held.blocks)
-                raise SceneError(
-                    f"the face between blocks {a} and {b} lies {off:.3g} m off block "
-                    f"{content.blocks[i].key}; look for faces anew (detect), or allow a wider gap"
-                )
-            farthest = max(farthest, off)
-    if farthest <= gap:
-        return []
-    return [f"faces of the file lie up to {1e3 * farthest:.3g} mm off their blocks"]
-
-
-def _file_faces(content: Content, solids: Sequence[_Shape]) -> Iterator[_Held]:
-    """Yield the faces of a file, in convex pieces, their normals into the second block."""
-    for held in content.faces:
-        a, b = held.blocks
-        if a == b or len(held.corners) < 3:
-            continue
-        plane = flat_face(held.corners)
-        for piece in _convex_pieces(_polygons(_valid(plane.corners))):
-            corners = plane.center + piece @ plane.axes[1:]
-            yield (a, b), flat_face(corners, _into(corners, plane.axes[0], solids[a], solids[b]))
-
-
-def _into(corners: Floats, normal: Floats, first: _Shape, second: _Shape) -> Floats:
-    """Return the normal of a face that points from the first block into the second."""
-    middle = corners.mean(axis=0)
-    step = _ASIDE * np.linalg.norm(np.ptp(corners, axis=0)) * normal
-    votes = 0
-    for solid, side in ((second, 1), (first, -1)):
-        if isinstance(solid, Polyhedron):
-            ahead, behind = (
-                solid.contains(middle + side * step),
-                solid.contains(middle - side * step),
-            )
-            votes += ahead - behind
-    if votes == 0:  # a thin block, or one that is not where its face is
-        toward = second.points.mean(axis=0) - first.points.mean(axis=0)
-        return normal if toward @ normal >= 0 else -normal
-    return normal if votes > 0 else -normal
 
 
 def _standing(bricks: Mapping[int, Brick], solids: Sequence[_Shape], gap: float) -> Iterator[_Held]:

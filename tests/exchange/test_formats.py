@@ -180,12 +180,7 @@ def test_what_can_be_mended_is_mended_and_said(read):
             Given(unit="m", density=1.0, supports=["0", "4", "7"]),
             "all blocks are supports",
         ),
-        (
-            "a.json",
-            DOCUMENTS["assembly"],
-            Given(unit="m", density=1.0, gap=0.0, detect=True),
-            "gap is 0",
-        ),
+        ("a.json", DOCUMENTS["assembly"], Given(unit="m", density=1.0, gap=0.0), "gap is 0"),
         ("a.obj", obj(LOW, box((1, 1, 1), at=(0, 0, 5))), METERS, "1 blocks touch nothing"),
         ("a.obj", "v 0 0 0\n", METERS, "it has no faces"),
         ("a.obj", "v 0 0 0\nf 1 2 3\n", METERS, "line 2: there is no vertex '2'; 1 stand before"),

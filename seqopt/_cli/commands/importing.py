@@ -18,7 +18,7 @@ from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import dump_scene
 from seqopt.work.progress import Tell
 
-ASKED = ("name", "unit", "up", "density", "robots", "gap", "detect", "accept_overlaps")
+ASKED = ("name", "unit", "up", "density", "robots", "gap", "accept_overlaps")
 
 
 def run(
