@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
@@ -96,12 +96,7 @@ def _unit(content: Content, given: Given, said: list[str]) -> float:
 
 
 def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
-    named = defaultdict[str, set[int]](set)
-    for i, block in enumerate(content.blocks):
-        named[block.group].add(i)
-    named.pop("", None)
-    for i, block in enumerate(content.blocks):
-        named[block.key].add(i)
+    named = {block.key: i for i, block in enumerate(content.blocks)}
     marked = [block.key for block in content.blocks if block.support]
     keys = marked if given.supports is None else rows("supports", given.supports, "keys of blocks")
     for key in keys:
@@ -113,7 +108,7 @@ def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
         more = "" if len(keys) <= 8 else f" and {len(keys) - 8} more"
         origin = "as the file says" if given.supports is None else "as given"
         said.append(f"supports are blocks {shown}{more}, {origin}: the ground")
-    supports = {i for key in keys for i in named[key]}
+    supports = {named[key] for key in keys}
     if len(supports) == len(content.blocks):
         raise SceneError("all blocks are supports; leave one to be built")
     return supports

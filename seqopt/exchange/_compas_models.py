@@ -157,7 +157,7 @@ _THIN = (  # of COMPAS, without a volume
     *("line", "polyline", "polygon", "point", "pointcloud", "vector", "frame", "plane", "circle"),
     *("ellipse", "arc", "bezier", "curve", "nurbscurve", "hyperbola", "parabola", "graph"),
 )
-_DEEPEST = 50  # lists and groups within each other
+_DEEPEST = 50  # lists and dictionaries within each other
 
 
 def is_meshes(document: Any) -> bool:
@@ -199,26 +199,23 @@ def read_meshes(document: Any, source: str) -> Content:
 
 
 def _listed(
-    where: str, value: Any, left: Counter[str], name: str = "", group: str = "", depth: int = 0
+    where: str, value: Any, left: Counter[str], name: str = "", depth: int = 0
 ) -> Iterator[FileBlock]:
-    """Yield the meshes of a value; a list or dictionary in another one is a group.
-
-    ``left``: gets what is left out, and how often.
-    """
+    """Yield the meshes of a value and of lists and dictionaries in it; ``left``: counts others."""
     if depth > _DEEPEST:
         raise SceneError(f"{where}: lists stand in lists more than {_DEEPEST} deep")
     if isinstance(value, list):
         for i, item in enumerate(value):
-            yield from _listed(f"{where}: mesh {i}", item, left, "", group or name, depth + 1)
+            yield from _listed(f"{where}: mesh {i}", item, left, "", depth + 1)
     elif isinstance(value, dict) and not kind(value) and not _is_solid(value):
         for key, item in value.items():
-            yield from _listed(f"{where}: {key}", item, left, key, group or name, depth + 1)
+            yield from _listed(f"{where}: {key}", item, left, key, depth + 1)
     elif kind(value) in _THIN:
         left[kind(value)] += 1
     else:
         own = value.get("name") if isinstance(value, dict) else None
         key = name or (own if isinstance(own, str) else "")
-        yield FileBlock(key, *solid_of(where, value), group=group)
+        yield FileBlock(key, *solid_of(where, value))
 
 
 def assembly_with_plan(

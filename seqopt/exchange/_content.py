@@ -43,8 +43,6 @@ class FileBlock:
         kg/m³ and kg, if the file says them.
     course
         Its place in the build; lower ones come first.
-    group
-        Its layer or group in the file.
     """
 
     key: str
@@ -54,7 +52,6 @@ class FileBlock:
     density: float | None = None
     mass: float | None = None
     course: float | None = None
-    group: str = ""
 
 
 @dataclass(frozen=True)
@@ -95,7 +92,7 @@ class Given:
     density : float, optional
         Of blocks for which the file has none, kg/m³.
     supports : sequence of str, optional
-        Keys of blocks that are fixed, or of layers and groups of blocks; by default the file's.
+        Keys of blocks that are fixed; by default the file's.
     law : JointLaw, optional
         Stiffness of joints by area; by default `seqopt.scene.library.common.MASONRY`.
     gap : float, optional

@@ -21,7 +21,7 @@ from seqopt.exchange._compas_models import (
 )
 from seqopt.exchange._compas_shapes import kind, payload
 from seqopt.exchange._content import Content, assembly_json
-from seqopt.exchange._mesh_files import read_mesh, read_obj, write_obj
+from seqopt.exchange._mesh_files import read_obj, write_obj
 from seqopt.exchange._tasks import tasks_csv, tasks_in_postures, tasks_json
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
@@ -32,6 +32,7 @@ _INSTEAD = {  # how to save as .obj, every block a closed mesh with a name, what
     "dwg dxf step stp iges igs sat x_t fcstd": "open it in Rhino or FreeCAD, and export",
     "3dm gh ghx": "bake and mesh it in Rhino, and export",
     "ifc rvt": "convert it (IfcConvert a.ifc a.obj, of IfcOpenShell), or export",
+    "ply stl": "open it in Rhino or Blender, and export",
     "skp blend fbx dae max c4d usd usdz glb gltf off 3mf": "export",
 }
 _REFUSED = {  # kinds of COMPAS, and what to save in their place
@@ -145,7 +146,6 @@ BUILT_IN = {
             lambda scene, _: write_obj(scene),
             lost=("densities", "the order", *_NEVER, "steps"),
         ),
-        *(Format(n, (n,), partial(read_mesh, form=n)) for n in ("ply", "stl")),
     )
 }
 

@@ -1,28 +1,15 @@
-"""Files of meshes: OBJ with its polygons, PLY and STL.
-
-trimesh reads PLY and STL. Of an OBJ it keeps triangles alone, cut as fans, which a face that is not
-convex does not survive, and it joins all objects; so this has a few lines of its own here.
-"""
+"""Files of meshes: OBJ, with its polygons and the names of its objects."""
 
 from __future__ import annotations
 
-import io
-import logging
-from importlib import import_module
-from importlib.util import find_spec
-from pathlib import Path
-
 import numpy as np
 
-from seqopt._files import read_bytes
-from seqopt.errors import FileError, SceneError
+from seqopt.errors import SceneError
 from seqopt.exchange._content import LARGEST, Content
 from seqopt.exchange._meshes import mesh_content
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.scene import Scene
-
-_UNASKED = logging.NullHandler()  # else Python prints unhandled errors
 
 
 def read_obj(text: str, source: str) -> Content:
@@ -80,29 +67,3 @@ def write_obj(scene: Scene) -> str:
         lines += ["f " + " ".join(str(first + i) for i in face) for face in faces]
         first += len(points)
     return "\n".join(lines) + "\n"
-
-
-def read_mesh(path: Path, form: str) -> Content:
-    """Return the blocks of a ``ply`` or ``stl`` file; what trimesh logs is for who asked for it."""
-    content, source = read_bytes(path), str(path)
-    if find_spec("trimesh") is None:
-        raise FileError(f"{source}: reading {form} needs trimesh; pip install 'seqopt[blocks]'")
-    logging.getLogger("trimesh").addHandler(_UNASKED)
-    try:
-        mesh = import_module("trimesh").load_mesh(
-            io.BytesIO(content), file_type=form, process=False
-        )
-        vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
-    except MemoryError:
-        raise
-    except Exception as error:  # a reader of broken bytes may raise any error
-        said = short(str(error) or type(error).__name__, 80)
-        raise SceneError(f"{source}: no {form} file that can be read: {said}") from error
-    if not (np.abs(vertices) <= LARGEST).all():
-        raise SceneError(f"{source}: a vertex is not finite; give numbers up to {LARGEST:g}")
-    if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
-        raise SceneError(f"{source}: a face names a vertex that is not there; {len(vertices)} are")
-    if form == "stl":  # it repeats the vertices of every triangle
-        vertices, place = np.unique(vertices, axis=0, return_inverse=True)
-        faces = place.reshape(-1)[faces]
-    return mesh_content(vertices, faces.tolist(), source)

@@ -102,8 +102,6 @@ ABOUT = {
     "vault338": "a herringbone vault around arch25 over 2670 x 4350 mm, our reconstruction",
 }
 
-_MESHES = (".obj", ".ply", ".stl")
-
 KINDS = {
     "arch": "an arch by span and rise: arch:span=2,rise=0.7,curve=catenary",
     "chain": "an arch of any number of bricks that turn evenly: chain:bricks=40",
@@ -207,7 +205,7 @@ def load_scene(name: str | Path) -> Scene:
             f"scene {name}: no such built-in scene or file{hint}; "
             f"built in: {', '.join(builtin_scenes())}; or in words, as arch:span=2,rise=0.7"
         )
-    if path.is_file() and path.suffix.lower() in _MESHES:
+    if path.is_file() and path.suffix.lower() == ".obj":
         out = shlex.quote(f"{path.resolve().stem}.json")
         words = f"{shlex.quote(str(path))} --unit m --density 2400 --out {out}"
         raise SceneError(

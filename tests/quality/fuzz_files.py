@@ -107,8 +107,6 @@ def _of_scenes() -> Iterator[tuple[str, File]]:
 
 
 def _of_imports() -> Iterator[tuple[str, File]]:
-    import trimesh  # noqa: PLC0415  # an extra
-
     def brought(path: Path) -> object:
         given = seqopt.exchange.Given(unit="m", density=2000.0)
         return (
@@ -122,12 +120,6 @@ def _of_imports() -> Iterator[tuple[str, File]]:
     yield "obj", ("i.obj", export_plan(scene, steps, "obj").encode(), brought)
     yield "compas_assembly", ("i.json", _json(DOCUMENTS["assembly"]), brought)
     yield "boxes", ("i.csv", BOXES.encode(), brought)
-    for end in ("ply", "stl"):
-        content = trimesh.creation.box((0.2, 0.1, 0.1)).export(file_type=end)
-        yield (
-            end,
-            (f"i.{end}", content if isinstance(content, bytes) else content.encode(), brought),
-        )
 
 
 def _of_caches() -> Iterator[tuple[str, File]]:

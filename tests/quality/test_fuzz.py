@@ -103,7 +103,7 @@ def test_a_hang_ends_the_run():
 KINDS = (
     *("instance", "timed instance", "answer", "answer as text", "bound 1", "bound 2", "bound 3"),
     *("scene", "plan", "schedule", "measured", "summary", "compas_assembly", "boxes"),
-    *("obj", "ply", "stl", "postures"),
+    *("obj", "postures"),
 )
 
 

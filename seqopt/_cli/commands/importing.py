@@ -44,8 +44,8 @@ def run(
     format : str, optional
         What the file is (default: what it looks like): {choices}.
     supports : str, optional
-        Blocks that are the ground, by their keys or layers in the file (default: those that it
-        marks, else what stands at the lowest level).
+        Blocks that are the ground, by their keys in the file (default: those that it marks,
+        else what stands at the lowest level).
     stiffness : str, optional
         Of joints by area, N/m³ (default: 1.5e9,1.5e8).
 
