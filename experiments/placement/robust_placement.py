@@ -27,7 +27,6 @@ import time
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -73,8 +72,7 @@ class StepQuantile(NamedTuple):
 
 def least_quantile(problem: Decisions, share: float = 0.1) -> StepQuantile:
     """Return the choice with the least level that no more than a share of open steps exceed."""
-    every = chain.from_iterable(problem.evaluation.levels())
-    steps = [(each.moves, problem.step_costs(each)) for each in every]
+    steps = [(each.moves, problem.step_costs(each)) for each in problem.evaluation.steps]
     most = math.floor(share * len(steps) + 1e-9)
     levels = np.unique(np.concatenate([costs[np.isfinite(costs)] for _, costs in steps]))
 

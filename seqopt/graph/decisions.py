@@ -13,7 +13,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, pairwise
+from itertools import pairwise
 
 import numpy as np
 
@@ -137,13 +137,10 @@ class Decisions(Shown):
         joined = Joined([len(move.candidates) for move in self.schedule.moves], join)
         for cost in self.given_costs:
             joined.add_anyway(float(cost))
-        seconds = 0.0
-        for steps in self.evaluation.levels():
-            start = time.perf_counter()
-            for choices in steps:
-                joined.add(choices.moves, self.step_costs(choices))
-            seconds += time.perf_counter() - start
-        return joined.layered(), seconds
+        steps, start = self.evaluation.steps, time.perf_counter()
+        for choices in steps:
+            joined.add(choices.moves, self.step_costs(choices))
+        return joined.layered(), time.perf_counter() - start
 
     @property
     def given(self) -> tuple[Step, ...]:
@@ -369,7 +366,7 @@ def steps_over(problem: Decisions, response: str, level: float, bound: float) ->
     `ProblemError` if the problem does not evaluate the response.
     """
     joined = Joined([*map(len, problem.candidates)], np.add)
-    for choices in chain.from_iterable(problem.evaluation.levels()):
+    for choices in problem.evaluation.steps:
         if response not in choices.responses:
             raise ProblemError(
                 f"budget on {response}: step {choices.step.number} has only "

@@ -1,4 +1,4 @@
-"""Pareto sets of choices, states or orders: non-dominated plans, their proof, and picking one."""
+"""Pareto sets of choices, states or orders: non-dominated plans, and their proof."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pandas as pd
 
 from seqopt.arrays import Floats, Terse
 from seqopt.engines.interface import Engine
-from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Formulation, Solution, as_formulation
 from seqopt.graph.graph import Graph
@@ -320,25 +320,3 @@ def upper_bounds(points: Floats) -> Floats:
         if not kept or not (np.array(kept) >= corner).all(axis=1).any():
             kept.append(corner)
     return np.array(kept)
-
-
-def pick(table: pd.DataFrame, least: str, under: Mapping[str, float] | None = None) -> int:
-    """Return the row of a Pareto set with the least value of a column, subject to upper bounds.
-
-    ``table``: of a `Front`; ``least``: the column; ``under``: strict bounds by column, SI units.
-    Result: index of the row, from 0; ties go to the first. Raises `ProblemError` if there is no
-    such column, or no row satisfies the bounds.
-    """
-    under = dict(under or {})
-    for name in (least, *under):
-        if name not in table:
-            known = [*map(str, table.columns)]
-            why = f"the set has no such column{did_you_mean(name, known)}"
-            raise ProblemError(f"pick {name}: {why}; give one of {', '.join(known)}")
-    rows = table[(table[[*under]] < pd.Series(under)).all(axis=1)] if under else table
-    if not len(rows):
-        closest = ", ".join(f"{name} from {table[name].min():.6g}" for name in under)
-        raise ProblemError(
-            f"pick {least}: no plan of the set is below all bounds; it has {closest}"
-        )
-    return [*table.index].index(rows[least].idxmin())

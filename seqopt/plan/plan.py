@@ -292,13 +292,6 @@ class Plan(ShownBuild):
         return own + self.selection.effort[1]
 
     @property
-    def models_needed(self) -> int:
-        """How many different models the formulation needs: fewer for window searches."""
-        if self.formulation.windowed != ():
-            return self.models
-        return window_models(self.decisions.schedule, self.choice)
-
-    @property
     def regrips(self) -> int:
         """Number of grips taken besides those that place a brick."""
         return sum(step.kind is StepKind.REPOSITION for step in self.steps)
@@ -352,6 +345,11 @@ class Plan(ShownBuild):
             return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}
         graph, scene = self._of_scene, self.engine.network.scene
         asked = self.problem if isinstance(self.problem, Problem) else graph
+        of_order: dict[str, object] = {}
+        if self.order:
+            sought = self.problem.orders.value  # type: ignore[union-attr]  # one was
+            evaluated = self.selection.effort[0]
+            of_order = {"order": [*self.order], "orders": sought, "order_evaluated": evaluated}
         return {
             "scene": scene.name,
             "schedule": self.method,
@@ -370,7 +368,7 @@ class Plan(ShownBuild):
             **({} if self.arms is None else self.arms.described()),
             "payload_exceeded": [str(excess) for excess in self.overloads],
             "spent": self.spent,
-            **self._of_order(),
+            **of_order,
             "seconds": dict(self.seconds),
             **provenance(self.engine),
         }
@@ -427,14 +425,6 @@ class Plan(ShownBuild):
             "gap": self.gap,
             "claimed_gap": left,
         }
-
-    def _of_order(self) -> dict[str, object]:
-        """Return the entries of a summary about the optimized order, if one was sought."""
-        if not self.order:
-            return {}
-        sought = self.problem.orders.value  # type: ignore[union-attr]  # one was
-        evaluated = self.selection.effort[0]
-        return {"order": [*self.order], "orders": sought, "order_evaluated": evaluated}
 
     @property
     def order_bound_said(self) -> str:

@@ -45,7 +45,6 @@ from seqopt.work.progress import INTERRUPT
 NONE_KEEPS = "no plan keeps it"
 UNKNOWN = "whether any plan keeps it is not known"
 INTERRUPTED = f"{UNKNOWN} (interrupted)"
-Kept = TypeVar("Kept")
 Measured = TypeVar("Measured", bound=Any)  # a plan, or a Pareto set
 EFFORT = ("seconds", "max_memory")  # of any formulation; responses have a memory of their own
 
@@ -260,22 +259,6 @@ def leaves(moved: Moved) -> bool:
     return moved.share > 1 + LIMIT_TOLERANCE
 
 
-def keeping(found: Kept, moved: Moved, again: Callable[[], Kept]) -> tuple[Kept, str]:
-    """Return a result within the linear range, and a reason if there is none.
-
-    ``moved``: displacements of ``found``; ``again``: solves with the range as a constraint. If it
-    raises an error, ``found`` is returned, with the reason in words.
-    """
-    if not leaves(moved):
-        return found, ""
-    try:
-        return again(), ""
-    except InfeasibleError:
-        return found, NONE_KEEPS
-    except SeqoptError as error:
-        return found, f"{UNKNOWN} ({message_of(error)})"
-
-
 def best_within(
     problem: Problem,
     measured: Callable[[Problem], Measured],
@@ -290,12 +273,15 @@ def best_within(
     """
     found = measured(problem)
     moved = farthest(found)
-    if problem.says_range or moved is None:
+    if problem.says_range or moved is None or not leaves(moved):
         return found
     if found.stopped == INTERRUPT:
-        return replace(found, beyond=INTERRUPTED * leaves(moved))
+        return replace(found, beyond=INTERRUPTED)
     try:
-        kept, why = keeping(found, moved, lambda: measured(problem.within_range(1.0)))
+        return measured(problem.within_range(1.0))
+    except InfeasibleError:
+        return replace(found, beyond=NONE_KEEPS)
+    except SeqoptError as error:
+        return replace(found, beyond=f"{UNKNOWN} ({message_of(error)})")
     except KeyboardInterrupt:
-        kept, why = interrupted(found), INTERRUPTED
-    return replace(kept, beyond=why)
+        return replace(interrupted(found), beyond=INTERRUPTED)

@@ -27,6 +27,7 @@ from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, _prop_faults, overloads
 from seqopt.report._regret._measure import measure_regret
 from seqopt.report._regret._table import RegretTable
+from seqopt.responses._choices import window_models
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
@@ -261,7 +262,8 @@ def _row(plan: Plan) -> dict[str, object]:
     else:
         assert plan.certificate is not None  # asked for
         value, gap = plan.certificate.objective, plan.certificate.gap
-        models = plan.models_needed
+        windowed = plan.formulation.windowed == ()  # it needs fewer models
+        models = window_models(plan.decisions.schedule, plan.choice) if windowed else plan.models
         seconds = sum(plan.seconds[stage] for stage in ("compile", "solve", "verify"))
     about = {"problem": plan.method, "objective": value, "gap": gap, "models": models}
     return about | {"seconds": seconds, "solve_seconds": plan.seconds["solve"]}

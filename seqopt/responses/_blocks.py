@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import pickle
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce
 from operator import or_
@@ -68,12 +68,6 @@ class Answers(FrozenValue):
     forces: Floats
 
 
-def join_answers(parts: Sequence[Answers]) -> Answers:
-    """Concatenate the answers to blocks, at least one."""
-    values = {name: np.concatenate([a.values[name] for a in parts]) for name in parts[0].values}
-    return Answers(values, np.concatenate([part.forces for part in parts]))
-
-
 def answer(engine: Engine, block: Block) -> Answers:
     """Return the responses of a block of states. Raises what the engine does."""
     asked = [CHOSEN_BY[name] for name in block.names if name in CHOSEN_BY]
@@ -115,25 +109,16 @@ def packed(engine: Engine) -> bytes:
         ) from error
 
 
-class _Made(threading.local):
-    """The engines of the last two runs of each thread of a worker.
-
-    Executors of users have no storage for workers' data between tasks; without this cache each
-    task would build its engine again.
-    """
-
-    def __init__(self) -> None:
-        self.engines: dict[bytes, Engine] = {}
-
-
-_OF_THREAD = _Made()
+# Engines of the last two runs of each thread of a worker: executors of users have no storage for
+# workers' data between tasks, each of which would build its engine again.
+_OF_THREAD = threading.local()
 
 
 def unpacked(engine: Engine | bytes) -> Engine:
     """Return an engine unchanged, or the one of a `packed` form, built once for a thread."""
     if not isinstance(engine, bytes):
         return engine
-    made = _OF_THREAD.engines
+    made: dict[bytes, Engine] = vars(_OF_THREAD).setdefault("engines", {})
     if engine not in made:
         found: Recipe | Engine = pickle.loads(engine)  # our own, of `packed`
         made[engine] = found.make() if isinstance(found, Recipe) else found

@@ -3,17 +3,13 @@
 Beside the responses of `seqopt.responses.quantities` there are those that belong to robots: the
 force of each (``F_`` and its name, as `robot_response` writes it), of the one that takes its grip
 (``F_move``) and the largest (``F_largest``), sizes without sign.
-
-If the responses of all choices exceed the memory limit, they are computed by brick count, and only
-costs are kept.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
@@ -111,53 +107,30 @@ class Evaluation(Terse):
             return self._given_table
         return self._given_table.assign(**{COLUMN: tolerances_along(self.engine, self.given)})
 
-    @cached_property
-    def streams(self) -> bool:
-        """Whether memory suffices for costs alone: responses are then computed step by step.
-
-        Raises `MemoryShortError` if it does not suffice for costs either.
-        """
-        return not require_memory(self.schedule, self.wanted, self.resources.max_memory)
-
     @property
     def steps(self) -> tuple[StepChoices, ...]:
-        """All open steps, in order.
-
-        Raises `MemoryShortError` if memory does not suffice for them.
-        """
-        if self.streams:
-            raise MemoryShortError(
-                "the responses of all choices do not fit into the memory that may be used; take "
-                "them from levels(), step by step, or raise max_memory"
-            )
-        return self._found[0]
-
-    def levels(self) -> Generator[Sequence[StepChoices], None, None]:
-        """Return all open steps, in order, those of one brick count after the other.
-
-        They are computed lazily, and cached if memory suffices.
+        """All open steps, those of one brick count after the other.
 
         Raises `MechanismError`, `SolverError`, `WorkerError` as the engine does, and the workers;
         `MemoryShortError` if memory does not suffice.
         """
-        kept = not self.streams
-        if self._kept and kept:
-            yield self._kept[0][0]
-            return
-        steps, models, seconds = list[StepChoices](), 0, 0.0
+        return self._found[0]
+
+    @cached_property
+    def _found(self) -> tuple[tuple[StepChoices, ...], int, float]:
+        """All open steps with their responses, the models solved for them, and the run time, s."""
+        _require_memory(self.schedule, self.wanted, self.resources.max_memory)
+        steps, models, start = list[StepChoices](), 0, time.perf_counter()
         works = {bricks: _work(self.schedule, own) for bricks, own in self._by_bricks.items()}
         total, resources = sum(works.values()), self.resources
         progress = Progress("responses", total, resources.progress)
         with keep(resources.executor, resources.workers):
             for bricks, own in self._by_bricks.items():
-                start = time.perf_counter()
                 sets = self._sets(bricks, total)
-                found = [self._choices(sets, step, {}) for step in own]
-                models, seconds = models + sets.solved, seconds + time.perf_counter() - start
+                steps += [self._choices(sets, step, {}) for step in own]
+                models += sets.solved
                 progress.add(works[bricks])
-                steps += found if kept else ()
-                yield found
-        self._kept[:] = [(tuple(steps), models, seconds)]
+        return tuple(steps), models, time.perf_counter() - start
 
     @cached_property
     def _by_bricks(self) -> dict[int, list[OpenStep]]:
@@ -167,19 +140,8 @@ class Evaluation(Terse):
 
     @property
     def is_kept(self) -> bool:
-        """Whether the responses of all choices are computed, and cached."""
-        return bool(self._kept) and not self.streams
-
-    @cached_property
-    def _kept(self) -> list[tuple[tuple[StepChoices, ...], int, float]]:
-        """After computing all levels: steps, if memory suffices for them, models and seconds."""
-        return []
-
-    @property
-    def _found(self) -> tuple[tuple[StepChoices, ...], int, float]:
-        if not self._kept:
-            deque(self.levels(), maxlen=0)
-        return self._kept[0]
+        """Whether the responses of all choices are computed."""
+        return "_found" in vars(self)
 
     @property
     def models(self) -> int:
@@ -199,16 +161,14 @@ class Evaluation(Terse):
         """
         steps, of = self.schedule.steps_of, {move - 1: before}
         own = [*steps.get((move - 1, move), ()), *steps.get((move,), ())]
-        return tuple(
-            self._choices(self._window_sets(step.bricks), step, of)
-            for step in sorted(own, key=lambda step: step.number)
-        )
-
-    def _window_sets(self, bricks: int) -> GripSets:
-        if bricks not in self._windows:
-            work = sum(_work(self.schedule, own, last=True) for own in self._by_bricks.values())
-            self._windows[bricks] = self._sets(bricks, work)
-        return self._windows[bricks]
+        found = []
+        for step in sorted(own, key=lambda step: step.number):
+            if step.bricks not in self._windows:
+                every = self._by_bricks.values()
+                work = sum(_work(self.schedule, same, last=True) for same in every)
+                self._windows[step.bricks] = self._sets(step.bricks, work)
+            found.append(self._choices(self._windows[step.bricks], step, of))
+        return tuple(found)
 
     @cached_property
     def _windows(self) -> dict[int, GripSets]:
@@ -305,50 +265,26 @@ def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
     return sum(map(len, met.values()))
 
 
-_NUMBER = 8  # bytes
 _BESIDE = 6  # numbers per choice beside its responses: nodes, order, costs
-_COSTS = 4  # numbers per choice where costs alone are kept: as found, posed, handed over, solved
-_AT_ONCE = 24  # numbers per choice of the brick count that is being evaluated
 _SHARE = 0.8  # of the free memory that responses and costs may take
 
 
-def _bytes_of_choices(schedule: Schedule, wanted: Wanted) -> int:
-    """Estimate the memory of the responses of all choices of a schedule, bytes."""
-    return sum(
-        _NUMBER
-        * (len(wanted(schedule.moves[step.moves[-1]].bricks)) + _BESIDE)
+def _require_memory(schedule: Schedule, wanted: Wanted, most: float | None) -> None:
+    """Raise a `MemoryShortError` if the responses and costs of all choices take too much memory.
+
+    ``most``: bytes that may be used; by default `_SHARE` of the free memory.
+    """
+    most = _SHARE * free_memory() if most is None else most
+    needed = 8 * sum(  # bytes
+        (len(wanted(schedule.moves[step.moves[-1]].bricks)) + _BESIDE)
         * _count(schedule, step.moves)
         for step in schedule.steps
         if step.moves
     )
-
-
-def _bytes_of_costs(schedule: Schedule) -> int:
-    """Estimate the memory of all costs if responses are computed step by step, bytes."""
-    of_moves: dict[tuple[int, ...], int] = {}
-    of_bricks = Counter[int]()
-    for step in (step for step in schedule.steps if step.moves):
-        of_moves[step.moves] = _count(schedule, step.moves)
-        of_bricks[step.bricks] += of_moves[step.moves]
-    at_once = _AT_ONCE * max(of_bricks.values(), default=0)
-    return _NUMBER * (_COSTS * sum(of_moves.values()) + at_once)
-
-
-def require_memory(schedule: Schedule, wanted: Wanted, most: float | None = None) -> bool:
-    """Return whether memory suffices for the responses of all choices, not only for costs.
-
-    ``most``: bytes that may be used; by default `_SHARE` of the free memory. Raises
-    `MemoryShortError` if it does not suffice for the costs.
-    """
-    most = _SHARE * free_memory() if most is None else most
-    if _bytes_of_choices(schedule, wanted) <= most:
-        return True
-    needed = _bytes_of_costs(schedule)
-    if needed <= most:
-        return False
-    largest = max(len(move.candidates) for move in schedule.moves)
-    raise MemoryShortError(
-        f"the costs of all choices take about {needed / 1e9:.3g} GB, and {most / 1e9:.3g} GB may "
-        f"be used; let robots reach less (a move has up to {largest} candidates), block nodes, "
-        "take near candidates only, or search without proof"
-    )
+    if needed > most:
+        largest = max(len(move.candidates) for move in schedule.moves)
+        raise MemoryShortError(
+            f"the responses of all choices take about {needed / 1e9:.3g} GB, and "
+            f"{most / 1e9:.3g} GB may be used; let robots reach less (a move has up to {largest} "
+            "candidates), block nodes, take near candidates only, or search without proof"
+        )

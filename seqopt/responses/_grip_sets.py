@@ -17,17 +17,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine, Fields, linear_limit
 from seqopt.errors import MechanismError
-from seqopt.responses._blocks import (
-    BLOCK,
-    COMPILED,
-    Answers,
-    Block,
-    answer,
-    join_answers,
-    packed,
-    unpacked,
-    work,
-)
+from seqopt.responses._blocks import BLOCK, COMPILED, Answers, Block, answer, packed, unpacked, work
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.resources import HERE, Resources
 from seqopt.sequence.steps import Step
@@ -203,20 +193,20 @@ def solve_sets(
 
 
 def _answer(engine: Engine | bytes, block: Block, *, loose: bool) -> Answers:
-    return (_answer_loose if loose else answer)(unpacked(engine), block)
-
-
-def _answer_loose(engine: Engine, block: Block) -> Answers:
-    """Return answers, infinite for mechanisms, which are isolated by bisecting the block."""
-    count = len(block.grips)
+    """Return answers; ``loose``: infinite for mechanisms, which are isolated by bisection."""
+    engine, count = unpacked(engine), len(block.grips)
     try:
         return answer(engine, block)
     except MechanismError:
-        if count == 1:
-            infinite = np.full(1, np.inf)
-            return Answers(dict.fromkeys(block.names, infinite), np.full(block.grips.shape, np.inf))
+        if not loose:
+            raise
+    if count == 1:
+        infinite = dict.fromkeys(block.names, np.full(1, np.inf))
+        return Answers(infinite, np.full(block.grips.shape, np.inf))
     halves = block.grips[: count // 2], block.grips[count // 2 :]
-    return join_answers([_answer_loose(engine, replace(block, grips=half)) for half in halves])
+    parts = [_answer(engine, replace(block, grips=half), loose=True) for half in halves]
+    values = {name: np.concatenate([part.values[name] for part in parts]) for name in block.names}
+    return Answers(values, np.concatenate([part.forces for part in parts]))
 
 
 class Moved(NamedTuple):

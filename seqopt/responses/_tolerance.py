@@ -33,7 +33,6 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine, OpeningEngine, Want, grip_columns
 from seqopt.engines.registry import AutoEngine
 from seqopt.errors import ProblemError
-from seqopt.network.network import Network
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
 from seqopt.responses.table import _Columns, _grips_of, _Held, _Key
 from seqopt.sequence.steps import Step
@@ -120,14 +119,9 @@ def _misplaced(engine: Engine, bricks: int, grips: Ints) -> Misplaced:
     off = engine.solve(bricks, np.repeat(grips, 3 * held, axis=0), Want(0), moved).grip_force
     change = off.reshape(sets, 3 * held, held, 3) - own[:, None]
     influence = change.transpose(0, 2, 3, 1).reshape(sets * held, 3, 3 * held)
-    most = _payloads(engine.network, grips).ravel()
+    kinds = engine.network.scene.grip_kinds
+    most = kinds.payload[kinds.split(grips)[1]].ravel()
     return Misplaced(own.reshape(-1, 3), np.ascontiguousarray(influence), most)
-
-
-def _payloads(network: Network, grips: Ints) -> Floats:
-    """Return the payloads (S, r) of the robots of grip sets, N."""
-    kinds = network.scene.grip_kinds
-    return np.asarray(kinds.payload[kinds.split(grips)[1]])
 
 
 def _tied(engine: Engine, bricks: int, grips: Ints) -> Bools:

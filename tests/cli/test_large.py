@@ -69,8 +69,8 @@ def test_what_does_not_fit_is_refused_before(capsys, tmp_path):
     assert main([*WORDS, "overlap_dp", *out, "--max-memory", "100kB"]) == 4
     err = capsys.readouterr().err
     assert re.fullmatch(
-        r"seqopt: out of memory: the costs of all choices take about [0-9.e-]+ GB, and 0\.0001 GB "
-        r"may be used; .*search without proof\n",
+        r"seqopt: out of memory: the responses of all choices take about [0-9.e-]+ GB, and "
+        r"0\.0001 GB may be used; .*search without proof\n",
         err,
     )
     assert not (tmp_path / "out").exists()

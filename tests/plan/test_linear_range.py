@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import pytest
 
@@ -16,7 +16,7 @@ from seqopt.judge._step_checks import check_shape
 from seqopt.plan.front import find_front
 from seqopt.plan.plan import Status
 from seqopt.plan.pose import states_of
-from seqopt.plan.solve import NONE_KEEPS, UNKNOWN, keeping
+from seqopt.plan.solve import INTERRUPTED, NONE_KEEPS, UNKNOWN, best_within
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.filters import parse_limits
 from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits
@@ -102,6 +102,15 @@ def test_the_best_plan_keeps_the_range_wherever_one_does(words, formulation):
 SOFT = 1e-6
 
 
+@dataclass(frozen=True)
+class Result:
+    """What a solve returns, as far as the linear range asks it."""
+
+    moved: Moved
+    beyond: str = ""
+    stopped: str = ""
+
+
 @pytest.mark.parametrize("loop", [False, True])
 def test_where_no_plan_keeps_it_that_is_said_first(loop):
     problem = posed(scaled(small_arch(5), stiffness=SOFT), loop=loop)
@@ -140,15 +149,23 @@ def test_what_would_help_is_said_in_shares():
         (InfeasibleError("none"), NONE_KEEPS),
         (NothingFoundError("left out"), f"{UNKNOWN} (NothingFoundError: left out)"),
         (TimeUpError("time is over"), f"{UNKNOWN} (TimeUpError: time is over)"),
+        (KeyboardInterrupt(), INTERRUPTED),
     ],
 )
 def test_only_a_proof_says_that_no_plan_keeps_it(error, why):
-    def again():
-        raise error
+    problem = posed(small_arch(4))
 
-    assert keeping("first", Moved(1.5, 3), again) == ("first", why)
-    assert keeping("first", Moved(1.0, 3), again) == ("first", "")
-    assert keeping("first", Moved(1.5, 3), lambda: "second") == ("second", "")
+    def best(share, second=None):
+        def measured(asked):
+            if asked is not problem and second is None:
+                raise error
+            return Result(Moved(share, 3)) if asked is problem else second
+
+        return best_within(problem, measured, lambda found: found.moved, lambda found: found)
+
+    assert best(1.5) == Result(Moved(1.5, 3), beyond=why)
+    assert best(1.0) == Result(Moved(1.0, 3))
+    assert best(1.5, Result(Moved(0.9, 3))) == Result(Moved(0.9, 3))
 
 
 def test_the_judge_finds_by_itself_that_steps_leave_the_range():

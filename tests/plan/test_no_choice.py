@@ -157,11 +157,13 @@ def test_a_heuristic_only_says_that_it_found_none(monkeypatch, kind, error, said
 
 
 def test_what_does_not_fit_into_memory_is_refused_before(problem, monkeypatch):
-    needed = batches._bytes_of_costs(problem.schedule) / batches._SHARE
-    whole = batches._bytes_of_choices(problem.schedule, problem.evaluation.wanted) / batches._SHARE
-    monkeypatch.setattr(batches, "free_memory", lambda: 0.99 * min(needed, whole))
+    monkeypatch.setattr(batches, "free_memory", lambda: 1.0)
     fresh = replace(problem, evaluation=replace(problem.evaluation))
-    with pytest.raises(MemoryShortError, match=r"take about .* GB, .*up to 7 candidates"):
+    with pytest.raises(MemoryShortError, match=r"about .* GB, .*up to 7 candidates") as caught:
+        _ = fresh.sums
+    needed = 1e9 * float(str(caught.value).partition("about ")[2].split()[0]) / batches._SHARE
+    monkeypatch.setattr(batches, "free_memory", lambda: 0.99 * needed)
+    with pytest.raises(MemoryShortError):
         _ = fresh.sums
     monkeypatch.setattr(batches, "free_memory", lambda: 1.01 * needed)
     fresh = replace(problem, evaluation=replace(problem.evaluation))
