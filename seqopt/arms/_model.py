@@ -31,13 +31,6 @@ SAYS = "…"  # in the name of a body: what it does
 _DRAWN = 2_000  # postures from which the reach of an arm is known
 
 
-def needs_extra() -> None:
-    """Raise an `ExtraError` if the packages for postures are not installed."""
-    for name in ("pinocchio", "coal"):
-        if find_spec(name) is None:
-            raise ExtraError("arms need pinocchio and coal: pip install 'seqopt[arms]'")
-
-
 @dataclass(frozen=True, eq=False)
 class Body:
     """A convex body of an arm.
@@ -78,7 +71,8 @@ class ArmModel:
     """An arm as pinocchio and coal have it, with its base where it stands."""
 
     def __init__(self, arm: Arm) -> None:
-        needs_extra()
+        if not (find_spec("pinocchio") and find_spec("coal")):
+            raise ExtraError("arms need pinocchio and coal: pip install 'seqopt[arms]'")
         self.arm, path = arm, model_path(arm)
         self.model, geometry = _read(path, arm)
         self.data = self.model.createData()

@@ -54,16 +54,19 @@ class _Search:
         for step in self._steps:
             now = tuple(h for h in self._holds if h.first <= step.number <= h.last)
             ways, why = self._ways(step, now)
-            onward = self._onward(before, now, kept[-1] if kept else {(): None}, ways)
+            same = [(before.index(hold), i) for i, hold in enumerate(now) if hold in before]
+            able: dict[_Way, _Way] = {}  # earlier ways, by the postures of holds that go on
+            for way in kept[-1] if kept else [()]:
+                able.setdefault(tuple(way[i] for i, _ in same), way)
+            pairs = ((way, able.get(tuple(way[i] for _, i in same))) for way in ways)
+            onward = {way: source for way, source in pairs if source is not None}
             if ways and not onward:
                 why = "arms would have to change postures while they hold"
             if why:
                 faults.append(Unreached(step.number, why))
                 onward = dict.fromkeys(ways, None)
-            kept.append(onward)
+            kept.append(onward or {(): None})
             before = now if onward else ()
-            if not onward:
-                kept[-1] = {(): None}
         return PlanPostures(self._table, self._traced(kept), tuple(faults))
 
     def _ways(self, step: Step, now: Sequence[Hold]) -> tuple[list[_Way], str]:
@@ -99,21 +102,6 @@ class _Search:
             if not any(self._free((a,), b) for a in options[i] for b in options[j]):
                 return f"{names[i]} and {names[j]}"
         return ", ".join(names[:last]) + f" and {names[last]}"
-
-    def _onward(
-        self,
-        before: Sequence[Hold],
-        now: Sequence[Hold],
-        known: dict[_Way, _Way | None],
-        ways: Sequence[_Way],
-    ) -> dict[_Way, _Way | None]:
-        """Return the ways of a step in which holds that go on keep their postures."""
-        same = [(before.index(hold), i) for i, hold in enumerate(now) if hold in before]
-        able: dict[_Way, _Way] = {}
-        for way in known:
-            able.setdefault(tuple(way[i] for i, _ in same), way)
-        pairs = ((way, able.get(tuple(way[i] for _, i in same))) for way in ways)
-        return {way: source for way, source in pairs if source is not None}
 
     def _traced(
         self, kept: Sequence[dict[_Way, _Way | None]]

@@ -69,10 +69,7 @@ class Prover:
         for attempt in range(ATTEMPTS):
             answer = self._program(case, attempt)
             self.claims[answer.claim] += 1
-            size, own = (
-                max(1.0, abs(answer.value)),
-                np.nan,
-            )  # z, if forces alone prove that it will do
+            size, own = max(1.0, abs(answer.value)), np.nan  # z, if forces alone prove it
             if is_finite(self.assembly, answer):
                 exact = violation(self.assembly, case, answer) <= EXACT * size
                 own = max(answer.value, 0.0) if exact else np.nan

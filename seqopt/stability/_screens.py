@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -71,6 +70,13 @@ class TiltedStates:
         Of sets that stand without a pull. ``pull``: over gravity; ``places``, ``payload`` (S, r):
         as of `HeldStates.bracket`; ``solve``: whether directions that are open are solved.
         """
+
+        def settled(bracket: Floats) -> Bools:
+            """Return what has converged, or is far from the pull."""
+            low, high = bracket.T
+            narrow = high - low <= GAP * np.maximum(1e-2, high)
+            return np.asarray((high < pull) | (low >= _FAR * pull) | narrow | (low >= CAP))
+
         survived, least = np.full((len(places), FINE), np.nan), np.full(len(places), np.inf)
         for way, states in self._states.items():
             low, high = states.known.bracket(places, payload).T
@@ -86,8 +92,8 @@ class TiltedStates:
                 own = rows[ways == way]
                 if way not in self._states:
                     self._states[way] = HeldStates(self._assembly, self._cases[way], self._compile)
-                bracket, settled = self._states[way].bracket, partial(_settled, pull)
-                low, high = bracket(places[own], payload[own], settled, pull).T
+                grips = places[own], payload[own]
+                low, high = self._states[way].bracket(*grips, settled, pull).T
                 self._fell[way] += int((high < pull).sum())
                 asked[own, way] = True
                 survived[own, way] = np.where(low >= 0, low, np.nan)
@@ -106,13 +112,6 @@ class TiltedStates:
         for way in sorted(_FIRST, key=lambda way: (self._fell[way], -way)):
             out[~asked[:, way]] = way  # the one that most fell by comes last, and stays
         return out
-
-
-def _settled(pull: float, bracket: Floats) -> Bools:
-    """Return converged brackets (S, 2) of the critical pull, and those far from a given pull."""
-    low, high = bracket.T
-    narrow = high - low <= GAP * np.maximum(1e-2, high)
-    return np.asarray((high < pull) | (low >= _FAR * pull) | narrow | (low >= CAP))
 
 
 @dataclass

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import groupby
 from operator import attrgetter
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -36,7 +36,7 @@ from seqopt.stability.assessment import (
     assess,
 )
 from seqopt.stability.limit_analysis import Claim, Compile, compile_equilibrium
-from seqopt.work._workers import Crew, hire, map_ordered
+from seqopt.work._workers import hire, map_ordered
 from seqopt.work.progress import Tell, with_progress
 
 
@@ -122,8 +122,7 @@ _CHUNKS = 8  # for every worker, of neighboring steps, which are proven by one a
 _LARGE = 50  # bricks from which on steps are proven one by one, by the grips they have in common
 
 
-_Found = TypeVar("_Found")
-_Find = Callable[[PartialAssemblies, Sequence[Step]], Iterator[_Found]]
+_Find = Callable[[PartialAssemblies, Sequence[Step]], Iterator[Stability]]
 
 
 def parts_of(built: Network | PartialAssemblies, steps: Sequence[Step]) -> PartialAssemblies:
@@ -218,23 +217,16 @@ def each_stability(
     find = partial(_each, mortar=mortar, margins=margins, at=numbers if margins else ())
     parts = parts_of(network, steps)
     with hire(*shared) as crew:
-        yield from each_by_workers(parts, find, steps, crew)
+        if crew is None:
+            yield from find(parts, steps)
+            return
+        size = -(-len(steps) // (_CHUNKS * crew.workers)) or 1
+        chunks = [tuple(steps[i : i + size]) for i in range(0, len(steps), size)]
+        for found in map_ordered(partial(_in_worker, pickle.dumps(parts), find), chunks, crew):
+            yield from found
 
 
-def each_by_workers(
-    parts: PartialAssemblies, find: _Find[_Found], steps: Sequence[Step], crew: Crew | None
-) -> Iterator[_Found]:
-    """Yield what a function of a module finds in steps, in order, by workers if there are any."""
-    if crew is None:
-        yield from find(parts, steps)
-        return
-    size = -(-len(steps) // (_CHUNKS * crew.workers)) or 1
-    chunks = [tuple(steps[i : i + size]) for i in range(0, len(steps), size)]
-    for found in map_ordered(partial(_in_worker, pickle.dumps(parts), find), chunks, crew):
-        yield from found
-
-
-def _in_worker(parts: bytes, find: _Find[_Found], steps: Sequence[Step]) -> tuple[_Found, ...]:
+def _in_worker(parts: bytes, find: _Find, steps: Sequence[Step]) -> tuple[Stability, ...]:
     return tuple(find(_unpickled(parts), steps))
 
 

@@ -13,7 +13,7 @@ from itertools import chain, islice
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats
+from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.network.network import GROUND
@@ -114,25 +114,19 @@ class VerdictChain:
 
     def _sought(self, assembly: Assembly, case: Case) -> Iterator[tuple[Answer, Way]]:
         """Yield forces and motions sought for this case: first near what fell last, then in all."""
-        near = None if self._stood else self._falling(assembly)
-        if near is not None and near.mean() <= _NEAR:
-            for answer in islice(approach(assembly, case, near), 1, None):
+        if self._motion is not None and not self._stood:
+            size = np.abs(self._motion).max(axis=1)
+            falls = np.ones(len(assembly.centroid), dtype=bool)  # new ones as well
+            falls[: len(size)] = size[: len(falls)] > _MOVES * size.max()
+            between = assembly.bodies[(assembly.bodies != GROUND).all(axis=1)]
+            near = falls.copy()  # and those that touch them
+            near[between[falls[between].any(axis=1)].ravel()] = True
+            tries = approach(assembly, case, near) if near.mean() <= _NEAR else ()
+            for answer in islice(tries, 1, None):
                 if answer.value <= _TIGHT:
                     break  # others may fall
                 yield answer, Way.FORCES
         yield from ((answer, Way.FORCES) for answer in approach(assembly, case))
-
-    def _falling(self, assembly: Assembly) -> Bools | None:
-        """Return the blocks of the last motion, new ones, and those that touch them, (B,)."""
-        if self._motion is None:
-            return None
-        size = np.abs(self._motion).max(axis=1)
-        falls = np.ones(len(assembly.centroid), dtype=bool)
-        falls[: len(size)] = size[: len(falls)] > _MOVES * size.max()
-        between = assembly.bodies[(assembly.bodies != GROUND).all(axis=1)]
-        near = falls.copy()
-        near[between[falls[between].any(axis=1)].ravel()] = True
-        return near
 
     def _learn(self, assembly: Assembly, proven: Proven, held: Sequence[int]) -> None:
         (force, length), answer = assembly.scales, proven.answer

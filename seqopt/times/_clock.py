@@ -16,7 +16,7 @@ from seqopt.graph.paths import _to_go
 from seqopt.judge._bounds import Book, Closed, is_beyond_limits, limit_below
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
-from seqopt.judge.arithmetic import Claim, Labels, Stage, _sum, sum_books
+from seqopt.judge.arithmetic import Claim, Stage, _sum, sum_books
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.times._acts import Acts, Team, acts_of_instance, acts_of_rows, alike_in_order
@@ -201,31 +201,23 @@ def claimed_time(
     kept = np.isin(every, some)
     shares = _shares(timed.sizes.astype(float), claim.shares)
     if claim.labels is not None and claim.value is not None:
-        _require_labels(instance, claim.labels, len(stage.limited))
+        (nodes, values), width = claim.labels, 1 + len(timed.kinds) + len(stage.limited)
+        named = len(nodes) == 0 or (nodes.min() >= 0 and nodes.max() < instance.nodes)
+        if values.shape != (len(nodes), width) or not named or not np.isfinite(values).all():
+            raise SolverError(f"labels: give nodes, and for each a row of {width} numbers")
         acts = acts_of_instance(timed, stage.graph, kept)
         multipliers = np.column_stack([shares[:, 0], shares[:, 1:][:, timed.kinds]])
         clock = Clock(acts, multipliers, limit_below(claim.value), strict=True)
         books = sum_books(stage, _Target("", TIME), claim.value, acts.move)
         closed = Closed(stage.graph, acts.move, [clock, *books])
-        state, values = claim.labels
         own = values[:, 1 : 1 + acts.count]
-        since = alike_in_order(acts.groups, acts.entries[state], own)
+        since = alike_in_order(acts.groups, acts.entries[nodes], own)
         values = np.column_stack([values[:, 0], since, values[:, 1 + acts.count :]])
-        if closed.is_proof((state, values), lambda states: np.zeros(len(states), dtype=bool)):
+        if closed.is_proof((nodes, values), lambda states: np.zeros(len(states), dtype=bool)):
             return claim.value
         raise SolverError(f"labels do not prove that no path ends before {claim.value:.9g}")
     bounds = [_sum(stage, timed.work[kept] @ own, limited) for own in shares]
     return max(bounds) * (1 - 1e-12)
-
-
-def _require_labels(instance: Instance, labels: Labels, sums: int) -> None:
-    """Raise an error unless labels are of nodes, with as many numbers as there should be."""
-    assert instance.timed is not None  # labels are asked of times alone
-    nodes, values = labels
-    width = 1 + len(instance.timed.kinds) + sums
-    named = len(nodes) == 0 or (nodes.min() >= 0 and nodes.max() < instance.nodes)
-    if values.shape != (len(nodes), width) or not named or not np.isfinite(values).all():
-        raise SolverError(f"labels: give nodes, and for each a row of {width} numbers")
 
 
 def _shares(sizes: Floats, given: Floats | None) -> Floats:

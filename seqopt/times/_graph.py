@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -51,19 +52,17 @@ def timed_graph(problem: States, visited: Visited, cuts: FallCuts | None = None)
             acts * ((found.before[:, first:end] > 0).sum(axis=1) + takes) + prepares * takes
         )
     states, taken = (graph, levels, free, alike, kinds), np.column_stack(work)
-    curing = None if cuts is None else _curing(problem, visited, cuts)
-    return TimedGraph(*states, move, column, origin, prepares, acts, taken, longest, curing)
-
-
-def _curing(problem: States, visited: Visited, cuts: FallCuts) -> CuringStates:
-    """Return the bond that visited states need."""
+    timed = TimedGraph(*states, move, column, origin, prepares, acts, taken, longest, None)
+    if cuts is None:
+        return timed
     every = [(level, *problem.held_to_stand(rows)) for level, _, rows in visited.states]
     bricks = [np.full(len(held), problem.space.bricks_at(level)) for level, held, _ in every]
     held, payload = (np.concatenate([each[k] for each in every]) for k in (1, 2))
     full, begin = cuts.joints.full, problem.rules.begin
     placed = np.zeros(len(full))
     placed[: 0 if begin is None else begin.bricks] = () if begin is None else begin.placed
-    return CuringStates(cuts.starts, np.concatenate(bricks), held, payload, full, placed)
+    needed = CuringStates(cuts.starts, np.concatenate(bricks), held, payload, full, placed)
+    return replace(timed, curing=needed)  # the bond that states need
 
 
 def _moves(problem: States, graph: Graph, rows: Ints, levels: Ints) -> _Moves:

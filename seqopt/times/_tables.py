@@ -136,10 +136,3 @@ def spent_lines(busy: pd.DataFrame) -> Iterator[str]:
             f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
         )
         yield f"  {row['robot']}: {', '.join(spent)}"
-
-
-def total_lines(name: str, steps: int, given: float, least: float | None) -> Iterator[str]:
-    """Yield how long a build takes."""
-    yield f"{name}: {steps} steps take {given:.6g} s"
-    if least is not None:
-        yield f"the same grips by other robots: {least:.6g} s, the least"

@@ -21,7 +21,7 @@ from seqopt.problem.standing import Standing
 from seqopt.sequence.steps import _idle_note
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import has_durations
-from seqopt.times._tables import busy_table, spent_lines, total_lines
+from seqopt.times._tables import busy_table, spent_lines
 from seqopt.work.progress import Tell
 
 USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
@@ -75,7 +75,9 @@ def times(
     if written := output.write(progress, files):
         where = f"written to {out}: {', '.join(tables)}"
     busy = busy_table(built, build.steps, build._waits)
-    lines = [*total_lines(built.name, len(build.steps), given, least)]
+    lines = [f"{built.name}: {len(build.steps)} steps take {given:.6g} s"]
+    if least is not None:
+        lines.append(f"the same grips by other robots: {least:.6g} s, the least")
     lines += [*remarks.waits_said(build), *spent_lines(busy), where]
     trouble = posture_trouble(built, asked.words.get("cache"), progress)
     cannot = (f"not checked; {trouble}",) if trouble else arm_faults(built, build.steps)
