@@ -49,6 +49,7 @@ class _Search:
     def found(self) -> PlanPostures:
         """Return what there is."""
         faults: list[Unreached] = []
+        begin: dict[_Way, _Way | None] = {(): None}
         kept: list[dict[_Way, _Way | None]] = []  # by step: ways, and what each comes from
         before: tuple[Hold, ...] = ()
         for step in self._steps:
@@ -56,16 +57,16 @@ class _Search:
             ways, why = self._ways(step, now)
             same = [(before.index(hold), i) for i, hold in enumerate(now) if hold in before]
             able: dict[_Way, _Way] = {}  # earlier ways, by the postures of holds that go on
-            for way in kept[-1] if kept else [()]:
+            for way in kept[-1] if kept else begin:
                 able.setdefault(tuple(way[i] for i, _ in same), way)
             pairs = ((way, able.get(tuple(way[i] for _, i in same))) for way in ways)
-            onward = {way: source for way, source in pairs if source is not None}
+            onward: dict[_Way, _Way | None] = {w: s for w, s in pairs if s is not None}
             if ways and not onward:
                 why = "arms would have to change postures while they hold"
             if why:
                 faults.append(Unreached(step.number, why))
                 onward = dict.fromkeys(ways, None)
-            kept.append(onward or {(): None})
+            kept.append(onward or begin)
             before = now if onward else ()
         return PlanPostures(self._table, self._traced(kept), tuple(faults))
 
