@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from seqopt.engines.interface import _NAMES, Fields, Want
-from seqopt.engines.rigid.compliance import ACCURACY, _solve_fast
+from seqopt.engines.rigid.compliance import ACCURACY, _FastSolution
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side
@@ -24,7 +24,7 @@ HERE = np.zeros((1, 0), dtype=int)  # one set of no grips
 
 def solve_batch(operator, columns, want=Want.RESPONSES, *, even=True, accuracy=ACCURACY):
     """The fields of grip sets as an operator alone gives them, and which of them are accurate."""
-    tried = _solve_fast(operator, columns, even=even, accuracy=accuracy)
+    tried = _FastSolution(operator, columns, even=even, accuracy=accuracy)
     return Fields(**tried.fields(want)), tried.well_conditioned
 
 

@@ -123,7 +123,7 @@ def test_who_looks_for_what_cancels(monkeypatch, scene, kind, share, uneven):
     """Only what has a joint that is far softer or stiffer than others, from where it acts on."""
     looked = []
     monkeypatch.setattr(
-        trial, "_cancels", lambda *seen: looked.append(len(seen[0].axis)) or _cancels(*seen)
+        trial, "_cancels", lambda *seen: looked.append(seen[0].bricks) or _cancels(*seen)
     )
     joint = scene.joints[2]
     engine = ComplianceEngine(build_network(evenly(scene, 2, kind, share)))

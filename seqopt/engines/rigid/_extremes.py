@@ -29,8 +29,8 @@ from seqopt.engines.rigid._grip_equations import (
 from seqopt.engines.rigid._operator import (
     Doubts,
     OperatorBuilder,
+    ResponseMaps,
     SceneMaps,
-    inner_edges,
     load_rows,
 )
 from seqopt.work._threads import cores, in_threads, one_thread
@@ -125,7 +125,7 @@ class Ends(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A partial structure: counts, and the `inner_edges` of its bricks."""
+    """A partial structure: counts, and what `ResponseMaps.inner` says."""
 
     bricks: int
     wrenches: int  # numbers: six for every spring that acts
@@ -164,7 +164,7 @@ class GrownExtremes:
     def __init__(self, builder: OperatorBuilder) -> None:
         self._network, self._growth = builder.network, builder.growth
         self._grown = Grown(self._growth.twist, self._growth.wrench, builder.nodes)
-        self._maps = maps_by_entry(builder.maps)
+        self._scene, self._maps = builder.maps, maps_by_entry(builder.maps)
         self._part = Part(0, 0, 0, 0, np.empty(0), np.empty((0, 3)))
         self._growth.remembers = True
 
@@ -177,7 +177,7 @@ class GrownExtremes:
         network, (twist, _, nodes) = self._network, self._grown
         acting = int(np.searchsorted(network.springs.since, bricks, side="right"))
         counts = bricks, 6 * acting, network.count_edges(bricks), network.count_nodes(bricks)
-        _, axis, at_second = inner_edges(network, bricks)
+        _, axis, at_second = ResponseMaps(self._scene, bricks).inner
         self._part = Part(*counts, at_second, axis)
         own, every = twist[1 : 1 + 6 * bricks, : 6 * bricks], np.arange(bricks)
         blocks = own.reshape(bricks, 6, bricks, 6)[every, :, every]

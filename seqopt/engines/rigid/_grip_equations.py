@@ -190,7 +190,7 @@ def share_pairs(
     pairs = pairs_of(operator.across, columns) if pairs is None else pairs
     if not len(pairs.sets):
         return
-    sets, edges = pairs.sets, operator.inner_edge[pairs.brick]
+    sets, edges = pairs.sets, operator.maps.inner[0][pairs.brick]
     if carried.shape[1]:
         between = carried[sets, edges]
         carried[sets, edges] = 0.0

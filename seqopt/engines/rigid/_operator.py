@@ -65,6 +65,18 @@ class ResponseMaps(FrozenValue):
         return frozen(self.scene.network.ground_motion(self.bricks).ravel())
 
     @cached_property
+    def inner(self) -> tuple[Ints, Floats, Floats]:
+        """The inner edges of bricks (b,), unit vectors along them (b, 3), and what pulls there.
+
+        That is the weight on their second nodes, with that of loads, along the edge (b,), N.
+        """
+        network = self.scene.network
+        edge = np.flatnonzero(network.edge_spring[: network.count_edges(self.bricks)] < 0)
+        axis = network.edge_axis[edge]
+        pull = np.einsum("bi,bi->b", axis, network.inner_load(self.bricks)[1::2])
+        return frozen((edge, axis, pull))
+
+    @cached_property
     def edge(self) -> sparse.csr_array:
         """What edges carry of wrenches, (E, 6s)."""
         network = self.scene.network
@@ -108,17 +120,6 @@ class ResponseMaps(FrozenValue):
         return out
 
 
-def inner_edges(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
-    """Return the inner edges of bricks, and the weight on their second nodes.
-
-    Results: ``edge`` (b,); ``axis`` (b, 3): unit vectors to the second nodes; ``weight`` (b,):
-    there, with that of loads, along the edge, N.
-    """
-    edge = np.flatnonzero(network.edge_spring[: network.count_edges(bricks)] < 0)
-    axis = network.edge_axis[edge]
-    return edge, axis, np.einsum("bi,bi->b", axis, network.inner_load(bricks)[1::2])
-
-
 _Number = TypeVar("_Number", np.float64, np.int64)
 _OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
 _FEW = 200  # loads whose responses take little, and are always made once for all
@@ -157,10 +158,8 @@ class ComplianceOperator(FrozenValue):
     ``held`` (h,): the bricks that are loaded, ascending. ``flexibility`` (l, l): displacements of
     their inner nodes, m/N. ``dead_displacement`` (l,): displacements of these under the weight with
     no grip, m. ``twist`` (l + 1, 6b): of the bricks. ``wrench`` (l + 1, 6s): of
-    the s springs that act on their second bodies. ``maps``: what these mean. ``at_second`` (b,):
-    along every brick's inner edge, the weight at its second node, N. ``axis`` (b, 3): unit vectors
-    along the inner edges. ``inner_edge`` (b,): the inner edge of
-    each brick. ``loss`` (l,): how many last digits of the flexibility of each load are rounding.
+    the s springs that act on their second bodies. ``maps``: what these mean.
+    ``loss`` (l,): how many last digits of the flexibility of each load are rounding.
     ``loose``: how many loose motions come after the loads, as further rows and unknowns; see
     `seqopt.engines.rigid._refinement`. ``softness``: of the springs that they stand on, m/N.
     """
@@ -171,9 +170,6 @@ class ComplianceOperator(FrozenValue):
     twist: Floats
     wrench: Floats
     maps: ResponseMaps
-    at_second: Floats
-    axis: Floats
-    inner_edge: Ints
     loss: Floats
     loose: int = 0
     softness: float = 0.0
@@ -182,7 +178,7 @@ class ComplianceOperator(FrozenValue):
     @property
     def bricks(self) -> int:
         """How many stand, b."""
-        return len(self.axis)
+        return self.maps.bricks
 
     @property
     def width(self) -> int:
@@ -210,7 +206,8 @@ class ComplianceOperator(FrozenValue):
     @cached_property
     def across(self) -> Floats:
         """Unit vectors from each inner node to the other of its brick, (2b, d)."""
-        return frozen(np.stack([self.axis, -self.axis], axis=1).reshape(-1, 3))
+        axis = self.maps.inner[1]
+        return frozen(np.stack([axis, -axis], axis=1).reshape(-1, 3))
 
     @cached_property
     def doubts(self) -> Doubts:
@@ -248,7 +245,7 @@ class ComplianceOperator(FrozenValue):
         and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
         which few of the wrenches determine.
         """
-        few = are_few(self.axis.size, len(index))  # independent of earlier requests
+        few = are_few(3 * self.bricks, len(index))  # independent of earlier requests
         loads = self.loads(index, force)
         return {
             name: np.asarray(loads @ self.of_loads(name))
@@ -272,13 +269,14 @@ class ComplianceOperator(FrozenValue):
         if name == "displacement" and self.maps.ground.any():
             out += self.maps.ground
         if name == "edge_force":  # of inner edges: the weight's and the grips' at second nodes too
-            out[:, self.inner_edge] += self.at_second
+            edge, axis, pull = self.maps.inner
+            out[:, edge] += pull
             place, at = np.divmod(self.by_grip(index)[..., 0], 6 + self.moments)
             brick = self.held[place]
-            pull = self.by_grip(force)[..., :3]
-            along = np.einsum("snd,snd->sn", pull, self.axis[brick]) * (at // 3)
+            given = self.by_grip(force)[..., :3]
+            along = np.einsum("snd,snd->sn", given, axis[brick]) * (at // 3)
             for i in range(brick.shape[1]):  # two may share an edge
-                out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
+                out[np.arange(len(index)), edge[brick[:, i]]] += along[:, i]
         return out
 
     def of_loads(self, name: str) -> Floats:
@@ -287,10 +285,11 @@ class ComplianceOperator(FrozenValue):
             return self._made[name]
         out = self.maps.apply(name, self._states(name))
         if name == "edge_force":
-            out[-1, self.inner_edge] += self.at_second
+            edge, axis, pull = self.maps.inner
+            out[-1, edge] += pull
             each = 6 + self.moments
             rows = each * np.arange(len(self.held))[:, None] + np.arange(3, 6)
-            out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
+            out[rows, edge[self.held][:, None]] += axis[self.held]
         if name == "displacement":
             out[-1] += self.maps.ground
         self._made[name] = frozen(out)
@@ -355,7 +354,6 @@ class OperatorBuilder:
         at_nodes = np.empty((len(twist), *nodes.shape[:2]))  # displacements
         np.matmul(turned, nodes.swapaxes(1, 2), out=at_nodes.transpose(1, 0, 2))
         moved = at_nodes.reshape(len(twist), loads)
-        inner_edge, axis, at_second = inner_edges(self.network, bricks)
         return ComplianceOperator(
             held=held,
             flexibility=moved[:-1],
@@ -363,9 +361,6 @@ class OperatorBuilder:
             twist=twist,
             wrench=wrench,
             maps=ResponseMaps(self.maps, bricks),
-            at_second=at_second,
-            axis=axis,
-            inner_edge=inner_edge,
             loss=np.repeat(loss, nodes.shape[1]),
             moments=self.moments,
         )

@@ -55,13 +55,7 @@ from seqopt.engines.rigid._mixed import (
     unchanged,
     unscaled,
 )
-from seqopt.engines.rigid._operator import (
-    ComplianceOperator,
-    ResponseMaps,
-    inner_edges,
-    load_rows,
-    scene_maps,
-)
+from seqopt.engines.rigid._operator import ComplianceOperator, ResponseMaps, load_rows, scene_maps
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import point_motion
 from seqopt.network.network import GROUND, Network
@@ -188,7 +182,6 @@ def _operator(
     weight[at[:, :3].ravel()] = network.inner_weight[: 2 * bricks].ravel()
     wrench, twist = unscaled(parts, states)
     wrench = wrench[:, parts.acting].reshape(len(states), -1)
-    inner_edge, axis, at_second = inner_edges(network, bricks)
     return ComplianceOperator(
         held=np.arange(bricks),
         flexibility=flexibility,
@@ -196,9 +189,6 @@ def _operator(
         twist=np.vstack([twist, weight @ twist]),
         wrench=np.vstack([wrench, weight @ wrench]),
         maps=ResponseMaps(scene_maps(network), bricks),
-        at_second=at_second,
-        axis=axis,
-        inner_edge=inner_edge,
         loss=np.ones(len(states)),
         loose=loose,
         softness=softness,

@@ -13,7 +13,6 @@ Brick counts are best asked in ascending order: what all of them share grows in 
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from math import prod
 from typing import TYPE_CHECKING
@@ -36,7 +35,6 @@ from seqopt.engines.interface import (
 )
 from seqopt.engines.rigid._extremes import Extremes, GrownExtremes, can_compile, extremes_in
 from seqopt.engines.rigid._grip_equations import (
-    Pairs,
     grip_forces,
     nearly_rigid,
     pairs_of,
@@ -61,17 +59,43 @@ _UNSEEN = 100 * np.finfo(float).eps  # largest error met, over what is read off 
 _CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class _FastSolution:
-    """What an operator alone says about grip sets."""
+    """What an operator alone says about grip sets.
 
-    operator: ComplianceOperator
-    columns: Ints  # (S, r); grips as indices into ``network.inner.ravel()``
-    index: Ints  # (S, k); its loads at the grips
-    force: Floats  # (S, k); there, N; zero where it cannot be well_conditioned
-    pairs: Pairs  # of rigid grips on one brick
-    lever: float  # of moments, m
-    well_conditioned: Bools  # (S,); which sets it answers well enough
+    ``even``: whether the joints are about equally stiff: where not, pivots do not bound the error;
+    ``accuracy``: largest error of fields, over the largest entry of each, that is accepted;
+    ``well_conditioned`` (S,): which sets are answered as well as that.
+    """
+
+    def __init__(
+        self,
+        operator: ComplianceOperator,
+        columns: Ints,
+        compliance: GripCompliance = RIGID,
+        *,
+        even: bool,
+        accuracy: float,
+    ) -> None:
+        sets, index = len(columns), operator.load_index(columns)
+        pairs = pairs_of(operator.across, columns)
+        force, good = np.empty(index.shape), np.empty(sets, dtype=bool)
+        for start in range(0, sets, _CHUNK):
+            part = slice(start, start + _CHUNK)
+            mine = pairs if sets <= _CHUNK else pairs.within(start, start + _CHUNK)
+            own, most = compliance.select(part), accuracy / _UNSEEN
+            found = grip_forces(operator, columns[part], index[part], mine, own)
+            force[part] = found.force
+            doubts = operator.doubts
+            good[part] = well_conditioned(doubts, index[part], found, most, operator, own)
+            good[part] &= ~nearly_rigid(operator, index[part], mine, own)
+        if np.count_nonzero(good) < sets:
+            force[~good] = 0.0
+        if not compliance.rigid and len(pairs.sets):
+            pairs = pairs.only(pairs.rigid(compliance, *columns.shape))
+        if not even:
+            good &= ~_cancels(operator, index, force)
+        self.operator, self.columns, self.index, self.force = operator, columns, index, force
+        self.pairs, self.lever, self.well_conditioned = pairs, compliance.lever, good
 
     def fields(self, want: Want) -> dict[str, Floats]:
         """Return the fields of all sets by name."""
@@ -92,41 +116,6 @@ class _FastSolution:
         if operator.moments:
             found["grip_moment"] = self.lever * borne[..., 3:]
         return found
-
-
-def _solve_fast(
-    operator: ComplianceOperator,
-    columns: Ints,
-    compliance: GripCompliance = RIGID,
-    *,
-    even: bool,
-    accuracy: float,
-) -> _FastSolution:
-    """Return the operator's answers to grip sets, and which of them are accurate enough.
-
-    ``even``: whether the joints are about equally stiff: where not, pivots do not bound the error;
-    ``accuracy``: largest error of fields,
-    over the largest entry of each, that is accepted.
-    """
-    sets, index = len(columns), operator.load_index(columns)
-    pairs = pairs_of(operator.across, columns)
-    force, good = np.empty(index.shape), np.empty(sets, dtype=bool)
-    for start in range(0, sets, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        mine = pairs if sets <= _CHUNK else pairs.within(start, start + _CHUNK)
-        own = compliance.select(part)
-        found = grip_forces(operator, columns[part], index[part], mine, own)
-        force[part] = found.force
-        most = accuracy / _UNSEEN
-        good[part] = well_conditioned(operator.doubts, index[part], found, most, operator, own)
-        good[part] &= ~nearly_rigid(operator, index[part], mine, own)
-    if np.count_nonzero(good) < sets:
-        force[~good] = 0.0
-    if not compliance.rigid and len(pairs.sets):
-        pairs = pairs.only(pairs.rigid(compliance, *columns.shape))
-    if not even:
-        good &= ~_cancels(operator, index, force)
-    return _FastSolution(operator, columns, index, force, pairs, compliance.lever, good)
 
 
 def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
@@ -190,7 +179,7 @@ class ComplianceEngine(NamedEngine):
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._uniform
             accuracy = self._accepted(want)
-            fast = _solve_fast(operator, columns, compliance, even=even, accuracy=accuracy)
+            fast = _FastSolution(operator, columns, compliance, even=even, accuracy=accuracy)
         sure = 0 if fast is None else np.count_nonzero(fast.well_conditioned)
         if fast is None or (len(columns) and not sure):
             return self._refined(bricks, columns, compliance, want)
