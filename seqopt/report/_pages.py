@@ -20,7 +20,7 @@ from seqopt.problem.requirements import overloads
 from seqopt.report._regret._table import RegretTable
 from seqopt.report._robots import _known_arms
 from seqopt.report.comparison import CLOSED, Comparison, largest, method_tables, shown_table
-from seqopt.report.page import Build, _Drawn, report_page
+from seqopt.report.page import Build, report_page
 from seqopt.report.text import IN_UNITS
 from seqopt.responses.table import (
     OUTSIDE,
@@ -70,7 +70,7 @@ def _page(
     engine: Engine,
     builds: Sequence[Build],
     sentence: str,
-    tables: Sequence[tuple[str, pd.DataFrame | _Drawn]],
+    tables: Sequence[tuple[str, pd.DataFrame | bytes]],
     scatter: tuple[str, pd.DataFrame] | None = None,
 ) -> str:
     """Return a page of several builds, whose sentence also names their faults."""
@@ -78,7 +78,7 @@ def _page(
     if said and len(builds) == 1:
         said = (*map(str, builds[0].departures),)
     outside = f"{OUTSIDE.capitalize()}: {'; '.join(said)}. Do not rely on it. " if said else ""
-    count = sum(bool(build.overloads(engine.network.scene)) for build in builds)
+    count = sum(bool(overloads(engine.network.scene, build.table)) for build in builds)
     over = f"; in {count} of them a robot would hold more than its payload" if count else ""
     return report_page(engine, builds, f"{outside}{sentence}{over}.", tables, scatter)
 
@@ -94,11 +94,9 @@ def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFra
     rows = {build.name: largest(scene, build.table) for build in builds}
     found = pd.DataFrame.from_dict(rows, orient="index")
     found.insert(0, "steps", [len(build.steps) for build in builds])
-    over = [{n for each in build.overloads(scene) for n in each.steps} for build in builds]
+    over = [{n for each in overloads(scene, build.table) for n in each.steps} for build in builds]
     if any(over):
-        found[OVER] = [
-            f"{len(steps):,} step{'s' * (len(steps) != 1)}" * bool(steps) for steps in over
-        ]
+        found[OVER] = [f"{len(n):,} step{'s' * (len(n) != 1)}" * bool(n) for n in over]
     if any(build.departures for build in builds):
         found[OUTSIDE] = ["yes" if build.departures else "" for build in builds]
     found = found.rename(columns=IN_UNITS).join(_falls(builds))
@@ -108,11 +106,8 @@ def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFra
 
 def _falls(builds: Sequence[Build]) -> pd.DataFrame:
     """Return how many steps of builds fall with every mortar, a row each; nothing if not asked."""
-    rows = {
-        build.name: {f"fall {each.how}": each.count(Verdict.FALLS) for each in build.verdicts}
-        for build in builds
-    }
-    return pd.DataFrame.from_dict(rows, orient="index")
+    counts = [{f"fall {v.how}": v.count(Verdict.FALLS) for v in each.verdicts} for each in builds]
+    return pd.DataFrame(counts, [build.name for build in builds])
 
 
 def plan_page(
@@ -153,36 +148,26 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     shown = shown.rename(columns={**marks, **IN_UNITS, "gap": GAP}).join(_falls(builds))
     shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
     shown = shown.rename_axis("method or formulation").reset_index()
-    tables: list[tuple[str, pd.DataFrame | _Drawn]] = []
+    tables: list[tuple[str, pd.DataFrame | bytes]] = []
     tables += [] if result.speed is None else _speed_parts(result.speed)
     tables.append(_captioned("Methods and formulations; a click shows the build", shown))
     sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side"
     return _page(engine, builds, sentence, tables)
 
 
-def _speed_parts(speed: RegretTable) -> Iterator[tuple[str, pd.DataFrame | _Drawn]]:
+def _speed_parts(speed: RegretTable) -> Iterator[tuple[str, pd.DataFrame | bytes]]:
     """Yield speed against accuracy as a picture, where matplotlib is installed, and a table."""
     title = f"Speed against regret, valued by {speed.reference}"
     with suppress(ExtraError):
         draw = display(RegretTable, "plot")
         from seqopt.report._style import picture_files  # noqa: PLC0415  # an extra
 
-        yield title, _Drawn(picture_files("", draw(speed))[".png"], speed.sentence)
+        yield title, picture_files("", draw(speed))[".png"]
     yield f"{title}, in numbers. {speed.sentence}", speed.table
 
 
 def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:
     """Return the page of the plans in a folder that a command has written."""
-    scene, builds = engine.network.scene, folder_builds(engine, folder, prover)
-    shown = [_worst_table(scene, builds)]
-    if len(builds) == 1:
-        return report_page(engine, builds, builds[0].sentence(scene), shown)
-    sentence = f"{scene.name}, built in {len(builds)} ways, step by step"
-    return _page(engine, builds, sentence, shown)
-
-
-def folder_builds(engine: Engine, folder: Path, prover: BuildProver) -> list[Build]:
-    """Return the plans in a folder that a command has written, analyzed."""
     scene = engine.network.scene
     paths = [path for name in PLANS for path in sorted(folder.glob(name))]
     if not paths:
@@ -192,8 +177,13 @@ def folder_builds(engine: Engine, folder: Path, prover: BuildProver) -> list[Bui
         )
     plans = {path.stem.removeprefix("steps_"): read_plan(scene, path) for path in paths}
     tables = {name: analyze(engine, steps) for name, steps in plans.items()}
-    found = prover.of_builds(plans)
-    return _builds(scene, tables, LinearRange(engine).of_builds(tables), found)
+    left = LinearRange(engine).of_builds(tables)
+    builds = _builds(scene, tables, left, prover.of_builds(plans))
+    shown = [_worst_table(scene, builds)]
+    if len(builds) == 1:
+        return report_page(engine, builds, builds[0].sentence(scene), shown)
+    sentence = f"{scene.name}, built in {len(builds)} ways, step by step"
+    return _page(engine, builds, sentence, shown)
 
 
 def front_page(

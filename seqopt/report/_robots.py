@@ -100,10 +100,10 @@ class Cell:
             reach = robot.reach
             if isinstance(reach, Sphere):
                 out[robot.name] = (np.array(reach.center), reach.radius)
+            elif isinstance(reach, Side):
+                beside[robot.name] = self._away(np.array(reach.toward))
             else:
-                side = isinstance(reach, Side)
-                beside[robot.name] = self._away(np.array(reach.toward)) if side else along
-                along = along if side else -along
+                beside[robot.name], along = along, -along
         for name, away in beside.items():
             same = [each for each, other in beside.items() if away @ other > 0.5]
             place = same.index(name) - 0.5 * (len(same) - 1)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from seqopt._files import csv_text
 from seqopt.arms._kept import arm_faults
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
@@ -37,7 +36,7 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import METHODS, modified_sequential
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.schedule_file import MOST, find_schedule, parse_plan
+from seqopt.sequence.schedule_file import MOST, find_schedule
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
@@ -133,15 +132,13 @@ def compare(
     """
     asked, engine = engine, simplest(engine)
     scene, (tables, notes, refused) = engine.network.scene, method_tables(engine, robots)
-    largest_by_robot: dict[str, dict[str, float]] = {
-        name: {
-            f"{robot_response(r.name)} [N]": table[force_column(r)].abs().max()
-            for r in scene.robots
-        }
-        | {f"{n} [{LARGEST[n]}]": v for n, v in largest(scene, table).items() if n != "F_rob"}
-        for name, table in tables.items()
+    grips = {force_column(robot): f"{robot_response(robot.name)} [N]" for robot in scene.robots}
+    others = {RESPONSES[name].column: f"{name} [{LARGEST[name]}]" for name in [*LARGEST][1:]}
+    worst = {
+        name: pd.concat([own[[*grips]].abs(), own[[*others]]], axis=1).max()
+        for name, own in tables.items()
     }
-    maxima = pd.DataFrame(largest_by_robot)
+    maxima = pd.DataFrame(worst).rename(grips | others)
     known = published_about(scene) if tables else None
     printed = None if known is None else known.maxima.set_axis(maxima.index)
     rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
@@ -150,7 +147,9 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     if problem is not None and PUBLISHED in rows and not robots:
-        rows[PUBLISHED] |= _published_row(problem)
+        value = problem.sums.cost(published_choice(problem))
+        gap = (value - problem.sums.least(Aim.SUM)) / max(abs(value), TINY)
+        rows[PUBLISHED] |= {"problem": problem.schedule.method, "objective": value, "gap": gap}
     free, why = _free_plan(engine, criterion, fixed, robots, progress)
     if not tables and free is None:  # whose refusal says most
         raise type(first := next(iter(refused.values())))(f"{first}; {why[0]}")
@@ -194,9 +193,7 @@ def _table(
     for name, steps in tables.items():
         over = overloads(scene, steps)
         rows[name].update(largest(scene, steps), overloaded=bool(over))
-        faults = (
-            arm_faults(scene, parse_plan(scene, csv_text(steps), name)) if scene.has_arms else ()
-        )
+        faults = arm_faults(scene, _steps_in_table(scene, steps))
         notes += [f"{name}: {fault}" for fault in (*over, *_prop_faults(scene, steps), *faults)]
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
     falls = {
@@ -267,13 +264,6 @@ def _row(plan: Plan) -> dict[str, object]:
         seconds = sum(plan.seconds[stage] for stage in ("compile", "solve", "verify"))
     about = {"problem": plan.method, "objective": value, "gap": gap, "models": models}
     return about | {"seconds": seconds, "solve_seconds": plan.seconds["solve"]}
-
-
-def _published_row(problem: Decisions) -> dict[str, object]:
-    """Return the objective of the published plan."""
-    value = problem.sums.cost(published_choice(problem))
-    gap = (value - problem.sums.least(Aim.SUM)) / max(abs(value), TINY)
-    return {"problem": problem.schedule.method, "objective": value, "gap": gap}
 
 
 def method_tables(
@@ -360,12 +350,9 @@ def _in_shown_unit(value: pd.Series[float] | float, name: str) -> pd.Series[floa
 
 def shown_table(table: pd.DataFrame) -> pd.DataFrame:
     """Return the table of a Pareto set with the tilt that is survived and tolerances, in units."""
-    out = table.copy()
-    for name in [str(name) for name in table]:
-        if name == "tilt" or is_tolerance(name):
-            out[name] = _in_shown_unit(table[name], name)
-            out = out.rename(columns={name: "tilt_survived_deg" if name == "tilt" else COLUMN})
-    return out
+    names = {name: COLUMN for name in map(str, table) if is_tolerance(name)}
+    names |= {"tilt": "tilt_survived_deg"} if "tilt" in table else {}
+    return table.assign(**{n: _in_shown_unit(table[n], n) for n in names}).rename(columns=names)
 
 
 _STANDING = (
@@ -443,18 +430,28 @@ def format_comparison(
     return "\n\n".join("\n".join(map(wrapped, block)) for block in blocks)
 
 
-def _grouped(comparison: Comparison, figures: Mapping[Any, object]) -> Iterator[tuple[str, str]]:
-    """Yield headings, with an empty name, and below each the label and name of its rows.
+def _rows(
+    table: pd.DataFrame, figures: Mapping[Any, object], cells: Callable[[str], str]
+) -> Iterator[str]:
+    """Yield headings, and below each a line for every name.
 
-    Of rows with the same figures the plainest is named, and how many more there are.
+    Of names with the same figures the plainest has a line, which says how many more there are.
     """
-    for problem, rows in comparison.table.groupby("problem", sort=False):
-        yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation"), ""
-        same: dict[object, list[str]] = {}
-        for name in sorted(map(str, rows.index), key=_plainness):
+    found = formulations()
+
+    def plainness(name: str) -> tuple[bool, bool, str]:
+        if (own := found.get(name)) is None:
+            return False, False, name
+        return own.kind is not FormulationKind.EXACT, own.takes_budgets, name
+
+    for problem, rows in table.groupby("problem", sort=False):
+        yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")
+        names, same = [*map(str, rows.index)], dict[object, list[str]]()
+        for name in sorted(names, key=plainness):
             same.setdefault(figures[name], []).append(name)
-        for name, *more in sorted(same.values(), key=lambda own: [*rows.index].index(own[0])):
-            yield f"  {name}{f' +{len(more)}' if more else ''}", name
+        for name, *more in sorted(same.values(), key=lambda own: names.index(own[0])):
+            label = f"  {name}{f' +{len(more)}' if more else ''}"
+            yield f"{label:{NAME}}{cells(name)}".rstrip()
 
 
 def _responses(comparison: Comparison) -> Iterator[str]:
@@ -462,19 +459,19 @@ def _responses(comparison: Comparison) -> Iterator[str]:
     for line in (0, 1):
         heads = (f"{names[line]:>{names[2]}}" for names in HEADS.values())
         yield f"{'':{NAME}}{''.join(heads)}".rstrip()
-    figures = comparison.table[[*HEADS]].astype(float).round(3).apply(tuple, axis=1).to_dict()
-    for label, name in _grouped(comparison, figures):
-        if not name:
-            yield label
-            continue
-        row, paper, cells = comparison.table.T[name], _printed_largest(comparison, name), ""
+
+    def cells(name: str) -> str:
+        row, paper, out = comparison.table.T[name], _printed_largest(comparison, name), ""
         marks = {"F_rob": "!" if row["overloaded"] else " ", "D_max": "?" * bool(row["outside"])}
         for response, (_, _, width) in HEADS.items():
             value = float(row[response])
             said = f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
             said += f" ({paper[response]:.1f})" if response in paper else ""
-            cells += f"{said + marks.get(response, ''):>{width}}"
-        yield f"{label:{NAME}}{cells}".rstrip()
+            out += f"{said + marks.get(response, ''):>{width}}"
+        return out
+
+    figures = comparison.table[[*HEADS]].astype(float).round(3).apply(tuple, axis=1).to_dict()
+    yield from _rows(comparison.table, figures, cells)
 
 
 def _stands(comparison: Comparison) -> Iterator[str]:
@@ -482,26 +479,17 @@ def _stands(comparison: Comparison) -> Iterator[str]:
     first, *_ = comparison.verdicts.values()
     heads = "".join(f"{each.mortar:>9}" for each in first)
     yield f"{'':{NAME}}{'steps':>5}{heads}   first, {first[0].mortar}".rstrip()
-    for label, name in _grouped(comparison, comparison.verdicts):
-        if not name:
-            yield label
-            continue
+
+    def cells(name: str) -> str:
         shown, *_ = found = comparison.verdicts[name]
-        counts = ""
+        out = f"{len(shown.verdicts):5}"
         for each in found:
             open_ = each.count(Verdict.UNDECIDED)
-            counts += f"{each.count(Verdict.FALLS)}{f' ({open_}?)' if open_ else ''}".rjust(9)
+            out += f"{each.count(Verdict.FALLS)}{f' ({open_}?)' if open_ else ''}".rjust(9)
         where = f"step {shown.first}: brick {shown.brick}" if shown.first else ""
-        where += f", joint {shown.joint}" if shown.joint else ""
-        yield f"{label:{NAME}}{len(shown.verdicts):5}{counts}   {where}".rstrip()
+        return f"{out}   {where}{f', joint {shown.joint}' if shown.joint else ''}"
 
-
-def _plainness(name: str) -> tuple[bool, bool, str]:
-    """Return the sort key of names: rows with the same figures go by the first of them."""
-    found = formulations().get(name)
-    if found is None:
-        return False, False, name
-    return found.kind is not FormulationKind.EXACT, found.takes_budgets, name
+    yield from _rows(comparison.table, comparison.verdicts, cells)
 
 
 def _printed_largest(comparison: Comparison, name: str) -> dict[str, float]:
@@ -538,15 +526,16 @@ def _choices(comparison: Comparison) -> Iterator[str]:
     kinds |= {MODIFIED: kinds.get("cascade", ""), FREE: "exact"}
     yield f"{'':{NAME}}{'objective':>10}{'gap':>9}{'steps':>7}{'models':>9}{'seconds':>9}  kind"
     chosen = comparison.table[comparison.table["objective"].notna()]
-    for problem, rows in chosen.groupby("problem", sort=False):
-        yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")
-        for name, row in rows.iterrows():
-            steps = len(comparison.tables[str(name)])
-            models, seconds = (
-                format(row[column], form) if np.isfinite(row[column]) else "-"
-                for column, form in (("models", ",.0f"), ("seconds", ".3f"))
-            )
-            yield (
-                f"{f'  {name}':{NAME}}{row['objective']:10.2f}{100 * row['gap']:7.2f} %{steps:7}"
-                f"{models:>9}{seconds:>9}  {kinds.get(str(name), 'in print')}"
-            )
+
+    def cells(name: str) -> str:
+        row, steps = chosen.loc[name], len(comparison.tables[name])
+        models, seconds = (
+            format(row[column], form) if np.isfinite(row[column]) else "-"
+            for column, form in (("models", ",.0f"), ("seconds", ".3f"))
+        )
+        return (
+            f"{row['objective']:10.2f}{100 * row['gap']:7.2f} %{steps:7}"
+            f"{models:>9}{seconds:>9}  {kinds.get(name, 'in print')}"
+        )
+
+    yield from _rows(chosen, {name: name for name in chosen.index}, cells)

@@ -27,7 +27,7 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import ProblemError
 from seqopt.network.network import GROUND, Network, PartKind
-from seqopt.problem.requirements import Excess, _prop_faults, overloads
+from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
 from seqopt.report.text import _deciding_step, _in_a_sentence, _robot_words
 from seqopt.responses.quantities import _number_text
@@ -86,18 +86,6 @@ class Build:
     def sentence(self, scene: Scene) -> str:
         """Describe it in one sentence."""
         return _in_a_sentence(scene, self.table, self.verdicts, self.departures, self.faults)
-
-    def overloads(self, scene: Scene) -> tuple[Excess, ...]:
-        """Return the payloads that steps exceed."""
-        return overloads(scene, self.table)
-
-
-@dataclass(frozen=True, eq=False)
-class _Drawn:
-    """A picture on a page: PNG, and what it shows."""
-
-    png: bytes
-    alt: str
 
 
 def _structure_data(network: Network) -> dict[str, object]:
@@ -216,7 +204,7 @@ def _build_data(
 
 def _marks(scene: Scene, build: Build) -> list[str]:
     """Return payloads that every step exceeds, and the linear range that it leaves, in words."""
-    over, props, out = build.overloads(scene), _prop_faults(scene, build.table), []
+    over, props, out = overloads(scene, build.table), _prop_faults(scene, build.table), []
     for step in build.steps:
         said = [
             f"{_robot_words(each.robot)} exceeds its payload"
@@ -263,7 +251,7 @@ def report_page(
     engine: Engine,
     builds: Sequence[Build],
     sentence: str,
-    tables: Sequence[tuple[str, pd.DataFrame | _Drawn]] = (),
+    tables: Sequence[tuple[str, pd.DataFrame | bytes]] = (),
     scatter: tuple[str, pd.DataFrame] | None = None,
     *,
     found: str = "",
@@ -285,7 +273,13 @@ def report_page(
     >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
     True
     """
-    data = _data(engine, builds) | {"scatter": scatter and _scatter(*scatter)}
+    chart: dict[str, object] = {}
+    if scatter is not None:
+        title, points = scatter
+        known = points.astype(float).replace([np.inf, -np.inf, np.nan], None)
+        chart = {"title": title, "builds": [*map(str, points.index)], "axes": [*points]}
+        chart["values"] = known.to_dict("list")
+    data = _data(engine, builds) | {"scatter": chart or None}
     scene = engine.network.scene
     loading = f" Counted, and not drawn: {scene.loading}." if scene.loading else ""
     loading += "".join(f" Of {note}." for note in shape_notes(scene))
@@ -296,14 +290,6 @@ def report_page(
         tables="".join(_part(caption, part) for caption, part in tables),
         data=data,
     )
-
-
-def _scatter(title: str, points: pd.DataFrame) -> dict[str, object]:
-    """Return a chart of builds as lists, ready for JSON; None where unknown."""
-    known = points.astype(float)
-    known = known.astype(object).where(np.isfinite(known), None)
-    builds, values = [*map(str, points.index)], {name: known[name].tolist() for name in known}
-    return {"title": title, "builds": builds, "axes": [*points], "values": values}
 
 
 def _filled(data: Mapping[str, object], **parts: str) -> str:
@@ -349,20 +335,14 @@ def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
     }
 
 
-def _part(caption: str, part: pd.DataFrame | _Drawn) -> str:
-    """Return a table as HTML, numbers as people write them, or a picture."""
-    if isinstance(part, _Drawn):
-        source = f"data:image/png;base64,{b64encode(part.png).decode('ascii')}"
-        return (
-            f'<figure class="drawn"><figcaption>{escape(caption)}</figcaption>'
-            f'<img src="{source}" alt="{escape(part.alt)}"></figure>'
-        )
-    body = (
-        part.map(_cell_text)
-        .to_html(index=False, border=0, classes="wide")
-        .replace(' style="text-align: right;"', "")
-    )  # as the page does itself
+def _part(caption: str, part: pd.DataFrame | bytes) -> str:
+    """Return a table as HTML, numbers as people write them, or a picture, PNG."""
     named = f"<figcaption>{escape(caption)}</figcaption>"
+    if isinstance(part, bytes):
+        source = f"data:image/png;base64,{b64encode(part).decode('ascii')}"
+        return f'<figure class="drawn">{named}<img src="{source}" alt="{escape(caption)}"></figure>'
+    body = part.map(_cell_text).to_html(index=False, border=0, classes="wide")
+    body = body.replace(' style="text-align: right;"', "")  # as the page does itself
     return f'<figure class="table" tabindex="0">{named}{body}</figure>'
 
 
